@@ -1,0 +1,1 @@
+"""Shoal: simulate and identify planar rigid-flexible machines."""

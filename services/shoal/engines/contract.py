@@ -1,0 +1,65 @@
+"""The one contract behind which every engine stands, ours and others'."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.scene import Scene
+from shoal.trajectory import Array, Trajectory
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What an engine can simulate; the comparison and the tests read it."""
+
+    elements: frozenset[str]
+    joints: frozenset[str]
+    integrators: frozenset[str]
+    closed_loops: bool
+    lanes: bool
+    """Whether many scenes run side by side in one compiled call."""
+
+
+class Engine(Protocol):
+    """Simulates scenes. Bad input raises InputError; a run that failed carries its status."""
+
+    name: str
+    capabilities: Capabilities
+
+    def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
+        """Run one scene; `times` [s] are the requested sampling instants, else the scene's own."""
+        ...
+
+    def simulate_many(
+        self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
+    ) -> Trajectory:
+        """Run one scene per lane; `values` maps a path in the scene to one number per lane."""
+        ...
+
+
+def sampling_times(scene: Scene, times: Sequence[float] | Array | None) -> Array:
+    """Requested instants [s] as an increasing array, or the scene's own. Raises InputError."""
+    if times is None:
+        return np.linspace(0.0, scene.solver.duration, scene.solver.samples + 1)[1:]
+    wanted = np.asarray(times, dtype=float)
+    if wanted.ndim != 1 or wanted.size == 0 or not np.all(np.isfinite(wanted)):
+        raise InputError(f"at: needs a list of finite times in s, found {times!r}")
+    if wanted[0] < 0 or np.any(np.diff(wanted) <= 0):
+        raise InputError("at: times must increase and start at or after 0 s")
+    return wanted
+
+
+def check_lanes(scene: Scene, values: Mapping[str, Array]) -> int:
+    """Number of lanes in `values`, after the scene accepted the extremes of each. Raises InputError."""
+    sizes = {path: np.asarray(lanes).size for path, lanes in values.items()}
+    if len(set(sizes.values())) != 1:
+        raise InputError(f"values: every path needs the same number of lanes, found {sizes}")
+    for path, lanes in values.items():
+        for extreme in (float(np.min(lanes)), float(np.max(lanes))):
+            scene.with_values({path: extreme})
+    return next(iter(sizes.values()))

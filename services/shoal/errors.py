@@ -1,0 +1,21 @@
+"""The two ways a request can go wrong, as the outer edge reports them."""
+
+from __future__ import annotations
+
+
+class ShoalError(Exception):
+    """Base of every error a user is meant to read; one line, no traceback needed."""
+
+    exit_status = 1
+
+
+class InputError(ShoalError):
+    """The request is wrong: names the field, the value found and what would be right."""
+
+    exit_status = 2
+
+
+class ComputationError(ShoalError):
+    """The computation ran and cannot be trusted, or could not run to its end."""
+
+    exit_status = 3

@@ -1,0 +1,45 @@
+"""The frozen base of everything a user writes, and the scalar types its fields share."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from shoal.errors import InputError
+
+
+class Record(BaseModel):
+    """An immutable description in SI units; unknown fields and non-finite numbers are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def _plausible_angle(value: float) -> float:
+    if abs(value) > 4 * math.pi:
+        raise ValueError("an angle is in radians, between -4 pi and 4 pi (is this in degrees?)")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Angle = Annotated[float, AfterValidator(_plausible_angle)]
+Vector = tuple[float, float]
+
+
+def one_line(error: ValidationError, what: str) -> InputError:
+    """Turn pydantic's report into one line that names the field, the value and what is right."""
+    first = error.errors()[0]
+    tags = {"rod", "rigid-body", "revolute", "file", "engine"}
+    path = ".".join(str(part) for part in first["loc"] if part not in tags)
+    message = first["msg"].removeprefix("Value error, ")
+    others = error.error_count() - 1
+    more = f" (and {others} more)" if others else ""
+    found = "" if first["type"] in ("missing", "value_error") else f", found {_short(first['input'])}"
+    return InputError(f"{what}: {path + ': ' if path else ''}{message}{found}{more}")
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,176 @@
+"""The scene: everything a user states about a machine, checked as a whole."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, ValidationError, model_validator
+
+from shoal.errors import InputError
+from shoal.scene.bodies import Body
+from shoal.scene.joints import GROUND, Attachment, Joint
+from shoal.scene.record import Angle, Record, Vector, one_line
+from shoal.scene.solver import Solver
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
+
+
+class InitialState(Record):
+    """Absolute angle [rad], counter-clockwise from +X, and rate [rad/s] of a body at time zero."""
+
+    angle: Angle = 0.0
+    rate: float = 0.0
+
+
+class Scene(Record):
+    """A planar machine in SI units: bodies, joints, markers, initial state, gravity, solver settings.
+
+    Raises pydantic's ValidationError; `Scene.parse` and `with_values` raise `InputError` in one line.
+    """
+
+    name: str
+    description: str = ""
+    gravity: Vector = (0.0, -9.81)
+    bodies: Annotated[dict[Name, Body], Field(min_length=1)]
+    joints: dict[Name, Joint] = {}
+    markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
+    initial: dict[str, InitialState] = {}
+    solver: Solver = Solver()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if GROUND in self.bodies:
+            raise ValueError("bodies.ground: the name 'ground' is taken by the fixed frame")
+        for name, joint in self.joints.items():
+            for side in ("first", "second"):
+                self._check_attachment(f"joints.{name}.{side}", getattr(joint, side))
+            if joint.first.body == joint.second.body:
+                raise ValueError(f"joints.{name}: joins {joint.first.body!r} to itself; a joint needs two bodies")
+        for name, marker in self.markers.items():
+            if marker.body == GROUND:
+                raise ValueError(f"markers.{name}.body: a marker sits on a body, not on the ground")
+            self._check_attachment(f"markers.{name}", marker)
+        for name in self.initial:
+            if name not in self.bodies:
+                raise ValueError(f"initial.{name}: no such body; the bodies are {', '.join(self.bodies)}")
+        loose = [name for name in self.bodies if name not in self._connected()]
+        if loose:
+            raise ValueError(f"bodies.{loose[0]}: no chain of joints connects it to the ground")
+        return self
+
+    def _check_attachment(self, where: str, attachment: Attachment) -> None:
+        if attachment.body == GROUND:
+            if isinstance(attachment.point, str):
+                raise ValueError(f"{where}.point: a place on the ground is given as [x, y] in m, found {attachment.point!r}")
+            return
+        if attachment.body not in self.bodies:
+            known = ", ".join([*self.bodies, GROUND])
+            raise ValueError(f"{where}.body: no body {attachment.body!r}; there are {known}")
+        body = self.bodies[attachment.body]
+        if isinstance(attachment.point, str) and attachment.point not in body.points:
+            raise ValueError(
+                f"{where}.point: {attachment.body} has no point {attachment.point!r}; there are {', '.join(body.points)}"
+            )
+        if body.element != "rigid" and not isinstance(attachment.point, str):
+            x, y = attachment.point
+            if y != 0 or not 0 <= x <= body.length:
+                raise ValueError(
+                    f"{where}.point: [{x:g}, {y:g}] is not on the axis of {attachment.body}; use [s, 0] with 0 <= s <= {body.length:g}"
+                )
+
+    def _connected(self) -> set[str]:
+        reached, frontier = {GROUND}, [GROUND]
+        while frontier:
+            here = frontier.pop()
+            for joint in self.joints.values():
+                ends = {joint.first.body, joint.second.body}
+                if here in ends:
+                    frontier += (new := ends - reached)
+                    reached |= new
+        return reached
+
+    @classmethod
+    def parse(cls, data: Any, source: str = "scene") -> Scene:
+        """Check `data` (as read from YAML or JSON). Raises InputError, one line that names the field."""
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise one_line(error, source) from None
+
+    def location(self, attachment: Attachment) -> Vector:
+        """Coordinates [m] of an attachment in its body's (or the ground's) frame."""
+        if isinstance(attachment.point, str):
+            return self.bodies[attachment.body].points[attachment.point]
+        return attachment.point
+
+    def start(self, body: str) -> InitialState:
+        """Initial state of `body`; at angle zero and at rest where the scene says nothing."""
+        return self.initial.get(body, InitialState())
+
+    def with_values(self, values: Mapping[str, Any]) -> Scene:
+        """This scene with fields replaced, by dotted path (`bodies.OA.length`). Raises InputError."""
+        data = self.model_dump()
+        for path, value in values.items():
+            place: Any = data
+            *parents, leaf = path.split(".")
+            for depth, part in enumerate(parents):
+                if parents[: depth + 1] == ["initial", part] and part in self.bodies:
+                    place.setdefault(part, {})
+                if not isinstance(place, dict) or part not in place:
+                    raise _unknown(path, ".".join(parents[:depth]), place)
+                place = place[part]
+            fields = InitialState.model_fields if parents[:1] == ["initial"] else place
+            if not isinstance(place, dict) or leaf not in fields:
+                raise _unknown(path, ".".join(parents), place)
+            place[leaf] = value
+        return Scene.parse(data, self.name)
+
+    def with_lanes(self, values: Mapping[str, npt.NDArray[np.float64]]) -> Scene:
+        """This scene with numbers replaced by arrays, one entry per lane (population member), unchecked.
+
+        Every derived property broadcasts over the lanes. The extremes of each array are what
+        `with_values` should have accepted first; `engines` does so.
+        """
+        scene = self
+        for path, lanes in values.items():
+            scene = _replace(scene, path.split("."), np.asarray(lanes, dtype=float))
+        return scene
+
+    def value(self, path: str) -> Any:
+        """The field at a dotted path. Raises InputError."""
+        place: Any = self
+        for part in path.split("."):
+            if part in self.bodies and place is self.initial:
+                place = self.start(part)
+            elif isinstance(place, Mapping) and part in place:
+                place = place[part]
+            elif isinstance(place, Record) and part in type(place).model_fields:
+                place = getattr(place, part)
+            else:
+                raise _unknown(path, "", place)
+        return place
+
+    @property
+    def fingerprint(self) -> str:
+        """Twelve hexadecimal digits that change when any field does."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:12]
+
+
+def _replace(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any:
+    head, *rest = path
+    if isinstance(place, Mapping):
+        inner = place.get(head, InitialState())
+        return {**place, head: _replace(inner, rest, lanes)}
+    value = _replace(getattr(place, head), rest, lanes) if rest else lanes
+    return place.model_copy(update={head: value})
+
+
+def _unknown(path: str, parent: str, place: Any) -> InputError:
+    if isinstance(place, Record):
+        place = type(place).model_fields
+    known = ", ".join(place) if isinstance(place, Mapping) else "nothing below it"
+    return InputError(f"{path}: no such field; {parent or 'the scene'} has {known}")

@@ -1,0 +1,97 @@
+"""What every engine returns: where the markers went, and the evidence for believing it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class Status(StrEnum):
+    """How a run ended. Only `ok` may be believed."""
+
+    OK = "ok"
+    REFUSED = "refused"
+    DIVERGED = "diverged"
+    ENERGY = "energy-check-failed"
+    DRIFTED = "drifted"
+    OUT_OF_REACH = "out-of-reach"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Motion of one or more lanes (scenes that differ in numbers only), sampled at `times`.
+
+    times: sampling instants [s], (samples,)
+    markers: names, in the order of the scene
+    points: marker positions [m], (samples, markers, 2, lanes)
+    angles: direction of the body (of a cable: of its tangent) at each marker [rad],
+        continuous in time, (samples, markers, lanes)
+    status: one per lane; message: why the first lane that is not ok is not
+    energy_drift: largest |E(t) + dissipated - E(0)| relative to the largest kinetic plus
+        elastic energy, (lanes,)
+    constraint_drift: largest violation of a position constraint, (lanes,)
+    steps: time steps taken by each lane; wall_s: wall-clock time of the whole call [s]
+    model: what was computed, for the record (unknowns, elements, integrator, step, ...)
+    """
+
+    engine: str
+    times: Array
+    markers: tuple[str, ...]
+    points: Array
+    angles: Array
+    status: tuple[Status, ...]
+    energy_drift: Array
+    constraint_drift: Array
+    steps: int
+    wall_s: float
+    message: str = ""
+    model: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def lanes(self) -> int:
+        """Number of scenes simulated side by side."""
+        return len(self.status)
+
+    @property
+    def ok(self) -> bool:
+        """Whether every lane may be believed."""
+        return all(status is Status.OK for status in self.status)
+
+    def marker(self, name: str, lane: int = 0) -> Array:
+        """Path of one marker [m], (samples, 2)."""
+        return self.points[:, self.markers.index(name), :, lane]
+
+    def angle(self, name: str, lane: int = 0) -> Array:
+        """Direction at one marker [rad], (samples,)."""
+        return self.angles[:, self.markers.index(name), lane]
+
+    def to_json(self, lane: int = 0) -> dict[str, Any]:
+        """One lane as plain data, the object that `shoal simulate --json` prints."""
+        times = self.times.tolist()
+        return {
+            "status": str(self.status[lane]),
+            "message": self.message,
+            "engine": self.engine,
+            "markers": {
+                name: {
+                    "t": times,
+                    "x": self.marker(name, lane)[:, 0].tolist(),
+                    "y": self.marker(name, lane)[:, 1].tolist(),
+                    "angle": self.angle(name, lane).tolist(),
+                }
+                for name in self.markers
+            },
+            "final": {name: self.marker(name, lane)[-1].tolist() for name in self.markers},
+            "energy_drift": float(self.energy_drift[lane]),
+            "constraint_drift": float(self.constraint_drift[lane]),
+            "steps": self.steps,
+            "wall_s": self.wall_s,
+            "model": self.model,
+        }
