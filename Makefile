@@ -1,0 +1,73 @@
+# Everything happens in this folder: the environment in .venv, Shoal's state in .shoal.
+.DEFAULT_GOAL := help
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-print-directory
+
+UV_VERSION := 0.13.8
+BIN := .venv/bin
+STAMP := .venv/.installed
+SUITABLE := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export DO_NOT_TRACK := true
+
+.PHONY: help setup demo test lint types imports bench up lock clean
+
+help:  ## this list
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
+
+setup: $(STAMP)  ## make .venv and install the locked packages
+
+# `make setup PYTHON=/path/to/python` chooses another interpreter.
+$(STAMP): pyproject.toml requirements.lock
+	@python=""; \
+	for candidate in $(or $(PYTHON),python3 python3.11 python3.12); do \
+	  if "$$candidate" -c '$(SUITABLE)' 2>/dev/null; then python="$$candidate"; break; fi; \
+	done; \
+	if [ -z "$$python" ]; then \
+	  echo "Shoal needs Python 3.11 or 3.12 with venv and pip (on Debian: apt install python3-venv)." >&2; \
+	  echo "Tried: $(or $(PYTHON),python3 python3.11 python3.12). Choose one with: make setup PYTHON=/path/to/python" >&2; \
+	  exit 1; \
+	fi; \
+	if ! $(BIN)/python -c '$(SUITABLE)' 2>/dev/null || ! $(BIN)/uv --version 2>/dev/null | grep -qF 'uv $(UV_VERSION)'; then \
+	  echo "making .venv with $$("$$python" --version)"; \
+	  "$$python" -m venv --clear .venv; \
+	  $(BIN)/python -m pip install --quiet 'uv==$(UV_VERSION)'; \
+	fi
+	@echo "installing the locked packages"
+	@VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/uv pip sync --quiet requirements.lock
+	@VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/uv pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+demo: setup  ## identify and compare both cases of the paper; one table, one report
+	@$(BIN)/shoal demo
+
+test: setup  ## the tests
+	@echo "compiling the kernels (once)"
+	@$(BIN)/python -m shoal.mechanics.warm
+	@$(BIN)/pytest -n 2 $(ARGS)
+
+lint: setup  ## style and format
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+
+types: setup  ## static types
+	@$(BIN)/mypy
+
+imports: setup  ## imports go one way
+	@$(BIN)/lint-imports
+
+bench: setup  ## speed and accuracy against the other engines
+	@$(BIN)/python -m shoal_validation.benchmarks
+
+up: setup  ## browse the runs
+	@$(BIN)/shoal ui
+
+lock: setup  ## resolve pyproject.toml anew into requirements.lock
+	@$(BIN)/uv pip compile --quiet --upgrade --all-extras --no-emit-index-url --no-header --no-annotate -p 3.11 \
+	  pyproject.toml -o requirements.lock
+
+clean:  ## remove the environment, the state and the caches
+	@rm -rf .venv .shoal .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis dist

@@ -1,0 +1,138 @@
+"""Positions of every body as CasADi expressions: the open chains of revolute joints, walked from the ground.
+
+A rigid body contributes its absolute angle, a cable the positions and slopes of its nodes. Where a body
+hangs on its parent its position is an expression in the parent's coordinates, so no joint needs a multiplier.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from shoal.engines.casadi_bodies import Placed, PlacedCable, PlacedGround, PlacedRigid, cable_place, turned
+from shoal.engines.casadi_element import cable_element
+from shoal.errors import InputError
+from shoal.scene import GROUND, Attachment, Rod, Scene
+from shoal.scene.record import Vector
+
+
+@dataclass(frozen=True)
+class Tree:
+    """All bodies of a scene, placed.
+
+    placed: the ground and every body by name
+    coordinates: q, symbols, (unknowns,)
+    angles: one symbol per body in the scene's order, the initial angles [rad], (bodies,)
+    start: q of the straight bodies as an expression in `angles`, (unknowns,)
+    entry: where each body hangs on its parent, in its own frame [m]
+    root: the point of the ground [m] from which each body's chain hangs
+    length: length of that chain up to the body's entry [m]
+    """
+
+    placed: dict[str, Placed]
+    coordinates: Any
+    angles: Any
+    start: Any
+    entry: dict[str, Vector]
+    root: dict[str, Vector]
+    length: dict[str, float]
+
+
+def build_tree(scene: Scene) -> Tree:
+    """Place every body of an open-chain scene. Raises InputError for a closed loop or an unknown element."""
+    placed: dict[str, Placed] = {GROUND: PlacedGround()}
+    straight: dict[str, Placed] = {GROUND: PlacedGround()}
+    entry: dict[str, Vector] = {}
+    root: dict[str, Vector] = {}
+    length: dict[str, float] = {}
+    angles = {name: ca.SX.sym(f"{name}_start") for name in scene.bodies}
+    coordinates: list[Any] = []
+    start: list[Any] = []
+    for parent, child in _links(scene):
+        outer, inner, name = scene.location(parent), scene.location(child), child.body
+        body, angle = scene.bodies[name], angles[name]
+        straight[name] = rest = PlacedRigid(straight[parent.body].point(outer) - turned(angle, inner), angle)
+        anchor = placed[parent.body].point(outer)
+        if isinstance(body, Rod) and body.element == "ancf-cable":
+            placed[name], free = _place_cable(name, body, inner, anchor)
+            start += _straight_cable(body, inner, rest)
+        elif body.element == "rigid":
+            free = [ca.SX.sym(f"{name}_angle")]
+            placed[name] = PlacedRigid(anchor - turned(free[0], inner), free[0])
+            start.append(angle)
+        else:
+            raise InputError(
+                f"bodies.{name}.element: the casadi engine has no {body.element!r}; use rigid or ancf-cable"
+            )
+        coordinates += free
+        entry[name] = inner
+        on_ground = parent.body == GROUND
+        root[name] = outer if on_ground else root[parent.body]
+        length[name] = 0.0 if on_ground else length[parent.body] + math.dist(outer, entry[parent.body])
+    return Tree(
+        placed=placed,
+        coordinates=ca.vertcat(*coordinates),
+        angles=ca.vertcat(*angles.values()),
+        start=ca.vertcat(*start),
+        entry=entry,
+        root=root,
+        length=length,
+    )
+
+
+def _links(scene: Scene) -> Iterator[tuple[Attachment, Attachment]]:
+    """Joints from the ground outwards, each as (place on the parent, place on the child)."""
+    reached, waiting = {GROUND}, dict(scene.joints)
+    while waiting:
+        for name, joint in list(waiting.items()):
+            known = [side.body in reached for side in (joint.first, joint.second)]
+            if all(known):
+                raise InputError(
+                    f"joints.{name}: closes a loop ({joint.first.body} to {joint.second.body}); "
+                    "the casadi engine simulates open chains, use another engine"
+                )
+            if any(known):
+                parent, child = (joint.first, joint.second) if known[0] else (joint.second, joint.first)
+                del waiting[name]
+                reached.add(child.body)
+                yield parent, child
+
+
+def _place_cable(name: str, rod: Rod, inner: Vector, anchor: Any) -> tuple[PlacedCable, list[Any]]:
+    """The cable whose place `inner` sits on the anchor [m], (2,), and its free coordinates.
+
+    The held node's position follows from the anchor, because the Hermite field is linear in it.
+    """
+    slopes = [ca.SX.sym(f"{name}_slope{k}", 2) for k in range(rod.elements + 1)]
+    positions = [ca.SX.sym(f"{name}_node{k}", 2) for k in range(rod.elements + 1)]
+    (index, s), held = cable_place(rod, inner), _held_node(rod, inner)
+    free = [part for k in range(rod.elements + 1) for part in ([] if k == held else [positions[k]]) + [slopes[k]]]
+    positions[held] = ca.SX.zeros(2)
+    others = PlacedCable(rod, _nodes(positions, slopes)).point(inner)
+    unit = np.eye(8)[4 * (held - index)]
+    weight = float(cable_element(rod.quadrature).field(unit, s, rod.length / rod.elements)[0][0])
+    positions[held] = (anchor - others) / weight
+    return PlacedCable(rod, _nodes(positions, slopes)), free
+
+
+def _straight_cable(rod: Rod, inner: Vector, rest: PlacedRigid) -> list[Any]:
+    """The free coordinates of a straight cable, in the order of `_place_cable`."""
+    held = _held_node(rod, inner)
+    slope = turned(rest.turn, (1.0, 0.0))
+    positions = [rest.point((k * rod.length / rod.elements, 0.0)) for k in range(rod.elements + 1)]
+    return [part for k in range(rod.elements + 1) for part in ([] if k == held else [positions[k]]) + [slope]]
+
+
+def _held_node(rod: Rod, inner: Vector) -> int:
+    """The node nearest to the place `inner`."""
+    index, s = cable_place(rod, inner)
+    return index + int(s > rod.length / rod.elements / 2)
+
+
+def _nodes(positions: list[Any], slopes: list[Any]) -> tuple[Any, ...]:
+    return tuple(ca.vertcat(*pair) for pair in zip(positions, slopes, strict=True))

@@ -1,0 +1,100 @@
+"""A run of Exudyn is not believed before its numbers, its reach, its joints and its energy were looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.engines.exudyn_build import Machine
+from shoal.engines.exudyn_pose import extent
+from shoal.engines.exudyn_record import Indices, Record
+from shoal.scene import GROUND, Scene
+from shoal.trajectory import Array, Status
+
+STRETCH = 1.02
+"""How much longer than its undeformed bodies a machine may reach."""
+LARGEST_GAP = 1e-4
+"""Joint gap per metre of reach beyond which a run has drifted."""
+INSTANTS = 400
+"""Kept steps at which energy and joints are examined."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Marker motion of one run and what to think of it.
+
+    points [m], (samples, markers, 2); angles [rad], (samples, markers); gap: largest joint gap [m].
+    """
+
+    points: Array
+    angles: Array
+    status: Status
+    message: str
+    energy_drift: float
+    gap: float
+
+
+def judge(machine: Machine, record: Record, failure: str) -> Verdict:
+    """Read the markers and check the run; `failure` is what the solver said, empty where it was content."""
+    points, angles = _markers(machine, record)
+    rows = np.unique(np.linspace(0, len(record.q) - 1, INSTANTS).astype(int))
+    gap = machine.gap(record.q[rows], record.v[rows])
+    drift = _energy_drift(machine, record, rows)
+    status, message = Status.OK, ""
+    reach = max_reach(machine.scene)
+    far = _farthest(machine.scene, points)
+    tolerance = machine.scene.solver.energy_tolerance
+    if failure:
+        status, message = Status.FAILED, failure
+    elif not (np.all(np.isfinite(record.q)) and np.all(np.isfinite(record.v))):
+        status, message = Status.DIVERGED, "the coordinates stopped being finite"
+    elif far > STRETCH * reach:
+        status, message = (
+            Status.OUT_OF_REACH,
+            f"a marker is {far:.3g} m from the ground; the bodies reach {reach:.3g} m",
+        )
+    elif gap > LARGEST_GAP * reach:
+        status, message = Status.DRIFTED, f"a joint opened by {gap:.3g} m; reduce solver.step"
+    elif drift > tolerance:
+        status, message = Status.ENERGY, f"energy is off by {drift:.3g}, allowed is {tolerance:.3g}; reduce solver.step"
+    return Verdict(points, angles, status, message, drift, gap)
+
+
+def max_reach(scene: Scene) -> float:
+    """Sum of the bodies' extents [m]: no marker can be farther from the nearest joint with the ground."""
+    return sum(extent(scene, body) for body in scene.bodies)
+
+
+def _farthest(scene: Scene, points: Array) -> float:
+    ends = [end for joint in scene.joints.values() for end in (joint.first, joint.second)]
+    pivots = np.array([scene.location(end) for end in ends if end.body == GROUND])
+    return float(np.max(np.min(np.linalg.norm(points[:, :, None] - pivots, axis=-1), axis=-1)))
+
+
+def _markers(machine: Machine, record: Record) -> tuple[Array, Array]:
+    scene, samples = machine.scene, record.at_wanted()
+    points, angles = [], []
+    for marker in scene.markers.values():
+        part, place = machine.parts[marker.body], scene.location(marker)
+        path = np.unwrap(part.motion(record.q, record.v, place).direction)
+        path += _turns(scene.start(marker.body).angle - path[0])
+        here = part.motion(*samples, place)
+        about = np.interp(record.steps.wanted, record.times, path)
+        points.append(here.position)
+        angles.append(here.direction + _turns(about - here.direction))
+    return np.stack(points, axis=1), np.stack(angles, axis=1)
+
+
+def _turns(angle: Array) -> Array:
+    return 2 * np.pi * np.round(angle / (2 * np.pi))
+
+
+def _energy_drift(machine: Machine, record: Record, rows: Indices) -> float:
+    power = machine.friction_power(record.q, record.v)
+    lost = np.concatenate([[0.0], np.cumsum(np.diff(record.times) * (power[1:] + power[:-1]) / 2)])
+    energy, moving = machine.energy(record.q[rows], record.v[rows])
+    energy += lost[rows]
+    # A machine at rest has no energy to compare with; round-off of its potential must not count as drift.
+    scale = max(float(np.max(moving)), 1e-9 * float(np.max(np.abs(energy))), np.finfo(float).tiny)
+    return float(np.max(np.abs(energy - energy[0]))) / scale

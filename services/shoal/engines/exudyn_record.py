@@ -1,0 +1,95 @@
+"""Fixed steps that suit the requested times, and the coordinates Exudyn passed through on them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shoal.trajectory import Array
+
+Indices = npt.NDArray[np.int64]
+LARGEST_RECORD = 5_000_000
+"""Coordinates (and as many velocities) kept of one run; beyond, only every n-th step is kept."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """`count` steps of `size` [s]; `kept` are the indices of those recorded, increasing, from 0 to count."""
+
+    wanted: Array
+    count: int
+    size: float
+    kept: Indices
+
+
+def choose_steps(wanted: Array, step: float, unknowns: int) -> Steps:
+    """Steps no longer than `step` [s] (but for round-off) that meet the wanted times [s] where possible."""
+    last = float(wanted[-1])
+    between = np.diff(wanted, prepend=0.0)
+    interval = float(np.min(between[between > 0], initial=last))
+    if last == 0:
+        size, count = step, 0
+    elif _multiples(wanted, step):
+        size, count = step, round(last / step)
+    else:
+        common = interval if interval >= step and _multiples(wanted, interval) else last
+        size = common / math.ceil(common / step - 1e-9)
+        count = round(last / size)
+    stride = max(1, math.ceil(count * unknowns / LARGEST_RECORD))
+    before = np.floor(wanted / size + 1e-9).astype(np.int64)
+    kept = np.unique(np.concatenate([np.arange(0, count, stride), before, before + 1, [count]]))
+    return Steps(wanted, count, size, kept[kept <= count])
+
+
+def _multiples(times: Array, interval: float) -> bool:
+    ratio = times / interval
+    return bool(np.allclose(ratio, np.round(ratio), rtol=1e-12, atol=1e-9))
+
+
+@dataclass
+class Record:
+    """Coordinates and velocities at the kept steps, (kept, unknowns); not a number where the run did not get."""
+
+    steps: Steps
+    reference: Array
+    """Coordinates [m or rad] of the undeformed start, from which Exudyn counts, (unknowns,)."""
+    q: Array = field(init=False)
+    v: Array = field(init=False)
+    seen: int = field(default=0, init=False)
+    filled: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        self.q = np.full((len(self.steps.kept), self.reference.size), np.nan)
+        self.v = np.full_like(self.q, np.nan)
+
+    @property
+    def times(self) -> Array:
+        """Time of each kept step [s], (kept,)."""
+        return np.multiply(self.steps.kept, self.steps.size, dtype=float)
+
+    def take(self, mbs: Any, _time: float) -> bool:
+        """Exudyn's call after the initialisation and after each step."""
+        if self.steps.kept[self.filled] == self.seen:
+            # GetODE2CoordinatesTotal, which adds the reference, aborts beyond about 100 coordinates (Exudyn 1.13.6).
+            self.q[self.filled] = self.reference + mbs.systemData.GetODE2Coordinates()
+            self.v[self.filled] = mbs.systemData.GetODE2Coordinates_t()
+            self.filled += 1
+        self.seen += 1
+        return True
+
+    def at_wanted(self) -> tuple[Array, Array]:
+        """Coordinates and velocities at the wanted times, (samples, unknowns) each; cubic Hermite between steps."""
+        size = self.steps.size
+        row = np.searchsorted(self.times, self.steps.wanted + 1e-9 * size, side="right") - 1
+        row = np.clip(row, 0, max(len(self.times) - 2, 0))
+        after = np.minimum(row + 1, len(self.times) - 1)
+        s = ((self.steps.wanted - self.times[row]) / size)[:, None]
+        s = np.where(np.abs(s - np.round(s)) < 1e-6, np.round(s), s)
+        q0, q1, v0, v1 = self.q[row], self.q[after], self.v[row] * size, self.v[after] * size
+        q = (1 + 2 * s) * (1 - s) ** 2 * q0 + s * (1 - s) ** 2 * v0 + s**2 * (3 - 2 * s) * q1 + s**2 * (s - 1) * v1
+        v = 6 * s * (1 - s) * (q1 - q0) + (1 - s) * (1 - 3 * s) * v0 + s * (3 * s - 2) * v1
+        return q, v / size

@@ -1,0 +1,94 @@
+"""Where Shoal keeps its state: everything lies below one folder, nothing in the user's own folders."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import tempfile
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from shoal.errors import InputError
+
+_KERNELS = Path(__file__).parent / "mechanics"
+
+
+def home() -> Path:
+    """The folder of all state, made on demand: $SHOAL_HOME, else ./.shoal. Raises InputError."""
+    folder = Path(os.environ.get("SHOAL_HOME") or ".shoal").expanduser().absolute()
+    if not _writable(folder):
+        raise InputError(f"SHOAL_HOME: cannot write to {folder}; set SHOAL_HOME to a folder that you may write to")
+    return folder
+
+
+def kernel_cache() -> Path:
+    """The folder of the compiled kernels, made on demand.
+
+    Its name changes with everything the machine code depends on. Numba itself only looks at the file
+    of each kernel, so it would go on using one whose callee in another file has changed. Where the
+    home cannot be written to, a private folder among the temporary files takes its place.
+    """
+    name = f"kernels-{_fingerprint()}"
+    try:
+        folder = home() / name
+    except InputError:
+        return _private_temporary(name)
+    return folder if _writable(folder) else _private_temporary(name)
+
+
+def prepare_kernel_cache() -> None:
+    """Point Numba at `kernel_cache()` unless the user chose a folder. Call before importing Numba."""
+    if not os.environ.get("NUMBA_CACHE_DIR"):
+        os.environ["NUMBA_CACHE_DIR"] = str(kernel_cache())
+
+
+def _fingerprint() -> str:
+    """Short hash over the kernel sources, the versions of the compiler and the processor."""
+    digest = hashlib.sha256()
+    for source in sorted(_KERNELS.rglob("*.py")):
+        digest.update(source.relative_to(_KERNELS).as_posix().encode() + b"\0")
+        digest.update(source.read_bytes() + b"\0")
+    for part in (_version("numba"), _version("numpy"), platform.python_version(), _processor()):
+        digest.update(part.encode() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, "") or platform.processor() or platform.machine()
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)
+
+
+def _private_temporary(name: str) -> Path:
+    """A folder that only this user can fill: Numba loads what it finds there as code."""
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"shoal-{user}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        status = folder.lstat()
+        if folder.is_symlink() or (hasattr(os, "getuid") and status.st_uid != user) or status.st_mode & 0o022:
+            raise PermissionError
+    except OSError:
+        folder = Path(tempfile.mkdtemp(prefix="shoal-"))
+    cache = folder / name
+    cache.mkdir(exist_ok=True)
+    return cache

@@ -1,0 +1,56 @@
+"""Leapfrog (velocity Verlet): explicit, second order, one force per step, no energy drift in the long run.
+
+Where accelerations depend on the rates, the rate at the end of the step is predicted from the old
+acceleration, which keeps second order.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numba import njit
+
+from shoal.mechanics import dynamics
+from shoal.mechanics.dynamics import Work
+from shoal.mechanics.integrators.scheme import Facts, implement
+from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.tile import Tile
+from shoal.scene import Solver
+
+
+class Leapfrog(NamedTuple):
+    """Settings."""
+
+    rank_tolerance: float
+
+
+FACTS = Facts(order=2, explicit=True, stable_step_times_frequency=2.0)
+
+
+def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Leapfrog:
+    """Settings for one tile of lanes."""
+    return Leapfrog(solver.rank_tolerance)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, h: float) -> None:
+    """One step of h [s]."""
+    end = m.unknowns * len(tile)
+    for i in range(end):
+        w.zdot[i] += 0.5 * h * w.a[i]
+        w.z[i] += h * w.zdot[i]
+    if m.frictions.count + m.constraints.count > 0:
+        for i in range(end):
+            w.stage[i] = w.zdot[i]
+            w.zdot[i] += 0.5 * h * w.a[i]
+        dynamics.acceleration(tile, m, w, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        for i in range(end):
+            w.zdot[i] = w.stage[i] + 0.5 * h * w.a[i]
+        dynamics.settle(tile, m, w, scheme.rank_tolerance)
+    else:
+        dynamics.acceleration(tile, m, w, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        for i in range(end):
+            w.zdot[i] += 0.5 * h * w.a[i]
+
+
+implement(Leapfrog, step)

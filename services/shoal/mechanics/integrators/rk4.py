@@ -1,0 +1,58 @@
+"""The classical explicit Runge-Kutta method of order 4."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numba import njit
+
+from shoal.mechanics import dynamics
+from shoal.mechanics.dynamics import Work
+from shoal.mechanics.integrators.scheme import Facts, implement
+from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.tile import Tile
+from shoal.scene import Solver
+
+
+class Rk4(NamedTuple):
+    """Settings."""
+
+    rank_tolerance: float
+
+
+FACTS = Facts(order=4, explicit=True, stable_step_times_frequency=2.828)
+
+
+def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Rk4:
+    """Settings for one tile of lanes."""
+    return Rk4(solver.rank_tolerance)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def step(tile: Tile, scheme: Rk4, m: Arrays, w: Work, h: float) -> None:
+    """One step of h [s]; w.a holds the acceleration at its beginning, and afterwards that at its end."""
+    end = m.unknowns * len(tile)
+    v, q_sum, v_sum = end, 2 * end, 3 * end
+    for i in range(end):
+        w.stage[i] = w.z[i]
+        w.stage[v + i] = w.zdot[i]
+        w.stage[q_sum + i] = w.zdot[i]
+        w.stage[v_sum + i] = w.a[i]
+    for stage in range(3):
+        part = h if stage == 2 else 0.5 * h
+        weight = 1.0 if stage == 2 else 2.0
+        for i in range(end):
+            w.z[i] = w.stage[i] + part * w.zdot[i]
+            w.zdot[i] = w.stage[v + i] + part * w.a[i]
+        dynamics.acceleration(tile, m, w, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        for i in range(end):
+            w.stage[q_sum + i] += weight * w.zdot[i]
+            w.stage[v_sum + i] += weight * w.a[i]
+    for i in range(end):
+        w.z[i] = w.stage[i] + h / 6.0 * w.stage[q_sum + i]
+        w.zdot[i] = w.stage[v + i] + h / 6.0 * w.stage[v_sum + i]
+    dynamics.settle(tile, m, w, scheme.rank_tolerance)
+    dynamics.acceleration(tile, m, w, w.z, w.zdot, scheme.rank_tolerance, w.a)
+
+
+implement(Rk4, step)

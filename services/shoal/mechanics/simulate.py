@@ -1,0 +1,177 @@
+"""The main path: scene -> model -> march over tiles of lanes -> checked trajectory."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics import stability
+from shoal.mechanics.dynamics import work_space
+from shoal.mechanics.integrators import choose, facts
+from shoal.mechanics.march import march
+from shoal.mechanics.model import Model, build
+from shoal.mechanics.tile import Array, pack, tiles, unpack
+from shoal.scene import GROUND, Rod, Scene
+from shoal.trajectory import Status, Trajectory
+
+REACH_MARGIN = 1.05
+DRIFT_TOLERANCE = 1e-6
+
+
+def simulate(
+    scene: Scene, times: Array, values: Mapping[str, Array] | None = None, *, threads: int | None = None
+) -> Trajectory:
+    """Motion of a scene, or of one scene per lane, sampled at `times` [s].
+
+    values: path in the scene -> one number per lane. Lanes are computed in tiles, tiles on threads.
+    Raises InputError if the scene cannot be modelled or its step is beyond the stability limit.
+    """
+    begin = time.perf_counter()
+    lanes = len(next(iter(values.values()))) if values else 1
+    model = build(scene.with_lanes(values) if values else scene, lanes)
+    limits = check_step(scene, model)
+    step = scene.solver.step
+    steps = int(np.ceil(times[-1] / step - 1e-9))
+    tile, parts = tiles(lanes)
+
+    def run(part: slice) -> tuple[Array, ...]:
+        arrays = model.tile(tile, part)
+        room = work_space(tile, arrays)
+        room.z[: model.unknowns * len(tile)] = pack(model.q0, part, tile)
+        room.zdot[: model.unknowns * len(tile)] = pack(model.v0, part, tile)
+        scheme = choose(scene.solver, model, tile, part)
+        record = march(
+            tile, scheme, arrays, room, step, steps, times, model.marker_rows.ravel(), scene.solver.rank_tolerance
+        )
+        return tuple(unpack(field, part, tile) for field in record)
+
+    workers = min(threads or os.cpu_count() or 1, len(parts))
+    if workers == 1:
+        results = [run(part) for part in parts]
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            results = list(pool.map(run, parts))
+    samples, error, scale, drift, correction = (np.concatenate(field, axis=1) for field in zip(*results, strict=True))
+    samples = samples.reshape(len(times), len(scene.markers), 4, lanes)
+    points = samples[:, :, :2]
+    angles = _angles(scene, model, samples[:, :, 2:])
+    energy_drift = _relative(error[0], scale[0], scene, model)
+    status, message = _verdict(scene, model, points, energy_drift, drift[0])
+    return Trajectory(
+        engine="gauss",
+        times=times,
+        markers=tuple(scene.markers),
+        points=points,
+        angles=angles,
+        status=status,
+        energy_drift=energy_drift,
+        constraint_drift=drift[0],
+        steps=steps,
+        wall_s=time.perf_counter() - begin,
+        message=message,
+        model=_facts(scene, model, limits, float(np.max(correction))),
+    )
+
+
+def check_step(scene: Scene, model: Model) -> float:
+    """The stability limit [s] of the scene's integrator. Raises InputError if the step is beyond it."""
+    fact = facts(scene.solver.integrator)
+    if not fact.explicit:
+        return np.inf
+    varies = any(np.shape(values)[1] > 1 for values in (model.mass_values, *_stiff_numbers(model)))
+    limit = min(
+        stability.step_limit(model, fact.stable_step_times_frequency, lane)
+        for lane in range(model.lanes if varies else 1)
+    )
+    if scene.solver.step > limit:
+        raise InputError(
+            f"solver.step: {scene.solver.step:g} s is beyond the stability limit {limit:.3e} s of "
+            f"{scene.solver.integrator} for this scene; use a smaller step or solver.integrator=generalized-alpha"
+        )
+    return limit
+
+
+def _stiff_numbers(model: Model) -> tuple[Array, ...]:
+    return (model.cables_full.coefficients, model.cables_reduced.coefficients, model.frictions.coefficient)
+
+
+def _angles(scene: Scene, model: Model, directions: Array) -> Array:
+    """Angles [rad] of the marker directions (samples, markers, 2, lanes), continuous from the initial angles on."""
+    raw = np.arctan2(directions[:, :, 1], directions[:, :, 0])
+    first = np.empty((1, *raw.shape[1:]))
+    for index, marker in enumerate(scene.markers.values()):
+        first[0, index] = model.scene.start(marker.body).angle
+    return np.unwrap(np.concatenate([first, raw]), axis=0)[1:]
+
+
+def _relative(error: Array, scale: Array, scene: Scene, model: Model) -> Array:
+    """Energy error over the largest kinetic + elastic energy; a machine that never moves is measured by its weight."""
+    floor = 1e-9 * float(np.max(np.abs(model.weight))) * _reach(scene)
+    relative: Array = error / np.maximum(scale, floor + 1e-300)
+    return relative
+
+
+def _verdict(
+    scene: Scene, model: Model, points: Array, energy_drift: Array, drift: Array
+) -> tuple[tuple[Status, ...], str]:
+    """Status of every lane, and the reason for the first that is not ok."""
+    reach = _reach(scene) * REACH_MARGIN
+    anchor = _anchor(scene)
+    statuses, message = [], ""
+    for lane in range(model.lanes):
+        distance = np.hypot(points[:, :, 0, lane] - anchor[0], points[:, :, 1, lane] - anchor[1])
+        if not (np.all(np.isfinite(distance)) and np.isfinite(energy_drift[lane])):
+            status, reason = Status.DIVERGED, "the motion is not finite; use a smaller step"
+        elif np.max(distance) > reach:
+            status, reason = Status.OUT_OF_REACH, f"a marker is {np.max(distance):.3g} m away, the reach is {reach:.3g} m"
+        elif energy_drift[lane] > scene.solver.energy_tolerance:
+            status = Status.ENERGY
+            reason = f"energy is off by {energy_drift[lane]:.2g}, allowed {scene.solver.energy_tolerance:g} (relative)"
+        elif drift[lane] > DRIFT_TOLERANCE:
+            status, reason = Status.DRIFTED, f"constraints are violated by {drift[lane]:.2g}"
+        else:
+            status, reason = Status.OK, ""
+        statuses.append(status)
+        message = message or reason
+    return tuple(statuses), message
+
+
+def _reach(scene: Scene) -> float:
+    """No point can be farther from the anchor than this [m]: all bodies stretched out, plus other anchors."""
+    total = 0.0
+    for name, body in scene.bodies.items():
+        attached = [a for j in scene.joints.values() for a in (j.first, j.second) if a.body == name]
+        attached += [a for a in scene.markers.values() if a.body == name]
+        places = [np.hypot(*scene.location(a)) for a in attached]
+        total += body.length if isinstance(body, Rod) else 2 * max(places)
+    return total
+
+
+def _anchor(scene: Scene) -> tuple[float, float]:
+    sides = (side for joint in scene.joints.values() for side in (joint.first, joint.second))
+    return next(scene.location(side) for side in sides if side.body == GROUND)
+
+
+def _facts(scene: Scene, model: Model, limit: float, correction: float) -> dict[str, Any]:
+    """What was computed, for the record."""
+    return {
+        "unknowns": model.unknowns,
+        "elements": model.elements,
+        "constraints": len(model.constraint_names),
+        "integrator": scene.solver.integrator,
+        "step": scene.solver.step,
+        "stability_limit": limit if np.isfinite(limit) else None,
+        "initial_correction": correction,
+        "bodies": {
+            name: {"element": body.element, **({"elements": body.elements} if body.element != "rigid" else {})}
+            for name, body in scene.bodies.items()
+        },
+    }
+
+

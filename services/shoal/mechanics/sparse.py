@@ -1,0 +1,127 @@
+"""Sparse LDL' factorisation of symmetric matrices with a fixed pattern, lane by lane.
+
+The pattern is worked out once in Python (symbolic elimination); the compiled kernels then only
+follow index lists, so factoring and solving cost what the pattern needs: linear in the number of
+elements for chains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics.tile import Array, Index, Tile
+from shoal.mechanics.vector import add_product, copy, pointer, scale, subtract_product
+
+
+class Pattern(NamedTuple):
+    """Lower triangle by columns, fill included. Slots 0..n-1 are the diagonal, then the columns in order.
+
+    size is the number of rows. column[k]:column[k+1] are the entries of column k, `row` their rows; entry p is slot n + p.
+    update[k]:update[k+1] are the eliminations of column k: slot `target` -= L[left] D L[right].
+    """
+
+    size: int
+    column: Index
+    row: Index
+    update: Index
+    target: Index
+    left: Index
+    right: Index
+
+    @property
+    def slots(self) -> int:
+        """Length of a value array, per lane."""
+        return self.size + len(self.row)
+
+
+def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dict[tuple[int, int], int]]:
+    """Pattern of the factor of a matrix with these entries, and the slot of each (row, column), row >= column."""
+    below: list[set[int]] = [set() for _ in range(size)]
+    for i, j in entries:
+        if i != j:
+            below[min(i, j)].add(max(i, j))
+    for k in range(size):
+        if below[k]:
+            parent = min(below[k])
+            below[parent] |= below[k] - {parent}
+    slot = {(k, k): k for k in range(size)}
+    column, row = [0], []
+    for k in range(size):
+        for i in sorted(below[k]):
+            slot[i, k] = size + len(row)
+            row.append(i)
+        column.append(len(row))
+    update, target, left, right = [0], [], [], []
+    for k in range(size):
+        rows = row[column[k] : column[k + 1]]
+        for a, i in enumerate(rows):
+            for b, j in enumerate(rows[: a + 1]):
+                target.append(slot[i, j])
+                left.append(column[k] + a)
+                right.append(column[k] + b)
+        update.append(len(target))
+    arrays = (np.array(part, dtype=np.int64) for part in (column, row, update, target, left, right))
+    return Pattern(size, *arrays), slot
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def raw(pattern: Pattern) -> Pattern:
+    """The same pattern with pointers in place of arrays."""
+    p = pattern
+    return Pattern(
+        p.size,
+        pointer(p.column),
+        pointer(p.row),
+        pointer(p.update),
+        pointer(p.target),
+        pointer(p.left),
+        pointer(p.right),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def factor(tile: Tile, pattern: Pattern, values: Array) -> None:
+    """Replace the matrix (slots, lanes) by L below the diagonal and 1/D on it. Pointers."""
+    width = len(tile)
+    size = pattern.size
+    for k in range(size):
+        for lane in range(width):
+            values[k * width + lane] = 1.0 / values[k * width + lane]
+        for u in range(pattern.update[k], pattern.update[k + 1]):
+            target = pattern.target[u] * width
+            left = (size + pattern.left[u]) * width
+            right = (size + pattern.right[u]) * width
+            for lane in range(width):
+                values[target + lane] -= values[left + lane] * values[right + lane] * values[k * width + lane]
+        for p in range(size + pattern.column[k], size + pattern.column[k + 1]):
+            scale(tile, values, p, values, k)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def solve(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) -> None:
+    """Replace the right-hand side in the rows of x from `first` on by the solution. Pointers."""
+    size = pattern.size
+    for k in range(size):
+        for p in range(pattern.column[k], pattern.column[k + 1]):
+            subtract_product(tile, x, first + pattern.row[p], factors, size + p, x, first + k)
+    for k in range(size - 1, -1, -1):
+        scale(tile, x, first + k, factors, k)
+        for p in range(pattern.column[k], pattern.column[k + 1]):
+            subtract_product(tile, x, first + k, factors, size + p, x, first + pattern.row[p])
+
+
+@njit(cache=True, error_model="numpy")
+def multiply(tile: Tile, pattern: Pattern, values: Array, x: Array, y: Array) -> None:
+    """y = A x for the unfactored symmetric matrix (slots, lanes); x, y: (rows, lanes). Pointers."""
+    size = pattern.size
+    for k in range(size):
+        copy(tile, y, k, x, k)
+        scale(tile, y, k, values, k)
+    for k in range(size):
+        for p in range(pattern.column[k], pattern.column[k + 1]):
+            add_product(tile, y, pattern.row[p], values, size + p, x, k)
+            add_product(tile, y, k, values, size + p, x, pattern.row[p])

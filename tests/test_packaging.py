@@ -1,0 +1,89 @@
+"""The lock names exact versions only, the command line stays light, the state stays in its folder."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from shoal import home
+from shoal.errors import InputError
+
+ROOT = Path(__file__).parents[1]
+HEAVY = ("numpy", "numba", "scipy", "matplotlib", "mlflow", "prefect", "exudyn", "casadi")
+
+
+def test_lock_pins_every_package_and_names_no_host() -> None:
+    text = (ROOT / "requirements.lock").read_text()
+    lines = [line for line in text.splitlines() if line.strip()]
+    assert len(lines) > 50
+    assert "://" not in text
+    assert [line for line in lines if not re.fullmatch(r"[a-z0-9][a-z0-9.-]*==[0-9][\w.+!]*", line)] == []
+
+
+def test_uv_in_the_makefile_is_pinned() -> None:
+    assert re.search(r"^UV_VERSION := \d+\.\d+\.\d+$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+
+
+def test_command_line_imports_nothing_heavy() -> None:
+    program = f"import sys, shoal.cli; print([name for name in {HEAVY!r} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.stdout.strip(), done.stderr) == ("[]", "")
+
+
+def test_home_is_the_folder_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHOAL_HOME", str(tmp_path / "deep" / "home"))
+    assert home.home() == tmp_path / "deep" / "home"
+    assert home.home().is_dir()
+    monkeypatch.delenv("SHOAL_HOME")
+    monkeypatch.chdir(tmp_path)
+    assert home.home() == tmp_path / ".shoal"
+
+
+def test_home_that_cannot_be_made_is_refused_and_kernels_go_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("SHOAL_HOME", str(tmp_path / "file" / "home"))
+    with pytest.raises(InputError, match="SHOAL_HOME"):
+        home.home()
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(home.tempfile, "tempdir", str(tmp_path / "temporary"))
+    assert home.kernel_cache().is_relative_to(tmp_path / "temporary")
+    assert home.kernel_cache() == home.kernel_cache()
+
+
+def test_temporary_folder_that_others_can_fill_is_not_trusted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("SHOAL_HOME", str(tmp_path / "file" / "home"))
+    monkeypatch.setattr(home.tempfile, "tempdir", str(tmp_path))
+    shared = tmp_path / f"shoal-{os.getuid()}"
+    shared.mkdir()
+    shared.chmod(0o777)
+    assert not home.kernel_cache().is_relative_to(shared)
+
+
+def test_kernel_cache_follows_the_sources_and_the_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHOAL_HOME", str(tmp_path / "home"))
+    shutil.copytree(ROOT / "services/shoal/mechanics", tmp_path / "mechanics")
+    before = home.kernel_cache().name
+    monkeypatch.setattr(home, "_KERNELS", tmp_path / "mechanics")
+    assert home.kernel_cache().name == before
+    (tmp_path / "mechanics" / "elements" / "new.py").write_text("x = 1\n")
+    with_new_file = home.kernel_cache().name
+    monkeypatch.setattr(home, "_version", lambda package: "0")
+    assert len({before, with_new_file, home.kernel_cache().name}) == 3
+
+
+def test_the_choice_of_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")
+    home.prepare_kernel_cache()
+    assert os.environ["NUMBA_CACHE_DIR"] == "elsewhere"
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    home.prepare_kernel_cache()
+    assert os.environ["NUMBA_CACHE_DIR"] == str(home.kernel_cache())
