@@ -40,11 +40,12 @@ class CasadiEngine:
     integrator: `cvodes` (variable step; Adams, whose functional iteration needs no Jacobian and suits motion
         without damping) or `rk4` (the scene's step)
     tolerance: of CVODES, absolute (SI units) and relative
+    max_steps: of CVODES between two of the instants at which the run is checked
     """
 
     integrator: Literal["cvodes", "rk4"] = "cvodes"
     tolerance: float = 1e-11
-    max_steps: int = 10_000_000
+    max_steps: int = 1_000_000
     name: str = "casadi"
     capabilities: Capabilities = _CAPABILITIES
 
@@ -94,7 +95,7 @@ class CasadiEngine:
         try:
             states, steps = self._integrate(model, scene, x0, grid[1:])
         except RuntimeError as error:
-            return _failed(model, times, f"the integrator stopped: {_reason(error)}")
+            return _failed(model, times.size, Status.FAILED, f"the integrator stopped: {_reason(error)}")
         return _check(model, scene, np.hstack([x0.full(), states]), wanted, steps)
 
     def _integrate(self, model: CasadiModel, scene: Scene, x0: Any, grid: Array) -> tuple[Array, int]:
@@ -152,25 +153,27 @@ def _check_grid(times: Array) -> tuple[Array, npt.NDArray[np.intp]]:
 
 def _check(model: CasadiModel, scene: Scene, states: Array, wanted: npt.NDArray[np.intp], steps: int) -> _Run:
     """Judge a run by its states at the instants of the check grid, (2 unknowns + 1, instants)."""
+    if not np.all(np.isfinite(states)):
+        return _failed(model, wanted.size, Status.DIVERGED, "the motion is not finite", steps)
     instants = states.shape[1]
     points, angles = (value.full() for value in model.places(states))
     points = points.reshape(2, instants, len(model.markers)).transpose(1, 2, 0)
     angles = np.unwrap(angles.reshape(len(model.markers), instants, order="F").T, axis=0)
     angles += [scene.start(marker.body).angle for marker in scene.markers.values()] - angles[0]
-    drift = _energy_drift(model, states)
-    distance = np.linalg.norm(points - model.root.T, axis=2)
-    excess = np.max(distance - _STRETCH * model.reach, axis=0)
-    if not np.all(np.isfinite(states)):
-        status, message = Status.DIVERGED, "the motion is not finite"
-    elif np.any(excess > 1e-9):
+    # An unstable run may overflow on its way to being rejected.
+    with np.errstate(all="ignore"):
+        drift = _energy_drift(model, states)
+        distance = np.linalg.norm(points - model.root.T, axis=2).max(axis=0)
+    excess = distance - _STRETCH * model.reach
+    status, message = Status.OK, ""
+    if not np.all(excess <= 1e-9):
         worst = int(np.argmax(excess))
+        away, chain = distance[worst], model.reach[worst]
         status = Status.OUT_OF_REACH
-        away, chain = distance[:, worst].max(), model.reach[worst]
         message = f"marker {model.markers[worst]} goes {away:.4g} m away, its chain is {chain:.4g} m long"
-    elif drift > scene.solver.energy_tolerance:
-        status, message = Status.ENERGY, f"energy drifts by {drift:.2g}, allowed is {scene.solver.energy_tolerance:.2g}"
-    else:
-        status, message = Status.OK, ""
+    elif not drift <= scene.solver.energy_tolerance:
+        status = Status.ENERGY
+        message = f"energy drifts by {drift:.2g}, allowed is {scene.solver.energy_tolerance:.2g}"
     return _Run(points[wanted], angles[wanted], status, drift, steps, message)
 
 
@@ -183,9 +186,9 @@ def _energy_drift(model: CasadiModel, states: Array) -> float:
     return float(np.max(np.abs(balance - balance[0])) / scale) if scale > 0 else 0.0
 
 
-def _failed(model: CasadiModel, times: Array, message: str) -> _Run:
-    nothing = np.full((times.size, len(model.markers), 2), np.nan)
-    return _Run(nothing, nothing[..., 0], Status.FAILED, float("nan"), 0, message)
+def _failed(model: CasadiModel, samples: int, status: Status, message: str, steps: int = 0) -> _Run:
+    nothing = np.full((samples, len(model.markers), 2), np.nan)
+    return _Run(nothing, nothing[..., 0], status, float("nan"), steps, message)
 
 
 def _reason(error: RuntimeError) -> str:
