@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -73,7 +74,7 @@ class Trajectory:
         return self.angles[:, self.markers.index(name), lane]
 
     def to_json(self, lane: int = 0) -> dict[str, Any]:
-        """One lane as plain data, the object that `shoal simulate --json` prints."""
+        """One lane as plain data, the object that `shoal simulate --json` prints; null where nothing finite is known."""
         times = self.times.tolist()
         return {
             "status": str(self.status[lane]),
@@ -82,16 +83,29 @@ class Trajectory:
             "markers": {
                 name: {
                     "t": times,
-                    "x": self.marker(name, lane)[:, 0].tolist(),
-                    "y": self.marker(name, lane)[:, 1].tolist(),
-                    "angle": self.angle(name, lane).tolist(),
+                    "x": plain(self.marker(name, lane)[:, 0]),
+                    "y": plain(self.marker(name, lane)[:, 1]),
+                    "angle": plain(self.angle(name, lane)),
                 }
                 for name in self.markers
             },
-            "final": {name: self.marker(name, lane)[-1].tolist() for name in self.markers},
-            "energy_drift": float(self.energy_drift[lane]),
-            "constraint_drift": float(self.constraint_drift[lane]),
+            "final": {name: plain(self.marker(name, lane)[-1]) for name in self.markers},
+            "energy_drift": plain(self.energy_drift[lane]),
+            "constraint_drift": plain(self.constraint_drift[lane]),
             "steps": self.steps,
             "wall_s": self.wall_s,
             "model": self.model,
         }
+
+
+def plain(values: Any) -> Any:
+    """Numbers as JSON can hold them: lists and floats, null for what is not finite."""
+    if isinstance(values, Mapping):
+        return {key: plain(value) for key, value in values.items()}
+    if isinstance(values, list | tuple):
+        return [plain(value) for value in values]
+    if isinstance(values, np.ndarray):
+        return plain(values.tolist())
+    if isinstance(values, float | np.floating):
+        return float(values) if np.isfinite(values) else None
+    return values

@@ -28,8 +28,15 @@ class Capabilities:
 class Engine(Protocol):
     """Simulates scenes. Bad input raises InputError; a run that failed carries its status."""
 
-    name: str
-    capabilities: Capabilities
+    @property
+    def name(self) -> str:
+        """Name by which the engine is chosen."""
+        ...
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can simulate."""
+        ...
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene; `times` [s] are the requested sampling instants, else the scene's own."""

@@ -1,0 +1,48 @@
+"""The native engine: Gauss's principle, compiled, many lanes at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from shoal.engines.contract import Capabilities, check_lanes, sampling_times
+from shoal.scene import Scene
+from shoal.trajectory import Array, Trajectory
+
+
+@dataclass(frozen=True)
+class GaussEngine:
+    """Shoal's own solver. threads: how many share the tiles of lanes (default: one per core)."""
+
+    threads: int | None = None
+
+    @property
+    def name(self) -> str:
+        """Name by which the engine is chosen."""
+        return "gauss"
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can simulate."""
+        return Capabilities(
+            elements=frozenset({"rigid", "ancf-cable"}),
+            joints=frozenset({"revolute"}),
+            integrators=frozenset({"leapfrog", "rk4", "generalized-alpha"}),
+            closed_loops=True,
+            lanes=True,
+        )
+
+    def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
+        """Run one scene; see `Engine`."""
+        from shoal.mechanics.simulate import simulate
+
+        return simulate(scene, sampling_times(scene, times), threads=self.threads)
+
+    def simulate_many(
+        self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
+    ) -> Trajectory:
+        """Run one scene per lane, all in compiled tiles; see `Engine`."""
+        from shoal.mechanics.simulate import simulate
+
+        check_lanes(scene, values)
+        return simulate(scene, sampling_times(scene, times), values, threads=self.threads)
