@@ -78,7 +78,7 @@ class Terms:
             self._close(name)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def raw(constraints: Constraints) -> Constraints:
     """The same constraints with pointers in place of arrays."""
     c = constraints

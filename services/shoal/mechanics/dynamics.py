@@ -41,7 +41,7 @@ def work_space(tile: Tile, m: Arrays) -> Work:
     return Work(*(np.zeros(size) for size in sizes), gauss.work_space(width, m))  # type: ignore[call-arg]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def raw(w: Work) -> Work:
     """The same room as pointers."""
     return Work(
@@ -57,7 +57,7 @@ def raw(w: Work) -> Work:
     )
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def derive(tile: Tile, m: Arrays, z: Array, last: int, moving: bool) -> None:
     """Fill the derived rows of z up to row `last`; for rates (moving) the constants do not count."""
     for row in range(m.unknowns, last):
@@ -70,7 +70,7 @@ def derive(tile: Tile, m: Arrays, z: Array, last: int, moving: bool) -> None:
             add_product(tile, z, row, m.derived.coefficient, t, z, m.derived.source[t])
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def _fold(tile: Tile, m: Arrays, f: Array) -> None:
     """Pass the forces on derived rows to the unknowns they depend on (transpose of `derive`)."""
     for row in range(m.unknowns, m.force_rows):
@@ -79,7 +79,7 @@ def _fold(tile: Tile, m: Arrays, f: Array) -> None:
             add_product(tile, f, m.derived.source[t], m.derived.coefficient, t, f, row)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def force(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, f: Array) -> None:
     """Applied and elastic generalised forces Q on the unknowns; z, zdot, f: (rows, lanes).
 
@@ -98,7 +98,7 @@ def force(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, f: Array) -> No
     _fold(tile, m, f)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def acceleration(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """The acceleration by Gauss's principle; z, zdot, a: (rows, lanes), a valid on the unknowns."""
     force(tile, m, w, z, zdot, a)
@@ -107,7 +107,7 @@ def acceleration(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, toleranc
         gauss.constrain(tile, m, w.gauss, z, zdot, a, tolerance)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def settle(tile: Tile, m: Arrays, w: Work, tolerance: float) -> None:
     """Remove the drift of a constrained model (nothing to do where sharing expressed every joint)."""
     if m.constraints.count > 0:

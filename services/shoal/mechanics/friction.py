@@ -21,7 +21,7 @@ class Frictions(NamedTuple):
     coefficient: Array
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def raw(frictions: Frictions) -> Frictions:
     """The same joints with pointers in place of arrays."""
     return Frictions(frictions.count, pointer(frictions.rows), pointer(frictions.coefficient))

@@ -36,7 +36,7 @@ def work_space(width: int, m: Arrays) -> GaussWork:
     return GaussWork(*(np.zeros(size * width) for size in sizes))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def raw(w: GaussWork) -> GaussWork:
     """The same room as pointers."""
     return GaussWork(pointer(w.jacobian), pointer(w.response), pointer(w.gram), pointer(w.multiplier), pointer(w.gap))

@@ -53,7 +53,7 @@ class Arrays(NamedTuple):
     constraints: Constraints
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def raw(m: Arrays) -> Arrays:
     """The same numbers with pointers in place of arrays, for use inside the time loop."""
     d = m.derived

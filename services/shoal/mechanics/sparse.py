@@ -68,7 +68,7 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
     return Pattern(size, *arrays), slot
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def raw(pattern: Pattern) -> Pattern:
     """The same pattern with pointers in place of arrays."""
     p = pattern

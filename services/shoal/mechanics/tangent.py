@@ -98,7 +98,7 @@ def _contributions(scene_model: Model, blocks: list[list[int]]) -> list[tuple[tu
     return found
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def raw(t: Tangent) -> Tangent:
     """The same lists with pointers in place of arrays."""
     return Tangent(

@@ -32,7 +32,7 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Leapfrog
     return Leapfrog(solver.rank_tolerance)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, h: float) -> None:
     """One step of h [s]."""
     end = m.unknowns * len(tile)

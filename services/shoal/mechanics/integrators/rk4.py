@@ -28,7 +28,7 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Rk4:
     return Rk4(solver.rank_tolerance)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy")
 def step(tile: Tile, scheme: Rk4, m: Arrays, w: Work, h: float) -> None:
     """One step of h [s]; w.a holds the acceleration at its beginning, and afterwards that at its end."""
     end = m.unknowns * len(tile)

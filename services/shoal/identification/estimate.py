@@ -1,0 +1,108 @@
+"""The answer: values with honest intervals, what is identifiable, and a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from shoal.trajectory import Array, plain
+
+
+class Verdict(StrEnum):
+    """What may be made of an estimate. Only the first two are answers."""
+
+    IDENTIFIED = "identified"
+    COMBINATION = "identified up to a combination"
+    AMBIGUOUS = "ambiguous"
+    REJECTED = "model rejected"
+    FAILED = "failed"
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the answer can be used."""
+        return self in (Verdict.IDENTIFIED, Verdict.COMBINATION)
+
+
+@dataclass(frozen=True)
+class Value:
+    """An estimated number: standard deviation from the residuals, 95 % interval with the model's own error in it.
+
+    model_bias: estimated shift by the discretisation error of the model, None if not computed
+    """
+
+    value: float
+    std: float
+    lower: float
+    upper: float
+    identifiable: bool
+    model_bias: float | None = None
+    at_bound: bool = False
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Result of an identification. fitness: mean squared deviation; rms: per observed thing (position or angle).
+
+    history: evaluations and the best fitness after them; iterations: (iteration, best, mean fitness)
+    """
+
+    problem: str
+    method: str
+    engine: str
+    seed: int
+    verdict: Verdict
+    message: str
+    parameters: dict[str, Value]
+    quantities: dict[str, Value]
+    combinations: list[str]
+    fitness: float
+    rms: float
+    evaluations: int
+    placements: int
+    wall_s: float
+    history: tuple[Array, Array]
+    iterations: list[tuple[int, float, float]]
+    minima: list[dict[str, float]]
+    residual_autocorrelation: float
+    model_error_rms: float | None
+    truth: dict[str, float]
+    data: str
+    model: dict[str, Any]
+    scene: Any
+    measurement: Any
+
+    @property
+    def status(self) -> str:
+        """`ok` if the answer can be used, else `failed`."""
+        return "ok" if self.verdict.trusted else "failed"
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal identify --json` prints."""
+
+        def values(table: dict[str, Value]) -> dict[str, Any]:
+            return {name: plain(vars(value)) for name, value in table.items()}
+
+        return {
+            "status": self.status,
+            "verdict": str(self.verdict),
+            "message": self.message,
+            "problem": self.problem,
+            "method": self.method,
+            "engine": self.engine,
+            "seed": self.seed,
+            "parameters": {**values(self.parameters), **values(self.quantities)},
+            "combinations": self.combinations,
+            "fitness": plain(self.fitness),
+            "rms": plain(self.rms),
+            "evaluations": self.evaluations,
+            "placements": self.placements,
+            "wall_s": self.wall_s,
+            "minima": plain(self.minima),
+            "residual_autocorrelation": plain(self.residual_autocorrelation),
+            "model_error_rms": plain(self.model_error_rms),
+            "truth": self.truth,
+            "data": self.data,
+            "iterations": plain([list(row) for row in self.iterations]),
+            "model": self.model,
+        }

@@ -1,0 +1,90 @@
+"""The forward model of a problem: parameters in, residuals out, every evaluation counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shoal.engines import Engine
+from shoal.errors import InputError
+from shoal.identification.measurement import Measurement, observe
+from shoal.identification.problem import Problem
+from shoal.scene import Scene
+from shoal.swarm import EvaluationCounter
+from shoal.trajectory import Array, Status
+
+Progress = Callable[[int, float, float], None]
+"""Called with (iteration, best fitness, mean fitness of the iteration)."""
+
+
+@dataclass
+class ForwardModel:
+    """Simulates parameter sets, one per lane, and compares them with the measurement.
+
+    `residuals` is wrapped by one counter, which every method shares. Fitness is the mean over the
+    samples of the sum of squared residuals (for a tip: the mean squared distance [m^2]).
+    """
+
+    problem: Problem
+    scene: Scene
+    engine: Engine
+    measurement: Measurement
+    counter: EvaluationCounter = field(init=False)
+    placements: int = field(init=False, default=0)
+    """Poses computed without simulating a motion."""
+
+    def __post_init__(self) -> None:
+        self.counter = EvaluationCounter(self._residuals, cost=self.cost)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters, in the order of the vectors."""
+        return tuple(self.problem.parameters)
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds, (parameters,)."""
+        return np.array([p.lower for p in self.problem.parameters.values()])
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds, (parameters,)."""
+        return np.array([p.upper for p in self.problem.parameters.values()])
+
+    def residuals(self, points: Array) -> Array:
+        """Model minus measurement, (points, samples * channels); inf where a simulation failed. Counted."""
+        return np.asarray(self.counter(points))
+
+    def fitness(self, points: Array) -> Array:
+        """Mean squared deviation of each point, (points,). Counted."""
+        return self.cost(self.residuals(points))
+
+    def cost(self, residuals: Array) -> Array:
+        """Fitness of residuals (points, samples * channels)."""
+        return np.asarray(np.sum(residuals**2, axis=1) / len(self.measurement.times))
+
+    def observe(self, points: Array, times: Array, scene: Scene | None = None) -> Array:
+        """Channels of the model at `times`, (points, samples, channels); nan where a simulation failed. Not counted."""
+        values = {p.path: points[:, k] for k, p in enumerate(self.problem.parameters.values())}
+        try:
+            trajectory = self.engine.simulate_many(scene or self.scene, values, times)
+        except InputError:
+            if len(points) == 1:
+                return np.full((1, len(times), len(self.measurement.channels)), np.nan)
+            # Some point is no scene at all (outside the box a mass may be negative): find out which.
+            return np.concatenate([self.observe(point[None], times, scene) for point in points])
+        seen = observe(trajectory, self.measurement.channels)
+        seen[[status is not Status.OK for status in trajectory.status]] = np.nan
+        return seen
+
+    def poses(self, points: Array) -> Array:
+        """Channels at time zero, (points, channels). No motion is simulated, so nothing is counted as an evaluation."""
+        self.placements += len(points)
+        return self.observe(points, np.zeros(1))[:, 0]
+
+    def _residuals(self, points: Array) -> Array:
+        seen = self.observe(points, self.measurement.times)
+        difference = (seen - self.measurement.values).reshape(len(points), -1)
+        return np.where(np.isfinite(difference), difference, np.inf)

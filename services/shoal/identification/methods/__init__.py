@@ -1,0 +1,29 @@
+"""The methods: one list. `auto` is the one a user gets who does not choose."""
+
+from __future__ import annotations
+
+from shoal.errors import InputError
+from shoal.identification.methods.casadi_shooting import casadi
+from shoal.identification.methods.least_squares import least_squares
+from shoal.identification.methods.outcome import Method, Outcome
+from shoal.identification.methods.swarms import afsa, iafsa, iafsa_printed, iafsa_unseeded
+
+METHODS: dict[str, Method] = {
+    "auto": least_squares,
+    "least-squares": least_squares,
+    "afsa": afsa,
+    "iafsa": iafsa,
+    "iafsa-unseeded": iafsa_unseeded,
+    "iafsa-printed": iafsa_printed,
+    "casadi": casadi,
+}
+
+
+def get_method(name: str) -> Method:
+    """The method of that name. Raises InputError."""
+    if name not in METHODS:
+        raise InputError(f"method: no method {name!r}; there are {', '.join(METHODS)}")
+    return METHODS[name]
+
+
+__all__ = ["METHODS", "Method", "Outcome", "get_method"]

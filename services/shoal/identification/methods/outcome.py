@@ -1,0 +1,29 @@
+"""What every identification method is given and what it returns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shoal.identification.forward import ForwardModel, Progress
+from shoal.trajectory import Array
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The best point a method found, (parameters,), its fitness, and how it got there.
+
+    iterations: rows of (iteration, best fitness, mean fitness of the iteration)
+    minima: other points where a local search ended, with their fitness
+    """
+
+    point: Array
+    fitness: float
+    iterations: list[tuple[int, float, float]]
+    message: str
+    minima: list[tuple[Array, float]] = field(default_factory=list)
+
+
+Method = Callable[[ForwardModel, np.random.Generator, Progress], Outcome]
