@@ -1,0 +1,70 @@
+"""One scene through several engines, and how far apart they come out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.errors import InputError
+from shoal.scene import Scene
+from shoal.trajectory import Array, Trajectory, plain
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Trajectories by engine; engines that cannot run the scene are in `refused` with their reason."""
+
+    scene: Scene
+    trajectories: dict[str, Trajectory]
+    refused: dict[str, str]
+
+    @property
+    def ok(self) -> bool:
+        """Whether at least two engines ran and every run may be believed."""
+        return len(self.trajectories) >= 2 and not self.refused and all(t.ok for t in self.trajectories.values())
+
+    def differences(self) -> list[dict[str, Any]]:
+        """Per pair of engines and marker: largest distance over all samples and distance at the end [m]."""
+        rows = []
+        for (one, a), (other, b) in combinations(self.trajectories.items(), 2):
+            for marker in self.scene.markers:
+                distance = np.linalg.norm(a.marker(marker) - b.marker(marker), axis=1)
+                rows.append(
+                    {
+                        "engines": [one, other],
+                        "marker": marker,
+                        "largest": plain(float(np.max(distance))),
+                        "final": plain(float(distance[-1])),
+                    }
+                )
+        return rows
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal compare --json` prints."""
+        return {
+            "status": "ok" if self.ok else "failed",
+            "scene": self.scene.name,
+            "engines": {name: trajectory.to_json() for name, trajectory in self.trajectories.items()},
+            "refused": self.refused,
+            "differences": self.differences(),
+        }
+
+
+def compare(scene: Scene, engines: Sequence[str], times: Sequence[float] | Array | None = None) -> Comparison:
+    """Run a scene on every engine. Raises InputError for an unknown engine, or if the scene suits none."""
+    chosen = {name: get_engine(name) for name in engines}
+    trajectories: dict[str, Trajectory] = {}
+    refused: dict[str, str] = {}
+    for name, engine in chosen.items():
+        try:
+            trajectories[name] = engine.simulate(scene, times)
+        except InputError as error:
+            refused[name] = str(error)
+    if not trajectories:
+        raise InputError(next(iter(refused.values())))
+    return Comparison(scene, trajectories, refused)

@@ -1,0 +1,75 @@
+"""A scene over a grid of values: where its markers are at one instant (the paper's Figure 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shoal.engines.contract import Engine
+from shoal.scene import Scene
+from shoal.trajectory import Array, Status, plain
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Marker positions and displacements from the start at `time` [s] over a grid.
+
+    grid: path -> value of every point, (points,); positions, displacements [m]: marker -> (points, 2)
+    """
+
+    scene: Scene
+    engine: str
+    time: float
+    grid: dict[str, Array]
+    positions: dict[str, Array]
+    displacements: dict[str, Array]
+    status: tuple[Status, ...]
+    wall_s: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether every point may be believed."""
+        return all(status is Status.OK for status in self.status)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The table: one row a point, with the values, positions, displacements and status."""
+        table = []
+        for k, status in enumerate(self.status):
+            row: dict[str, Any] = {path: float(values[k]) for path, values in self.grid.items()}
+            for marker, positions in self.positions.items():
+                moved = self.displacements[marker]
+                row |= {f"{marker}.x": positions[k, 0], f"{marker}.y": positions[k, 1]}
+                row |= {f"{marker}.dx": moved[k, 0], f"{marker}.dy": moved[k, 1]}
+            table.append(plain({**row, "status": str(status)}))
+        return table
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal sweep --json` prints."""
+        return {
+            "status": "ok" if self.ok else "failed",
+            "scene": self.scene.name,
+            "engine": self.engine,
+            "time": self.time,
+            "rows": self.rows(),
+            "wall_s": self.wall_s,
+        }
+
+
+def sweep(scene: Scene, vary: Mapping[str, Array], engine: Engine, time: float | None = None) -> Sweep:
+    """Simulate the full grid of the values in `vary` (path -> values). Raises InputError."""
+    instant = scene.solver.duration if time is None else time
+    axes = np.meshgrid(*vary.values(), indexing="ij")
+    grid = {path: axis.ravel() for path, axis in zip(vary, axes, strict=True)}
+    # Time zero as a second instant gives the start, from which displacements count.
+    times = np.array([0.0, instant]) if instant > 0 else np.array([0.0])
+    trajectory = engine.simulate_many(scene, grid, times)
+    positions = {name: trajectory.points[-1, k].T for k, name in enumerate(trajectory.markers)}
+    displacements = {
+        name: positions[name] - trajectory.points[0, k].T for k, name in enumerate(trajectory.markers)
+    }
+    return Sweep(
+        scene, trajectory.engine, instant, grid, positions, displacements, trajectory.status, trajectory.wall_s
+    )
