@@ -150,6 +150,12 @@ def project(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: 
             break
         prepare(tile, m, m.mass_factor, m.pattern, q, w)
         apply(tile, m, w, tolerance, q)
+    project_rates(tile, m, w, q, v, tolerance)
+
+
+@njit(cache=True, error_model="numpy")
+def project_rates(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: float) -> None:
+    """Move v back onto C_q v = 0 by the smallest change in the mass metric."""
     prepare(tile, m, m.mass_factor, m.pattern, q, w)
     for k in range(m.constraints.count):
         clear(tile, w.gap, k)

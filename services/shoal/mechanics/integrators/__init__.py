@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from shoal.mechanics.integrators import leapfrog, rk4
+from shoal.mechanics.integrators import generalized_alpha, leapfrog, rk4
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
 from shoal.mechanics.tile import Tile
@@ -13,6 +13,7 @@ from shoal.scene import Solver
 INTEGRATORS: dict[str, Any] = {
     "leapfrog": leapfrog,
     "rk4": rk4,
+    "generalized-alpha": generalized_alpha,
 }
 
 
