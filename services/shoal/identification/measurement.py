@@ -92,6 +92,10 @@ def _recorded(problem: Problem, source: FileSource, path: Path) -> Measurement:
         )
     chosen = np.flatnonzero(inside)[:: source.every]
     values = np.column_stack([c.offset + c.scale * columns[c.column][chosen] for c in problem.channels])
+    for k, channel in enumerate(problem.channels):
+        if channel.quantity == "angle":
+            # Whole turns before the window say nothing about the motion in it.
+            values[:, k] -= 2 * np.pi * np.round(values[0, k] / (2 * np.pi))
     return Measurement(
         times=times[chosen] - times[chosen[0]],
         channels=tuple(problem.channels),

@@ -113,20 +113,17 @@ class Scene(Record):
 
     def with_values(self, values: Mapping[str, Any]) -> Scene:
         """This scene with fields replaced, by dotted path (`bodies.OA.length`). Raises InputError."""
-        data = self.model_dump()
+        data = self.model_dump(mode="json")
         for path, value in values.items():
             place: Any = data
             *parents, leaf = path.split(".")
             for depth, part in enumerate(parents):
                 if parents[: depth + 1] == ["initial", part] and part in self.bodies:
                     place.setdefault(part, {})
-                if not isinstance(place, dict) or part not in place:
-                    raise _unknown(path, ".".join(parents[:depth]), place)
-                place = place[part]
-            fields = InitialState.model_fields if parents[:1] == ["initial"] else place
-            if not isinstance(place, dict) or leaf not in fields:
-                raise _unknown(path, ".".join(parents), place)
-            place[leaf] = value
+                place = place[_key(place, part, path, ".".join(parents[:depth]))]
+            if parents[:1] == ["initial"] and leaf in InitialState.model_fields:
+                place.setdefault(leaf, None)
+            place[_key(place, leaf, path, ".".join(parents))] = value
         return Scene.parse(data, self.name)
 
     def with_lanes(self, values: Mapping[str, npt.NDArray[np.float64]]) -> Scene:
@@ -150,6 +147,8 @@ class Scene(Record):
                 place = place[part]
             elif isinstance(place, Record) and part in type(place).model_fields:
                 place = getattr(place, part)
+            elif isinstance(place, tuple):
+                place = place[_key(place, part, path, "")]
             else:
                 raise _unknown(path, "", place)
         return place
@@ -162,6 +161,8 @@ class Scene(Record):
 
 def _replace(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any:
     head, *rest = path
+    if isinstance(place, tuple):
+        return tuple(lanes if k == int(head) else entry for k, entry in enumerate(place))
     if isinstance(place, Mapping):
         inner = place.get(head, InitialState())
         return {**place, head: _replace(inner, rest, lanes)}
@@ -169,8 +170,19 @@ def _replace(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any
     return place.model_copy(update={head: value})
 
 
+def _key(place: Any, part: str, path: str, parent: str) -> Any:
+    """The key of a mapping, or the index of a vector's component. Raises InputError."""
+    if isinstance(place, dict) and part in place:
+        return part
+    if isinstance(place, list | tuple) and part.isdecimal() and int(part) < len(place):
+        return int(part)
+    raise _unknown(path, parent, place)
+
+
 def _unknown(path: str, parent: str, place: Any) -> InputError:
     if isinstance(place, Record):
         place = type(place).model_fields
+    if isinstance(place, list | tuple):
+        place = {str(k): entry for k, entry in enumerate(place)}
     known = ", ".join(place) if isinstance(place, Mapping) else "nothing below it"
     return InputError(f"{path}: no such field; {parent or 'the scene'} has {known}")

@@ -19,6 +19,10 @@ from shoal.trajectory import Array
 DIFFERENCE = 1e-6
 """Step of the finite differences, relative to the size of a parameter (at least 1e-3 of its range)."""
 _ITERATIONS = 60
+_SMALL_STEP = 1e-9
+"""Relative to the size of a parameter; a smaller step is the end."""
+_SMALL_GAIN = 1e-8
+"""A step that promises to lower the fitness by less than this fraction is the end."""
 _STARTS = 8
 
 
@@ -35,60 +39,77 @@ class Descent:
 
 
 def least_squares(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
-    """Descend from every start, best start first; a start whose descent can only end elsewhere is still descended."""
+    """Descend from every start, the best start first.
+
+    Later starts are rivals: a rival is given up when after two steps it is still more than a hundred times
+    worse than the best answer, and is then listed with the fitness it had.
+    """
     starts = starting_points(model)[:_STARTS]
+    first = [linearise(model, start) for start in starts]
+    order = np.argsort([_cost(residual) for residual, _ in first], kind="stable")
     descents: list[Descent] = []
     rows: list[tuple[int, float, float]] = []
-    for start in starts:
-        descent = descend(model, start, progress, first=len(rows))
+    for k in order:
+        hopeless = 100 * min((d.fitness for d in descents), default=np.inf)
+        descent = _descend(model, starts[k], *first[k], progress, len(rows), hopeless)
         descents.append(descent)
         best_before = rows[-1][1] if rows else np.inf
-        rows += [(k, min(best, best_before), mean) for k, best, mean in descent.rows]
+        rows += [(i, min(best, best_before), mean) for i, best, mean in descent.rows]
     best = min(descents, key=lambda d: d.fitness)
     others = [(d.point, d.fitness) for d in descents if d is not best]
-    message = "" if best.converged else f"no convergence after {_ITERATIONS} iterations"
+    message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
     return Outcome(best.point, best.fitness, rows, message, others)
 
 
-def descend(model: ForwardModel, start: Array, progress: Progress, first: int = 0) -> Descent:
+def descend(model: ForwardModel, start: Array, progress: Progress) -> Descent:
     """Minimise the squared residuals from one start, within the bounds."""
-    point = start
-    residual, jacobian = linearise(model, point)
-    cost = float(residual @ residual)
+    return _descend(model, start, *linearise(model, start), progress, 0, np.inf)
+
+
+def _descend(
+    model: ForwardModel,
+    point: Array,
+    residual: Array,
+    jacobian: Array,
+    progress: Progress,
+    first: int,
+    hopeless: float,
+) -> Descent:
     samples = len(model.measurement.times)
+    cost = _cost(residual)
     scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
     damping, growth = 1e-6, 2.0
     rows = [(first, cost / samples, cost / samples)]
     progress(*rows[-1])
     converged = not np.isfinite(cost)
     for iteration in range(1, _ITERATIONS):
-        if converged:
+        if converged or (iteration > 2 and cost / samples > hopeless):
             break
         scale = np.maximum(scale, np.linalg.norm(jacobian, axis=0))
-        step = _step(jacobian, residual, damping, scale)
-        trial = np.clip(point + step, model.lower, model.upper)
+        trial = np.clip(point + _step(jacobian, residual, damping, scale), model.lower, model.upper)
         moved = trial - point
-        if np.max(np.abs(moved) / _sizes(model, point)) < 1e-12:
+        predicted = cost - _cost(residual + jacobian @ moved)
+        if np.max(np.abs(moved) / _sizes(model, point)) < _SMALL_STEP or predicted < _SMALL_GAIN * cost:
             converged = True
             break
         trial_residual, trial_jacobian = linearise(model, trial)
-        trial_cost = float(trial_residual @ trial_residual)
-        predicted = cost - float(np.sum((residual + jacobian @ moved) ** 2))
+        trial_cost = _cost(trial_residual)
+        rows.append((first + iteration, min(cost, trial_cost) / samples, trial_cost / samples))
+        progress(*rows[-1])
         if trial_cost < cost:
-            ratio = (cost - trial_cost) / max(predicted, 1e-300)
-            small = np.max(np.abs(moved) / _sizes(model, trial)) < 1e-10 or cost - trial_cost < 1e-12 * cost
+            ratio = (cost - trial_cost) / predicted
             point, residual, jacobian, cost = trial, trial_residual, trial_jacobian, trial_cost
-            damping *= max(1 / 3, 1 - (2 * ratio - 1) ** 3) if ratio < 1 else 0.1
+            damping *= max(0.1, 1 - (2 * ratio - 1) ** 3)
             growth = 2.0
-            converged = bool(small) or cost / samples < 1e-24
         else:
-            # Nothing left to gain: what the model predicts is below the round-off of the cost.
-            converged = predicted < 1e-10 * cost or damping > 1e12
             damping *= growth
             growth *= 2
-        rows.append((first + iteration, cost / samples, trial_cost / samples))
-        progress(*rows[-1])
+            converged = damping > 1e12
     return Descent(point, residual, jacobian, cost / samples, rows, converged and bool(np.isfinite(cost)))
+
+
+def _cost(residual: Array) -> float:
+    return float(residual @ residual) if np.all(np.isfinite(residual)) else float("inf")
 
 
 def linearise(model: ForwardModel, point: Array) -> tuple[Array, Array]:

@@ -1,0 +1,282 @@
+"""The command line. Every command calls one plain function; heavy imports wait until they are needed."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import click
+
+from shoal.errors import InputError, ShoalError
+
+EXIT_UNTRUSTED = 3
+
+
+class Program(click.Group):
+    """Turns every error a user is meant to read into one line and its exit status."""
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run the program and leave with its exit status."""
+        try:
+            sys.exit(super().main(*args, **{**kwargs, "standalone_mode": False}))
+        except click.exceptions.NoArgsIsHelpError as error:
+            click.echo(error.format_message())
+            sys.exit(InputError.exit_status)
+        except (ShoalError, click.ClickException) as error:
+            message = error.format_message() if isinstance(error, click.ClickException) else str(error)
+            click.echo(f"shoal: {message}", err=True)
+            sys.exit(getattr(error, "exit_status", InputError.exit_status))
+        except click.Abort:
+            click.echo("shoal: stopped", err=True)
+            sys.exit(130)
+
+
+def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, str]:
+    """PATH=VALUE pairs as a mapping."""
+    found = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not (key and equals and value):
+            raise click.BadParameter(f"{pair!r} is not PATH=VALUE")
+        found[key.strip()] = value.strip()
+    return found
+
+
+def times_list(context: click.Context, parameter: click.Parameter, text: str | None) -> list[float] | None:
+    """T,T,... as numbers."""
+    if text is None:
+        return None
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise click.BadParameter(f"{text!r} is not a list of times in s, such as 0.1,0.2,0.5") from None
+
+
+Command = Callable[..., Any]
+
+
+def option_set(command: Command) -> Command:
+    """--set PATH=VALUE."""
+    text = "Set any field of the scene, such as bodies.OA.elements=16, solver.step=1e-5 (repeatable)."
+    return click.option("--set", "values", multiple=True, metavar="PATH=VALUE", callback=key_value, help=text)(command)
+
+
+def option_json(command: Command) -> Command:
+    """--json."""
+    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")(command)
+
+
+def option_engine(command: Command) -> Command:
+    """--engine."""
+    return click.option("--engine", default="gauss", show_default=True, help="gauss, exudyn, exudyn-ge or casadi.")(
+        command
+    )
+
+
+@click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="shoal")
+def main() -> None:
+    """Simulate and identify planar rigid-flexible machines, and check the answers against other engines.
+
+    SCENE and PROBLEM are a built-in name (see `shoal scenes`) or a YAML file.
+    """
+
+
+@main.command()
+@click.argument("name", required=False)
+def scenes(name: str | None) -> None:
+    """List the built-in scenes and problems, or print one as YAML to start your own from."""
+    from shoal import terminal
+    from shoal.identification.problem import load_problem, problem_library, problem_names
+    from shoal.scene.load import load_scene, scene_library, scene_names
+
+    if name is None:
+        terminal.listing("scenes", {n: load_scene(n).description for n in scene_names()})
+        terminal.listing("problems", {n: load_problem(n).description for n in problem_names()})
+        return
+    for folder, known in ((scene_library(), scene_names()), (problem_library(), problem_names())):
+        if name in known:
+            click.echo((folder / f"{name}.yaml").read_text(encoding="utf-8"), nl=False)
+            return
+    raise InputError(f"{name}: no such scene or problem; there are {', '.join([*scene_names(), *problem_names()])}")
+
+
+@main.command()
+@click.argument("scene")
+@option_engine
+@option_set
+@click.option("--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s].")
+@option_json
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .csv, .json or .png.")
+def simulate(
+    scene: str, engine: str, values: dict[str, str], times: list[float] | None, as_json: bool, out: Path | None
+) -> None:
+    """Simulate SCENE and report where its markers go."""
+    from shoal import terminal
+    from shoal.engines import get_engine
+    from shoal.scene import load_scene
+
+    terminal.check_output(out, (".csv", ".json", ".png"))
+    chosen = get_engine(engine)
+    wanted = load_scene(scene).with_values(values)
+    with terminal.working(f"simulating {wanted.name} with {engine}"):
+        trajectory = chosen.simulate(wanted, times)
+    if out is not None:
+        terminal.write_trajectory(trajectory, wanted, out)
+    terminal.show(trajectory.to_json(), as_json, lambda: terminal.trajectory_table(trajectory, wanted))
+    _finish(trajectory.ok, trajectory.message)
+
+
+@main.command()
+@click.argument("problem")
+@click.option("--data", metavar="CSV", help="A recording, instead of the problem's own data.")
+@click.option("--method", help="auto, least-squares, iafsa, iafsa-printed, iafsa-unseeded, afsa or casadi.")
+@click.option("--seed", default=0, show_default=True, help="Seed of the random numbers.")
+@option_engine
+@option_set
+@option_json
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .json or .png.")
+def identify(
+    problem: str,
+    data: str | None,
+    method: str | None,
+    seed: int,
+    engine: str,
+    values: dict[str, str],
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Find the parameters of PROBLEM from measured motion, with intervals and a verdict."""
+    from shoal import terminal
+    from shoal.identification import identify, load_problem
+
+    terminal.check_output(out, (".json", ".png"))
+    wanted = load_problem(problem)
+    with terminal.fitness_progress(wanted.name) as progress:
+        estimate = identify(
+            wanted, method=method, data=data, engine=engine, values=values, seed=seed, progress=progress
+        )
+    if out is not None:
+        terminal.write_estimate(estimate, out)
+    terminal.show(estimate.to_json(), as_json, lambda: terminal.estimate_table(estimate))
+    _finish(estimate.verdict.trusted, f"{estimate.verdict}: {estimate.message}")
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--vary", "vary", multiple=True, required=True, metavar="PATH=LOW:HIGH:COUNT", callback=key_value)
+@option_engine
+@option_set
+@click.option("--at", "time", type=float, metavar="T", help="Instant [s]; the scene's duration by default.")
+@option_json
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .csv, .json or .png.")
+def sweep(
+    scene: str,
+    vary: dict[str, str],
+    engine: str,
+    values: dict[str, str],
+    time: float | None,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Marker positions of SCENE at one instant over a grid of values (the paper's Figure 4)."""
+    from shoal import terminal
+    from shoal.engines import get_engine
+    from shoal.engines.sweep import sweep
+    from shoal.scene import load_scene
+
+    terminal.check_output(out, (".csv", ".json", ".png"))
+    wanted = load_scene(scene).with_values(values)
+    grid = {path: terminal.axis(path, text) for path, text in vary.items()}
+    with terminal.working(f"sweeping {wanted.name}"):
+        result = sweep(wanted, grid, get_engine(engine), time)
+    if out is not None:
+        terminal.write_sweep(result, out)
+    terminal.show(result.to_json(), as_json, lambda: terminal.sweep_table(result))
+    _finish(result.ok, "some points failed; their status is in the table")
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--engines", default="gauss,exudyn,casadi", show_default=True, help="Names, separated by commas.")
+@option_set
+@click.option("--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s].")
+@option_json
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .json or .png.")
+def compare(
+    scene: str,
+    engines: str,
+    values: dict[str, str],
+    times: list[float] | None,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Run SCENE on several engines and show how far apart they come out."""
+    from shoal import terminal
+    from shoal.engines.compare import compare
+    from shoal.scene import load_scene
+
+    terminal.check_output(out, (".json", ".png"))
+    wanted = load_scene(scene).with_values(values)
+    with terminal.working(f"running {wanted.name} on {engines}"):
+        comparison = compare(wanted, [name.strip() for name in engines.split(",")], times)
+    if out is not None:
+        terminal.write_comparison(comparison, out)
+    terminal.show(comparison.to_json(), as_json, lambda: terminal.comparison_table(comparison))
+    reasons = [*comparison.refused.values(), *(t.message for t in comparison.trajectories.values() if t.message)]
+    _finish(comparison.ok, reasons[0] if reasons else "fewer than two engines ran")
+
+
+@main.command()
+@click.argument("flow")
+@click.option("--param", "parameters", multiple=True, metavar="K=V", callback=key_value, help="JSON or plain text.")
+@option_json
+def run(flow: str, parameters: dict[str, str], as_json: bool) -> None:
+    """Run a Prefect FLOW (forward, identify, compare, sweep) and log it to MLflow."""
+    _finish(bool(_pipeline("shoal_flows.run").main(flow, parameters, as_json)), "the flow did not end well")
+
+
+@main.command()
+@click.option("--host", default="127.0.0.1", show_default=True)
+@click.option("--port", default=5000, show_default=True)
+def ui(host: str, port: int) -> None:
+    """Serve the MLflow dashboard of all runs until Ctrl-C."""
+    _pipeline("shoal_flows.ui").ui(host, port)
+
+
+@main.command()
+def demo() -> None:
+    """The main job: identify both cases of the paper, compare the engines, write one report."""
+    sys.exit(_pipeline("shoal_flows.demo").main())
+
+
+@main.command()
+@option_json
+def doctor(as_json: bool) -> None:
+    """Check the installation: engines, compiled kernels, pipeline, folders; say what is wrong."""
+    from shoal import doctor, terminal
+
+    checks = doctor.examine()
+    report = {"status": "ok" if all(c.ok for c in checks) else "failed", "checks": [vars(c) for c in checks]}
+    terminal.show(report, as_json, lambda: terminal.doctor_table(checks))
+    _finish(all(check.ok for check in checks), "something is missing; see the table")
+
+
+def _pipeline(module: str) -> Any:
+    """A module of the pipeline, which the library itself does not depend on. Raises InputError."""
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] in ("prefect", "mlflow", "shoal_flows"):
+            raise InputError(f"{error.name} is not installed; install shoal with its extra 'pipeline'") from None
+        raise
+
+
+def _finish(trusted: bool, reason: str) -> None:
+    """Exit status 0 only for an answer that can be trusted, else 3 with the reason."""
+    if not trusted:
+        click.echo(f"shoal: {reason}", err=True)
+        sys.exit(EXIT_UNTRUSTED)

@@ -1,0 +1,244 @@
+"""What a person sees in a terminal: tables of 80 columns, progress on standard error, files on request."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from shoal.errors import InputError
+from shoal.trajectory import Array, plain
+
+if TYPE_CHECKING:
+    from shoal.doctor import Check
+    from shoal.engines.compare import Comparison
+    from shoal.engines.sweep import Sweep
+    from shoal.identification import Estimate
+    from shoal.scene import Scene
+    from shoal.trajectory import Trajectory
+
+out = Console(highlight=False)
+err = Console(stderr=True, highlight=False)
+
+
+def show(data: Mapping[str, Any], as_json: bool, table: Callable[[], None]) -> None:
+    """One JSON object, or the table."""
+    if as_json:
+        print(json.dumps(plain(data), allow_nan=False))  # noqa: T201 - this is the output
+    else:
+        table()
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """A spinner on a terminal; nothing in a log file."""
+    with _progress() as progress:
+        progress.add_task(what, total=None)
+        yield
+
+
+@contextmanager
+def fitness_progress(what: str) -> Iterator[Callable[[int, float, float], None]]:
+    """A line that follows the best fitness of a running search."""
+    with _progress() as progress:
+        task = progress.add_task(f"{what}: preparing the data", total=None)
+
+        def note(iteration: int, best: float, mean: float) -> None:
+            progress.update(task, description=f"{what}: iteration {iteration}, best fitness {best:.3e}")
+
+        yield note
+
+
+def _progress() -> Progress:
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    return Progress(*columns, console=err, transient=True, disable=not err.is_terminal)
+
+
+def _table(title: str, *headings: str) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if index == 0 else "right", overflow="fold")
+    return table
+
+
+def listing(title: str, items: Mapping[str, str]) -> None:
+    """Names with their descriptions."""
+    table = Table(title=title, title_justify="left", title_style="bold", box=None, show_header=False, pad_edge=False)
+    table.add_column(no_wrap=True)
+    table.add_column()
+    for name, text in items.items():
+        table.add_row(name, text)
+    out.print(table)
+    out.print()
+
+
+def trajectory_table(trajectory: Trajectory, scene: Scene) -> None:
+    """Where the markers end, and the evidence."""
+    table = _table(f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s", "marker", "x [m]", "y [m]")
+    for name in trajectory.markers:
+        x, y = trajectory.marker(name)[-1]
+        table.add_row(name, f"{x:.9f}", f"{y:.9f}")
+    out.print(table)
+    out.print(
+        f"status {trajectory.status[0]}; energy off by {trajectory.energy_drift[0]:.1e}, constraints by "
+        f"{trajectory.constraint_drift[0]:.1e}; {trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms"
+    )
+
+
+def estimate_table(estimate: Estimate) -> None:
+    """Values with intervals, fit, effort and verdict."""
+    table = _table(
+        f"{estimate.problem}, {estimate.method}", "parameter", "value", "std", "95 % interval", "identifiable"
+    )
+    for name, value in {**estimate.parameters, **estimate.quantities}.items():
+        known = "yes" if value.identifiable else "at bound" if value.at_bound else "only in a ratio"
+        interval = f"{value.lower:.6g} to {value.upper:.6g}" if value.identifiable else "-"
+        table.add_row(name, f"{value.value:.8g}", f"{value.std:.1e}" if value.identifiable else "-", interval, known)
+    out.print(table)
+    out.print(f"data: {estimate.data}")
+    out.print(
+        f"fitness {estimate.fitness:.4e}, RMS {estimate.rms:.3e}; {estimate.evaluations} evaluations "
+        f"in {estimate.wall_s:.2f} s"
+    )
+    if estimate.truth:
+        errors = (f"{name} {estimate.parameters[name].value - true:+.2e}" for name, true in estimate.truth.items())
+        out.print(f"against the truth of the computed data: {', '.join(errors)}")
+    if estimate.model_error_rms is not None:
+        out.print(f"the mesh of the model is off by {estimate.model_error_rms:.1e} m (RMS); the intervals include it")
+    for sentence in estimate.combinations:
+        out.print(sentence)
+    for other in estimate.minima:
+        values = ", ".join(f"{name} {value:.4g}" for name, value in other.items())
+        out.print(f"another minimum: {values}")
+    out.print(f"verdict: {estimate.verdict}" + (f" ({estimate.message})" if estimate.message else ""))
+
+
+def sweep_table(sweep: Sweep) -> None:
+    """Displacements of every marker over the grid."""
+    markers = list(sweep.positions)
+    last = markers[-1]
+    table = _table(
+        f"{sweep.scene.name}: displacement of {last} after {sweep.time:g} s",
+        *sweep.grid,
+        f"{last}.dx [m]",
+        f"{last}.dy [m]",
+        "status",
+    )
+    for row in sweep.rows():
+        numbers = [f"{row[path]:.6g}" for path in sweep.grid]
+        moved = [row[f"{last}.dx"], row[f"{last}.dy"]]
+        table.add_row(*numbers, *("-" if m is None else f"{m:.6f}" for m in moved), row["status"])
+    out.print(table)
+
+
+def comparison_table(comparison: Comparison) -> None:
+    """Ends by engine, then differences by pair."""
+    last = list(comparison.scene.markers)[-1]
+    table = _table(f"{comparison.scene.name}: {last} at the end", "engine", "x [m]", "y [m]", "energy", "time", "status")
+    for name, trajectory in comparison.trajectories.items():
+        x, y = trajectory.marker(last)[-1]
+        time = f"{trajectory.wall_s * 1e3:.0f} ms"
+        table.add_row(
+            name, f"{x:.7f}", f"{y:.7f}", f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0])
+        )
+    for name, reason in comparison.refused.items():
+        table.add_row(name, "-", "-", "-", "-", reason)
+    out.print(table)
+    table = _table("largest distance over all samples", "engines", "marker", "largest [m]", "final [m]")
+    for row in comparison.differences():
+        distances = ("-" if row[key] is None else f"{row[key]:.2e}" for key in ("largest", "final"))
+        table.add_row(" - ".join(row["engines"]), row["marker"], *distances)
+    out.print(table)
+
+
+def doctor_table(checks: list[Check]) -> None:
+    """What was looked at, and what to do."""
+    table = _table("shoal doctor", "check", "", "found", "what to do")
+    for check in checks:
+        table.add_row(check.name, "ok" if check.ok else "FAILED", check.found, check.advice)
+    table.columns[2].justify = table.columns[3].justify = "left"
+    out.print(table)
+
+
+def axis(path: str, text: str) -> Array:
+    """LOW:HIGH:COUNT as values. Raises InputError."""
+    try:
+        low, high, count = text.split(":")
+        first, last, number = float(low), float(high), int(count)
+    except ValueError:
+        raise InputError(f"vary: {path}={text} is not PATH=LOW:HIGH:COUNT, such as initial.OA.angle=0:1.5:31") from None
+    if not (1 <= number <= 1_000_000) or not np.isfinite([first, last]).all():
+        raise InputError(f"vary: {path}={text}: COUNT is between 1 and 1000000, LOW and HIGH are finite")
+    return np.linspace(first, last, number)
+
+
+def check_output(path: Path | None, endings: tuple[str, ...]) -> None:
+    """Refuse a file that could not be written, before anything is computed. Raises InputError."""
+    if path is None:
+        return
+    if path.suffix not in endings:
+        raise InputError(f"out: {path} ends in {path.suffix or 'nothing'}; use one of {', '.join(endings)}")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"out: the folder {path.absolute().parent} does not exist")
+
+
+def write_trajectory(trajectory: Trajectory, scene: Scene, path: Path) -> None:
+    """One lane as CSV, JSON or picture."""
+    if path.suffix == ".csv":
+        columns, table = ["t"], [trajectory.times]
+        for name in trajectory.markers:
+            columns += [f"{name}.x", f"{name}.y", f"{name}.angle"]
+            table += [*trajectory.marker(name).T, trajectory.angle(name)]
+        np.savetxt(path, np.column_stack(table), delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
+    elif path.suffix == ".json":
+        _write_json(trajectory.to_json(), path)
+    else:
+        from shoal import pictures
+
+        pictures.trajectory(trajectory, scene, path)
+
+
+def write_estimate(estimate: Estimate, path: Path) -> None:
+    """An estimate as JSON or picture."""
+    if path.suffix == ".json":
+        _write_json(estimate.to_json(), path)
+    else:
+        from shoal import pictures
+
+        pictures.estimate(estimate, path)
+
+
+def write_sweep(sweep: Sweep, path: Path) -> None:
+    """A sweep as CSV, JSON or picture."""
+    if path.suffix == ".csv":
+        rows = sweep.rows()
+        lines = [",".join(rows[0]), *(",".join("" if v is None else str(v) for v in row.values()) for row in rows)]
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    elif path.suffix == ".json":
+        _write_json(sweep.to_json(), path)
+    else:
+        from shoal import pictures
+
+        pictures.sweep(sweep, path)
+
+
+def write_comparison(comparison: Comparison, path: Path) -> None:
+    """A comparison as JSON or picture."""
+    if path.suffix == ".json":
+        _write_json(comparison.to_json(), path)
+    else:
+        from shoal import pictures
+
+        pictures.comparison(comparison, path)
+
+
+def _write_json(data: Mapping[str, Any], path: Path) -> None:
+    path.write_text(json.dumps(plain(data), allow_nan=False, indent=1), encoding="utf-8")

@@ -1,0 +1,208 @@
+"""Every kind of bad input is refused in one line that names the field."""
+
+from __future__ import annotations
+
+import copy
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from shoal.errors import InputError
+from shoal.scene import Scene, load_scene
+
+CABLES = load_scene("flexible-double-pendulum").model_dump()
+CABLE_SCENE = load_scene("flexible-double-pendulum")
+GONE = object()
+
+
+def _changed(*changes: tuple[str, Any]) -> dict[str, Any]:
+    """The flexible double pendulum as data, with fields set, added or (GONE) left out by dotted path."""
+    data = copy.deepcopy(CABLES)
+    for path, value in changes:
+        *parents, leaf = path.split(".")
+        place = data
+        for part in parents:
+            place = place[part]
+        if value is GONE:
+            del place[leaf]
+        else:
+            place[leaf] = value
+    return data
+
+
+ROD = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 1000.0}
+SELF = {"kind": "revolute", "first": {"body": "OA"}, "second": {"body": "OA", "point": "end"}}
+GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "ground", "point": [1.0, 0.0]}}
+
+
+@pytest.mark.parametrize(
+    ("change", "named", "why"),
+    [
+        pytest.param(("bodies.OA.density", -5540.0), "bodies.OA.density", "greater than 0", id="negative-density"),
+        pytest.param(("bodies.OA.length", 0.0), "bodies.OA.length", "greater than 0", id="zero-length"),
+        pytest.param(("bodies.OA.height", 1.5), "bodies.OA", "height 1.5 m is larger than the length 1 m", id="thick"),
+        pytest.param(("bodies.AB.width", 2.5), "bodies.AB", "width 2.5 m is larger than the length 2 m", id="wide"),
+        pytest.param(("bodies.OA.colour", "red"), "bodies.OA.colour", "Extra inputs", id="unknown-body-field"),
+        pytest.param(("colour", "red"), "colour", "Extra inputs", id="unknown-scene-field"),
+        pytest.param(("solver.speed", 1), "solver.speed", "Extra inputs", id="unknown-solver-field"),
+        pytest.param(("joints.A.damping", 1), "joints.A.damping", "Extra inputs", id="unknown-joint-field"),
+        pytest.param(("bodies.OA.length", math.nan), "bodies.OA.length", "finite", id="nan"),
+        pytest.param(("gravity", [0.0, math.inf]), "gravity.1", "finite", id="infinite-gravity"),
+        pytest.param(("gravity", [0.0]), "gravity", "missing|required", id="one-component-of-gravity"),
+        pytest.param(("bodies.OA.length", "long"), "bodies.OA.length", "number", id="text-for-a-number"),
+        pytest.param(("bodies.OA.length", GONE), "bodies.OA.length", "required", id="missing-length"),
+        pytest.param(("bodies.OA.element", "brick"), "bodies.OA.element", "'rigid' or 'ancf-cable'", id="element"),
+        pytest.param(("bodies.OA.elements", 0), "bodies.OA.elements", "greater than or equal to 1", id="no-elements"),
+        pytest.param(("bodies.OA.elements", 2.5), "bodies.OA.elements", "integer", id="half-an-element"),
+        pytest.param(("bodies.OA.quadrature", "half"), "bodies.OA.quadrature", "'full' or 'reduced'", id="quadrature"),
+        pytest.param(("bodies.OA.youngs_modulus", GONE), "bodies.OA", "youngs_modulus is missing", id="no-modulus"),
+        pytest.param(("bodies.OA.poisson_ratio", 0.7), "bodies.OA.poisson_ratio", "0.5", id="poisson"),
+        pytest.param(("bodies.OA.kind", "blob"), "bodies.OA", "'rod', 'rigid-body'", id="unknown-kind-of-body"),
+        pytest.param(("bodies.OA.kind", GONE), "bodies.OA", "discriminator 'kind'", id="no-kind-of-body"),
+        pytest.param(("bodies.ground", ROD), "bodies.ground", "fixed frame", id="a-body-called-ground"),
+        pytest.param(("bodies", {}), "bodies", "at least 1", id="no-bodies"),
+        pytest.param(("bodies.2nd", ROD), "bodies.2nd", "pattern", id="bad-name"),
+        pytest.param(("bodies.C", ROD), "bodies.C", "no chain of joints connects it to the ground", id="disconnected"),
+        pytest.param(("joints.O", GONE), "bodies.OA", "no chain of joints", id="chain-that-hangs-on-nothing"),
+        pytest.param(("joints.A.second.body", "XY"), "joints.A.second.body", "no body 'XY'", id="missing-body"),
+        pytest.param(("joints.A.first.point", "tip"), "joints.A.first.point", "no point 'tip'", id="missing-point"),
+        pytest.param(("joints.A", SELF), "joints.A", "joins 'OA' to itself", id="joint-with-itself"),
+        pytest.param(("joints.A", GROUNDS), "joints.A", "joins 'ground' to itself", id="ground-to-ground"),
+        pytest.param(("joints.O.first.point", "start"), "joints.O.first.point", r"\[x, y\]", id="name-on-the-ground"),
+        pytest.param(("joints.A.first.point", [0.5, 0.01]), "joints.A.first.point", "axis of OA", id="joint-off-axis"),
+        pytest.param(("joints.A.friction", -0.1), "joints.A.friction", "greater than or equal to 0", id="friction"),
+        pytest.param(("joints.A.kind", "weld"), "joints.A.kind", "'revolute'", id="unknown-joint"),
+        pytest.param(("markers.B.point", [1.0, 0.01]), "markers.B.point", "axis of AB", id="marker-off-axis"),
+        pytest.param(("markers.B.point", [2.1, 0.0]), "markers.B.point", "0 <= s <= 2", id="marker-past-the-end"),
+        pytest.param(("markers.B.body", "ground"), "markers.B.body", "not on the ground", id="marker-on-the-ground"),
+        pytest.param(("markers.B.body", "XY"), "markers.B.body", "no body 'XY'", id="marker-on-nothing"),
+        pytest.param(("markers", {}), "markers", "at least 1", id="no-markers"),
+        pytest.param(("initial.OA.angle", 45.0), "initial.OA.angle", "radians", id="degrees"),
+        pytest.param(("initial.XY", {"angle": 1.0}), "initial.XY", "no such body", id="start-of-nothing"),
+        pytest.param(("initial.OA.rate", math.inf), "initial.OA.rate", "finite", id="infinite-rate"),
+        pytest.param(("solver.step", 0.0), "solver.step", "greater than 0", id="zero-step"),
+        pytest.param(("solver.duration", -1.0), "solver.duration", "greater than 0", id="negative-duration"),
+        pytest.param(("solver.samples", 0), "solver.samples", "greater than or equal to 1", id="no-samples"),
+        pytest.param(("solver.integrator", "euler"), "solver.integrator", "'leapfrog'", id="unknown-integrator"),
+        pytest.param(("solver.spectral_radius", 1.5), "solver.spectral_radius", "equal to 1", id="spectral-radius"),
+        pytest.param(("name", GONE), "name", "required", id="no-name"),
+    ],
+)
+def test_bad_data_is_refused_in_one_line_that_names_the_field(change: tuple[str, Any], named: str, why: str) -> None:
+    with pytest.raises(InputError, match=why) as refusal:
+        Scene.parse(_changed(change), "my.yaml")
+    line = str(refusal.value)
+    assert "\n" not in line
+    assert line.startswith(f"my.yaml: {named}: ")
+    assert refusal.value.exit_status == 2
+
+
+def test_several_mistakes_are_counted() -> None:
+    with pytest.raises(InputError, match=r"^s: bodies\.AB\.length: .*\(and 1 more\)$|bodies\.OA") as refusal:
+        Scene.parse(_changed(("bodies.OA.length", -1.0), ("bodies.AB.length", -1.0)), "s")
+    assert "(and 1 more)" in str(refusal.value)
+
+
+RIGID = """\
+name: s
+bodies:
+  R: {kind: rod, length: 1.0, height: 0.02, width: 0.02, density: 1000.0}
+joints:
+  O: {first: {body: ground, point: [0, 0]}, second: {body: R}}
+markers:
+  E: {body: R, point: end}
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        pytest.param(RIGID + "name: t\n", r"line 1: the key 'name' stands twice", id="duplicate-key"),
+        pytest.param(
+            RIGID.replace("length: 1.0,", "length: 1.0, length: 2.0,"), "'length' stands twice", id="duplicate-inside"
+        ),
+        pytest.param("name: [unclosed\nbodies: {", "line 2: ", id="not-yaml"),
+        pytest.param("name: \x00", "not YAML", id="control-character"),
+        pytest.param("- a\n- b\n", "a scene is a mapping of fields, found list", id="a-list"),
+        pytest.param("", "a scene is a mapping of fields, found NoneType", id="empty"),
+        pytest.param("just words", "a scene is a mapping of fields, found str", id="words"),
+        pytest.param(RIGID + "extra: !!python/object/apply:os.getcwd []\n", "line 8: ", id="python-object"),
+        pytest.param(RIGID.replace("1000.0", ".nan"), "bodies.R.density: .*finite", id="yaml-nan"),
+        pytest.param(RIGID.replace("1000.0", "-1"), "bodies.R.density: .*greater than 0", id="yaml-negative"),
+        pytest.param(RIGID.replace("{kind: rod, ", "{&a x: *a, "), "", id="recursive-alias"),
+        pytest.param(RIGID + "? [1, 2]\n: x\n", "", id="a-key-that-is-a-list"),
+        pytest.param("{{}: x}", "", id="a-key-that-is-a-mapping"),
+        pytest.param("1: x\n", "", id="a-key-that-is-a-number"),
+        pytest.param("date: 2020-99-99\n", "", id="an-impossible-date"),
+        pytest.param("<<: 3\n", "", id="a-merge-of-nothing"),
+        pytest.param("a: " + "[" * 3000, "", id="deep-nesting"),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line_that_names_it(text: str, why: str, tmp_path: Path) -> None:
+    file = tmp_path / "bad.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=why) as refusal:
+        load_scene(str(file))
+    assert "\n" not in str(refusal.value)
+    assert str(refusal.value).startswith(f"{file}: ")
+
+
+def test_the_good_file_of_the_table_above_loads(tmp_path: Path) -> None:
+    file = tmp_path / "good.yaml"
+    file.write_text(RIGID, encoding="utf-8")
+    assert load_scene(str(file)).bodies["R"].mass == pytest.approx(0.4, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        pytest.param("missing.yaml", "cannot be read: No such file", id="missing-file"),
+        pytest.param("folder.yaml", "cannot be read: Is a directory", id="a-folder"),
+        pytest.param("latin.yaml", "cannot be read: not UTF-8 text", id="not-utf-8"),
+        pytest.param("no-such-scene", "no such scene; give a .yaml file or one of .*single-pendulum", id="no-name"),
+        pytest.param("../library/single-pendulum", "no such scene", id="a-path-for-a-name"),
+    ],
+)
+def test_a_scene_that_cannot_be_found_is_refused(
+    name: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "folder.yaml").mkdir()
+    (tmp_path / "latin.yaml").write_bytes("name: café".encode("latin-1"))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=why) as refusal:
+        load_scene(name)
+    assert str(refusal.value).startswith(f"{name}: ")
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "why"),
+    [
+        ("bodies.XY.length", 1.0, r"bodies\.XY\.length: no such field; bodies has OA, AB"),
+        ("bodies.OA.lenght", 1.0, r"bodies\.OA\.lenght: no such field; bodies\.OA has .*length"),
+        ("boddies.OA.length", 1.0, r"boddies\.OA\.length: no such field; the scene has .*bodies"),
+        ("bodies.OA.length.x", 1.0, r"bodies\.OA\.length\.x: no such field; bodies\.OA\.length has nothing"),
+        ("initial.XY.angle", 1.0, r"initial\.XY\.angle: no such field; initial has OA, AB"),
+        ("initial.OA.speed", 1.0, r"initial\.OA\.speed: no such field"),
+        ("initial.OA", 1.0, r"initial\.OA"),
+        ("solver", 1.0, r"solver"),
+        ("", 1.0, r"no such field"),
+        (".", 1.0, r"no such field"),
+        ("bodies.OA.density", -1.0, r"bodies\.OA\.density: .*greater than 0"),
+        ("bodies.OA.density", math.nan, r"bodies\.OA\.density: .*finite"),
+        ("initial.OA.angle", 90.0, r"initial\.OA\.angle: .*radians"),
+        ("solver.integrator", "euler", r"solver\.integrator: "),
+    ],
+)
+def test_with_values_refuses_unknown_paths_and_bad_values(path: str, value: Any, why: str) -> None:
+    with pytest.raises(InputError, match=why) as refusal:
+        CABLE_SCENE.with_values({path: value})
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("path", ["bodies.XY.length", "bodies.OA.lenght", "initial.XY.angle", "nothing", ""])
+def test_value_refuses_unknown_paths(path: str) -> None:
+    with pytest.raises(InputError, match="no such field") as refusal:
+        CABLE_SCENE.value(path)
+    assert str(refusal.value).startswith(f"{path}: ")

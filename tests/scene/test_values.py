@@ -1,0 +1,113 @@
+"""Scenes with fields replaced, by one value or by one per lane; derived properties by their formulas."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from shoal.scene import RigidBody, Rod, Scene, load_scene
+
+SCENE = load_scene("flexible-double-pendulum")
+
+
+def test_with_values_replaces_and_leaves_the_original_alone() -> None:
+    before = SCENE.fingerprint
+    changed = SCENE.with_values(
+        {"bodies.OA.length": 1.5, "gravity": [0.0, -1.62], "initial.AB.rate": 2, "joints.A.friction": 0.1}
+    )
+    assert changed.bodies["OA"].length == 1.5
+    assert changed.gravity == (0.0, -1.62)
+    assert changed.start("AB").rate == 2.0
+    assert changed.start("AB").angle == SCENE.start("AB").angle
+    assert changed.joints["A"].friction == 0.1
+    assert SCENE.fingerprint == before
+
+
+def test_with_no_values_is_the_same_scene() -> None:
+    assert SCENE.with_values({}) == SCENE
+
+
+def test_with_values_starts_a_body_of_which_the_scene_says_nothing() -> None:
+    data = SCENE.model_dump()
+    del data["initial"]
+    scene = Scene.parse(data)
+    assert (scene.start("AB").angle, scene.start("AB").rate) == (0.0, 0.0)
+    moved = scene.with_values({"initial.AB.rate": 1.25})
+    assert (moved.start("AB").angle, moved.start("AB").rate) == (0.0, 1.25)
+    assert moved.start("OA").rate == 0.0
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("bodies.AB.length", 2.0),
+        ("solver.integrator", "leapfrog"),
+        ("gravity", (0.0, -9.81)),
+        ("initial.OA.rate", 0.0),
+        ("joints.O.first.body", "ground"),
+    ],
+)
+def test_value_reads_what_with_values_writes(path: str, expected: object) -> None:
+    assert SCENE.value(path) == expected
+    assert SCENE.with_values({path: expected}) == SCENE
+
+
+def test_lanes_broadcast_through_the_derived_properties() -> None:
+    lengths, heights = np.array([1.0, 1.5, 2.0]), np.array([0.01, 0.02, 0.03])
+    scene = SCENE.with_lanes({"bodies.OA.length": lengths, "bodies.OA.height": heights})
+    rod = scene.bodies["OA"]
+    assert isinstance(rod, Rod)
+    np.testing.assert_allclose(rod.mass, 5540 * 0.04 * heights * lengths, rtol=1e-15)
+    np.testing.assert_allclose(rod.inertia, rod.mass * lengths**2 / 12, rtol=1e-15)
+    np.testing.assert_allclose(rod.bending_stiffness, 2e8 * 0.04 * heights**3 / 12, rtol=1e-15)
+    np.testing.assert_array_equal(rod.points["end"][0], lengths)
+    assert scene.bodies["AB"] == SCENE.bodies["AB"]
+    assert SCENE.bodies["OA"].length == 1.0
+
+
+def test_lanes_reach_the_initial_state_even_where_the_scene_says_nothing() -> None:
+    data = SCENE.model_dump()
+    del data["initial"]["AB"]
+    lanes = np.array([0.1, 0.2])
+    scene = Scene.parse(data).with_lanes({"initial.AB.angle": lanes, "initial.OA.rate": lanes})
+    np.testing.assert_array_equal(scene.start("AB").angle, lanes)
+    np.testing.assert_array_equal(scene.start("OA").rate, lanes)
+    assert scene.start("AB").rate == 0.0
+
+
+def test_records_are_frozen() -> None:
+    with pytest.raises(ValidationError, match="frozen"):
+        SCENE.bodies["OA"].length = 2.0  # type: ignore[misc]
+
+
+numbers = st.floats(min_value=1e-6, max_value=1e6, allow_nan=False)
+fractions = st.floats(min_value=1e-6, max_value=1.0)
+
+
+@given(length=numbers, height=fractions, width=fractions, density=numbers, modulus=numbers)
+def test_every_slender_rod_is_accepted_and_weighs_what_its_prism_does(
+    length: float, height: float, width: float, density: float, modulus: float
+) -> None:
+    height, width = height * length, width * length
+    rod = Rod(length=length, height=height, width=width, density=density, youngs_modulus=modulus, element="ancf-cable")
+    volume = length * height * width
+    assert rod.area == pytest.approx(height * width, rel=1e-14)
+    assert rod.mass == pytest.approx(density * volume, rel=1e-14)
+    assert rod.mass_per_length * length == pytest.approx(rod.mass, rel=1e-14)
+    # A slender rod about its middle: m L^2 / 12; about an end (Steiner): m L^2 / 3.
+    assert rod.inertia == pytest.approx(density * volume * length**2 / 12, rel=1e-14)
+    assert rod.inertia + rod.mass * rod.centre_of_mass[0] ** 2 == pytest.approx(rod.mass * length**2 / 3, rel=1e-13)
+    assert rod.axial_stiffness == pytest.approx(modulus * height * width, rel=1e-14)
+    # Second moment of area of a rectangle bent across its height: b h^3 / 12.
+    assert rod.bending_stiffness == pytest.approx(modulus * width * height**3 / 12, rel=1e-14)
+    assert rod.points == {"start": (0.0, 0.0), "centre": (length / 2, 0.0), "end": (length, 0.0)}
+    assert Rod.model_validate_json(rod.model_dump_json()) == rod
+
+
+@given(mass=numbers, inertia=st.one_of(st.just(0.0), numbers), x=st.floats(-1e3, 1e3), y=st.floats(-1e3, 1e3))
+def test_every_rigid_body_is_accepted(mass: float, inertia: float, x: float, y: float) -> None:
+    body = RigidBody(mass=mass, inertia=inertia, centre_of_mass=(x, y), named_points={"tip": (y, x)})
+    assert body.points == {"start": (0.0, 0.0), "tip": (y, x)}
+    assert RigidBody.model_validate_json(body.model_dump_json()) == body
