@@ -7,7 +7,7 @@ bodies that do not own the coordinates; first those that forces act on, then tho
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -100,6 +100,16 @@ class Model:
     constraints: Constraints
     constraint_names: tuple[str, ...]
     marker_rows: Index
+    shared_tiles: dict[int, Arrays] = field(default_factory=dict, compare=False, repr=False)
+    """Arrays by tile width, where no number but the initial state depends on the lane."""
+
+    @property
+    def varies(self) -> bool:
+        """Whether lanes differ in more than their initial state."""
+        d = self.derived
+        numbers = (self.mass_values, self.weight, self.cables_full.coefficients, self.cables_reduced.coefficients)
+        others = (self.frictions.coefficient, self.constraints.value, d.coefficient, d.constant)
+        return any(values.shape[1] > 1 for values in (*numbers, *others))
 
     @property
     def unknowns(self) -> int:
@@ -128,7 +138,13 @@ class Model:
 
     def tile(self, tile: Tile, lanes: slice) -> Arrays:
         """The arrays of one tile of lanes. Raises InputError if a mass matrix is singular."""
+        if self.varies:
+            return self._tile(tile, lanes)
+        if len(tile) not in self.shared_tiles:
+            self.shared_tiles[len(tile)] = self._tile(tile, lanes)
+        return self.shared_tiles[len(tile)]
 
+    def _tile(self, tile: Tile, lanes: slice) -> Arrays:
         def packed(values: Array) -> Array:
             return pack(values, lanes, tile)
 
@@ -164,6 +180,13 @@ def scatter(
     for key, value in entries.items():
         values[slot[key]] = value
     return values
+
+
+def with_start(model: Model, scene: Scene, lanes: int) -> Model:
+    """The same model with the initial state of a scene that differs in nothing else."""
+    placement = place(scene)
+    start = {"q0": _real_pairs(placement.positions), "v0": _real_pairs(placement.velocities)}
+    return replace(model, scene=scene, lanes=lanes, **start)
 
 
 def build(scene: Scene, lanes: int = 1) -> Model:

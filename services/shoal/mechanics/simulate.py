@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from shoal.mechanics import stability
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import choose, facts
 from shoal.mechanics.march import march
-from shoal.mechanics.model import Model, build
+from shoal.mechanics.model import Model, build, with_start
 from shoal.mechanics.tile import Array, pack, tiles, unpack
 from shoal.scene import GROUND, Rod, Scene
 from shoal.trajectory import Status, Trajectory
@@ -34,8 +35,9 @@ def simulate(
     """
     begin = time.perf_counter()
     lanes = len(next(iter(values.values()))) if values else 1
-    model = build(scene.with_lanes(values) if values else scene, lanes)
-    limits = check_step(scene, model)
+    model, limit = _model_and_limit(scene, values or {}, lanes)
+    if times[-1] > 0:
+        _check_step(scene, limit)
     step = scene.solver.step
     steps = int(np.ceil(times[-1] / step - 1e-9))
     tile, parts = tiles(lanes)
@@ -55,8 +57,7 @@ def simulate(
     if workers == 1:
         results = [run(part) for part in parts]
     else:
-        with ThreadPoolExecutor(workers) as pool:
-            results = list(pool.map(run, parts))
+        results = list(_pool(workers).map(run, parts))
     samples, error, scale, drift, correction = (np.concatenate(field, axis=1) for field in zip(*results, strict=True))
     samples = samples.reshape(len(times), len(scene.markers), 4, lanes)
     points = samples[:, :, :2]
@@ -75,30 +76,44 @@ def simulate(
         steps=steps,
         wall_s=time.perf_counter() - begin,
         message=message,
-        model=_facts(scene, model, limits, float(np.max(correction))),
+        model=_facts(scene, model, limit, float(np.max(correction))),
     )
 
 
-def check_step(scene: Scene, model: Model) -> float:
-    """The stability limit [s] of the scene's integrator. Raises InputError if the step is beyond it."""
+@cache
+def _pool(workers: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(workers, thread_name_prefix="shoal-tiles")
+
+
+@lru_cache(maxsize=64)
+def _prepared(scene_json: str) -> tuple[Model, float]:
+    """Model and stability limit of a scene; repeated runs, and lanes that only start differently, share them."""
+    scene = Scene.model_validate_json(scene_json)
+    model = build(scene)
+    return model, _limit(scene, model)
+
+
+def _model_and_limit(scene: Scene, values: Mapping[str, Array], lanes: int) -> tuple[Model, float]:
+    """The model of all lanes, and the smallest stability limit [s] at the scene's own start."""
+    if all(path.startswith("initial.") for path in values):
+        model, limit = _prepared(scene.model_dump_json())
+        return (with_start(model, scene.with_lanes(values), lanes) if values else model), limit
+    model = build(scene.with_lanes(values), lanes)
+    return model, _limit(scene, model)
+
+
+def _limit(scene: Scene, model: Model) -> float:
     fact = facts(scene.solver.integrator)
-    if not fact.explicit:
-        return np.inf
-    varies = any(np.shape(values)[1] > 1 for values in (model.mass_values, *_stiff_numbers(model)))
-    limit = min(
-        stability.step_limit(model, fact.stable_step_times_frequency, lane)
-        for lane in range(model.lanes if varies else 1)
-    )
+    return stability.step_limit(model, fact.stable_step_times_frequency) if fact.explicit else np.inf
+
+
+def _check_step(scene: Scene, limit: float) -> None:
+    """Raises InputError if the step is beyond the stability limit."""
     if scene.solver.step > limit:
         raise InputError(
             f"solver.step: {scene.solver.step:g} s is beyond the stability limit {limit:.3e} s of "
             f"{scene.solver.integrator} for this scene; use a smaller step or solver.integrator=generalized-alpha"
         )
-    return limit
-
-
-def _stiff_numbers(model: Model) -> tuple[Array, ...]:
-    return (model.cables_full.coefficients, model.cables_reduced.coefficients, model.frictions.coefficient)
 
 
 def _angles(scene: Scene, model: Model, directions: Array) -> Array:

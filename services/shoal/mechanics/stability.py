@@ -15,55 +15,71 @@ from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.model import Model
 from shoal.mechanics.sparse import Pattern
 from shoal.mechanics.tangent import stiffness_at, tangent_tile
-from shoal.mechanics.tile import SINGLE, Array, pack
+from shoal.mechanics.tile import Array, pack, tiles, unpack
 
-_DENSE = 300
+_DENSE = 200
 
 
-def highest_frequency(model: Model, lane: int = 0) -> float:
-    """Highest eigenfrequency of one lane [rad/s]; 0 if nothing is elastic."""
+def highest_frequency(model: Model) -> float:
+    """Highest eigenfrequency over all lanes [rad/s]; 0 if nothing is elastic."""
     if model.elements == 0:
         return 0.0
-    stiffness, mass = _matrices(model, lane, 0.0)
-    return float(np.sqrt(max(0.0, _largest_eigenvalue(stiffness, mass))))
+    return float(np.sqrt(max(0.0, _largest_eigenvalue(model, damping=False))))
 
 
-def highest_damping_rate(model: Model, lane: int = 0) -> float:
-    """Largest decay rate of the friction at the initial state [1/s]; 0 without friction."""
-    if len(model.frictions.rows) == 0:
+def highest_damping_rate(model: Model) -> float:
+    """Largest decay rate of the joint friction at the initial state, over all lanes [1/s]."""
+    if model.frictions.count == 0:
         return 0.0
-    undamped, mass = _matrices(model, lane, 0.0)
-    damped, _ = _matrices(model, lane, 1.0)
-    return max(0.0, _largest_eigenvalue(damped - undamped, mass))
+    return max(0.0, _largest_eigenvalue(model, damping=True))
 
 
-def step_limit(model: Model, stable_step_times_frequency: float, lane: int = 0) -> float:
-    """Largest stable step [s] of an explicit integrator; infinite if nothing limits it."""
-    rate = max(highest_frequency(model, lane), highest_damping_rate(model, lane))
+def step_limit(model: Model, stable_step_times_frequency: float) -> float:
+    """Largest stable step [s] of an explicit integrator for every lane; infinite if nothing limits it."""
+    rate = max(highest_frequency(model), highest_damping_rate(model))
     return stable_step_times_frequency / rate if rate > 0 else np.inf
 
 
-def _matrices(model: Model, lane: int, damping: float) -> tuple[scipy.sparse.csc_array, scipy.sparse.csc_array]:
-    here = slice(lane, lane + 1)
-    tangent = tangent_tile(model, SINGLE, here)
-    arrays = model.tile(SINGLE, here)
-    room = work_space(SINGLE, arrays)
-    room.z[: model.unknowns] = pack(model.q0, here, SINGLE)
-    values = stiffness_at(SINGLE, arrays, tangent, room, damping)
-    return _symmetric(tangent.pattern, values), _symmetric(tangent.pattern, tangent.mass)
+def _largest_eigenvalue(model: Model, damping: bool) -> float:
+    """Largest eigenvalue of K (or of the damping D) against M, over all lanes that differ in more than their start."""
+    tile, parts = tiles(model.lanes if model.varies else 1)
+    largest = 0.0
+    for part in parts:
+        tangent = tangent_tile(model, tile, part)
+        arrays = model.tile(tile, part)
+        room = work_space(tile, arrays)
+        room.z[: model.unknowns * len(tile)] = pack(model.q0, part, tile)
+        values = stiffness_at(tile, arrays, tangent, room, 0.0)
+        if damping:
+            values = stiffness_at(tile, arrays, tangent, room, 1.0) - values
+        matrix, mass = unpack(values, part, tile), unpack(tangent.mass, part, tile)
+        for lane in range(matrix.shape[1]):
+            largest = max(largest, _top(tangent.pattern, matrix[:, lane], mass[:, lane]))
+    return largest
 
 
-def _symmetric(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
-    """The full matrix of lower-triangle slots."""
+def _top(pattern: Pattern, matrix: Array, mass: Array) -> float:
+    """Largest eigenvalue of A x = lambda M x, both symmetric in the slots of a pattern."""
+    n = pattern.size
+    if n <= _DENSE:
+        full = (_dense(pattern, matrix), _dense(pattern, mass))
+        return float(scipy.linalg.eigh(*full, eigvals_only=True, subset_by_index=[n - 1, n - 1])[0])
+    start = np.cos(np.arange(n))  # a fixed start vector, so that the same scene gives the same limit
+    sparse = (_sparse(pattern, matrix), _sparse(pattern, mass))
+    found = scipy.sparse.linalg.eigsh(sparse[0], k=1, M=sparse[1], which="LA", v0=start, return_eigenvectors=False)
+    return float(found[0])
+
+
+def _dense(pattern: Pattern, values: Array) -> Array:
+    n = pattern.size
+    out = np.diag(values[:n])
+    columns = np.repeat(np.arange(n), np.diff(pattern.column))
+    out[pattern.row, columns] = values[n:]
+    out[columns, pattern.row] = values[n:]
+    return out
+
+
+def _sparse(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
     n = pattern.size
     lower = scipy.sparse.csc_array((values[n:], pattern.row, pattern.column), shape=(n, n))
     return scipy.sparse.csc_array(lower + lower.T + scipy.sparse.diags_array(values[:n]))
-
-
-def _largest_eigenvalue(matrix: scipy.sparse.csc_array, mass: scipy.sparse.csc_array) -> float:
-    n = matrix.shape[0]
-    if n <= _DENSE:
-        top = scipy.linalg.eigh(matrix.toarray(), mass.toarray(), eigvals_only=True, subset_by_index=[n - 1, n - 1])
-        return float(top[0])
-    start = np.cos(np.arange(n))  # a fixed start vector, so that the same scene gives the same limit
-    return float(scipy.sparse.linalg.eigsh(matrix, k=1, M=mass, which="LA", v0=start, return_eigenvectors=False)[0])

@@ -35,6 +35,8 @@ def read_yaml(text: str, source: str) -> Any:
         raise InputError(f"{source}: line {line}: {error.problem or 'not YAML'}") from None
     except yaml.YAMLError as error:
         raise InputError(f"{source}: not YAML: {str(error).splitlines()[0]}") from None
+    except (ValueError, RecursionError) as error:  # an impossible date; brackets nested without end
+        raise InputError(f"{source}: not YAML: {error}") from None
 
 
 def read_named(name: str, folder: Traversable, what: str) -> Any:
@@ -46,11 +48,10 @@ def read_named(name: str, folder: Traversable, what: str) -> Any:
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
             raise InputError(f"{name}: cannot be read: {reason}") from None
-    built_in = folder / f"{name}.yaml"
-    if not built_in.is_file():
+    if name not in names(folder):
         known = ", ".join(names(folder))
         raise InputError(f"{name}: no such {what}; give a .yaml file or one of {known}")
-    return read_yaml(built_in.read_text(encoding="utf-8"), name)
+    return read_yaml((folder / f"{name}.yaml").read_text(encoding="utf-8"), name)
 
 
 def names(folder: Traversable) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
@@ -155,8 +156,9 @@ class Scene(Record):
 
     @property
     def fingerprint(self) -> str:
-        """Twelve hexadecimal digits that change when any field does."""
-        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:12]
+        """Twelve hexadecimal digits that change when any field does, not with the order of the fields."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def _replace(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any:

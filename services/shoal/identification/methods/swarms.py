@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.least_squares import descend
+from shoal.identification.methods.least_squares import least_squares
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.starts import starting_points
 from shoal.swarm import Afsa, Iafsa, IafsaPrinted, minimize
@@ -23,7 +23,7 @@ def afsa(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> O
 
 def iafsa(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """IAFSA as repaired, with both seeds."""
-    traditional, previous = seeds(model)
+    traditional, previous = seeds(model, rng)
     optimizer = Iafsa(lower=model.lower, upper=model.upper, traditional=traditional, previous=previous)
     return _search(model, optimizer, rng, progress)
 
@@ -35,20 +35,20 @@ def iafsa_unseeded(model: ForwardModel, rng: np.random.Generator, progress: Prog
 
 def iafsa_printed(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """IAFSA exactly as printed in the paper, with both seeds."""
-    traditional, previous = seeds(model)
+    traditional, previous = seeds(model, rng)
     optimizer = IafsaPrinted(lower=model.lower, upper=model.upper, traditional=traditional, previous=previous)
     return _search(model, optimizer, rng, progress)
 
 
-def seeds(model: ForwardModel) -> tuple[Array, Array]:
+def seeds(model: ForwardModel, rng: np.random.Generator) -> tuple[Array, Array]:
     """The paper's two additional fish, for the inverse problem; their evaluations are counted.
 
-    The optimum of a traditional method is that of least squares from the first start; in place of the
+    The optimum of a traditional method is that of least squares; in place of the
     previous time step's optimum, which the inverse problem does not have, stands the pose that the first
     samples fix.
     """
     pose = starting_points(model)[0]
-    return descend(model, pose, lambda *_: None).point, pose
+    return least_squares(model, rng, lambda *_: None).point, pose
 
 
 def _search(model: ForwardModel, optimizer: Any, rng: np.random.Generator, progress: Progress) -> Outcome:

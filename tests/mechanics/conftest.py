@@ -1,0 +1,148 @@
+"""Doors into single kernels, and independent equations of motion to compare with."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy.integrate import solve_ivp
+from shoal.mechanics import constraints, dynamics, gauss, model, sparse
+from shoal.mechanics.elements import ancf_cable
+from shoal.mechanics.vector import pointer
+
+Array = Any
+
+
+@njit(cache=True)
+def cable_force(tile, cables, full, z, f, w):
+    if full:
+        ancf_cable.add_force_full(tile, ancf_cable.raw(cables), pointer(z), pointer(f), pointer(w))
+    else:
+        ancf_cable.add_force_reduced(tile, ancf_cable.raw(cables), pointer(z), pointer(f), pointer(w))
+
+
+@njit(cache=True)
+def cable_energy(tile, cables, axial, bending, z, energy, w):
+    ancf_cable.add_energy(
+        tile, ancf_cable.raw(cables), axial, bending, pointer(z), pointer(w), pointer(energy), 0
+    )
+
+
+@njit(cache=True)
+def cable_tangent(tile, cables, axial, bending, z, out, w):
+    ancf_cable.tangent(tile, ancf_cable.raw(cables), axial, bending, pointer(z), pointer(w), pointer(out), 0)
+
+
+@njit(cache=True)
+def solve(tile, pattern, values, x):
+    sparse.factor(tile, sparse.raw(pattern), pointer(values))
+    sparse.solve(tile, sparse.raw(pattern), pointer(values), pointer(x), 0)
+
+
+@njit(cache=True)
+def multiply(tile, pattern, values, x, y):
+    sparse.multiply(tile, sparse.raw(pattern), pointer(values), pointer(x), pointer(y))
+
+
+@njit(cache=True)
+def residual(tile, held, q, out):
+    constraints.residual(tile, constraints.raw(held), pointer(q), pointer(out))
+
+
+@njit(cache=True)
+def jacobian(tile, held, unknowns, q, out):
+    constraints.jacobian(tile, constraints.raw(held), unknowns, pointer(q), pointer(out))
+
+
+@njit(cache=True)
+def bias(tile, held, v, out):
+    constraints.bias(tile, constraints.raw(held), pointer(v), pointer(out))
+
+
+@njit(cache=True)
+def acceleration(tile, arrays, room, tolerance):
+    """The acceleration of the state in `room`, into room.a."""
+    w = dynamics.raw(room)
+    dynamics.acceleration(tile, model.raw(arrays), w, w.z, w.zdot, tolerance, w.a)
+
+
+@njit(cache=True)
+def force(tile, arrays, room):
+    """The generalised force of the state in `room`, into room.a."""
+    w = dynamics.raw(room)
+    dynamics.force(tile, model.raw(arrays), w, w.z, w.zdot, w.a)
+
+
+@njit(cache=True)
+def project(tile, arrays, room, tolerance):
+    """Make the state in `room` consistent."""
+    w = dynamics.raw(room)
+    gauss.project(tile, model.raw(arrays), w.gauss, w.z, w.zdot, tolerance)
+
+
+@pytest.fixture(scope="session")
+def kernels() -> types.SimpleNamespace:
+    """Single kernels, callable on plain arrays."""
+    names = (
+        cable_force, cable_energy, cable_tangent, solve, multiply,
+        residual, jacobian, bias, acceleration, force, project,
+    )  # fmt: skip
+    return types.SimpleNamespace(**{kernel.__name__: kernel for kernel in names})
+
+
+@pytest.fixture(scope="session")
+def uniform_rods() -> Callable[..., Any]:
+    """Motion of planar uniform rods in absolute angles, integrated by scipy; shares nothing with the package.
+
+    centre[k, j] says how far [m] the centre of rod k lies along rod j, so that r_k = sum_j centre[k, j] e_j
+    (from a fixed point), and the virtual work of m r'' = m g gives the textbook equations. friction[k, j] is the
+    torque matrix, tau = -friction omega; closure[j]: sum_j closure[j] e_j = const, by multipliers.
+    Returns angles and rates, each (rods, times).
+    """
+
+    def motion(
+        masses: Array,
+        inertias: Array,
+        centre: Array,
+        angles: Array,
+        rates: Array,
+        times: Array,
+        *,
+        friction: Array | None = None,
+        closure: Array | None = None,
+        gravity: complex = -9.81j,
+    ) -> tuple[Array, Array]:
+        masses, centre = np.asarray(masses, dtype=float), np.asarray(centre, dtype=float)
+        count = len(masses)
+
+        def rate(_time: float, y: Array) -> Array:
+            angle, omega = y[:count], y[count:]
+            e = np.exp(1j * angle)
+            levers = 1j * centre * e  # d r_k / d angle_j
+            matrix = np.diag(np.asarray(inertias, dtype=float)) + np.real(
+                np.einsum("kj,k,ki->ji", np.conj(levers), masses, levers)
+            )
+            swing = -(centre * e) @ omega**2
+            load = np.real(np.conj(levers).T @ (masses * (gravity - swing)))
+            if friction is not None:
+                load = load - friction @ omega
+            if closure is not None:
+                gap = np.asarray(closure) * e
+                rows = np.array([np.real(1j * gap), np.imag(1j * gap)])
+                pull = gap @ omega**2
+                full = np.block([[matrix, rows.T], [rows, np.zeros((2, 2))]])
+                change = np.linalg.solve(full, np.concatenate([load, [np.real(pull), np.imag(pull)]]))[:count]
+            else:
+                change = np.linalg.solve(matrix, load)
+            return np.concatenate([omega, change])
+
+        start = np.concatenate([angles, rates])
+        run = solve_ivp(rate, (0.0, times[-1]), start, "DOP853", times, rtol=1e-13, atol=1e-13)
+        assert run.success
+        return run.y[:count], run.y[count:]
+
+    return motion
