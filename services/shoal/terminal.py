@@ -142,7 +142,9 @@ def sweep_table(sweep: Sweep) -> None:
 def comparison_table(comparison: Comparison) -> None:
     """Ends by engine, then differences by pair."""
     last = list(comparison.scene.markers)[-1]
-    table = _table(f"{comparison.scene.name}: {last} at the end", "engine", "x [m]", "y [m]", "energy", "time", "status")
+    table = _table(
+        f"{comparison.scene.name}: {last} at the end", "engine", "x [m]", "y [m]", "energy", "time", "status"
+    )
     for name, trajectory in comparison.trajectories.items():
         x, y = trajectory.marker(last)[-1]
         time = f"{trajectory.wall_s * 1e3:.0f} ms"

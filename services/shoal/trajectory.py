@@ -74,7 +74,7 @@ class Trajectory:
         return self.angles[:, self.markers.index(name), lane]
 
     def to_json(self, lane: int = 0) -> dict[str, Any]:
-        """One lane as plain data, the object that `shoal simulate --json` prints; null where nothing finite is known."""
+        """One lane as plain data, which `shoal simulate --json` prints; null where nothing finite is known."""
         times = self.times.tolist()
         return {
             "status": str(self.status[lane]),

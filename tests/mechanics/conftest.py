@@ -117,7 +117,7 @@ def uniform_rods() -> Callable[..., Any]:
         gravity: complex = -9.81j,
     ) -> tuple[Array, Array]:
         masses, centre = np.asarray(masses, dtype=float), np.asarray(centre, dtype=float)
-        count = len(masses)
+        count = len(angles)
 
         def rate(_time: float, y: Array) -> Array:
             angle, omega = y[:count], y[count:]

@@ -67,7 +67,7 @@ def test_lanes_equal_singles(kernels: Any, system: Any) -> None:
     values = _pack(_matrices(size, pairs, seed, width), slot, pattern.slots)
     right = np.random.default_rng(seed).normal(size=(size, width))
     together = right.copy()
-    kernels.solve(WIDE, pattern, values.ravel(), together.reshape(-1))
+    kernels.solve(WIDE, pattern, values.flatten(), together.reshape(-1))
     for lane in range(width):
         alone = right[:, lane].copy()
         kernels.solve(SINGLE, pattern, values[:, lane].copy(), alone)

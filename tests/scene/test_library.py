@@ -37,6 +37,14 @@ def test_a_scene_survives_yaml(name: str, tmp_path: Path) -> None:
     assert load_scene(str(file)) == scene
 
 
+def test_an_edited_file_is_read_again(tmp_path: Path) -> None:
+    file = tmp_path / "scene.yaml"
+    for gravity in (-9.81, -1.62):
+        scene = load_scene("single-pendulum").with_values({"gravity": [0.0, gravity]})
+        file.write_text(yaml.safe_dump(scene.model_dump(mode="json")), encoding="utf-8")
+        assert load_scene(str(file)).gravity == (0.0, gravity)
+
+
 def test_a_scene_survives_yaml_as_plain_python_data() -> None:
     scene = load_scene("rigid-double-pendulum")
     data = yaml.safe_load(yaml.safe_dump(_listed(scene.model_dump())))

@@ -109,7 +109,7 @@ class ExudynEngine:
         try:
             with _silence(exu):
                 done = machine.mbs.SolveDynamic(
-                    self._settings(exu, machine, record.steps), showHints=False, showCausingItems=False
+                    self.simulation_settings(exu, machine, record.steps), showHints=False, showCausingItems=False
                 )
         except Exception as error:
             # Whatever the library raises is a failed run.
@@ -121,7 +121,8 @@ class ExudynEngine:
         reached = max(record.seen - 1, 0) * record.steps.size
         return f"exudyn: {reason} at {reached:.6g} s of {record.steps.wanted[-1]:.6g} s; reduce solver.step"
 
-    def _settings(self, exu: Any, machine: Machine, steps: Steps) -> Any:
+    def simulation_settings(self, exu: Any, machine: Machine, steps: Steps) -> Any:
+        """Exudyn's settings for so many steps: fixed step, files off."""
         settings = exu.SimulationSettings()
         settings.solution.file.write = False
         settings.solution.sensors.active = False

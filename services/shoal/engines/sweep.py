@@ -67,9 +67,7 @@ def sweep(scene: Scene, vary: Mapping[str, Array], engine: Engine, time: float |
     times = np.array([0.0, instant]) if instant > 0 else np.array([0.0])
     trajectory = engine.simulate_many(scene, grid, times)
     positions = {name: trajectory.points[-1, k].T for k, name in enumerate(trajectory.markers)}
-    displacements = {
-        name: positions[name] - trajectory.points[0, k].T for k, name in enumerate(trajectory.markers)
-    }
+    displacements = {name: positions[name] - trajectory.points[0, k].T for k, name in enumerate(trajectory.markers)}
     return Sweep(
         scene, trajectory.engine, instant, grid, positions, displacements, trajectory.status, trajectory.wall_s
     )

@@ -56,7 +56,9 @@ def _check(node: ast.AST, text: str) -> None:
     number = isinstance(node, ast.Constant) and isinstance(node.value, int | float)
     call = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS
     if not (isinstance(node, plain) or number or call):
-        raise InputError(f"expression: {text!r} has {type(node).__name__}; use numbers, names, + - * / ** and functions")
+        raise InputError(
+            f"expression: {text!r} has {type(node).__name__}; use numbers, names, + - * / ** and functions"
+        )
 
 
 def _value(node: Any, values: Mapping[str, float]) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from shoal.engines import Engine
 from shoal.errors import InputError
 from shoal.identification.measurement import Measurement, observe
-from shoal.identification.problem import Problem
+from shoal.identification.problem import Parameter, Problem
 from shoal.scene import Scene
 from shoal.swarm import EvaluationCounter
 from shoal.trajectory import Array, Status
@@ -37,6 +37,10 @@ class ForwardModel:
 
     def __post_init__(self) -> None:
         self.counter = EvaluationCounter(self._residuals, cost=self.cost)
+
+    @property
+    def _parameters(self) -> tuple[Parameter, ...]:
+        return tuple(self.problem.parameters.values())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -67,14 +71,13 @@ class ForwardModel:
 
     def observe(self, points: Array, times: Array, scene: Scene | None = None) -> Array:
         """Channels of the model at `times`, (points, samples, channels); nan where a simulation failed. Not counted."""
-        values = {p.path: points[:, k] for k, p in enumerate(self.problem.parameters.values())}
-        try:
-            trajectory = self.engine.simulate_many(scene or self.scene, values, times)
-        except InputError:
-            if len(points) == 1:
-                return np.full((1, len(times), len(self.measurement.channels)), np.nan)
-            # Some point is no scene at all (outside the box a mass may be negative): find out which.
-            return np.concatenate([self.observe(point[None], times, scene) for point in points])
+        if not np.all(valid := self._valid(points)):
+            seen = np.full((len(points), len(times), len(self.measurement.channels)), np.nan)
+            if np.any(valid):
+                seen[valid] = self.observe(points[valid], times, scene)
+            return seen
+        values = {p.path: points[:, k] for k, p in enumerate(self._parameters)}
+        trajectory = self.engine.simulate_many(scene or self.scene, values, times)
         seen = observe(trajectory, self.measurement.channels)
         seen[[status is not Status.OK for status in trajectory.status]] = np.nan
         return seen
@@ -83,6 +86,16 @@ class ForwardModel:
         """Channels at time zero, (points, channels). No motion is simulated, so nothing is counted as an evaluation."""
         self.placements += len(points)
         return self.observe(points, np.zeros(1))[:, 0]
+
+    def _valid(self, points: Array) -> Array:
+        """Which points are scenes at all, (points,): inside the box all are, outside a mass may be negative."""
+        valid = np.ones(len(points), dtype=bool)
+        for k in np.flatnonzero(np.any((points < self.lower) | (points > self.upper), axis=1)):
+            try:
+                self.scene.with_values({p.path: float(points[k, j]) for j, p in enumerate(self._parameters)})
+            except InputError:
+                valid[k] = False
+        return valid
 
     def _residuals(self, points: Array) -> Array:
         seen = self.observe(points, self.measurement.times)

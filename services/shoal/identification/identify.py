@@ -185,7 +185,10 @@ def _judge(
     if at_bound:
         return Verdict.COMBINATION, f"{', '.join(at_bound)} ended at a bound and is not identified"
     if unknown:
-        return Verdict.COMBINATION, f"only combinations are known: {len(unknown)} direction(s) leave the motion unchanged"
+        return (
+            Verdict.COMBINATION,
+            f"only combinations are known: {len(unknown)} direction(s) leave the motion unchanged",
+        )
     return Verdict.IDENTIFIED, ""
 
 

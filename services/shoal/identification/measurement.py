@@ -119,7 +119,7 @@ def _read_csv(path: Path) -> Any:
 def _numbers(series: Any, column: str, path: Path) -> Array:
     import pandas
 
-    numbers = pandas.to_numeric(series, errors="coerce").to_numpy(dtype=float)
+    numbers: Array = pandas.to_numeric(series, errors="coerce").to_numpy(dtype=float)
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         raise InputError(f"{path}: row {bad[0] + 2}, column {column!r}: {series.iloc[bad[0]]!r} is not a number")

@@ -31,7 +31,7 @@ def starting_points(model: ForwardModel) -> Array:
         points = _poses(model, middle, angles, pose)
     if rates:
         points = np.array([_with_rates(model, point, rates, angles, slope) for point in points])
-    return np.clip(points, model.lower, model.upper)
+    return np.asarray(np.clip(points, model.lower, model.upper))
 
 
 def _first_pose(model: ForwardModel) -> tuple[Array, Array]:
@@ -55,7 +55,9 @@ def _poses(model: ForwardModel, middle: Array, angles: list[int], pose: Array) -
         normal = np.einsum("nck,ncl->nkl", jacobian, jacobian)
         gradient = np.einsum("nck,nc->nk", jacobian, error)
         scale = np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(len(angles))
-        step = np.linalg.solve(normal + damping[:, None, None] * scale + 1e-14 * np.eye(len(angles)), gradient[..., None])
+        step = np.linalg.solve(
+            normal + damping[:, None, None] * scale + 1e-14 * np.eye(len(angles)), gradient[..., None]
+        )
         trial = points.copy()
         trial[:, angles] -= step[..., 0]
         trial = np.clip(trial, model.lower, model.upper)

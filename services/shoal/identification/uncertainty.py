@@ -15,7 +15,7 @@ RANK_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Covariance (p, p), directions that the data do not fix (p, k) in scaled parameters, and the pseudo-inverse (p, m)."""
+    """Covariance (p, p), directions the data do not fix (p, k) in scaled parameters, pseudo-inverse (p, m)."""
 
     covariance: Array
     unknown: Array
@@ -49,24 +49,23 @@ def autocorrelation(residual: Array, channels: int) -> float:
     return float(np.sum(table[1:] * table[:-1]) / power) if power > 0 else 0.0
 
 
-def spread(
-    function: Callable[[Array], float], point: Array, at: Linearisation
-) -> tuple[float, bool]:
+def spread(function: Callable[[Array], float], point: Array, at: Linearisation) -> tuple[float, bool]:
     """Standard deviation of a function of the parameters, and whether the data fix it."""
     steps = 1e-6 * at.scale
     gradient = np.array([(function(point + step) - function(point - step)) for step in np.diag(steps)]) / (2 * steps)
     scaled = gradient * at.scale
     hidden = np.linalg.norm(scaled @ at.unknown) if at.unknown.size else 0.0
     fixed = bool(hidden <= 1e-3 * max(float(np.linalg.norm(scaled)), 1e-300))
-    return float(np.sqrt(max(0.0, gradient @ at.covariance @ gradient))), fixed
+    variance = float(gradient @ at.covariance @ gradient)
+    return float(np.sqrt(max(0.0, variance))), fixed
 
 
 def combinations(unknown: Array, names: tuple[str, ...]) -> list[str]:
     """The directions that the data do not fix, in words: relative changes that leave the motion as it is."""
     sentences = []
     for direction in _sparse_basis(unknown).T:
-        largest = direction / direction[np.argmax(np.abs(direction))]
-        parts = [f"{names[k]} {value:+.2g}" for k, value in enumerate(largest) if abs(value) > 1e-3]
+        largest = direction / direction[np.abs(direction).argmax()]
+        parts = [f"{names[k]} {value:+.2g}" for k, value in enumerate(largest) if abs(value) > 1e-2]
         sentences.append("unchanged motion under relative changes of " + ", ".join(parts))
     return sentences
 
@@ -77,7 +76,7 @@ def _sparse_basis(unknown: Array) -> Array:
     taken: list[int] = []
     for k in range(basis.shape[1]):
         free = [i for i in range(len(basis)) if i not in taken]
-        row = max(free, key=lambda i: abs(basis[i, k]))
+        row = free[int(np.abs(basis[free, k]).argmax())]
         taken.append(row)
         basis[:, k] /= basis[row, k]
         for other in range(basis.shape[1]):

@@ -21,7 +21,7 @@ class Constraints(NamedTuple):
     second = -1 marks a linear term, first = -1 a constant.
     """
 
-    count: int
+    size: int
     start: Index
     first: Index
     second: Index
@@ -82,14 +82,14 @@ class Terms:
 def raw(constraints: Constraints) -> Constraints:
     """The same constraints with pointers in place of arrays."""
     c = constraints
-    return Constraints(c.count, pointer(c.start), pointer(c.first), pointer(c.second), pointer(c.value))
+    return Constraints(c.size, pointer(c.start), pointer(c.first), pointer(c.second), pointer(c.value))
 
 
 @njit(cache=True, error_model="numpy")
 def residual(tile: Tile, constraints: Constraints, q: Array, value: Array) -> None:
     """C(q); value: (constraints, lanes)."""
     width = len(tile)
-    for k in range(constraints.count):
+    for k in range(constraints.size):
         for lane in range(width):
             value[k * width + lane] = 0.0
         for t in range(constraints.start[k], constraints.start[k + 1]):
@@ -107,9 +107,9 @@ def residual(tile: Tile, constraints: Constraints, q: Array, value: Array) -> No
 def jacobian(tile: Tile, constraints: Constraints, unknowns: int, q: Array, out: Array) -> None:
     """C_q(q); out: (constraints * unknowns, lanes)."""
     width = len(tile)
-    for i in range(constraints.count * unknowns * width):
+    for i in range(constraints.size * unknowns * width):
         out[i] = 0.0
-    for k in range(constraints.count):
+    for k in range(constraints.size):
         for t in range(constraints.start[k], constraints.start[k + 1]):
             i, j = constraints.first[t], constraints.second[t]
             if i < 0:
@@ -128,7 +128,7 @@ def jacobian(tile: Tile, constraints: Constraints, unknowns: int, q: Array, out:
 def bias(tile: Tile, constraints: Constraints, v: Array, out: Array) -> None:
     """eta = C_qq v v, so that C_q a = -eta; out: (constraints, lanes)."""
     width = len(tile)
-    for k in range(constraints.count):
+    for k in range(constraints.size):
         for lane in range(width):
             out[k * width + lane] = 0.0
         for t in range(constraints.start[k], constraints.start[k + 1]):
@@ -145,5 +145,5 @@ def drift(tile: Tile, constraints: Constraints, q: Array, gap: Array, worst: Arr
     """Raise worst (lanes,) to the largest |C(q)|; gap is work space, (constraints, lanes)."""
     width = len(tile)
     residual(tile, constraints, q, gap)
-    for k in range(constraints.count * width):
+    for k in range(constraints.size * width):
         worst[k % width] = max(worst[k % width], abs(gap[k]))

@@ -11,7 +11,7 @@ from shoal.mechanics import friction, gauss, sparse
 from shoal.mechanics.elements import ancf_cable
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.tile import Array, Tile
-from shoal.mechanics.vector import add, add_product, clear, copy, pointer
+from shoal.mechanics.vector import add_product, clear, copy, pointer
 
 
 class Work(NamedTuple):
@@ -38,7 +38,8 @@ def work_space(tile: Tile, m: Arrays) -> Work:
     width = len(tile)
     rows = m.rows * width
     sizes = (rows, rows, rows, 2 * rows, 4 * rows, 24 * width, width, 3 * width)
-    return Work(*(np.zeros(size) for size in sizes), gauss.work_space(width, m))  # type: ignore[call-arg]
+    z, zdot, a, before, stage, element, power, energy = (np.zeros(size) for size in sizes)
+    return Work(z, zdot, a, before, stage, element, power, energy, gauss.work_space(width, m))
 
 
 @njit(cache=True, error_model="numpy")
@@ -92,7 +93,7 @@ def force(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, f: Array) -> No
         clear(tile, f, row)
     ancf_cable.add_force_full(tile, m.cables_full, z, f, w.element)
     ancf_cable.add_force_reduced(tile, m.cables_reduced, z, f, w.element)
-    if m.frictions.count > 0:
+    if m.frictions.size > 0:
         derive(tile, m, zdot, m.force_rows, True)
         friction.add_force(tile, m.frictions, z, zdot, f, w.element, w.power)
     _fold(tile, m, f)
@@ -103,14 +104,14 @@ def acceleration(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, toleranc
     """The acceleration by Gauss's principle; z, zdot, a: (rows, lanes), a valid on the unknowns."""
     force(tile, m, w, z, zdot, a)
     sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
-    if m.constraints.count > 0:
+    if m.constraints.size > 0:
         gauss.constrain(tile, m, w.gauss, z, zdot, a, tolerance)
 
 
 @njit(cache=True, error_model="numpy")
 def settle(tile: Tile, m: Arrays, w: Work, tolerance: float) -> None:
     """Remove the drift of a constrained model (nothing to do where sharing expressed every joint)."""
-    if m.constraints.count > 0:
+    if m.constraints.size > 0:
         gauss.project(tile, m, w.gauss, w.z, w.zdot, tolerance)
 
 

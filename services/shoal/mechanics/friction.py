@@ -16,7 +16,7 @@ from shoal.mechanics.vector import add_product, pointer
 class Frictions(NamedTuple):
     """rows: four a joint, those of both directions; coefficient c [N m s/rad]: (joints, lanes)."""
 
-    count: int
+    size: int
     rows: Index
     coefficient: Array
 
@@ -24,7 +24,7 @@ class Frictions(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def raw(frictions: Frictions) -> Frictions:
     """The same joints with pointers in place of arrays."""
-    return Frictions(frictions.count, pointer(frictions.rows), pointer(frictions.coefficient))
+    return Frictions(frictions.size, pointer(frictions.rows), pointer(frictions.coefficient))
 
 
 @njit(cache=True, error_model="numpy")
@@ -50,7 +50,7 @@ def add_force(tile: Tile, frictions: Frictions, z: Array, zdot: Array, f: Array,
     width = len(tile)
     for lane in range(width):
         power[lane] = 0.0
-    for joint in range(frictions.count):
+    for joint in range(frictions.size):
         levers(tile, frictions, joint, z, w)
         for lane in range(width):
             w[4 * width + lane] = 0.0
@@ -59,8 +59,6 @@ def add_force(tile: Tile, frictions: Frictions, z: Array, zdot: Array, f: Array,
         for k in range(4):
             row = frictions.rows[4 * joint + k] * width
             for lane in range(width):
-                f[row + lane] -= (
-                    frictions.coefficient[joint * width + lane] * w[4 * width + lane] * w[k * width + lane]
-                )
+                f[row + lane] -= frictions.coefficient[joint * width + lane] * w[4 * width + lane] * w[k * width + lane]
         for lane in range(width):
             power[lane] += frictions.coefficient[joint * width + lane] * w[4 * width + lane] ** 2

@@ -31,7 +31,7 @@ class GaussWork(NamedTuple):
 
 def work_space(width: int, m: Arrays) -> GaussWork:
     """Room for the constraints of a model."""
-    count, n = m.constraints.count, m.unknowns
+    count, n = m.constraints.size, m.unknowns
     sizes = (count * n, count * n, count * count, count, count)
     return GaussWork(*(np.zeros(size * width) for size in sizes))
 
@@ -46,7 +46,7 @@ def raw(w: GaussWork) -> GaussWork:
 def prepare(tile: Tile, m: Arrays, factor: Array, pattern: sparse.Pattern, q: Array, w: GaussWork) -> None:
     """Evaluate C_q, H^-1 C_q' and C_q H^-1 C_q' at q for the factored matrix H (M, or a tangent)."""
     n = m.unknowns
-    count = m.constraints.count
+    count = m.constraints.size
     constraints.jacobian(tile, m.constraints, n, q, w.jacobian)
     for row in range(count * n):
         copy(tile, w.response, row, w.jacobian, row)
@@ -64,7 +64,7 @@ def apply(tile: Tile, m: Arrays, w: GaussWork, tolerance: float, x: Array) -> No
     """x -= H^-1 C_q' lambda with (C_q H^-1 C_q') lambda = gap; lambda is left in w.multiplier."""
     width = len(tile)
     n = m.unknowns
-    count = m.constraints.count
+    count = m.constraints.size
     for lane in range(width):
         _solve_semidefinite(count, width, lane, w.gram, w.gap, w.multiplier, tolerance)
     for k in range(count):
@@ -132,7 +132,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, a: Array,
 @njit(cache=True, error_model="numpy")
 def add_rates(tile: Tile, m: Arrays, w: GaussWork, x: Array) -> None:
     """gap += C_q x."""
-    for k in range(m.constraints.count):
+    for k in range(m.constraints.size):
         for i in range(m.unknowns):
             add_product(tile, w.gap, k, w.jacobian, k * m.unknowns + i, x, i)
 
@@ -140,7 +140,7 @@ def add_rates(tile: Tile, m: Arrays, w: GaussWork, x: Array) -> None:
 @njit(cache=True, error_model="numpy")
 def project(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: float) -> None:
     """Move q and v back onto C = 0 and C_q v = 0 by the smallest change in the mass metric."""
-    rows = m.constraints.count * len(tile)
+    rows = m.constraints.size * len(tile)
     for _ in range(3):
         constraints.residual(tile, m.constraints, q, w.gap)
         largest = 0.0
@@ -157,7 +157,7 @@ def project(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: 
 def project_rates(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: float) -> None:
     """Move v back onto C_q v = 0 by the smallest change in the mass metric."""
     prepare(tile, m, m.mass_factor, m.pattern, q, w)
-    for k in range(m.constraints.count):
+    for k in range(m.constraints.size):
         clear(tile, w.gap, k)
     add_rates(tile, m, w, v)
     apply(tile, m, w, tolerance, v)

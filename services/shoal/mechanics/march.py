@@ -60,7 +60,7 @@ def march(
 
     energy, start, dissipated = np.zeros(width), np.zeros(width), np.zeros(width)
     last_power = room.power.copy()
-    gap = np.empty(m.constraints.count * width)
+    gap = np.empty(m.constraints.size * width)
     _energy(tile, m, w, start, record.energy_scale)
     check_every = max(1, steps // CHECKS)
     sample = 0
@@ -83,7 +83,7 @@ def march(
                 copy(tile, w.before, row, w.z, row)
                 copy(tile, w.before, m.unknowns + row, w.zdot, row)
         advance(tile, scheme, m, w, step)
-        if m.frictions.count > 0:
+        if m.frictions.size > 0:
             for lane in range(width):
                 dissipated[lane] += 0.5 * step * (last_power[lane] + w.power[lane])
                 last_power[lane] = w.power[lane]

@@ -21,14 +21,14 @@ from shoal.mechanics.constraints import Constraints, Terms
 from shoal.mechanics.elements import ancf_cable
 from shoal.mechanics.elements.ancf_cable import AncfCables
 from shoal.mechanics.friction import Frictions
-from shoal.mechanics.placement import CableFrame, Placement, RigidFrame, as_complex, place
+from shoal.mechanics.placement import Placement, RigidFrame, as_complex, place
 from shoal.mechanics.tile import Array, Index, Tile, pack
 from shoal.mechanics.vector import pointer
 from shoal.scene import GROUND, Rod, Scene
 
 
 class Derived(NamedTuple):
-    """Row r (counted from the unknowns on) is constant[r] + sum coefficient[t] z[source[t]], t in start[r]:start[r+1]."""
+    """Row r (after the unknowns): constant[r] + sum of coefficient[t] z[source[t]] over start[r] <= t < start[r+1]."""
 
     start: Index
     source: Index
@@ -114,7 +114,7 @@ class Model:
     @property
     def unknowns(self) -> int:
         """Number of coordinates."""
-        return self.q0.shape[0]
+        return len(self.q0)
 
     @property
     def rows(self) -> int:
@@ -124,7 +124,7 @@ class Model:
     @property
     def elements(self) -> int:
         """Number of flexible elements."""
-        return self.cables_full.count + self.cables_reduced.count
+        return self.cables_full.size + self.cables_reduced.size
 
     @cached_property
     def mass_pattern(self) -> tuple[sparse.Pattern, dict[tuple[int, int], int]]:
@@ -171,9 +171,7 @@ class Model:
         )
 
 
-def scatter(
-    pattern: sparse.Pattern, slot: dict[tuple[int, int], int], entries: dict[tuple[int, int], Array]
-) -> Array:
+def scatter(pattern: sparse.Pattern, slot: dict[tuple[int, int], int], entries: dict[tuple[int, int], Array]) -> Array:
     """Values of a symmetric matrix in a pattern, (slots, lanes)."""
     lanes = max((np.size(value) for value in entries.values()), default=1)
     values = np.zeros((pattern.slots, lanes))
@@ -185,8 +183,8 @@ def scatter(
 def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     """The same model with the initial state of a scene that differs in nothing else."""
     placement = place(scene)
-    start = {"q0": _real_pairs(placement.positions), "v0": _real_pairs(placement.velocities)}
-    return replace(model, scene=scene, lanes=lanes, **start)
+    q0, v0 = _real_pairs(placement.positions), _real_pairs(placement.velocities)
+    return replace(model, scene=scene, lanes=lanes, q0=q0, v0=v0)
 
 
 def build(scene: Scene, lanes: int = 1) -> Model:

@@ -51,7 +51,8 @@ class RigidFrame:
 
     def point(self, p: Number) -> Affine:
         """The material point p = x + iy [m]."""
-        return self.origin + self.axis * p
+        offset: Affine = self.axis * p
+        return self.origin + offset
 
     def direction(self, p: Number) -> Affine:
         """A vector along the body's x axis."""
@@ -166,6 +167,10 @@ def _joint_points(scene: Scene) -> list[_JointPoint]:
             places += [p for p in group.places if not any(_same(p, q) for q in places)]
         groups.append(_JointPoint(name, places))
     for group in groups:
+        bodies = [body for body, _ in group.places]
+        for body in bodies:
+            if bodies.count(body) > 1:
+                raise InputError(f"joints.{group.name}: two places of {body} cannot be joined into one point")
         grounded = [position for body, position in group.places if body == GROUND]
         if grounded:
             group.where = fixed(grounded[0])

@@ -54,10 +54,7 @@ def simulate(
         return tuple(unpack(field, part, tile) for field in record)
 
     workers = min(threads or os.cpu_count() or 1, len(parts))
-    if workers == 1:
-        results = [run(part) for part in parts]
-    else:
-        results = list(_pool(workers).map(run, parts))
+    results = [run(part) for part in parts] if workers == 1 else list(_pool(workers).map(run, parts))
     samples, error, scale, drift, correction = (np.concatenate(field, axis=1) for field in zip(*results, strict=True))
     samples = samples.reshape(len(times), len(scene.markers), 4, lanes)
     points = samples[:, :, :2]
@@ -144,7 +141,10 @@ def _verdict(
         if not (np.all(np.isfinite(distance)) and np.isfinite(energy_drift[lane])):
             status, reason = Status.DIVERGED, "the motion is not finite; use a smaller step"
         elif np.max(distance) > reach:
-            status, reason = Status.OUT_OF_REACH, f"a marker is {np.max(distance):.3g} m away, the reach is {reach:.3g} m"
+            status, reason = (
+                Status.OUT_OF_REACH,
+                f"a marker is {np.max(distance):.3g} m away, the reach is {reach:.3g} m",
+            )
         elif energy_drift[lane] > scene.solver.energy_tolerance:
             status = Status.ENERGY
             reason = f"energy is off by {energy_drift[lane]:.2g}, allowed {scene.solver.energy_tolerance:g} (relative)"
@@ -188,5 +188,3 @@ def _facts(scene: Scene, model: Model, limit: float, correction: float) -> dict[
             for name, body in scene.bodies.items()
         },
     }
-
-

@@ -14,14 +14,16 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics.tile import Array, Index, Tile
-from shoal.mechanics.vector import add_product, copy, pointer, scale, subtract_product
+from shoal.mechanics.vector import add_product, copy, pointer, scale, subtract_dot
 
 
 class Pattern(NamedTuple):
     """Lower triangle by columns, fill included. Slots 0..n-1 are the diagonal, then the columns in order.
 
-    size is the number of rows. column[k]:column[k+1] are the entries of column k, `row` their rows; entry p is slot n + p.
+    size: number of rows, n. column[k]:column[k+1] are the entries of column k, `row` their rows; entry p is slot n + p.
     update[k]:update[k+1] are the eliminations of column k: slot `target` -= L[left] D L[right].
+    The same entries by rows, for the forward substitution: slot[p] and other[p] (the column) of row i for p in
+    across[i]:across[i+1]. by_column holds the slots in the order of the columns.
     """
 
     size: int
@@ -31,6 +33,10 @@ class Pattern(NamedTuple):
     target: Index
     left: Index
     right: Index
+    across: Index
+    slot: Index
+    other: Index
+    by_column: Index
 
     @property
     def slots(self) -> int:
@@ -49,7 +55,8 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
             parent = min(below[k])
             below[parent] |= below[k] - {parent}
     slot = {(k, k): k for k in range(size)}
-    column, row = [0], []
+    column: list[int] = [0]
+    row: list[int] = []
     for k in range(size):
         for i in sorted(below[k]):
             slot[i, k] = size + len(row)
@@ -64,7 +71,10 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
                 left.append(column[k] + a)
                 right.append(column[k] + b)
         update.append(len(target))
-    arrays = (np.array(part, dtype=np.int64) for part in (column, row, update, target, left, right))
+    by_row = sorted((i, k, slot[i, k]) for i, k in slot if i != k)
+    across = np.searchsorted([i for i, _, _ in by_row], np.arange(size + 1))
+    rows = (across, [p for _, _, p in by_row], [k for _, k, _ in by_row], range(size, size + len(row)))
+    arrays = (np.array(part, dtype=np.int64) for part in (column, row, update, target, left, right, *rows))
     return Pattern(size, *arrays), slot
 
 
@@ -80,6 +90,10 @@ def raw(pattern: Pattern) -> Pattern:
         pointer(p.target),
         pointer(p.left),
         pointer(p.right),
+        pointer(p.across),
+        pointer(p.slot),
+        pointer(p.other),
+        pointer(p.by_column),
     )
 
 
@@ -105,13 +119,13 @@ def factor(tile: Tile, pattern: Pattern, values: Array) -> None:
 def solve(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) -> None:
     """Replace the right-hand side in the rows of x from `first` on by the solution. Pointers."""
     size = pattern.size
-    for k in range(size):
-        for p in range(pattern.column[k], pattern.column[k + 1]):
-            subtract_product(tile, x, first + pattern.row[p], factors, size + p, x, first + k)
+    for i in range(size):
+        begin, end = pattern.across[i], pattern.across[i + 1]
+        subtract_dot(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
     for k in range(size - 1, -1, -1):
         scale(tile, x, first + k, factors, k)
-        for p in range(pattern.column[k], pattern.column[k + 1]):
-            subtract_product(tile, x, first + k, factors, size + p, x, first + pattern.row[p])
+        begin, end = pattern.column[k], pattern.column[k + 1]
+        subtract_dot(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
 
 
 @njit(cache=True, error_model="numpy")

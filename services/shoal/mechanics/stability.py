@@ -29,7 +29,7 @@ def highest_frequency(model: Model) -> float:
 
 def highest_damping_rate(model: Model) -> float:
     """Largest decay rate of the joint friction at the initial state, over all lanes [1/s]."""
-    if model.frictions.count == 0:
+    if model.frictions.size == 0:
         return 0.0
     return max(0.0, _largest_eigenvalue(model, damping=True))
 

@@ -138,7 +138,7 @@ def assemble(
     width = len(tile)
     for i in range(slots * width):
         values[i] = mass_factor * t.mass[i]
-    full = m.cables_full.count
+    full = m.cables_full.size
     ancf_cable.tangent(tile, m.cables_full, ancf_cable.FULL_AXIAL, ancf_cable.FULL_BENDING, z, w.element, block, 0)
     ancf_cable.tangent(
         tile,
@@ -161,13 +161,10 @@ def assemble(
         for lane in range(width):
             c = damping_factor * m.frictions.coefficient[joint * width + lane]
             values[t.friction_slot[k] * width + lane] += (
-                t.friction_coefficient[k * width + lane]
-                * c
-                * w.element[a * width + lane]
-                * w.element[b * width + lane]
+                t.friction_coefficient[k * width + lane] * c * w.element[a * width + lane] * w.element[b * width + lane]
             )
     c = m.constraints
-    for number in range(c.count):
+    for number in range(c.size):
         for term in range(c.start[number], c.start[number + 1]):
             if t.curvature[term] >= 0:
                 scale = 2.0 if c.first[term] == c.second[term] else 1.0
@@ -183,9 +180,9 @@ def stiffness_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work, dampi
     width = len(tile)
     m, t, w = model.raw(arrays), raw(tangent), dynamics.raw(room)
     dynamics.derive(tile, m, w.z, m.force_rows, False)
-    block = np.empty(64 * (m.cables_full.count + m.cables_reduced.count) * width)
+    block = np.empty(64 * (m.cables_full.size + m.cables_reduced.size) * width)
     values = np.empty(tangent.mass.size)
-    multiplier = np.zeros(m.constraints.count * width)
+    multiplier = np.zeros(m.constraints.size * width)
     assemble(
         tile,
         m,

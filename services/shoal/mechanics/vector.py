@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 _CONTRACT = ("contract",)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def pointer(typing_context, array):  # type: ignore[no-untyped-def]
     """Address of an array's first entry; the array must outlive its use."""
     if not isinstance(array, types.Array) or array.layout != "C":
@@ -61,37 +61,59 @@ _add_product = _operation(lambda b, y, a, x: b.fadd(y, b.fmul(a, x, flags=_CONTR
 _subtract_product = _operation(lambda b, y, a, x: b.fsub(y, b.fmul(a, x, flags=_CONTRACT), flags=_CONTRACT), 2)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def copy(typing_context, tile, y, i, x, j):  # type: ignore[no-untyped-def]
     """Row i of y = row j of x."""
     return _copy(tile, (y, i, x, j))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def clear(typing_context, tile, y, i):  # type: ignore[no-untyped-def]
     """Row i of y = 0."""
     return _clear(tile, (y, i))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def add(typing_context, tile, y, i, x, j):  # type: ignore[no-untyped-def]
     """Row i of y += row j of x."""
     return _add(tile, (y, i, x, j))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def scale(typing_context, tile, y, i, a, j):  # type: ignore[no-untyped-def]
     """Row i of y *= row j of a."""
     return _scale(tile, (y, i, a, j))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def add_product(typing_context, tile, y, i, a, j, x, k):  # type: ignore[no-untyped-def]
     """Row i of y += row j of a * row k of x."""
     return _add_product(tile, (y, i, a, j, x, k))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def subtract_product(typing_context, tile, y, i, a, j, x, k):  # type: ignore[no-untyped-def]
     """Row i of y -= row j of a * row k of x."""
     return _subtract_product(tile, (y, i, a, j, x, k))
+
+
+@intrinsic
+def subtract_dot(typing_context, tile, x, i, a, slots, rows, begin, end, first):  # type: ignore[no-untyped-def]
+    """Row i of x -= sum over begin <= p < end of (row slots[p] of a) * (row first + rows[p] of x)."""
+    width = tile.count
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        _, x, i, a, slots, rows, begin, end, first = arguments
+        target = _row(builder, x, i, width)
+        total = cgutils.alloca_once_value(builder, builder.load(target, align=8))
+        with cgutils.for_range(builder, end, start=begin) as loop:
+            slot = builder.load(builder.gep(slots, [loop.index]))
+            row = builder.add(first, builder.load(builder.gep(rows, [loop.index])))
+            factor = builder.load(_row(builder, a, slot, width), align=8)
+            value = builder.load(_row(builder, x, row, width), align=8)
+            product = builder.fmul(factor, value, flags=_CONTRACT)
+            builder.store(builder.fsub(builder.load(total), product, flags=_CONTRACT), total)
+        builder.store(builder.load(total), target, align=8)
+        return context.get_dummy_value()
+
+    return types.void(tile, x, i, a, slots, rows, begin, end, first), generate

@@ -69,9 +69,17 @@ def scene_names() -> list[str]:
     return names(scene_library())
 
 
-@cache
 def load_scene(name: str) -> Scene:
-    """The built-in scene of that name, or the scene in that YAML file. Raises InputError."""
+    """The built-in scene of that name, or the scene in that YAML file as it is now. Raises InputError."""
+    return _built_in(name) if name in scene_names() else _read(name)
+
+
+@cache
+def _built_in(name: str) -> Scene:
+    return _read(name)
+
+
+def _read(name: str) -> Scene:
     data = read_named(name, scene_library(), "scene")
     if not isinstance(data, dict):
         raise InputError(f"{name}: a scene is a mapping of fields, found {type(data).__name__}")

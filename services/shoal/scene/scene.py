@@ -66,7 +66,9 @@ class Scene(Record):
     def _check_attachment(self, where: str, attachment: Attachment) -> None:
         if attachment.body == GROUND:
             if isinstance(attachment.point, str):
-                raise ValueError(f"{where}.point: a place on the ground is given as [x, y] in m, found {attachment.point!r}")
+                raise ValueError(
+                    f"{where}.point: a place on the ground is given as [x, y] in m, found {attachment.point!r}"
+                )
             return
         if attachment.body not in self.bodies:
             known = ", ".join([*self.bodies, GROUND])
@@ -74,13 +76,15 @@ class Scene(Record):
         body = self.bodies[attachment.body]
         if isinstance(attachment.point, str) and attachment.point not in body.points:
             raise ValueError(
-                f"{where}.point: {attachment.body} has no point {attachment.point!r}; there are {', '.join(body.points)}"
+                f"{where}.point: {attachment.body} has no point {attachment.point!r}; "
+                f"there are {', '.join(body.points)}"
             )
         if body.element != "rigid" and not isinstance(attachment.point, str):
             x, y = attachment.point
             if y != 0 or not 0 <= x <= body.length:
                 raise ValueError(
-                    f"{where}.point: [{x:g}, {y:g}] is not on the axis of {attachment.body}; use [s, 0] with 0 <= s <= {body.length:g}"
+                    f"{where}.point: [{x:g}, {y:g}] is not on the axis of {attachment.body}; "
+                    f"use [s, 0] with 0 <= s <= {body.length:g}"
                 )
 
     def _connected(self) -> set[str]:

@@ -8,6 +8,7 @@ from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.starts import starting_points
+from shoal.trajectory import Array
 
 
 def casadi(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
@@ -21,7 +22,8 @@ def casadi(model: ForwardModel, rng: np.random.Generator, progress: Progress) ->
         raise InputError("method: casadi finds initial angles and rates only; use least-squares for other parameters")
     if len(markers) != 1 or [c.quantity for c in channels] != ["x", "y"]:
         raise InputError("method: casadi takes x and y of one marker; use least-squares for other channels")
-    rows, ends = [], []
+    rows: list[tuple[int, float, float]] = []
+    ends: list[tuple[Array, float, str]] = []
     for start in starting_points(model):
         result = identify_initial_angles(
             model.scene,

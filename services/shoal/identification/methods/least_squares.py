@@ -51,7 +51,8 @@ def least_squares(model: ForwardModel, rng: np.random.Generator, progress: Progr
     rows: list[tuple[int, float, float]] = []
     for k in order:
         hopeless = 100 * min((d.fitness for d in descents), default=np.inf)
-        descent = _descend(model, starts[k], *first[k], progress, len(rows), hopeless)
+        residual, jacobian = first[k]
+        descent = _descend(model, starts[k], residual, jacobian, progress, len(rows), hopeless)
         descents.append(descent)
         best_before = rows[-1][1] if rows else np.inf
         rows += [(i, min(best, best_before), mean) for i, best, mean in descent.rows]
@@ -63,7 +64,8 @@ def least_squares(model: ForwardModel, rng: np.random.Generator, progress: Progr
 
 def descend(model: ForwardModel, start: Array, progress: Progress) -> Descent:
     """Minimise the squared residuals from one start, within the bounds."""
-    return _descend(model, start, *linearise(model, start), progress, 0, np.inf)
+    residual, jacobian = linearise(model, start)
+    return _descend(model, start, residual, jacobian, progress, 0, np.inf)
 
 
 def _descend(

@@ -69,5 +69,3 @@ def _search(model: ForwardModel, optimizer: Any, rng: np.random.Generator, progr
 
     state = minimize(optimizer, evaluate, rng=rng, iterations=ITERATIONS, callback=note)
     return Outcome(state.best, state.best_value, rows, "")
-
-

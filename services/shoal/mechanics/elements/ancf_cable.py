@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.mechanics.affine import Number
 from shoal.mechanics.tile import Array, Index, Tile
 from shoal.mechanics.vector import add, copy, pointer
 
@@ -23,17 +24,17 @@ ROWS = 8
 class AncfCables(NamedTuple):
     """Elements of one quadrature: eight rows of (r1, r1', r2, r2') and 1/L, EA L, EI/L for each."""
 
-    count: int
+    size: int
     rows: Index
     coefficients: Array
 
 
-def coefficients(length: Array, axial_stiffness: Array, bending_stiffness: Array) -> list[Array]:
+def coefficients(length: Number, axial_stiffness: Number, bending_stiffness: Number) -> list[Number]:
     """The three numbers of an element [1/m, N m, N m]."""
     return [1.0 / length, axial_stiffness * length, bending_stiffness / length]
 
 
-def mass_matrix(mass_per_length: Array, length: Array) -> list[list[Array]]:
+def mass_matrix(mass_per_length: Number, length: Number) -> list[list[Number]]:
     """Consistent mass [kg, kg m, kg m^2] on (r1, r1', r2, r2'), the same for x and y."""
     m, l = mass_per_length * length / 420, length  # noqa: E741
     return [
@@ -44,13 +45,13 @@ def mass_matrix(mass_per_length: Array, length: Array) -> list[list[Array]]:
     ]
 
 
-def weight(mass_per_length: Array, length: Array) -> list[Array]:
+def weight(mass_per_length: Number, length: Number) -> list[Number]:
     """Consistent load of a unit acceleration [kg, kg m] on (r1, r1', r2, r2')."""
     m = mass_per_length * length
     return [m / 2, m * length / 12, m / 2, -m * length / 12]
 
 
-def position_shape(x: float, length: Array) -> list[Array]:
+def position_shape(x: Number, length: Number) -> list[Number]:
     """Hermite shape functions of r at the fraction x of the element."""
     return [
         1 - 3 * x**2 + 2 * x**3 + 0 * length,
@@ -60,7 +61,7 @@ def position_shape(x: float, length: Array) -> list[Array]:
     ]
 
 
-def slope_shape(x: float, length: Array) -> list[Array]:
+def slope_shape(x: Number, length: Number) -> list[Number]:
     """Shape functions of r' at the fraction x of the element [1/m, 1]."""
     return [
         (6 * x**2 - 6 * x) / length,
@@ -92,7 +93,7 @@ REDUCED_BENDING = _gauss(2)
 @njit(cache=True, error_model="numpy", forceinline=True)
 def raw(cables: AncfCables) -> AncfCables:
     """The same elements with pointers in place of arrays."""
-    return AncfCables(cables.count, pointer(cables.rows), pointer(cables.coefficients))
+    return AncfCables(cables.size, pointer(cables.rows), pointer(cables.coefficients))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -197,7 +198,7 @@ def _force_reduced(tile: Tile, number: int, coefficient: Array, w: Array) -> Non
 @njit(cache=True, error_model="numpy")
 def add_force_full(tile: Tile, cables: AncfCables, z: Array, f: Array, w: Array) -> None:
     """Add the elastic force -dU/dz [N, N m] to f (rows, lanes); w is work space of 16 rows. Pointers."""
-    for number in range(cables.count):
+    for number in range(cables.size):
         _gather(tile, cables, number, z, w)
         _force_full(tile, number, cables.coefficients, w)
         _scatter(tile, cables, number, w, f)
@@ -206,17 +207,19 @@ def add_force_full(tile: Tile, cables: AncfCables, z: Array, f: Array, w: Array)
 @njit(cache=True, error_model="numpy")
 def add_force_reduced(tile: Tile, cables: AncfCables, z: Array, f: Array, w: Array) -> None:
     """As `add_force_full`, with 3 Lobatto points axial and 2 Gauss points bending."""
-    for number in range(cables.count):
+    for number in range(cables.size):
         _gather(tile, cables, number, z, w)
         _force_reduced(tile, number, cables.coefficients, w)
         _scatter(tile, cables, number, w, f)
 
 
 @njit(cache=True, error_model="numpy")
-def add_energy(tile: Tile, cables: AncfCables, axial: Array, bending: Array, z: Array, w: Array, energy: Array, row: int) -> None:
+def add_energy(
+    tile: Tile, cables: AncfCables, axial: Array, bending: Array, z: Array, w: Array, energy: Array, row: int
+) -> None:
     """Add the strain energy [J] to a row of energy, with the given quadrature tables. Pointers."""
     width = len(tile)
-    for number in range(cables.count):
+    for number in range(cables.size):
         _gather(tile, cables, number, z, w)
         base = 3 * number * width
         for lane in range(width):
@@ -242,12 +245,14 @@ def add_energy(tile: Tile, cables: AncfCables, axial: Array, bending: Array, z: 
 
 
 @njit(cache=True, error_model="numpy")
-def tangent(tile: Tile, cables: AncfCables, axial: Array, bending: Array, z: Array, w: Array, out: Array, first: int) -> None:
+def tangent(
+    tile: Tile, cables: AncfCables, axial: Array, bending: Array, z: Array, w: Array, out: Array, first: int
+) -> None:
     """Stiffness d2U/dz2 of every element; rows of out from `first` on: (elements * 64, lanes), 8 x 8 blocks."""
     width = len(tile)
     shape = np.empty((2, 8))
     hessian = np.empty((4, 4))
-    for number in range(cables.count):
+    for number in range(cables.size):
         _gather(tile, cables, number, z, w)
         base = 3 * number * width
         for k in range((first + 64 * number) * width, (first + 64 * number + 64) * width):

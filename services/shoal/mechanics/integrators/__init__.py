@@ -19,7 +19,8 @@ INTEGRATORS: dict[str, Any] = {
 
 def facts(name: str) -> Facts:
     """Declared order and stability of an integrator."""
-    return INTEGRATORS[name].FACTS
+    declared: Facts = INTEGRATORS[name].FACTS
+    return declared
 
 
 def choose(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Any:

@@ -58,7 +58,7 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Generali
         np.zeros(tangent.mass.size),
         np.zeros(max(1, 64 * model.elements) * width),
         np.zeros(model.rows * width),
-        np.zeros(max(1, model.constraints.count) * width),
+        np.zeros(max(1, model.constraints.size) * width),
     )
 
 
@@ -95,13 +95,13 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, h: float) -> 
         )
         sparse.factor(tile, t.pattern, matrix)
         sparse.solve(tile, t.pattern, matrix, residual, 0)
-        if m.constraints.count > 0:
+        if m.constraints.size > 0:
             # H dq + C_q' dlambda = r, C_q dq = -C
             constraints.residual(tile, m.constraints, w.z, w.gauss.gap)
             gauss.prepare(tile, m, matrix, t.pattern, w.z, w.gauss)
             gauss.add_rates(tile, m, w.gauss, residual)
             gauss.apply(tile, m, w.gauss, scheme.rank_tolerance, residual)
-            for k in range(m.constraints.count * width):
+            for k in range(m.constraints.size * width):
                 multiplier[k] += w.gauss.multiplier[k]
         largest = 0.0
         for i in range(end):
@@ -117,7 +117,7 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, h: float) -> 
             w.z[i] = np.nan  # the iteration did not converge: the lane must not go on with a plausible number
     for i in range(end):
         auxiliary[i] += (1 - alpha_f) / (1 - alpha_m) * w.a[i]
-    if m.constraints.count > 0:
+    if m.constraints.size > 0:
         gauss.project_rates(tile, m, w.gauss, w.z, w.zdot, scheme.rank_tolerance)
 
 
@@ -129,9 +129,9 @@ def _residual(tile: Tile, m: Arrays, w: Work, multiplier: Array, out: Array) -> 
     sparse.multiply(tile, m.pattern, m.mass, w.a, w.stage)
     for i in range(n * len(tile)):
         out[i] -= w.stage[i]
-    if m.constraints.count > 0:
+    if m.constraints.size > 0:
         constraints.jacobian(tile, m.constraints, n, w.z, w.gauss.jacobian)
-        for k in range(m.constraints.count):
+        for k in range(m.constraints.size):
             for i in range(n):
                 for lane in range(len(tile)):
                     out[i * len(tile) + lane] -= (

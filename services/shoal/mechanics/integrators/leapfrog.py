@@ -39,7 +39,7 @@ def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, h: float) -> None:
     for i in range(end):
         w.zdot[i] += 0.5 * h * w.a[i]
         w.z[i] += h * w.zdot[i]
-    if m.frictions.count + m.constraints.count > 0:
+    if m.frictions.size + m.constraints.size > 0:
         for i in range(end):
             w.stage[i] = w.zdot[i]
             w.zdot[i] += 0.5 * h * w.a[i]

@@ -33,7 +33,7 @@ def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, step: float) -> None:
 def implement(settings: type, kernel: Any) -> None:
     """Let compiled calls of `advance` with settings of this type run `kernel`."""
 
-    @overload(advance)  # type: ignore[untyped-decorator]
+    @overload(advance)
     def choose(tile, scheme, m, w, step):  # type: ignore[no-untyped-def]
         if not (isinstance(scheme, types.BaseNamedTuple) and scheme.instance_class is settings):
             return None

@@ -1,0 +1,38 @@
+"""What a running flow tells whoever listens in the same process: one line when work starts, one when it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+Listener = Callable[[str, str], None]
+"""Called with the name of the work and `started`, `done` or `failed`; from any thread."""
+
+_listeners: list[Listener] = []
+
+
+@contextmanager
+def listening(listener: Listener) -> Iterator[None]:
+    """Let `listener` hear everything within the block."""
+    _listeners.append(listener)
+    try:
+        yield
+    finally:
+        _listeners.remove(listener)
+
+
+@contextmanager
+def work(name: str) -> Iterator[None]:
+    """Announce that the block runs, and how it ended."""
+    _tell(name, "started")
+    try:
+        yield
+    except BaseException:
+        _tell(name, "failed")
+        raise
+    _tell(name, "done")
+
+
+def _tell(name: str, what: str) -> None:
+    for listener in _listeners:
+        listener(name, what)

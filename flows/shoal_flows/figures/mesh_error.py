@@ -1,0 +1,36 @@
+"""What the mesh of the model does to the answer, and whether the estimate knew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from shoal_flows.figures.style import BLUE, ORANGE, VERMILION, canvas, log_ticks
+from shoal_flows.jobs import Fit
+
+
+def mesh_error(fits: Sequence[Fit], title: str) -> Figure:
+    """Size of the true error of every parameter, of the error predicted from the mesh, and of the interval."""
+    names = list(fits[0].estimate.truth)
+    figure, axes = canvas(1.6 + 2.0 * len(names), nrows=len(names), sharex=True, sharey=True, squeeze=False)
+    places = np.arange(len(fits))
+    for panel, name in zip(axes[:, 0], names, strict=True):
+        values = [f.estimate.parameters[name] for f in fits]
+        true = [abs(v.value - f.estimate.truth[name]) for v, f in zip(values, fits, strict=True)]
+        predicted = [abs(v.model_bias) if v.model_bias is not None else np.nan for v in values]
+        half = [(v.upper - v.lower) / 2 for v in values]
+        dots = {"linestyle": "none", "markersize": 9}
+        panel.plot(places, np.degrees(half), color=ORANGE, marker="_", markeredgewidth=2, label="95 % interval", **dots)
+        panel.plot(places, np.degrees(predicted), color=BLUE, marker="D", label="predicted", fillstyle="none", **dots)
+        panel.plot(places, np.degrees(true), color=VERMILION, marker="o", label="true error", **dots)
+        panel.set_yscale("log")
+        log_ticks(panel)
+        panel.set_ylabel(f"error of {name} [°]")
+    axes[-1, 0].set_xticks(places, [f.cell.name.replace(" ", "\n") for f in fits])
+    axes[-1, 0].set_xlabel("elements on OA / AB, quadrature")
+    axes[-1, 0].set_xlim(-0.5, len(fits) - 0.5)
+    axes[0, 0].set_title(title)
+    axes[0, 0].legend(loc="lower left")
+    return figure

@@ -1,0 +1,78 @@
+"""One look for every picture: colours that colour-blind readers tell apart, room for a message in the title."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Okabe and Ito (2008), Color Universal Design.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#767676"
+
+METHODS: dict[str, dict[str, Any]] = {
+    "auto": {"color": BLACK, "marker": "o"},
+    "least-squares": {"color": BLACK, "marker": "o"},
+    "iafsa": {"color": BLUE, "marker": "s"},
+    "iafsa-unseeded": {"color": SKY, "marker": "D", "linestyle": "--"},
+    "afsa": {"color": ORANGE, "marker": "^"},
+    "iafsa-printed": {"color": VERMILION, "marker": "v", "linestyle": "-."},
+    "casadi": {"color": GREEN, "marker": "P", "linestyle": ":"},
+}
+ENGINES: dict[str, dict[str, Any]] = {
+    "gauss": {"color": BLUE, "linestyle": "-"},
+    "exudyn": {"color": ORANGE, "linestyle": "--"},
+    "casadi": {"color": GREEN, "linestyle": ":"},
+    "exudyn-ge": {"color": PURPLE, "linestyle": "-."},
+}
+OTHER: dict[str, Any] = {"color": PURPLE, "linestyle": "-"}
+
+_RC: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 11,
+    "axes.titlesize": 12,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 10,
+    "lines.linewidth": 1.8,
+    "figure.constrained_layout.use": True,
+    "svg.hashsalt": "shoal",
+}
+
+
+def canvas(height: float = 4.2, **layout: Any) -> tuple[Figure, Any]:
+    """A figure that stays legible at the width of a phone, and its axes; `layout` goes to `Figure.subplots`."""
+    with rc_context(_RC):
+        figure = Figure(figsize=(6.4, height))
+        return figure, figure.subplots(**layout)
+
+
+def log_ticks(axes: Axes) -> None:
+    """Without the fine grid of a logarithmic axis."""
+    axes.grid(False, which="minor")
+
+
+def png(figure: Figure) -> bytes:
+    """The picture as PNG."""
+    return _saved(figure, format="png", dpi=120)
+
+
+def svg(figure: Figure) -> bytes:
+    """The picture as SVG, the same bytes for the same numbers."""
+    return _saved(figure, format="svg", metadata={"Date": None})
+
+
+def _saved(figure: Figure, **options: Any) -> bytes:
+    stream = BytesIO()
+    with rc_context(_RC):
+        figure.savefig(stream, **options)
+    return stream.getvalue()

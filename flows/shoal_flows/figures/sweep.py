@@ -1,0 +1,57 @@
+"""Where a marker has moved to, over a grid of values: the paper's Figure 4."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from shoal.engines.sweep import Sweep
+from shoal.errors import InputError
+from shoal.trajectory import Status
+
+from shoal_flows.figures.style import BLUE, ORANGE, canvas
+
+
+def sweep(result: Sweep, marker: str) -> Figure:
+    """One value: displacement in x and y as lines. Two values: two maps. Raises InputError for more."""
+    if len(result.grid) == 1:
+        return _lines(result, marker)
+    if len(result.grid) == 2:
+        return _maps(result, marker)
+    raise InputError(f"vary: a sweep over {len(result.grid)} values has no picture; draw one over one or two")
+
+
+def _moved(result: Sweep, marker: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    good = np.array([status is Status.OK for status in result.status])
+    return np.where(good[:, None], result.displacements[marker], np.nan)
+
+
+def _lines(result: Sweep, marker: str) -> Figure:
+    (path, values), moved = next(iter(result.grid.items())), _moved(result, marker)
+    figure, axes = canvas()
+    axes.plot(values, moved[:, 0], color=BLUE, label="horizontal")
+    axes.plot(values, moved[:, 1], color=ORANGE, linestyle="--", label="vertical")
+    axes.set_title(f"{result.scene.name}: where {marker} has moved after {result.time:g} s")
+    axes.set_xlabel(_labelled(path))
+    axes.set_ylabel(f"displacement of {marker} [m]")
+    axes.legend()
+    return figure
+
+
+def _maps(result: Sweep, marker: str) -> Figure:
+    (one, first), (other, second) = result.grid.items()
+    moved = _moved(result, marker)
+    x, y = np.unique(first), np.unique(second)
+    figure, axes = canvas(6.6, nrows=2, sharex=True)
+    for k, (panel, direction) in enumerate(zip(axes, ("horizontal", "vertical"), strict=True)):
+        image = panel.pcolormesh(x, y, moved[:, k].reshape(len(x), len(y)).T, cmap="viridis", shading="nearest")
+        figure.colorbar(image, ax=panel, label=f"{direction} [m]")
+        panel.set_ylabel(_labelled(other))
+        panel.grid(False)
+    axes[0].set_title(f"{result.scene.name}: displacement of {marker} after {result.time:g} s")
+    axes[-1].set_xlabel(_labelled(one))
+    return figure
+
+
+def _labelled(path: str) -> str:
+    unit = {"angle": " [rad]", "length": " [m]", "height": " [m]", "width": " [m]", "density": " [kg/m³]"}
+    return path + unit.get(path.rpartition(".")[2], "")

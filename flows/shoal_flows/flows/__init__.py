@@ -1,0 +1,21 @@
+"""The flows by name. Importing this imports Prefect: start or name its server first."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from shoal_flows import settings
+
+settings.apply()
+
+from prefect import Flow  # noqa: E402 - it reads the settings when it is imported
+
+from shoal_flows.flows.compare import compare  # noqa: E402
+from shoal_flows.flows.demo import demo  # noqa: E402
+from shoal_flows.flows.forward import forward  # noqa: E402
+from shoal_flows.flows.identify import identify  # noqa: E402
+from shoal_flows.flows.sweep import sweep  # noqa: E402
+
+FLOWS: dict[str, Flow[..., Any]] = {flow.name: flow for flow in (forward, identify, compare, sweep, demo)}
+
+__all__ = ["FLOWS"]

@@ -1,0 +1,62 @@
+"""Flow: the main job. Both cases of the paper by every method, on several meshes, on three engines."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+
+from prefect import flow
+from prefect.task_runners import ThreadPoolTaskRunner
+from shoal.engines.compare import Comparison
+
+from shoal_flows import workers
+from shoal_flows.flows.study import Running, open_running
+from shoal_flows.flows.tasks import measure, run_engines
+from shoal_flows.jobs import Cell
+from shoal_flows.pictures import Picture, draw_best, draw_convergence, draw_mesh_error, draw_residuals
+from shoal_flows.plan import CASES, ENGINES, SLOWEST_FIRST, TITLES, mesh_cells, method_cells
+from shoal_flows.results import Compared, DemoResult, Study
+
+
+@flow(name="demo", task_runner=ThreadPoolTaskRunner(max_workers=workers.count()))
+def demo() -> DemoResult:
+    """Identify both cases by every method and on four meshes; compare the engines on both scenes."""
+    measured = {case: measure.submit(case, None) for case in CASES}
+    compared = {case: run_engines.submit(scene, ENGINES, {}) for case, scene in CASES.items()}
+    with ExitStack() as stack:
+
+        def begin(what: str, cells: list[Cell]) -> Running:
+            case = cells[0].problem
+            return stack.enter_context(open_running(f"{case} · {what}", cells, measured[case].result()))
+
+        studies = {case: begin("identify", method_cells(case)) for case in CASES}
+        meshes = {case: begin("mesh error", mesh_cells(case)) for case in CASES}
+        # The longest first, so that no core waits for the other at the end.
+        queue = [(study, cell) for study in (*studies.values(), *meshes.values()) for cell in study.cells]
+        for study, cell in sorted(queue, key=lambda item: SLOWEST_FIRST.index(item[1].method)):
+            study.submit(cell)
+        return DemoResult(
+            {case: _finish_methods(study) for case, study in studies.items()},
+            {case: _finish_meshes(study) for case, study in meshes.items()},
+            {case: _compared(future.result()) for case, future in compared.items()},
+        )
+
+
+def _finish_methods(study: Running) -> Study:
+    case = TITLES[study.cells[0].problem]
+    return study.finish(
+        {
+            "convergence": (draw_convergence, f"{case}: what each method pays"),
+            "residuals": (draw_residuals, f"{case}: what each method leaves"),
+            "trajectory": (draw_best, f"{case}: the fitted model runs through the data"),
+        }
+    )
+
+
+def _finish_meshes(study: Running) -> Study:
+    case = TITLES[study.cells[0].problem]
+    return study.finish({"mesh-error": (draw_mesh_error, f"{case}: a finer mesh, a truer answer")})
+
+
+def _compared(result: tuple[Comparison, Picture, str]) -> Compared:
+    comparison, picture, run_id = result
+    return Compared(comparison, run_id, picture)

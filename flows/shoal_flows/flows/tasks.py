@@ -1,0 +1,63 @@
+"""The tasks: each is a line around a plain function, run in a worker process, and the logging of its result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from prefect import task
+from prefect.cache_policies import NO_CACHE
+from shoal.engines.compare import Comparison
+from shoal.engines.sweep import Sweep
+from shoal.identification import Measurement
+from shoal.scene import Scene
+from shoal.trajectory import Trajectory
+
+from shoal_flows import events, jobs, pictures, workers
+from shoal_flows.jobs import Cell, Fit
+from shoal_flows.pictures import Picture
+from shoal_flows.tracking import engines as tracked
+from shoal_flows.tracking.identification import log_fit
+
+
+@task(task_run_name="measure {problem}", cache_policy=NO_CACHE)
+def measure(problem: str, data: str | None) -> Measurement:
+    """The motion to fit."""
+    with events.work(f"data of {problem}"):
+        return workers.run(jobs.measured, problem, data)
+
+
+@task(task_run_name="{cell.problem} {cell.name}", cache_policy=NO_CACHE)
+def optimise(cell: Cell, measurement: Measurement, study: str) -> Fit:
+    """One optimisation, logged as a child of the run `study`."""
+    with events.work(f"{cell.problem}, {cell.name}"):
+        fit, picture = workers.run(pictures.fitted, cell, measurement)
+        log_fit(fit, picture, study)
+        return fit
+
+
+@task(task_run_name="compare {scene}", cache_policy=NO_CACHE)
+def run_engines(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -> tuple[Comparison, Picture, str]:
+    """One scene on several engines; with its picture and the id of its run."""
+    with events.work(f"{scene} on {', '.join(engines)}"):
+        comparison = workers.run(jobs.compared, scene, engines, values)
+        marker = tracked.tip(comparison.scene)
+        title = f"{comparison.scene.name}: {marker} by each engine"
+        picture = workers.run(pictures.draw_engines, comparison, marker, title)
+        return comparison, picture, tracked.log_comparison(comparison, picture[0])
+
+
+@task(task_run_name="simulate {scene}", cache_policy=NO_CACHE)
+def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene, Trajectory, str]:
+    """One motion, with the id of its run."""
+    with events.work(f"{scene} on {engine}"):
+        wanted, motion = workers.run(jobs.simulated, scene, engine, values)
+        return wanted, motion, tracked.log_forward(wanted, motion)
+
+
+@task(task_run_name="sweep {scene}", cache_policy=NO_CACHE)
+def run_grid(scene: str, vary: Mapping[str, Sequence[float]], engine: str, time: float | None) -> tuple[Sweep, str]:
+    """One scene over a grid, with the id of its run."""
+    with events.work(f"{scene} over {', '.join(vary)}"):
+        result = workers.run(jobs.swept, scene, vary, engine, time)
+        return result, tracked.log_sweep(result)

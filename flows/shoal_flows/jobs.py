@@ -1,0 +1,105 @@
+"""What the tasks compute: one plain function each, from small descriptions to frozen results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from shoal.engines import compare as comparing
+from shoal.engines import get_engine
+from shoal.engines import sweep as sweeping
+from shoal.errors import InputError
+from shoal.identification import Estimate, Measurement, identify, load_problem, measure
+from shoal.identification.identify import load_truth
+from shoal.identification.measurement import observe
+from shoal.scene import Scene, load_scene
+from shoal.trajectory import Array, Trajectory
+
+_POINTS = 300
+"""Samples of a trajectory that is drawn and logged."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One optimisation of a study. values: fields of the scene to set; label: its readable name."""
+
+    problem: str
+    method: str
+    seed: int = 0
+    engine: str = "gauss"
+    values: dict[str, Any] = field(default_factory=dict)
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """Readable and unique within a study."""
+        return self.label or f"{self.method} · seed {self.seed}"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An estimate with the motion of the identified scene.
+
+    at_samples: the model at the samples of the measurement, (samples, channels)
+    motion: the model's markers on a fine grid of times from 0 to the last sample
+    """
+
+    cell: Cell
+    estimate: Estimate
+    at_samples: Array
+    motion: Trajectory
+
+    @property
+    def residuals(self) -> Array:
+        """Model minus measurement, (samples, channels)."""
+        return np.asarray(self.at_samples - self.estimate.measurement.values)
+
+
+def measured(problem: str, data: str | None = None) -> Measurement:
+    """The motion to fit: read from `data`, or computed as the problem says. Raises InputError."""
+    stated = load_problem(problem)
+    return measure(stated, load_truth(stated), data)
+
+
+def fit(cell: Cell, measurement: Measurement) -> Fit:
+    """One optimisation, and the motion of what it found. Raises InputError, ComputationError."""
+    estimate = identify(
+        load_problem(cell.problem),
+        method=cell.method,
+        engine=cell.engine,
+        values=cell.values,
+        seed=cell.seed,
+        measurement=measurement,
+    )
+    engine = get_engine(cell.engine)
+    sampled = engine.simulate(estimate.scene, measurement.times)
+    grid = np.linspace(0.0, float(measurement.times[-1]), _POINTS)
+    return Fit(cell, estimate, observe(sampled, measurement.channels)[0], engine.simulate(estimate.scene, grid))
+
+
+def simulated(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene, Trajectory]:
+    """A scene with its motion. Raises InputError."""
+    wanted = load_scene(scene).with_values(values)
+    return wanted, get_engine(engine).simulate(wanted)
+
+
+def compared(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -> comparing.Comparison:
+    """A scene on several engines. Raises InputError."""
+    return comparing.compare(load_scene(scene).with_values(values), engines)
+
+
+def swept(scene: str, vary: Mapping[str, Sequence[float]], engine: str, time: float | None) -> sweeping.Sweep:
+    """A scene over a grid; `vary` maps a path to [low, high, count]. Raises InputError."""
+    axes = {path: _axis(path, span) for path, span in vary.items()}
+    if not axes:
+        raise InputError("vary: name at least one path, as {path: [low, high, count]}")
+    return sweeping.sweep(load_scene(scene), axes, get_engine(engine), time)
+
+
+def _axis(path: str, span: Sequence[float]) -> Array:
+    if len(span) != 3 or span[2] != int(span[2]) or span[2] < 1:
+        raise InputError(f"vary: {path}: needs [low, high, count], found {list(span)}")
+    low, high, number = span
+    return np.linspace(low, high, int(number))

@@ -1,0 +1,51 @@
+"""What the demo runs: cases, methods, meshes and engines."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from shoal_flows.jobs import Cell
+
+CASES = {
+    "paper-case-1": "flexible-double-pendulum",
+    "paper-case-2": "flexible-double-pendulum-case-2",
+}
+"""Problem of each case, and the scene that the engines are compared on."""
+
+TITLES = {"paper-case-1": "Case 1", "paper-case-2": "Case 2"}
+METHODS = ("least-squares", "iafsa", "iafsa-unseeded", "iafsa-printed", "afsa", "casadi")
+SLOWEST_FIRST = ("iafsa-printed", "casadi", "afsa", "iafsa", "iafsa-unseeded", "least-squares")
+ENGINES = ("gauss", "exudyn", "casadi")
+SEED = 0
+
+MESHES = (
+    ("2/4 full", 2, "full", 5e-4),
+    ("2/4 reduced", 2, "reduced", 4e-4),
+    ("4/8 reduced", 4, "reduced", 2e-4),
+    ("8/16 reduced", 8, "reduced", 1e-4),
+)
+"""Label, elements on OA (twice as many on AB), quadrature, and a step [s] below the explicit stability limit."""
+
+
+def method_cells(case: str) -> list[Cell]:
+    """Every method once, on the problem's own mesh."""
+    return [Cell(case, method, SEED) for method in METHODS]
+
+
+def mesh_cells(case: str) -> list[Cell]:
+    """Least squares on every mesh."""
+    return [
+        Cell(case, "least-squares", SEED, values=mesh_values(elements, quadrature, step), label=label)
+        for label, elements, quadrature, step in MESHES
+    ]
+
+
+def mesh_values(elements: int, quadrature: str, step: float) -> dict[str, Any]:
+    """The fields of the scene that make a mesh."""
+    return {
+        "bodies.OA.elements": elements,
+        "bodies.AB.elements": 2 * elements,
+        "bodies.OA.quadrature": quadrature,
+        "bodies.AB.quadrature": quadrature,
+        "solver.step": step,
+    }

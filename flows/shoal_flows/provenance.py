@@ -1,0 +1,46 @@
+"""What a number was computed with: versions, revision of the source, platform."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+PACKAGES = ("shoal", "numpy", "scipy", "numba", "exudyn", "casadi", "prefect", "mlflow")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Versions of the packages that shape the numbers, and of Python."""
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+@cache
+def revision() -> str | None:
+    """The git revision of the source, with `+changes` if files differ from it; None outside a repository."""
+    commit = _git("rev-parse", "HEAD")
+    if commit is None:
+        return None
+    return commit + ("+changes" if _git("status", "--porcelain", "--untracked-files=no") else "")
+
+
+def machine() -> str:
+    """Operating system and processor architecture."""
+    return f"{platform.system()} {platform.release()}, {platform.machine()}"
+
+
+def _git(*arguments: str) -> str | None:
+    command = ["git", "-C", str(Path(__file__).parent), *arguments]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()

@@ -1,0 +1,143 @@
+"""What the flows return."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from shoal.engines.compare import Comparison
+from shoal.engines.sweep import Sweep
+from shoal.scene import Scene
+from shoal.trajectory import Trajectory, plain
+
+from shoal_flows.jobs import Fit
+from shoal_flows.pictures import Picture
+
+
+@dataclass(frozen=True)
+class Study:
+    """Fits of one problem, in the order asked for. run_id: of the parent run in MLflow; failures: reason by cell."""
+
+    name: str
+    run_id: str
+    fits: list[Fit]
+    failures: dict[str, str]
+    pictures: dict[str, Picture] = field(default_factory=dict)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every optimisation ended with an answer that can be used."""
+        return bool(self.fits) and not self.failures and all(f.estimate.verdict.trusted for f in self.fits)
+
+    def by_method(self) -> dict[str, Fit]:
+        """The first fit of each method."""
+        return {f.cell.method: f for f in reversed(self.fits)}
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run identify --json` prints."""
+        return {
+            "status": "ok" if self.trusted else "failed",
+            "study": self.name,
+            "run_id": self.run_id,
+            "estimates": [f.estimate.to_json() for f in self.fits],
+            "failures": self.failures,
+        }
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A comparison with the id of its run and its picture."""
+
+    comparison: Comparison
+    run_id: str
+    picture: Picture
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every engine ran and may be believed."""
+        return self.comparison.ok
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run compare --json` prints."""
+        return {**self.comparison.to_json(), "run_id": self.run_id}
+
+
+@dataclass(frozen=True)
+class Swept:
+    """A sweep with the id of its run."""
+
+    sweep: Sweep
+    run_id: str
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every point may be believed."""
+        return self.sweep.ok
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run sweep --json` prints."""
+        return {**self.sweep.to_json(), "run_id": self.run_id}
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A motion with the id of its run."""
+
+    scene: Scene
+    motion: Trajectory
+    run_id: str
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the motion may be believed."""
+        return self.motion.ok
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run forward --json` prints."""
+        return plain({**self.motion.to_json(), "scene": self.scene.name, "run_id": self.run_id})  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """Both cases: identified by every method, on several meshes, and simulated by several engines."""
+
+    studies: dict[str, Study]
+    meshes: dict[str, Study]
+    comparisons: dict[str, Compared]
+
+    @property
+    def trusted(self) -> bool:
+        """Whether least squares and the repaired swarm found trusted answers and the engines agree on the tip."""
+        return not self.doubts()
+
+    def doubts(self) -> list[str]:
+        """Every reason not to trust the whole."""
+        found = []
+        for name, study in self.studies.items():
+            fits = study.by_method()
+            for method in ("least-squares", "iafsa"):
+                if method not in fits:
+                    found.append(f"{name}: {method} failed: {next(iter(study.failures.values()), '')}")
+                elif not fits[method].estimate.verdict.trusted:
+                    found.append(f"{name}: {method}: {fits[method].estimate.verdict}")
+        for name, compared in self.comparisons.items():
+            if not compared.trusted:
+                found.append(f"{name}: an engine refused the scene or failed")
+            for row in compared.comparison.differences():
+                distance = row["largest"]
+                if "gauss" in row["engines"] and row["marker"] == "B" and not (distance or 1.0) < AGREEMENT:
+                    found.append(f"{name}: {' and '.join(row['engines'])} differ by {distance} m at B")
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run demo --json` prints."""
+        return {
+            "status": "ok" if self.trusted else "failed",
+            "doubts": self.doubts(),
+            "studies": {name: study.to_json() for name, study in {**self.studies, **self.meshes}.items()},
+            "comparisons": {name: compared.to_json() for name, compared in self.comparisons.items()},
+        }
+
+
+AGREEMENT = 1e-4
+"""Distance [m] of the tip by which engines may differ at the scenes' own step."""

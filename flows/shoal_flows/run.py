@@ -1,0 +1,63 @@
+"""Run a flow by name: the server, the parameters, the answer."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+from shoal.errors import InputError
+from shoal.trajectory import plain
+
+from shoal_flows import events, server, workers
+from shoal_flows.terminal import following, show
+
+
+def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> bool:
+    """Run a flow with its progress on standard error, print its answer; returns whether it can be trusted."""
+    with following(f"flow {name}") as listener, events.listening(listener):
+        result = run_flow(name, parameters)
+    if as_json:
+        print(json.dumps(plain(result.to_json()), allow_nan=False))  # noqa: T201 - this is the output
+    else:
+        show(result)
+    return bool(result.trusted)
+
+
+def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
+    """The result of the flow `name`; text among the parameters is read as YAML. Raises InputError, ComputationError."""
+    server.start()
+    # While the server starts, the workers and this process import what they need.
+    workers.warm_up()
+    from prefect.exceptions import ParameterTypeError
+
+    from shoal_flows.flows import FLOWS
+
+    if name not in FLOWS:
+        raise InputError(f"flow: no flow {name!r}; there are {', '.join(FLOWS)}")
+    flow = FLOWS[name]
+    wanted = _parsed(name, inspect.signature(flow.fn), parameters)
+    server.wait()
+    try:
+        return flow(**wanted)
+    except ParameterTypeError as error:
+        raise InputError(f"{name}: {' '.join(str(error).split())}") from None
+
+
+def _parsed(flow: str, signature: inspect.Signature, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    parsed = {}
+    for name, value in parameters.items():
+        if name not in signature.parameters:
+            raise InputError(f"{flow}: no parameter {name!r}; there are {', '.join(signature.parameters) or 'none'}")
+        if isinstance(value, str):
+            try:
+                value = yaml.safe_load(value)
+            except yaml.YAMLError:
+                raise InputError(f"{flow}: {name}: {value!r} is not a value (write lists as [a, b])") from None
+        annotation = str(signature.parameters[name].annotation)
+        if annotation.startswith("list") and not isinstance(value, list):
+            value = value.split(",") if isinstance(value, str) else [value]
+        parsed[name] = value
+    return parsed

@@ -1,0 +1,52 @@
+"""Defaults of Prefect and MLflow: quiet, private and below Shoal's home. Call `apply` before importing either."""
+
+from __future__ import annotations
+
+import logging
+import os
+from pathlib import Path
+
+from shoal.home import home
+
+
+def apply() -> None:
+    """Set what the user has not set. Raises InputError if the home cannot be written to."""
+    for name, value in defaults(home()).items():
+        os.environ.setdefault(name, value)
+    # Alembic announces every migration of a new database.
+    for name in ("mlflow", "alembic"):
+        logging.getLogger(name).setLevel(logging.WARNING)
+
+
+def defaults(folder: Path) -> dict[str, str]:
+    """Environment of the pipeline with its state below `folder`."""
+    return {
+        "DO_NOT_TRACK": "true",
+        "PREFECT_HOME": str(folder / "prefect"),
+        "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
+        "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
+        # The log of a flow is in Prefect's database; a terminal shows progress and the answer.
+        "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",
+        "PREFECT_CLI_COLORS": "false",
+        "MLFLOW_TRACKING_URI": f"sqlite:///{folder / 'mlflow.db'}",
+        "MLFLOW_DISABLE_TELEMETRY": "true",
+        "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",
+        "MLFLOW_LOGGING_LEVEL": "WARNING",
+    }
+
+
+def artifact_folder() -> Path:
+    """Where the artifacts of the default database lie."""
+    return home() / "artifacts"
+
+
+def log_folder() -> Path:
+    """Where the servers write what they have to say; made on demand."""
+    folder = home() / "logs"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def uses_default_store() -> bool:
+    """Whether runs go to the database below Shoal's home."""
+    return os.environ.get("MLFLOW_TRACKING_URI") == defaults(home())["MLFLOW_TRACKING_URI"]

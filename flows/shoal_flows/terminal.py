@@ -1,0 +1,120 @@
+"""What a person sees while a flow runs and when it has ended: progress on standard error, one table on the output."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from shoal_flows.events import Listener
+from shoal_flows.results import Compared, DemoResult, Simulated, Study, Swept
+
+
+@contextmanager
+def following(what: str) -> Iterator[Listener]:
+    """A line that names what runs, on a terminal; in a log file a line for everything that ended."""
+    console = Console(stderr=True, highlight=False)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        bar = progress.add_task(f"{what}: starting")
+        running: list[str] = []
+        ended = 0
+        lock = Lock()
+
+        def note(name: str, state: str) -> None:
+            nonlocal ended
+            with lock:
+                if state == "started":
+                    running.append(name)
+                else:
+                    running.remove(name)
+                    ended += 1
+                    if state == "failed" or not console.is_terminal:
+                        console.print(f"{state}: {name}", soft_wrap=True)
+                now = "; ".join(running)
+                progress.update(bar, description=f"{what}: {ended} done" + (f", now {now}" if now else ""))
+
+        yield note
+
+
+def show(result: Any) -> None:
+    """The table of a result."""
+    console = Console(highlight=False)
+    if isinstance(result, Study):
+        _study(console, result)
+    elif isinstance(result, Compared):
+        _differences(console, [result])
+    elif isinstance(result, DemoResult):
+        demo_tables(console, result)
+    elif isinstance(result, Simulated):
+        for name in result.motion.markers:
+            x, y = result.motion.marker(name)[-1]
+            console.print(f"{name} at {result.motion.times[-1]:g} s: ({x:.9f}, {y:.9f}) m")
+    elif isinstance(result, Swept):
+        console.print(f"{len(result.sweep.status)} points in {result.sweep.wall_s:.2f} s")
+    if not isinstance(result, DemoResult):
+        console.print(f"logged to MLflow as run {result.run_id}; browse it with `shoal ui`", soft_wrap=True)
+
+
+def demo_tables(console: Console, result: DemoResult) -> None:
+    """The identifications, then the engines."""
+    table = _table("Identified from the tip's motion, data from Exudyn on 16/32 elements")
+    for column in ("case", "method", "theta1", "theta2", "error°", "fitness", "runs", "s"):
+        table.add_column(column, justify="left" if column in ("case", "method") else "right", no_wrap=True)
+    for case, study in result.studies.items():
+        for fit in study.fits:
+            e = fit.estimate
+            first, second = (value.value for value in e.parameters.values())
+            error = _worst_error(fit)
+            numbers = f"{first:.5f}", f"{second:.5f}", f"{error:.3f}", f"{e.fitness:.1e}", str(e.evaluations)
+            table.add_row(case.removeprefix("paper-case-"), fit.cell.method, *numbers, f"{e.wall_s:.1f}")
+    console.print(table)
+    _differences(console, list(result.comparisons.values()))
+    for doubt in result.doubts():
+        console.print(f"doubt: {doubt}", soft_wrap=True)
+
+
+def _worst_error(fit: Any) -> float:
+    errors = [fit.estimate.parameters[name].value - true for name, true in fit.estimate.truth.items()]
+    return float(np.degrees(max(map(abs, errors), default=np.nan)))
+
+
+def _study(console: Console, study: Study) -> None:
+    table = _table(study.name)
+    for column in ("method", "values", "fitness", "runs", "s", "verdict"):
+        table.add_column(column, overflow="fold")
+    for fit in study.fits:
+        e = fit.estimate
+        values = ", ".join(f"{name} {value.value:.6g}" for name, value in e.parameters.items())
+        numbers = f"{e.fitness:.2e}", str(e.evaluations), f"{e.wall_s:.1f}"
+        table.add_row(fit.cell.name, values, *numbers, str(e.verdict))
+    for name, reason in study.failures.items():
+        table.add_row(name, reason, "", "", "", "failed")
+    console.print(table)
+
+
+def _differences(console: Console, results: list[Compared]) -> None:
+    for compared in results:
+        comparison = compared.comparison
+        marker = list(comparison.scene.markers)[-1]
+        parts = [
+            f"{one}-{other} {row['largest'] * 1e6:.1f} µm" if row["largest"] is not None else f"{one}-{other} ?"
+            for row in comparison.differences()
+            if row["marker"] == marker
+            for one, other in [row["engines"]]
+        ]
+        console.print(f"{comparison.scene.name}, largest distance at {marker}:", soft_wrap=True)
+        console.print(f"  {', '.join(parts)}", soft_wrap=True)
+        for engine, reason in comparison.refused.items():
+            console.print(f"  {engine} refused: {reason}", soft_wrap=True)
+
+
+def _table(title: str) -> Table:
+    return Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)

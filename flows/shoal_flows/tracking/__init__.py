@@ -1,0 +1,1 @@
+"""What is logged to MLflow, one file for each kind of result."""

@@ -1,0 +1,101 @@
+"""Comparisons, sweeps and single motions in MLflow."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from io import StringIO
+from typing import Any
+
+from shoal.engines.compare import Comparison
+from shoal.engines.sweep import Sweep
+from shoal.scene import Scene
+from shoal.trajectory import Trajectory, plain
+
+from shoal_flows.figures.engines import engines
+from shoal_flows.figures.style import png
+from shoal_flows.figures.sweep import sweep as draw_sweep
+from shoal_flows.tracking.motion import log_motion
+from shoal_flows.tracking.store import Run, open_run
+
+
+def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
+    """A parent run with the differences, a child per engine with its motion; returns the parent's id."""
+    scene = comparison.scene
+    tags = {"kind": "study", "scene": scene.name}
+    with open_run("Comparison", f"{scene.name} · compare", description=scene.description, tags=tags) as study:
+        study.params({**_scene(scene), "engines": ", ".join(comparison.trajectories), **_refused(comparison)})
+        for row in comparison.differences():
+            pair = "-".join(row["engines"])
+            for part in ("largest", "final"):
+                if row[part] is not None:
+                    study.metric(f"difference/{pair}/{row['marker']}/{part}", row[part])
+        marker = tip(scene)
+        shown = picture or png(engines(comparison, marker, f"{scene.name}: the engines over each other"))
+        study.picture(shown, "engines.png")
+        study.text(json.dumps(plain(comparison.differences()), indent=1), "differences.json")
+        for name, motion in comparison.trajectories.items():
+            with open_run("Comparison", name, tags={"kind": "engine", "scene": scene.name}, parent=study.run_id) as run:
+                _log_engine(run, scene, motion)
+        return study.run_id
+
+
+def log_forward(scene: Scene, motion: Trajectory) -> str:
+    """One run; returns its id."""
+    tags = {"kind": "forward", "scene": scene.name}
+    name = f"{scene.name} · {motion.engine}"
+    with open_run("Forward", name, description=scene.description, tags=tags) as run:
+        _log_engine(run, scene, motion)
+        return run.run_id
+
+
+def log_sweep(result: Sweep) -> str:
+    """One run with the table and, for one or two values, a picture per marker; returns its id."""
+    scene = result.scene
+    tags = {"kind": "sweep", "scene": scene.name}
+    with open_run("Sweep", f"{scene.name} · sweep", description=scene.description, tags=tags) as run:
+        spans = {f"vary.{path}": f"{v.min():g} to {v.max():g}" for path, v in result.grid.items()}
+        run.params({**_scene(scene), "engine": result.engine, "time": result.time, **spans})
+        run.metric("final/points", len(result.status))
+        run.metric("final/wall_s", result.wall_s)
+        run.metric("final/failed_points", sum(status != "ok" for status in result.status))
+        run.text(_table(result), "sweep.csv")
+        if len(result.grid) <= 2:
+            for marker in result.displacements:
+                run.picture(png(draw_sweep(result, marker)), f"displacement-{marker}.png")
+        return run.run_id
+
+
+def tip(scene: Scene) -> str:
+    """The marker that a picture shows if it shows one: the scene's last."""
+    return list(scene.markers)[-1]
+
+
+def _log_engine(run: Run, scene: Scene, motion: Trajectory) -> None:
+    run.params({**_scene(scene), "engine": motion.engine, **{f"model.{k}": v for k, v in motion.model.items()}})
+    x, y = motion.marker(tip(scene))[-1]
+    run.metric("final/x", float(x))
+    run.metric("final/y", float(y))
+    run.metric("final/energy_drift", float(motion.energy_drift[0]))
+    run.metric("final/constraint_drift", float(motion.constraint_drift[0]))
+    run.metric("final/steps", motion.steps)
+    run.metric("final/wall_s", motion.wall_s)
+    log_motion(run, motion, tip(scene))
+
+
+def _scene(scene: Scene) -> dict[str, Any]:
+    return {"scene": scene.name, "scene.fingerprint": scene.fingerprint, "step": scene.solver.step}
+
+
+def _refused(comparison: Comparison) -> Mapping[str, str]:
+    return {f"refused.{name}": reason for name, reason in comparison.refused.items()}
+
+
+def _table(result: Sweep) -> str:
+    rows = result.rows()
+    stream = StringIO()
+    writer = csv.DictWriter(stream, fieldnames=list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return stream.getvalue()

@@ -1,0 +1,100 @@
+"""A study of identifications in MLflow: the study is the parent run, each optimisation a child."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+from shoal.identification import Measurement
+from shoal.scene import Rod
+from shoal.trajectory import plain
+
+from shoal_flows.figures.overlay import overlay
+from shoal_flows.jobs import Cell, Fit
+from shoal_flows.tracking.motion import log_motion
+from shoal_flows.tracking.store import Run, open_run
+
+
+@contextmanager
+def open_study(name: str, cells: Sequence[Cell], measurement: Measurement) -> Iterator[Run]:
+    """The parent run of a study."""
+    problem = cells[0].problem
+    description = f"{len(cells)} optimisations of {problem}; data: {measurement.origin}"
+    with open_run("Identification", name, description=description, tags={"kind": "study", "problem": problem}) as run:
+        run.params({"problem": problem, "data": measurement.origin, "cells": ", ".join(cell.name for cell in cells)})
+        yield run
+
+
+def log_outcome(study: Run, fits: Sequence[Fit], failures: Mapping[str, str], pictures: Mapping[str, bytes]) -> None:
+    """What the study found, over all its fits; failures: what went wrong, by the name of the cell."""
+    study.metric("study/trusted", sum(f.estimate.verdict.trusted for f in fits))
+    study.metric("study/failed", len(failures))
+    for name, picture in pictures.items():
+        study.picture(picture, name)
+    study.text(summary(fits, failures), "summary.md")
+    if fits:
+        best = min((f.estimate for f in fits), key=lambda e: e.fitness)
+        study.metric("final/fitness", best.fitness)
+        study.metric("final/rms", best.rms)
+        study.text(overlay(fits), "overlay.html")
+
+
+def summary(fits: Sequence[Fit], failures: Mapping[str, str]) -> str:
+    """The study as a table in Markdown."""
+    lines = ["| method | values | fitness | RMS | evaluations | time [s] | verdict |", "|---|---|---|---|---|---|---|"]
+    for fit in fits:
+        e = fit.estimate
+        values = ", ".join(f"{name} = {value.value:.6f}" for name, value in e.parameters.items())
+        numbers = f"{e.fitness:.4e} | {e.rms:.3e} | {e.evaluations} | {e.wall_s:.2f}"
+        lines.append(f"| {fit.cell.name} | {values} | {numbers} | {e.verdict} |")
+    lines += [f"| {name} | {reason} | | | | | failed |" for name, reason in failures.items()]
+    return "\n".join(lines) + "\n"
+
+
+def log_fit(fit: Fit, picture: bytes, study: str) -> str:
+    """A child of the run `study` with all there is to know about one fit; returns its id."""
+    cell, estimate = fit.cell, fit.estimate
+    tags = {"kind": "optimisation", "problem": cell.problem, "method": cell.method, "verdict": str(estimate.verdict)}
+    with open_run("Identification", cell.name, tags=tags, parent=study, description=estimate.message) as run:
+        scene = estimate.scene
+        mesh = {name: b.elements for name, b in scene.bodies.items() if isinstance(b, Rod) and b.element != "rigid"}
+        run.params({"problem": cell.problem, "method": cell.method, "seed": cell.seed, "engine": cell.engine})
+        run.params({"scene": scene.name, "scene.fingerprint": scene.fingerprint, "data": estimate.data})
+        run.params({"mesh": ", ".join(f"{name}: {n}" for name, n in mesh.items()) or "rigid", **cell.values})
+        _log_progress(run, fit)
+        _log_result(run, fit)
+        log_motion(run, fit.motion, estimate.measurement.channels[0].marker)
+        run.picture(picture, "trajectory.png")
+        run.text(json.dumps(plain(estimate.to_json()), indent=1), "estimate.json")
+        return run.run_id
+
+
+def _log_progress(run: Run, fit: Fit) -> None:
+    """Fitness by iteration, and after how many evaluations the best of each iteration had been found."""
+    counted, values = fit.estimate.history
+    for iteration, best, mean in fit.estimate.iterations:
+        run.metric("fitness/best", best, iteration)
+        run.metric("fitness/mean", mean, iteration)
+        reached = np.flatnonzero(values <= best)
+        if reached.size:
+            run.metric("fitness/evaluations", float(counted[reached[0]]), iteration)
+
+
+def _log_result(run: Run, fit: Fit) -> None:
+    estimate = fit.estimate
+    run.metric("final/fitness", estimate.fitness)
+    run.metric("final/rms", estimate.rms)
+    run.metric("final/evaluations", estimate.evaluations)
+    run.metric("final/wall_s", estimate.wall_s)
+    run.metric("final/trusted", float(estimate.verdict.trusted))
+    for name, value in {**estimate.parameters, **estimate.quantities}.items():
+        run.metric(f"final/{name}", value.value)
+        run.metric(f"interval/{name}/lower", value.lower)
+        run.metric(f"interval/{name}/upper", value.upper)
+        run.metric(f"interval/{name}/std", value.std)
+        if value.model_bias is not None:
+            run.metric(f"model_bias/{name}", value.model_bias)
+    for name, true in estimate.truth.items():
+        run.metric(f"error/{name}", estimate.parameters[name].value - true)

@@ -1,0 +1,141 @@
+"""One run in MLflow: opened with its name and tags, filled in batches, ended with its status."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from shoal.errors import ComputationError
+
+from shoal_flows import provenance, settings
+
+settings.apply()
+
+from mlflow import MlflowClient  # noqa: E402 - it reads the settings when it is imported
+from mlflow.entities import Metric, Param  # noqa: E402
+from mlflow.exceptions import MlflowException  # noqa: E402
+
+_BATCH = 1000
+_EXPERIMENTS = {
+    "Identification": "Parameters found from measured motion: a parent per study, a child per method, case and seed.",
+    "Comparison": "One scene on several engines: a parent run per scene, a child per engine.",
+    "Sweep": "One scene over a grid of values.",
+    "Forward": "Motion of one scene on one engine.",
+}
+
+
+@dataclass
+class Run:
+    """An open run of MLflow; what is added is sent when it ends or in full batches."""
+
+    client: Any
+    run_id: str
+    _metrics: list[Any] = field(default_factory=list)
+    _params: list[Any] = field(default_factory=list)
+
+    def params(self, values: Mapping[str, Any]) -> None:
+        """Settings, which never change; what is too long for MLflow is cut."""
+        self._params += [Param(name, str(value)[:6000]) for name, value in values.items()]
+
+    def metric(self, name: str, value: float, step: int = 0) -> None:
+        """One number; what is not finite is left out."""
+        if math.isfinite(value):
+            self._metrics.append(Metric(_plain(name), float(value), int(time.time() * 1000), step))
+
+    def series(self, name: str, values: Iterable[tuple[int, float]]) -> None:
+        """Numbers by step."""
+        for step, value in values:
+            self.metric(name, value, step)
+
+    def text(self, content: str, path: str) -> None:
+        """A text artifact at `path`."""
+        self.client.log_text(self.run_id, content, path)
+
+    def picture(self, content: bytes, path: str) -> None:
+        """A PNG artifact named `path`."""
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / path
+            file.write_bytes(content)
+            self.client.log_artifact(self.run_id, str(file))
+
+    def flush(self) -> None:
+        """Send what was added, at most 1000 metrics and 100 settings a call."""
+        while self._metrics or self._params:
+            self.client.log_batch(self.run_id, metrics=self._metrics[:_BATCH], params=self._params[:100])
+            del self._metrics[:_BATCH], self._params[:100]
+
+
+@contextmanager
+def open_run(
+    experiment: str,
+    name: str,
+    *,
+    description: str = "",
+    tags: Mapping[str, str] | None = None,
+    parent: str | None = None,
+) -> Iterator[Run]:
+    """A run from its start to its end, failed if an exception leaves the block; parent: the id of a run.
+
+    Raises ComputationError if MLflow cannot be reached.
+    """
+    client = _client()
+    try:
+        all_tags = {**_common_tags(), **(tags or {}), "mlflow.runName": name}
+        if parent:
+            all_tags["mlflow.parentRunId"] = parent
+        if description:
+            all_tags["mlflow.note.content"] = description
+        created = client.create_run(_experiment(experiment), tags=all_tags, run_name=name)
+    except MlflowException as error:
+        raise ComputationError(f"MLflow: {str(error).splitlines()[0]}") from None
+    run = Run(client, created.info.run_id)
+    try:
+        yield run
+        run.flush()
+    except BaseException:
+        client.set_terminated(run.run_id, "FAILED")
+        raise
+    client.set_terminated(run.run_id, "FINISHED")
+
+
+@cache
+def _client() -> Any:
+    return MlflowClient()
+
+
+@cache
+def _experiment(name: str) -> str:
+    """The experiment of that name, made with its description when it is first used."""
+    client = _client()
+    found = client.get_experiment_by_name(name)
+    if found is not None:
+        if found.lifecycle_stage == "deleted":
+            client.restore_experiment(found.experiment_id)
+        return str(found.experiment_id)
+    location = (settings.artifact_folder() / name.lower()).as_uri() if settings.uses_default_store() else None
+    tags = {"mlflow.note.content": _EXPERIMENTS[name], "project": "shoal"}
+    return str(client.create_experiment(name, artifact_location=location, tags=tags))
+
+
+def _common_tags() -> dict[str, str]:
+    tags = {f"version.{package}": found for package, found in provenance.versions().items()}
+    revision = provenance.revision()
+    if revision:
+        tags |= {"mlflow.source.git.commit": revision.partition("+")[0], "source.revision": revision}
+    return {**tags, "platform": provenance.machine(), "mlflow.source.name": "shoal", "mlflow.source.type": "PROJECT"}
+
+
+def _plain(name: str) -> str:
+    """A name that MLflow accepts for a metric."""
+    return re.sub(r"[^\w\-. /]", "_", name)
+
+
+__all__ = ["Run", "open_run"]

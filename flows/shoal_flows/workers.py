@@ -1,0 +1,49 @@
+"""Processes for the computations, so that optimisations run side by side whatever holds the interpreter's lock."""
+
+from __future__ import annotations
+
+import atexit
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
+from functools import cache
+from multiprocessing import get_all_start_methods, get_context
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_PRELOADED = ["shoal.identification", "shoal.engines.gauss", "shoal.engines.compare"]
+
+
+def count() -> int:
+    """Computations that run at a time."""
+    return max(1, os.cpu_count() or 1)
+
+
+def submit(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+    """Run a module-level function in a worker process; arguments and result are pickled."""
+    return _pool().submit(function, *args, **kwargs)
+
+
+def run(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """The result of `submit`; an exception of the function is raised here."""
+    return submit(function, *args, **kwargs).result()
+
+
+def warm_up() -> None:
+    """Start the processes; they import while the caller does something else."""
+    for _ in range(count()):
+        submit(os.getpid)
+
+
+@cache
+def _pool() -> ProcessPoolExecutor:
+    # A server process that imports once and forks workers is the quickest that is safe with threads around.
+    method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
+    context = get_context(method)
+    if method == "forkserver":
+        context.set_forkserver_preload(_PRELOADED)
+    pool = ProcessPoolExecutor(count(), mp_context=context)
+    atexit.register(pool.shutdown, wait=False, cancel_futures=True)
+    return pool

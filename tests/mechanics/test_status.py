@@ -1,0 +1,239 @@
+"""What may be believed: every way a run can fail has its status, and bad scenes are refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.errors import InputError
+from shoal.mechanics import march, simulate
+from shoal.mechanics.integrators import INTEGRATORS
+from shoal.scene import Scene, load_scene
+from shoal.trajectory import Status
+
+FLEXIBLE = load_scene("flexible-double-pendulum")
+RIGID = load_scene("rigid-double-pendulum")
+every = pytest.mark.parametrize("integrator", list(INTEGRATORS))
+
+
+def _with(scene: Scene, **settings: Any) -> Scene:
+    return scene.with_values({f"solver.{key}": value for key, value in settings.items()})
+
+
+def test_a_run_that_loses_energy_is_not_believed() -> None:
+    # A spectral radius below one damps the modes that the step does not resolve; at 0.05 s that is the pendulum.
+    scene = _with(RIGID, integrator="generalized-alpha", step=0.05, spectral_radius=0.5)
+    run = simulate.simulate(scene, np.array([2.0]))
+    assert run.status == (Status.ENERGY,)
+    assert run.message.startswith("energy is off by 0.06")
+    assert np.all(np.isfinite(run.points))
+    assert simulate.simulate(_with(scene, step=0.005), np.array([2.0])).ok
+
+
+def test_runge_kutta_near_its_limit_shows_its_loss_of_energy() -> None:
+    near = simulate.simulate(_with(FLEXIBLE, integrator="rk4", step=9.3e-4, energy_tolerance=1e-7), np.array([0.5]))
+    assert near.status == (Status.ENERGY,)
+    fine = simulate.simulate(_with(FLEXIBLE, integrator="rk4", step=1e-4, energy_tolerance=1e-7), np.array([0.5]))
+    assert fine.ok
+    assert fine.energy_drift[0] < 0.01 * near.energy_drift[0]
+
+
+def test_a_coarse_run_of_violent_motion_is_not_believed() -> None:
+    scene = _with(RIGID, integrator="leapfrog", step=0.05).with_values({"initial.AB.rate": 20.0})
+    run = simulate.simulate(scene, np.array([2.0]))
+    assert run.status[0] in (Status.ENERGY, Status.OUT_OF_REACH, Status.DIVERGED)
+    assert run.message
+
+
+@every
+def test_a_motion_that_is_not_finite_has_diverged(integrator: str) -> None:
+    scene = _with(FLEXIBLE, integrator=integrator, step=5e-4).with_values({"initial.AB.rate": 1e200})
+    times = np.linspace(0, 0.02, 5)[1:]
+    run = simulate.simulate(scene, times)
+    assert run.status == (Status.DIVERGED,)
+    assert "not finite" in run.message
+    assert not run.ok
+
+
+@pytest.mark.parametrize("rate", [1e3, 1e4, 1e6])
+@every
+def test_violent_motion_never_passes_as_ok(integrator: str, rate: float) -> None:
+    # Just under the limit of the state at rest: the stretched cables are stiffer, the step is too long for them.
+    scene = _with(FLEXIBLE, integrator=integrator, step=6.5e-4).with_values({"initial.AB.rate": rate})
+    assert not simulate.simulate(scene, np.array([0.25, 0.5])).ok
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        ({"samples": np.nan}, Status.DIVERGED),
+        ({"energy_error": np.nan}, Status.DIVERGED),
+        ({"energy_error": np.inf}, Status.DIVERGED),
+        ({"energy_scale": np.nan}, Status.DIVERGED),
+        ({"energy_error": 1e3}, Status.ENERGY),
+        ({"samples": 4.0}, Status.OUT_OF_REACH),
+        ({"drift": 1e-3}, Status.DRIFTED),
+        ({"drift": np.nan}, Status.DRIFTED),
+        ({}, Status.OK),
+    ],
+)
+def test_the_verdict_on_a_record(
+    spoil: dict[str, float], expected: Status, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One number of the record is spoilt after the march."""
+
+    def spoilt(*arguments: Any) -> Any:
+        record = march.march(*arguments)
+        for field, value in spoil.items():
+            getattr(record, field)[-1] = value
+            if field == "samples":
+                record.samples[:] = value
+        return record
+
+    monkeypatch.setattr(simulate, "march", spoilt)
+    run = simulate.simulate(RIGID, np.array([0.1, 0.2]))
+    assert run.status == (expected,)
+    assert bool(run.message) == (expected is not Status.OK)
+
+
+def test_one_sample_that_is_not_finite_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    def spoilt(*arguments: Any) -> Any:
+        record = march.march(*arguments)
+        record.samples[5] = np.nan
+        return record
+
+    monkeypatch.setattr(simulate, "march", spoilt)
+    run = simulate.simulate(RIGID, np.linspace(0, 0.2, 11))
+    assert run.status == (Status.DIVERGED,)
+
+
+def test_a_record_of_lanes_names_the_first_that_failed() -> None:
+    scene = _with(RIGID, integrator="leapfrog", step=5e-3)
+    run = simulate.simulate(scene, np.array([1.0]), {"initial.AB.rate": np.array([0.0, 30.0, 0.1])})
+    assert run.status == (Status.OK, Status.ENERGY, Status.OK)
+    assert run.message.startswith("energy is off by ")
+
+
+@every
+def test_at_time_zero_everything_is_where_it_starts(integrator: str) -> None:
+    run = simulate.simulate(_with(RIGID, integrator=integrator), np.array([0.0]))
+    assert run.ok
+    assert run.steps == 0
+    np.testing.assert_allclose(run.angles[0, :, 0], [np.pi / 4, np.pi / 6], atol=1e-15)
+
+
+def test_a_machine_at_rest_in_equilibrium_is_ok() -> None:
+    hanging = {"initial.OA.angle": -np.pi / 2, "initial.AB.angle": -np.pi / 2}
+    run = simulate.simulate(RIGID.with_values(hanging), np.array([0.5]))
+    assert run.ok, run.message
+    np.testing.assert_allclose(run.marker("B")[-1], [0, -3], atol=1e-12)
+
+
+def test_nothing_moves_without_gravity() -> None:
+    still = {"gravity": [0.0, 0.0]}
+    for scene in (RIGID, FLEXIBLE):
+        run = simulate.simulate(scene.with_values(still), np.array([0.0, 0.1]))
+        assert run.ok, run.message
+        np.testing.assert_allclose(run.points[0], run.points[1], atol=1e-12)
+
+
+ROD = {"kind": "rod", "height": 0.02, "width": 0.05, "density": 1000.0, "length": 1.0}
+CABLE = ROD | {"youngs_modulus": 2e8, "element": "ancf-cable", "elements": 2}
+
+
+def _machine(bodies: dict[str, Any], joints: dict[str, Any], markers: dict[str, Any], **other: Any) -> Scene:
+    joined = {
+        name: {"first": {"body": a, "point": p}, "second": {"body": b, "point": q}}
+        for name, (a, p, b, q) in joints.items()
+    }
+    places = {name: {"body": body, "point": point} for name, (body, point) in markers.items()}
+    return Scene.parse({"name": "m", "bodies": bodies, "joints": joined, "markers": places} | other)
+
+
+GROUNDED = {"O": ("ground", [0.0, 0.0], "R", "start")}
+
+
+@pytest.mark.parametrize(
+    ("scene", "why"),
+    [
+        pytest.param(
+            _machine({"R": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.0}}, GROUNDED, {"E": ("R", "start")}),
+            "mass matrix is singular",
+            id="a-mass-point-that-cannot-move",
+        ),
+        pytest.param(
+            _machine(
+                {"R": CABLE, "S": ROD}, GROUNDED | {"A": ("R", [0.3, 0.0], "S", "start")}, {"E": ("S", "end")}
+            ),
+            r"joints\.A: a cable is joined at a node; bodies\.R has nodes every 0\.5 m",
+            id="a-joint-between-the-nodes-of-a-cable",
+        ),
+        pytest.param(
+            _machine(
+                {"R": ROD, "S": ROD},
+                GROUNDED | {"A": ("R", "end", "S", "start"), "B": ("R", "start", "S", "start")},
+                {"E": ("S", "end")},
+            ),
+            r"joints",
+            id="one-point-in-two-places-of-a-body",
+        ),
+        pytest.param(
+            _machine({"R": ROD}, GROUNDED | {"P": ("ground", [1.0, 0.0], "R", "start")}, {"E": ("R", "end")}),
+            r"joints",
+            id="one-point-in-two-places-of-the-ground",
+        ),
+    ],
+)
+def test_a_machine_that_cannot_be_modelled_is_refused(scene: Scene, why: str) -> None:
+    with pytest.raises(InputError, match=why) as refusal:
+        simulate.simulate(scene, np.array([0.1]))
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        pytest.param(
+            _machine({"R": ROD}, GROUNDED, {"E": ("R", [3.0, 0.5])}), id="a-marker-outside-the-rod"
+        ),
+        pytest.param(
+            _machine(
+                {"R": ROD, "S": ROD},
+                GROUNDED | {"P": ("ground", [10.0, 0.0], "S", "start")},
+                {"E": ("R", "end"), "F": ("S", "end")},
+            ),
+            id="two-machines-far-apart",
+        ),
+        pytest.param(
+            _machine(
+                {"R": ROD, "S": ROD},
+                GROUNDED | {"A": ("R", [4.0, 1.0], "S", "start")},
+                {"E": ("S", "end")},
+            ),
+            id="a-joint-outside-the-rod",
+        ),
+    ],
+)
+def test_the_check_of_reach_believes_legal_machines(scene: Scene) -> None:
+    run = simulate.simulate(_with(scene, integrator="rk4"), np.array([0.05, 0.1]))
+    assert run.ok, run.message
+
+
+def test_a_loop_that_starts_apart_is_assembled_or_refused() -> None:
+    """The rocker starts where the coupler's angle puts it; what is stated otherwise is moved as little as possible."""
+    bodies = {"R": ROD, "S": ROD | {"length": 2.0}, "T": ROD | {"length": 1.5}}
+    joints = GROUNDED | {
+        "A": ("R", "end", "S", "start"),
+        "B": ("S", "end", "T", "end"),
+        "C": ("ground", [2.0, 0.0], "T", "start"),
+    }
+    start = {"R": {"angle": 1.2}, "S": {"angle": 0.1}}
+    scene = _machine(bodies, joints, {"B": ("S", "end")}, initial=start)
+    run = simulate.simulate(_with(scene, integrator="rk4"), np.array([0.0, 0.1]))
+    assert run.ok, run.message
+    assert run.model["initial_correction"] > 0.01
+    assert np.hypot(*(run.marker("B")[0] - [2.0, 0.0])) == pytest.approx(1.5, abs=1e-12)
+    assert run.energy_drift[0] < 1e-9
+    apart = _machine(bodies, joints | {"C": ("ground", [9.0, 0.0], "T", "start")}, {"B": ("S", "end")})
+    assert not simulate.simulate(_with(apart, integrator="rk4"), np.array([0.1])).ok

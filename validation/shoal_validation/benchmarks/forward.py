@@ -1,0 +1,96 @@
+"""The headline scene, 2/4 cables, 1000 steps of 5e-4 s: our time loop beside Exudyn's."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.engines.exudyn import ExudynEngine
+from shoal.engines.exudyn_build import build as build_exudyn
+from shoal.engines.exudyn_build import library
+from shoal.engines.exudyn_record import choose_steps
+from shoal.mechanics.dynamics import work_space
+from shoal.mechanics.integrators import choose
+from shoal.mechanics.march import march
+from shoal.mechanics.model import build
+from shoal.mechanics.tile import Tile, pack, tiles
+from shoal.scene import Scene, load_scene
+from shoal_validation.benchmarks.timing import median_time
+
+STEPS = 1000
+LANES = 64
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of a benchmark: seconds a simulation, and how many times faster than the peer of its group."""
+
+    name: str
+    seconds: float
+    ratio: float
+
+
+def scene(quadrature: str) -> Scene:
+    """Case 1 with the step that both quadratures allow (the reduced one is stable up to 4.5e-4 s)."""
+    step = 5e-4 if quadrature == "full" else 4e-4
+    values = {"bodies.OA.quadrature": quadrature, "bodies.AB.quadrature": quadrature, "solver.step": step}
+    return load_scene("flexible-double-pendulum").with_values({**values, "solver.duration": STEPS * step})
+
+
+def measure(quadrature: str, repeats: int = 15) -> list[Row]:
+    """Time loops alone, then whole calls as a user makes them (model, motion, checks)."""
+    what = scene(quadrature)
+    many = {"initial.OA.angle": np.linspace(0.7, 0.8, LANES)}
+    one_core, exudyn = get_engine("gauss"), ExudynEngine(modified_newton=True)
+    loop = statistics.median(exudyn_loop(exudyn, what) for _ in range(repeats))
+    single = median_time(prepare(what, 1), repeats)
+    wide = median_time(prepare(what, LANES), repeats) / LANES
+    call = median_time(lambda: exudyn.simulate(what), repeats)
+    own_call = median_time(lambda: one_core.simulate(what), repeats)
+    own_many = median_time(lambda: one_core.simulate_many(what, many), repeats) / LANES
+    return [
+        Row(f"{quadrature}: Exudyn, modified Newton, time loop", loop, 1.0),
+        Row(f"{quadrature}: ours, one simulation, time loop", single, loop / single),
+        Row(f"{quadrature}: ours, {LANES} lanes, one core, time loop", wide, loop / wide),
+        Row(f"{quadrature}: Exudyn, whole call", call, 1.0),
+        Row(f"{quadrature}: ours, whole call", own_call, call / own_call),
+        Row(f"{quadrature}: ours, {LANES} lanes, all cores, whole call", own_many, call / own_many),
+    ]
+
+
+def exudyn_loop(engine: ExudynEngine, what: Scene) -> float:
+    """Seconds of SolveDynamic alone, on a fresh system, without callbacks and files."""
+    exu = library()
+    machine = build_exudyn(exu, what, engine.beam)
+    steps = choose_steps(np.array([what.solver.duration]), what.solver.step, machine.unknowns)
+    settings = engine.simulation_settings(exu, machine, steps)
+    begin = time.perf_counter()
+    machine.mbs.SolveDynamic(settings, showHints=False)
+    return time.perf_counter() - begin
+
+
+def prepare(what: Scene, lanes: int) -> Any:
+    """A call that marches all lanes on one core from prepared arrays."""
+    values = {"initial.OA.angle": np.linspace(0.7, 0.8, lanes)} if lanes > 1 else {}
+    model = build(what.with_lanes(values), lanes)
+    tile, parts = tiles(lanes)
+    times = np.linspace(0.0, what.solver.duration, 51)[1:]
+    work = [_room(model, tile, part) for part in parts]
+
+    def run() -> None:
+        for arrays, room, scheme, q, v in work:
+            room.z[: len(q)], room.zdot[: len(v)] = q, v
+            march(tile, scheme, arrays, room, what.solver.step, STEPS, times, model.marker_rows.ravel(), 1e-9)
+
+    return run
+
+
+def _room(model: Any, tile: Tile, part: slice) -> tuple[Any, ...]:
+    arrays = model.tile(tile, part)
+    scheme = choose(model.scene.solver, model, tile, part)
+    return arrays, work_space(tile, arrays), scheme, pack(model.q0, part, tile), pack(model.v0, part, tile)
