@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import inspect
-import json
 from collections.abc import Mapping
 from typing import Any
 
 import yaml
 from shoal.errors import InputError
-from shoal.trajectory import plain
 
 from shoal_flows import events, server, workers
+from shoal_flows.jsontext import as_json_text
 from shoal_flows.terminal import following, show
 
 
@@ -20,7 +19,7 @@ def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> bool:
     with following(f"flow {name}") as listener, events.listening(listener):
         result = run_flow(name, parameters)
     if as_json:
-        print(json.dumps(plain(result.to_json()), allow_nan=False))  # noqa: T201 - this is the output
+        print(as_json_text(result.to_json()))  # noqa: T201 - this is the output
     else:
         show(result)
     return bool(result.trusted)

@@ -106,6 +106,8 @@ def plain(values: Any) -> Any:
         return [plain(value) for value in values]
     if isinstance(values, np.ndarray):
         return plain(values.tolist())
-    if isinstance(values, float | np.floating):
-        return float(values) if np.isfinite(values) else None
+    if isinstance(values, np.generic):
+        return plain(values.item())
+    if isinstance(values, float):
+        return values if np.isfinite(values) else None
     return values

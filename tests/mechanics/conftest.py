@@ -27,9 +27,7 @@ def cable_force(tile, cables, full, z, f, w):
 
 @njit(cache=True)
 def cable_energy(tile, cables, axial, bending, z, energy, w):
-    ancf_cable.add_energy(
-        tile, ancf_cable.raw(cables), axial, bending, pointer(z), pointer(w), pointer(energy), 0
-    )
+    ancf_cable.add_energy(tile, ancf_cable.raw(cables), axial, bending, pointer(z), pointer(w), pointer(energy), 0)
 
 
 @njit(cache=True)

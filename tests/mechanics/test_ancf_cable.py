@@ -166,9 +166,7 @@ def test_lanes_equal_singles(kernels: Any, quadrature: str) -> None:
         single = _force(kernels, quadrature, np.ascontiguousarray(states[:, lane]))
         np.testing.assert_allclose(forces[:, lane], single, atol=1e-13 * np.abs(single).max())
         stiffness = _tangent(kernels, quadrature, np.ascontiguousarray(states[:, lane]))
-        np.testing.assert_allclose(
-            tangents[:, lane].reshape(8, 8), stiffness, atol=1e-13 * np.abs(stiffness).max()
-        )
+        np.testing.assert_allclose(tangents[:, lane].reshape(8, 8), stiffness, atol=1e-13 * np.abs(stiffness).max())
 
 
 @both

@@ -20,9 +20,7 @@ TOLERANCE = 1e-9
 
 
 def _joint(first: Any, second: Any, **other: Any) -> dict[str, Any]:
-    sides = {
-        name: {"body": body, "point": point} for name, (body, point) in {"first": first, "second": second}.items()
-    }
+    sides = {name: {"body": body, "point": point} for name, (body, point) in {"first": first, "second": second}.items()}
     return sides | other
 
 
@@ -238,9 +236,7 @@ def test_a_parallelogram_swings_as_the_pendulum_it_is(uniform_rods: Any, count: 
     scene = _three_cranks(count)
     times = np.linspace(0, 1, 21)[1:]
     crank, coupler = scene.bodies["crank0"].mass, scene.bodies["coupler"].mass
-    angle, _ = uniform_rods(
-        [count * crank, coupler], [count * crank / 12], [[0.5], [1.0]], [-0.6], [-0.5], times
-    )
+    angle, _ = uniform_rods([count * crank, coupler], [count * crank / 12], [[0.5], [1.0]], [-0.6], [-0.5], times)
     run = simulate(scene, times)
     assert run.ok, run.message
     np.testing.assert_allclose(run.angle("A"), angle[0], atol=1e-9)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from contextlib import ExitStack
 
 from prefect import flow
-from prefect.task_runners import ThreadPoolTaskRunner
 from shoal.engines.compare import Comparison
 
-from shoal_flows import workers
+from shoal_flows.flows.runner import side_by_side
 from shoal_flows.flows.study import Running, open_running
 from shoal_flows.flows.tasks import measure, run_engines
 from shoal_flows.jobs import Cell
@@ -17,7 +16,7 @@ from shoal_flows.plan import CASES, ENGINES, SLOWEST_FIRST, TITLES, mesh_cells, 
 from shoal_flows.results import Compared, DemoResult, Study
 
 
-@flow(name="demo", task_runner=ThreadPoolTaskRunner(max_workers=workers.count()))
+@flow(name="demo", task_runner=side_by_side())
 def demo() -> DemoResult:
     """Identify both cases by every method and on four meshes; compare the engines on both scenes."""
     measured = {case: measure.submit(case, None) for case in CASES}

@@ -6,11 +6,10 @@ from itertools import product
 from typing import Any
 
 from prefect import flow
-from prefect.task_runners import ThreadPoolTaskRunner
 from shoal.identification import load_problem
 from shoal.identification.methods import get_method
 
-from shoal_flows import workers
+from shoal_flows.flows.runner import side_by_side
 from shoal_flows.flows.study import open_running
 from shoal_flows.flows.tasks import measure
 from shoal_flows.jobs import Cell
@@ -19,7 +18,7 @@ from shoal_flows.results import Study
 
 
 @flow(
-    name="identify", flow_run_name="identify {problem}", task_runner=ThreadPoolTaskRunner(max_workers=workers.count())
+    name="identify", flow_run_name="identify {problem}", task_runner=side_by_side()
 )
 def identify(
     problem: str = "paper-case-1",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Mapping
 from io import StringIO
 from typing import Any
@@ -11,11 +10,12 @@ from typing import Any
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.scene import Scene
-from shoal.trajectory import Trajectory, plain
+from shoal.trajectory import Trajectory
 
 from shoal_flows.figures.engines import engines
 from shoal_flows.figures.style import png
 from shoal_flows.figures.sweep import sweep as draw_sweep
+from shoal_flows.jsontext import as_json_text
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
 
@@ -34,7 +34,7 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
         marker = tip(scene)
         shown = picture or png(engines(comparison, marker, f"{scene.name}: the engines over each other"))
         study.picture(shown, "engines.png")
-        study.text(json.dumps(plain(comparison.differences()), indent=1), "differences.json")
+        study.text(as_json_text(comparison.differences(), indent=1), "differences.json")
         for name, motion in comparison.trajectories.items():
             with open_run("Comparison", name, tags={"kind": "engine", "scene": scene.name}, parent=study.run_id) as run:
                 _log_engine(run, scene, motion)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
 from shoal.identification import Measurement
 from shoal.scene import Rod
-from shoal.trajectory import plain
 
 from shoal_flows.figures.overlay import overlay
 from shoal_flows.jobs import Cell, Fit
+from shoal_flows.jsontext import as_json_text
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
 
@@ -67,7 +66,7 @@ def log_fit(fit: Fit, picture: bytes, study: str) -> str:
         _log_result(run, fit)
         log_motion(run, fit.motion, estimate.measurement.channels[0].marker)
         run.picture(picture, "trajectory.png")
-        run.text(json.dumps(plain(estimate.to_json()), indent=1), "estimate.json")
+        run.text(as_json_text(estimate.to_json(), indent=1), "estimate.json")
         return run.run_id
 
 

@@ -164,7 +164,7 @@ def _quantities(model: ForwardModel, point: Array, at: Linearisation, bias: Arra
 
 def _value(value: float, std: float, identifiable: bool, bias: float | None, at_bound: bool) -> Value:
     half = 1.96 * std + abs(bias or 0.0)
-    return Value(value, std, value - half, value + half, identifiable, bias, at_bound)
+    return Value(value, std, value - half, value + half, bool(identifiable), bias, at_bound)
 
 
 def _judge(

@@ -1,0 +1,33 @@
+"""What the paper prints in its tables 2 and 3, misprint included (0.7584 where its text says 0.7854)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A row of a table: angles [rad] and fitness as printed."""
+
+    theta1: str
+    theta2: str
+    fitness: str
+
+
+TABLES: dict[str, tuple[str, dict[str, Printed]]] = {
+    "paper-case-1": (
+        "Table 2",
+        {
+            "afsa": Printed("0.7584", "0.5236", "6.0323 × 10⁻⁶"),
+            "iafsa": Printed("0.7584", "0.5236", "1.6541 × 10⁻⁸"),
+        },
+    ),
+    "paper-case-2": (
+        "Table 3",
+        {
+            "afsa": Printed("1.0472", "0.7584", "6.6317 × 10⁻⁷"),
+            "iafsa": Printed("1.0472", "0.7584", "2.1591 × 10⁻⁸"),
+        },
+    ),
+}
+"""By problem: the number of the table and its rows by method."""

@@ -1,0 +1,130 @@
+"""Numbers as people read them, and the sentences that come before the tables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shoal_flows.jobs import Fit
+from shoal_flows.results import Compared, DemoResult, Study
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def power(value: float | None, digits: int = 4) -> str:
+    """A number in scientific notation, 2.1674 × 10⁻⁶."""
+    if value is None or not np.isfinite(value):
+        return "none"
+    mantissa, _, exponent = f"{value:.{digits}e}".partition("e")
+    return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}"
+
+
+def length(metres: float | None) -> str:
+    """A length in the unit that needs no zeros."""
+    if metres is None or not np.isfinite(metres):
+        return "unknown"
+    for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
+        if abs(metres) >= size:
+            return f"{metres / size:.3g} {unit}"
+    return f"{metres / 1e-9:.3g} nm"
+
+
+def degrees(radians: float | None, digits: int = 4) -> str:
+    """An angle in degrees, with its sign only if negative."""
+    return "none" if radians is None else f"{np.degrees(radians):.{digits}f}"
+
+
+def errors(fit: Fit) -> dict[str, float]:
+    """Estimate minus truth [rad]."""
+    return {name: fit.estimate.parameters[name].value - true for name, true in fit.estimate.truth.items()}
+
+
+def covered(fit: Fit) -> bool:
+    """Whether every interval contains the truth."""
+    values = fit.estimate.parameters
+    return all(values[name].lower <= true <= values[name].upper for name, true in fit.estimate.truth.items())
+
+
+def largest_error(fit: Fit) -> float:
+    """Largest error of an angle [rad]."""
+    return max(map(abs, errors(fit).values()))
+
+
+def largest_distance(compared: Compared, marker: str = "B") -> float:
+    """Largest distance [m] of two engines at a marker."""
+    return max((row["largest"] or np.inf) for row in compared.comparison.differences() if row["marker"] == marker)
+
+
+def identified(title: str, study: Study) -> str:
+    """What was identified and how exactly, by least squares."""
+    fit = study.by_method().get("least-squares")
+    if fit is None:
+        return f"{title}: least squares failed ({next(iter(study.failures.values()), 'no reason given')})."
+    e = fit.estimate
+    values = " and ".join(f"{name} = {np.degrees(v.value):.3f}°" for name, v in e.parameters.items())
+    truth = " and ".join(f"{np.degrees(true):.0f}°" for true in e.truth.values())
+    return (
+        f"{title}: {values}, where the data were computed with {truth}. The larger error is "
+        f"{degrees(largest_error(fit))}°, the tip is matched to {length(e.rms)} (RMS), and "
+        f"{e.evaluations} simulations were enough. Verdict: {e.verdict}."
+    )
+
+
+def against_swarms(title: str, study: Study) -> str:
+    """What the swarms do beside least squares."""
+    fits = study.by_method()
+    if not {"iafsa", "afsa", "iafsa-printed", "least-squares"} <= set(fits):
+        return f"{title}: not every swarm ended."
+    repaired, plain, printed, exact = (fits[m] for m in ("iafsa", "afsa", "iafsa-printed", "least-squares"))
+    gap = max(abs(a - b) for a, b in zip(errors(repaired).values(), errors(exact).values(), strict=True))
+    return (
+        f"{title}: the repaired IAFSA ends within {power(gap, 0)} rad of least squares after "
+        f"{repaired.estimate.evaluations} simulations. AFSA as published stops {degrees(largest_error(plain), 3)}° from "
+        f"the truth after {plain.estimate.evaluations}. IAFSA exactly as printed ends "
+        f"{degrees(largest_error(printed), 2)}° away{_outside(printed)}."
+    )
+
+
+def _outside(fit: Fit) -> str:
+    bound = [name for name, value in fit.estimate.parameters.items() if value.at_bound or abs(value.value) > np.pi / 2]
+    return f", with {' and '.join(bound)} outside the bounds of the search" if bound else ""
+
+
+def confirmed(title: str, compared: Compared, study: Study) -> str:
+    """Which engines confirm."""
+    names = list(compared.comparison.trajectories)
+    text = (
+        f"{title}: {', '.join(names[:-1])} and {names[-1]} put the tip of the paper's 2/4 mesh within "
+        f"{length(largest_distance(compared))} of each other over the whole motion."
+    )
+    fits = study.by_method()
+    if {"casadi", "least-squares"} <= set(fits):
+        pairs = zip(errors(fits["casadi"]).values(), errors(fits["least-squares"]).values(), strict=True)
+        gap = max(abs(a - b) for a, b in pairs)
+        text += f" CasADi's own derivation, optimised by IPOPT, finds the same angles to {power(gap, 0)} rad."
+    return text
+
+
+def mesh_sentence(title: str, study: Study) -> str:
+    """What the mesh does, coarsest against finest."""
+    if len(study.fits) < 2:
+        return f"{title}: the meshes could not be compared."
+    coarse, fine = study.fits[0], study.fits[-1]
+    return (
+        f"{title}: with {coarse.cell.name} the larger error is {degrees(largest_error(coarse), 2)}°, with "
+        f"{fine.cell.name} {degrees(largest_error(fine), 5)}°."
+    )
+
+
+def headline(result: DemoResult) -> str:
+    """The whole in one line."""
+    worst = [largest_error(fit) for study in result.studies.values() for fit in study.fits if _answers(fit)]
+    if not result.trusted or not worst:
+        return "Not every answer can be trusted: " + "; ".join(result.doubts()) + "."
+    return (
+        f"Both pairs of initial angles are recovered from the motion of the tip, to {degrees(max(worst), 3)}° or better, "
+        f"from data of a finer model in another engine."
+    )
+
+
+def _answers(fit: Fit) -> bool:
+    return fit.cell.method in ("least-squares", "iafsa")

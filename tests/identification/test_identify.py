@@ -1,0 +1,109 @@
+"""Recovered numbers against the truth of data that other engines computed, and against published ones."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shoal.errors import InputError
+from shoal.identification import METHODS, Estimate, Measurement, Problem, Verdict, identify, load_problem, measure
+
+RECORDINGS = Path(__file__).parents[3] / "shared" / "data" / "multiarm_kaheman"
+
+
+@cache
+def data(name: str) -> tuple[Problem, Measurement]:
+    problem = load_problem(name)
+    return problem, measure(problem, problem.load_scene())
+
+
+def run(name: str, method: str, **options: object) -> Estimate:
+    problem, measurement = data(name)
+    return identify(problem, method=method, measurement=measurement, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["paper-case-1-same-mesh", "paper-case-2-same-mesh"])
+def test_least_squares_on_casadi_data_of_the_same_mesh_is_exact(name: str) -> None:
+    estimate = run(name, "least-squares")
+    assert estimate.verdict is Verdict.IDENTIFIED
+    assert estimate.evaluations <= 30
+    assert estimate.fitness < 1e-16
+    for parameter, true in estimate.truth.items():
+        assert estimate.parameters[parameter].value == pytest.approx(true, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["paper-case-1", "paper-case-2"])
+def test_data_from_exudyns_fine_mesh_lie_within_the_intervals(name: str) -> None:
+    estimate = run(name, "least-squares")
+    assert estimate.verdict is Verdict.IDENTIFIED
+    for parameter, true in estimate.truth.items():
+        found = estimate.parameters[parameter]
+        assert found.value == pytest.approx(true, abs=1e-3)
+        assert found.lower <= true <= found.upper
+        # The finer mesh predicts where the coarser one leads astray.
+        assert found.model_bias is not None
+        assert found.value + found.model_bias == pytest.approx(true, abs=1e-4)
+
+
+def test_both_elbow_branches_are_looked_at() -> None:
+    estimate = run("paper-case-1", "least-squares")
+    assert len(estimate.minima) == 1
+    assert estimate.minima[0]["fitness"] > 100 * estimate.fitness
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name not in ("auto", "casadi", "afsa")])
+def test_every_native_method_finds_the_angles(method: str) -> None:
+    estimate = run("paper-case-1", method, seed=1)
+    for parameter, true in estimate.truth.items():
+        assert estimate.parameters[parameter].value == pytest.approx(true, abs=1e-3)
+    best = np.array([row[1] for row in estimate.iterations])
+    assert np.all(np.diff(best) <= 0)
+    assert estimate.fitness == pytest.approx(best[-1])
+    assert estimate.history[0][-1] == estimate.evaluations
+
+
+def test_the_published_swarm_comes_near_and_says_what_it_cost() -> None:
+    estimate = run("paper-case-1", "afsa", seed=1)
+    assert estimate.evaluations > 4000
+    assert estimate.fitness < 1e-3
+
+
+def test_the_same_seed_gives_the_same_answer() -> None:
+    one, other = (run("paper-case-1", "iafsa-unseeded", seed=3) for _ in range(2))
+    assert one.parameters == other.parameters
+    assert one.evaluations == other.evaluations == 4040
+
+
+def test_a_rigid_model_of_a_flexible_machine_is_not_passed_off_as_exact() -> None:
+    values = {"bodies.OA.element": "rigid", "bodies.AB.element": "rigid", "solver.integrator": "rk4"}
+    estimate = run("paper-case-1", "least-squares", values=values)
+    wrong = max(abs(estimate.parameters[name].value - true) for name, true in estimate.truth.items())
+    assert wrong > 0.02
+    assert estimate.fitness > 1e-4
+
+
+def test_unknown_method_is_refused() -> None:
+    with pytest.raises(InputError, match="no method 'magic'"):
+        run("paper-case-1", "magic")
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recordings are not here")
+def test_real_double_pendulum_gives_the_published_ratios() -> None:
+    """Kaheman et al. 2022, arXiv:2205.06231: J2/J1 .5568, C/J1 .4913, G1/J1 58.96, G2/J1 27.90."""
+    estimate = identify(load_problem("kaheman-double"), data=str(RECORDINGS / "double_1kHz.csv.gz"))
+    assert estimate.verdict is Verdict.COMBINATION
+    assert estimate.rms < 2e-3
+    published = {"J2/J1": 0.5568, "C/J1": 0.4913, "G1/J1": 58.96, "G2/J1": 27.90}
+    for name, value in published.items():
+        assert estimate.quantities[name].value == pytest.approx(value, rel=0.03)
+        assert estimate.quantities[name].identifiable
+    assert not any(estimate.parameters[name].identifiable for name in ("a1", "I1", "m2", "a2", "I2"))
+    assert len(estimate.combinations) == 2
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recordings are not here")
+def test_real_single_pendulum() -> None:
+    """Authors' numbers give G/J = m a g / (I + m a^2) = 64.2 with their own arm inertia."""
+    estimate = identify(load_problem("kaheman-single"), data=str(RECORDINGS / "single_1kHz.csv.gz"))
+    assert estimate.rms < 2e-3
+    assert estimate.quantities["G/J"].value == pytest.approx(64.2, rel=0.01)

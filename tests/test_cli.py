@@ -1,0 +1,110 @@
+"""The command line: what it prints, and with which exit status it leaves."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from shoal.cli import main
+
+
+def shoal(*arguments: str) -> Result:
+    return CliRunner().invoke(main, list(arguments))
+
+
+def answer(*arguments: str) -> dict[str, object]:
+    """The one JSON object a command prints on standard output."""
+    result = shoal(*arguments, "--json")
+    assert result.exit_code == 0, result.stderr
+    found: dict[str, object] = json.loads(result.stdout)
+    return found
+
+
+def test_simulate_prints_the_contract() -> None:
+    found = answer("simulate", "flexible-double-pendulum", "--at", "0.25,0.5")
+    assert found["status"] == "ok"
+    assert found["engine"] == "gauss"
+    markers = found["markers"]
+    assert isinstance(markers, dict)
+    assert markers["B"]["t"] == [0.25, 0.5]
+    # CasADi's time-converged tip on this mesh; leapfrog at 5e-4 s is 6e-6 m away.
+    assert found["final"]["B"] == pytest.approx([2.6761612551, 0.5786753311], abs=1e-5)  # type: ignore[index]
+    assert {"energy_drift", "constraint_drift", "steps", "wall_s", "model"} <= set(found)
+
+
+def test_identify_prints_the_contract() -> None:
+    found = answer("identify", "paper-case-1", "--method", "least-squares")
+    assert found["verdict"] == "identified"
+    theta1 = found["parameters"]["theta1"]  # type: ignore[index]
+    assert {"value", "std", "lower", "upper", "identifiable"} <= set(theta1)
+    assert theta1["value"] == pytest.approx(0.785398, abs=1e-3)
+    assert {"status", "method", "fitness", "rms", "evaluations", "wall_s"} <= set(found)
+
+
+def test_sweep_table_and_csv(tmp_path: Path) -> None:
+    out = tmp_path / "figure4.csv"
+    found = answer("sweep", "flexible-double-pendulum", "--vary", "initial.OA.angle=0:1.5:4", "--out", str(out))
+    rows = found["rows"]
+    assert isinstance(rows, list)
+    assert [row["initial.OA.angle"] for row in rows] == [0.0, 0.5, 1.0, 1.5]
+    assert len(out.read_text().splitlines()) == 5
+
+
+def test_compare_shows_three_engines_close_together() -> None:
+    found = answer("compare", "single-pendulum", "--at", "0.5,1")
+    assert set(found["engines"]) == {"gauss", "exudyn", "casadi"}  # type: ignore[call-overload]
+    assert all(row["largest"] < 1e-5 for row in found["differences"])  # type: ignore[attr-defined]
+
+
+def test_scenes_lists_and_prints() -> None:
+    assert "flexible-double-pendulum" in shoal("scenes").stdout
+    assert shoal("scenes", "single-pendulum").stdout.startswith("name: single-pendulum")
+
+
+def test_a_printed_scene_can_be_simulated_again(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(shoal("scenes", "rigid-double-pendulum").stdout)
+    assert answer("simulate", str(path))["status"] == "ok"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["simulate", "nothing"], "nothing"),
+        (["simulate", "nothing.yaml"], "nothing.yaml"),
+        (["simulate", "single-pendulum", "--set", "bodies.OA.mass=-1"], "bodies.OA.mass"),
+        (["simulate", "single-pendulum", "--set", "bodies.OA.mass"], "PATH=VALUE"),
+        (["simulate", "single-pendulum", "--at", "0.2,0.1"], "increase"),
+        (["simulate", "single-pendulum", "--at", "soon"], "soon"),
+        (["simulate", "single-pendulum", "--engine", "magic"], "magic"),
+        (["simulate", "flexible-double-pendulum", "--set", "solver.step=1e-3"], "6.635e-04"),
+        (["simulate", "single-pendulum", "--out", "here.doc"], "here.doc"),
+        (["simulate", "single-pendulum", "--out", "/no/such/folder/a.csv"], "folder"),
+        (["sweep", "single-pendulum", "--vary", "initial.OA.angle=0:1"], "LOW:HIGH:COUNT"),
+        (["sweep", "single-pendulum", "--vary", "initial.OA.colour=0:1:3"], "colour"),
+        (["compare", "single-pendulum", "--engines", "gauss,magic"], "magic"),
+        (["identify", "paper-case-1", "--method", "magic"], "magic"),
+        (["identify", "kaheman-double"], "--data"),
+        (["identify", "kaheman-double", "--data", "nowhere.csv"], "nowhere.csv"),
+        (["scenes", "nothing"], "nothing"),
+        (["simulate"], "SCENE"),
+        (["dance"], "dance"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_two(arguments: list[str], word: str) -> None:
+    result = shoal(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert word in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_an_answer_that_cannot_be_trusted_has_status_three() -> None:
+    result = shoal("simulate", "single-pendulum", "--set", "solver.energy_tolerance=1e-30", "--json")
+    assert result.exit_code == 3
+    assert json.loads(result.stdout)["status"] == "energy-check-failed"
+
+
+def test_doctor_finds_everything() -> None:
+    found = answer("doctor")
+    assert found["status"] == "ok"
