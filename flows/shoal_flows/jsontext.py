@@ -6,7 +6,6 @@ import json
 from typing import Any
 
 import numpy as np
-
 from shoal.trajectory import plain
 
 

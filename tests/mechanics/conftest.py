@@ -79,7 +79,7 @@ def force(tile, arrays, room):
 def project(tile, arrays, room, tolerance):
     """Make the state in `room` consistent."""
     w = dynamics.raw(room)
-    gauss.project(tile, model.raw(arrays), w.gauss, w.z, w.zdot, tolerance)
+    gauss.project(tile, model.raw(arrays), w.gauss, w.z, w.zdot, tolerance, 3)
 
 
 @pytest.fixture(scope="session")

@@ -17,9 +17,7 @@ from shoal_flows.pictures import draw_convergence, draw_residuals
 from shoal_flows.results import Study
 
 
-@flow(
-    name="identify", flow_run_name="identify {problem}", task_runner=side_by_side()
-)
+@flow(name="identify", flow_run_name="identify {problem}", task_runner=side_by_side())
 def identify(
     problem: str = "paper-case-1",
     methods: list[str] = ["auto"],  # noqa: B006 - Prefect shows the default in its form; nothing changes it

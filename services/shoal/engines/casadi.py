@@ -21,7 +21,7 @@ from shoal.trajectory import Array, Status, Trajectory
 
 _CHECK_INTERVAL = 0.01
 """Longest time [s] between two instants at which energy, reach and directions are looked at."""
-_STRETCH = 1.02
+_STRETCH = 1.1
 """A marker farther from its ground point than this times the length of its chain is out of reach."""
 
 _CAPABILITIES = Capabilities(

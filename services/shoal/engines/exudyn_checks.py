@@ -12,7 +12,7 @@ from shoal.engines.exudyn_record import Indices, Record
 from shoal.scene import GROUND, Scene
 from shoal.trajectory import Array, Status
 
-STRETCH = 1.02
+STRETCH = 1.1
 """How much longer than its undeformed bodies a machine may reach."""
 LARGEST_GAP = 1e-4
 """Joint gap per metre of reach beyond which a run has drifted."""

@@ -109,10 +109,10 @@ def acceleration(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, toleranc
 
 
 @njit(cache=True, error_model="numpy")
-def settle(tile: Tile, m: Arrays, w: Work, tolerance: float) -> None:
+def settle(tile: Tile, m: Arrays, w: Work, tolerance: float, iterations: int = 3) -> None:
     """Remove the drift of a constrained model (nothing to do where sharing expressed every joint)."""
     if m.constraints.size > 0:
-        gauss.project(tile, m, w.gauss, w.z, w.zdot, tolerance)
+        gauss.project(tile, m, w.gauss, w.z, w.zdot, tolerance, iterations)
 
 
 @njit(cache=True, error_model="numpy")

@@ -76,27 +76,31 @@ def apply(tile: Tile, m: Arrays, w: GaussWork, tolerance: float, x: Array) -> No
 def _solve_semidefinite(
     count: int, width: int, lane: int, gram: Array, gap: Array, solution: Array, tolerance: float
 ) -> None:
-    """Pivoted Cholesky of one lane; directions whose pivot falls below tolerance * largest are left out."""
+    """Pivoted Cholesky of one lane; directions whose pivot falls below the tolerance are left out.
+
+    The diagonal is scaled to one first, so that the mass of one body says nothing about the rank of another's rows.
+    """
     if count == 1:
         solution[lane] = gap[lane] / gram[lane] if gram[lane] > 0 else 0.0
         return
     a = np.empty((count, count))
     b = np.empty(count)
     order = np.arange(count)
+    scale = np.empty(count)
     for i in range(count):
-        b[i] = gap[i * width + lane]
+        diagonal = gram[(i * count + i) * width + lane]
+        scale[i] = 1.0 / np.sqrt(diagonal) if diagonal > 0 else 0.0
+    for i in range(count):
+        b[i] = scale[i] * gap[i * width + lane]
         for j in range(count):
-            a[i, j] = gram[(i * count + j) * width + lane]
-    largest = 0.0
-    for i in range(count):
-        largest = max(largest, a[i, i])
+            a[i, j] = scale[i] * scale[j] * gram[(i * count + j) * width + lane]
     rank = 0
     for k in range(count):
         pivot = k
         for i in range(k + 1, count):
             if a[i, i] > a[pivot, pivot]:
                 pivot = i
-        if not a[pivot, pivot] > tolerance * largest:
+        if not a[pivot, pivot] > tolerance:
             break
         if pivot != k:
             order[k], order[pivot] = order[pivot], order[k]
@@ -118,6 +122,8 @@ def _solve_semidefinite(
         for j in range(k + 1, rank):
             total -= a[k, j] * solution[order[j] * width + lane]
         solution[order[k] * width + lane] = total / a[k, k]
+    for k in range(count):
+        solution[k * width + lane] *= scale[k]
 
 
 @njit(cache=True, error_model="numpy")
@@ -138,10 +144,10 @@ def add_rates(tile: Tile, m: Arrays, w: GaussWork, x: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def project(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: float) -> None:
+def project(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: float, iterations: int) -> None:
     """Move q and v back onto C = 0 and C_q v = 0 by the smallest change in the mass metric."""
     rows = m.constraints.size * len(tile)
-    for _ in range(3):
+    for _ in range(iterations):
         constraints.residual(tile, m.constraints, q, w.gap)
         largest = 0.0
         for k in range(rows):

@@ -14,6 +14,8 @@ from shoal.mechanics.model import Arrays
 from shoal.mechanics.tile import Array, Index, Tile
 from shoal.mechanics.vector import copy
 
+ASSEMBLY = 30
+"""Iterations that may assemble a mechanism whose stated start is only roughly consistent."""
 CHECKS = 64
 """Energy and drift are looked at about so many times in a run."""
 
@@ -53,7 +55,7 @@ def march(
     )
     for row in range(m.unknowns):
         copy(tile, w.before, row, w.z, row)
-    dynamics.settle(tile, m, w, tolerance)
+    dynamics.settle(tile, m, w, tolerance, ASSEMBLY)
     for i in range(m.unknowns * width):
         record.correction[i % width] = max(record.correction[i % width], abs(w.z[i] - w.before[i]))
     dynamics.acceleration(tile, m, w, w.z, w.zdot, tolerance, w.a)

@@ -152,7 +152,8 @@ class Model:
         mass = packed(self.mass_values)
         factor = mass.copy()
         _factor_mass(tile, pattern, factor)
-        if not np.all(factor[: self.unknowns * len(tile)] > 0):
+        inverse = factor[: self.unknowns * len(tile)]
+        if not np.all((inverse > 0) & np.isfinite(inverse)):
             raise InputError(f"{self.scene.name}: the mass matrix is singular; some coordinate moves no mass")
         d, c = self.derived, self.constraints
         return Arrays(

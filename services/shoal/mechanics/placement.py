@@ -214,10 +214,7 @@ def _initial_pose(scene: Scene, name: str, anchor: _JointPoint, p: Number, resul
     start = scene.start(name)
     direction = np.exp(1j * np.asarray(start.angle)) if np.ndim(start.angle) else complex(np.exp(1j * start.angle))
     assert anchor.where is not None
-    position, velocity = anchor.where.constant, 0.0
-    for pair, coefficient in anchor.where.terms.items():
-        position = position + coefficient * result.positions[pair]
-        velocity = velocity + coefficient * result.velocities[pair]
+    position, velocity = _start_of(anchor.where, result)
     return Pose(position - direction * p, direction, velocity - 1j * start.rate * direction * p, start.rate)
 
 
@@ -233,6 +230,26 @@ def _rigid(anchors: list[_JointPoint], local: dict[int, Number], pose: Pose, res
     return RigidFrame(first.where + axis * (-p), axis)
 
 
+def _check_fit(name: str, rod: Rod, planned: Number, point: _JointPoint, result: Placement) -> None:
+    """A cable starts straight: raises InputError if a joint holds it somewhere else."""
+    assert point.where is not None
+    held, _ = _start_of(point.where, result)
+    if np.any(np.abs(held - planned) > 1e-6 * rod.length):
+        raise InputError(
+            f"initial.{name}.angle: joint {point.name} holds {name} {np.max(np.abs(held - planned)):.3g} m away from "
+            f"where the straight rod would start; a cable starts straight and unstrained"
+        )
+
+
+def _start_of(where: Affine, result: Placement) -> tuple[Number, Number]:
+    """Initial position and velocity of a vector."""
+    position, velocity = where.constant, 0.0
+    for pair, coefficient in where.terms.items():
+        position = position + coefficient * result.positions[pair]
+        velocity = velocity + coefficient * result.velocities[pair]
+    return position, velocity
+
+
 def _cable(
     name: str, rod: Rod, points: list[_JointPoint], local: dict[int, Number], pose: Pose, result: Placement
 ) -> CableFrame:
@@ -240,6 +257,8 @@ def _cable(
     slopes: list[Affine] = []
     shared = {}
     for point in points:
+        if point.where is not None:
+            _check_fit(name, rod, pose.point(local[id(point)]), point, result)
         place = np.real(local[id(point)]) / rod.length * rod.elements
         node = int(np.rint(np.asarray(place).flat[0]))
         if np.any(np.abs(place - node) > 1e-9):

@@ -73,8 +73,10 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
         update.append(len(target))
     by_row = sorted((i, k, slot[i, k]) for i, k in slot if i != k)
     across = np.searchsorted([i for i, _, _ in by_row], np.arange(size + 1))
-    rows = (across, [p for _, _, p in by_row], [k for _, k, _ in by_row], range(size, size + len(row)))
-    arrays = (np.array(part, dtype=np.int64) for part in (column, row, update, target, left, right, *rows))
+    slots, others = [p for _, _, p in by_row], [k for _, k, _ in by_row]
+    by_column = np.arange(size, size + len(row))
+    parts = (column, row, update, target, left, right, across, slots, others, by_column)
+    arrays = (np.array(part, dtype=np.int64) for part in parts)
     return Pattern(size, *arrays), slot
 
 

@@ -12,6 +12,7 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from shoal.mechanics.dynamics import work_space
+from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
 from shoal.mechanics.sparse import Pattern
 from shoal.mechanics.tangent import stiffness_at, tangent_tile
@@ -34,10 +35,13 @@ def highest_damping_rate(model: Model) -> float:
     return max(0.0, _largest_eigenvalue(model, damping=True))
 
 
-def step_limit(model: Model, stable_step_times_frequency: float) -> float:
-    """Largest stable step [s] of an explicit integrator for every lane; infinite if nothing limits it."""
-    rate = max(highest_frequency(model), highest_damping_rate(model))
-    return stable_step_times_frequency / rate if rate > 0 else np.inf
+def step_limit(model: Model, facts: Facts) -> float:
+    """Largest stable step [s] of an integrator for every lane; infinite if nothing limits it."""
+    if not facts.explicit:
+        return np.inf
+    frequency, decay = highest_frequency(model), highest_damping_rate(model)
+    oscillation = facts.stable_step_times_frequency / frequency if frequency > 0 else np.inf
+    return min(oscillation, facts.stable_step_times_decay / decay if decay > 0 else np.inf)
 
 
 def _largest_eigenvalue(model: Model, damping: bool) -> float:

@@ -41,7 +41,7 @@ class GeneralizedAlpha(NamedTuple):
     multiplier: Array
 
 
-FACTS = Facts(order=2, explicit=False, stable_step_times_frequency=np.inf)
+FACTS = Facts(order=2, explicit=False, stable_step_times_frequency=np.inf, stable_step_times_decay=np.inf)
 
 
 def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> GeneralizedAlpha:
@@ -108,9 +108,9 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, h: float) -> 
             w.z[i] += residual[i]
             w.zdot[i] += damping_factor * residual[i]
             w.a[i] += mass_factor * residual[i]
-            if not abs(residual[i]) <= largest:
+            if abs(residual[i]) > largest:  # a lane that is no number anymore does not keep the others waiting
                 largest = abs(residual[i])
-        if not largest > scheme.newton_tolerance:
+        if largest <= scheme.newton_tolerance:
             break
     for i in range(end):
         if not abs(residual[i]) <= 1e3 * scheme.newton_tolerance:

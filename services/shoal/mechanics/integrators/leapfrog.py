@@ -24,7 +24,8 @@ class Leapfrog(NamedTuple):
     rank_tolerance: float
 
 
-FACTS = Facts(order=2, explicit=True, stable_step_times_frequency=2.0)
+# The predicted rate makes decay a two-step recursion, which is stable up to one.
+FACTS = Facts(order=2, explicit=True, stable_step_times_frequency=2.0, stable_step_times_decay=1.0)
 
 
 def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Leapfrog:

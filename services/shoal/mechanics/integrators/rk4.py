@@ -20,7 +20,7 @@ class Rk4(NamedTuple):
     rank_tolerance: float
 
 
-FACTS = Facts(order=4, explicit=True, stable_step_times_frequency=2.828)
+FACTS = Facts(order=4, explicit=True, stable_step_times_frequency=2.828, stable_step_times_decay=2.785)
 
 
 def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Rk4:

@@ -18,11 +18,12 @@ from shoal.mechanics.tile import Tile
 
 
 class Facts(NamedTuple):
-    """What an integrator promises: order in time, and the largest stable step times frequency (0: none)."""
+    """What an integrator promises: order in time, and the largest stable step times frequency and times decay rate."""
 
     order: int
     explicit: bool
     stable_step_times_frequency: float
+    stable_step_times_decay: float
 
 
 def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, step: float) -> None:
