@@ -63,7 +63,9 @@ def _progress() -> Progress:
 
 
 def _table(title: str, *headings: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    """An empty table; its title is printed at once, so that it is not folded to the width of the table."""
+    out.print(title, style="bold")
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for index, heading in enumerate(headings):
         table.add_column(heading, justify="left" if index == 0 else "right", overflow="fold")
     return table
@@ -99,7 +101,7 @@ def estimate_table(estimate: Estimate) -> None:
         f"{estimate.problem}, {estimate.method}", "parameter", "value", "std", "95 % interval", "identifiable"
     )
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
-        known = "yes" if value.identifiable else "at bound" if value.at_bound else "only in a ratio"
+        known = "yes" if value.identifiable else "at bound" if value.at_bound else "no"
         interval = f"{value.lower:.6g} to {value.upper:.6g}" if value.identifiable else "-"
         table.add_row(name, f"{value.value:.8g}", f"{value.std:.1e}" if value.identifiable else "-", interval, known)
     out.print(table)
@@ -154,7 +156,7 @@ def comparison_table(comparison: Comparison) -> None:
     for name, reason in comparison.refused.items():
         table.add_row(name, "-", "-", "-", "-", reason)
     out.print(table)
-    table = _table("largest distance over all samples", "engines", "marker", "largest [m]", "final [m]")
+    table = _table("distances over all samples", "engines", "marker", "largest [m]", "final [m]")
     for row in comparison.differences():
         distances = ("-" if row[key] is None else f"{row[key]:.2e}" for key in ("largest", "final"))
         table.add_row(" - ".join(row["engines"]), row["marker"], *distances)

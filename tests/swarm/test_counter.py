@@ -113,3 +113,13 @@ def test_callback_sees_every_iteration() -> None:
         callback=lambda state: seen.append(state.iteration),
     )
     assert seen == [0, 1, 2, 3, 4]
+
+
+def test_evaluations_made_elsewhere_are_charged() -> None:
+    counter = EvaluationCounter(lambda points: np.sum(points**2, axis=1))
+    counter(np.array([[2.0]]))
+    counter.charge(10, np.array([1.0]), 1.0)
+    assert counter.evaluations == 11
+    assert counter.best_value == 1.0
+    assert counter.history[0].tolist() == [1.0, 11.0]
+    assert counter.history[1].tolist() == [4.0, 1.0]

@@ -62,6 +62,11 @@ class EvaluationCounter:
         self._record(before, asked, values)
         return result
 
+    def charge(self, count: int, point: Array, value: float) -> None:
+        """Note `count` evaluations that were made elsewhere, by another engine, and the best of them."""
+        self.evaluations += count
+        self._record(self.evaluations - 1, np.asarray(point, dtype=float)[None], np.array([value]))
+
     @property
     def history(self) -> tuple[Array, Array]:
         """Best value against evaluations: the numbers of the evaluations that improved it and of the last one, (m,),
