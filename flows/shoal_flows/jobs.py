@@ -73,6 +73,12 @@ def fit(cell: Cell, measurement: Measurement) -> Fit:
         seed=cell.seed,
         measurement=measurement,
     )
+    return with_motion(cell, estimate)
+
+
+def with_motion(cell: Cell, estimate: Estimate) -> Fit:
+    """An estimate with the motion of what it found."""
+    measurement = estimate.measurement
     engine = get_engine(cell.engine)
     sampled = engine.simulate(estimate.scene, measurement.times)
     grid = np.linspace(0.0, float(measurement.times[-1]), _POINTS)

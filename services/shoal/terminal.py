@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -205,9 +206,7 @@ def write_trajectory(trajectory: Trajectory, scene: Scene, path: Path) -> None:
     elif path.suffix == ".json":
         _write_json(trajectory.to_json(), path)
     else:
-        from shoal import pictures
-
-        pictures.trajectory(trajectory, scene, path)
+        _pictures().trajectory(trajectory, scene, path)
 
 
 def write_estimate(estimate: Estimate, path: Path) -> None:
@@ -215,9 +214,7 @@ def write_estimate(estimate: Estimate, path: Path) -> None:
     if path.suffix == ".json":
         _write_json(estimate.to_json(), path)
     else:
-        from shoal import pictures
-
-        pictures.estimate(estimate, path)
+        _pictures().estimate(estimate, path)
 
 
 def write_sweep(sweep: Sweep, path: Path) -> None:
@@ -229,9 +226,7 @@ def write_sweep(sweep: Sweep, path: Path) -> None:
     elif path.suffix == ".json":
         _write_json(sweep.to_json(), path)
     else:
-        from shoal import pictures
-
-        pictures.sweep(sweep, path)
+        _pictures().sweep(sweep, path)
 
 
 def write_comparison(comparison: Comparison, path: Path) -> None:
@@ -239,9 +234,12 @@ def write_comparison(comparison: Comparison, path: Path) -> None:
     if path.suffix == ".json":
         _write_json(comparison.to_json(), path)
     else:
-        from shoal import pictures
+        _pictures().comparison(comparison, path)
 
-        pictures.comparison(comparison, path)
+
+def _pictures() -> Any:
+    """The module that draws, which belongs to the pipeline and is not needed otherwise."""
+    return import_module("shoal_flows.figures.files")
 
 
 def _write_json(data: Mapping[str, Any], path: Path) -> None:

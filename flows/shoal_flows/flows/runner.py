@@ -9,6 +9,6 @@ from prefect.task_runners import ThreadPoolTaskRunner
 from shoal_flows import workers
 
 
-def side_by_side() -> ThreadPoolTaskRunner[Any]:
+def side_by_side() -> Any:
     """Threads that wait for the worker processes."""
     return ThreadPoolTaskRunner(max_workers=workers.count())

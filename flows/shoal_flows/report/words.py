@@ -78,8 +78,8 @@ def against_swarms(title: str, study: Study) -> str:
     gap = max(abs(a - b) for a, b in zip(errors(repaired).values(), errors(exact).values(), strict=True))
     return (
         f"{title}: the repaired IAFSA ends within {power(gap, 0)} rad of least squares after "
-        f"{repaired.estimate.evaluations} simulations. AFSA as published stops {degrees(largest_error(plain), 3)}° from "
-        f"the truth after {plain.estimate.evaluations}. IAFSA exactly as printed ends "
+        f"{repaired.estimate.evaluations} simulations. AFSA as published stops {degrees(largest_error(plain), 3)}° "
+        f"from the truth after {plain.estimate.evaluations}. IAFSA exactly as printed ends "
         f"{degrees(largest_error(printed), 2)}° away{_outside(printed)}."
     )
 
@@ -121,8 +121,8 @@ def headline(result: DemoResult) -> str:
     if not result.trusted or not worst:
         return "Not every answer can be trusted: " + "; ".join(result.doubts()) + "."
     return (
-        f"Both pairs of initial angles are recovered from the motion of the tip, to {degrees(max(worst), 3)}° or better, "
-        f"from data of a finer model in another engine."
+        f"Both pairs of initial angles are recovered from the motion of the tip, to {degrees(max(worst), 3)}° or "
+        f"better, from data of a finer model in another engine."
     )
 
 

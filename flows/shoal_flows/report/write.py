@@ -61,8 +61,8 @@ def _case(result: DemoResult, case: str) -> dict[str, Any]:
         "figures": [_figure(title, name, study) for name in study.pictures],
         "engines_figure": _picture(
             compared.picture,
-            f"{title}: position of the tip against time by {', '.join(compared.comparison.trajectories)}, which lie on one "
-            f"line, and below their distances, at most {words.length(words.largest_distance(compared))}.",
+            f"{title}: position of the tip against time by {', '.join(compared.comparison.trajectories)}, which lie on "
+            f"one line, and below their distances, at most {words.length(words.largest_distance(compared))}.",
             "Above, the motions, drawn in falling widths so that each shows; below, what lies between them.",
         ),
         "mesh_figure": _picture(
@@ -79,8 +79,8 @@ _CAPTIONS = {
         "The best fit over the data.",
     ),
     "convergence": (
-        "Best fitness against counted evaluations for every method, both axes logarithmic: least squares and CasADi need a "
-        "hundred or fewer, the seeded swarm starts from the same point, the others need thousands or never arrive.",
+        "Best fitness against counted evaluations for every method, both axes logarithmic: least squares and CasADi need "
+        "a hundred or fewer, the seeded swarm starts from the same point, the others need thousands or never arrive.",
         "A marker stands where a method ended. Below the dotted line no method can go much: that is the mesh error.",
     ),
     "residuals": (

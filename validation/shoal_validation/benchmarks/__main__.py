@@ -9,8 +9,8 @@ import platform
 from rich import box
 from rich.console import Console
 from rich.table import Table
-
 from shoal.home import home
+
 from shoal_validation.benchmarks import forward, inverse
 
 PROBLEMS = ("paper-case-1", "paper-case-1-same-mesh")

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
 from shoal.engines import get_engine
 from shoal.engines.exudyn import ExudynEngine
 from shoal.engines.exudyn_build import build as build_exudyn
@@ -20,6 +19,7 @@ from shoal.mechanics.march import march
 from shoal.mechanics.model import build
 from shoal.mechanics.tile import Tile, pack, tiles
 from shoal.scene import Scene, load_scene
+
 from shoal_validation.benchmarks.timing import median_time
 
 STEPS = 1000
