@@ -12,7 +12,12 @@ CASES = {
 }
 """Problem of each case, and the scene that the engines are compared on."""
 
+SAME_MESH = {case: f"{case}-same-mesh" for case in CASES}
+"""The same case with data from the very mesh that is fitted."""
+
 TITLES = {"paper-case-1": "Case 1", "paper-case-2": "Case 2"}
+TITLES |= {SAME_MESH[case]: f"{title}, same mesh" for case, title in TITLES.items()}
+
 METHODS = ("least-squares", "iafsa", "iafsa-unseeded", "iafsa-printed", "afsa", "casadi")
 SLOWEST_FIRST = ("iafsa-printed", "casadi", "afsa", "iafsa", "iafsa-unseeded", "least-squares")
 ENGINES = ("gauss", "exudyn", "casadi")
@@ -38,6 +43,12 @@ def mesh_cells(case: str) -> list[Cell]:
         Cell(case, "least-squares", SEED, values=mesh_values(elements, quadrature, step), label=label)
         for label, elements, quadrature, step in MESHES
     ]
+
+
+def same_mesh_cells(case: str) -> list[Cell]:
+    """Least squares on the mesh of the data, with a step that leaves nothing but the mesh to matter."""
+    values = {"solver.integrator": "leapfrog", "solver.step": 2e-5}
+    return [Cell(SAME_MESH[case], "least-squares", SEED, values=values)]
 
 
 def mesh_values(elements: int, quadrature: str, step: float) -> dict[str, Any]:

@@ -99,10 +99,11 @@ class Simulated:
 
 @dataclass(frozen=True)
 class DemoResult:
-    """Both cases: identified by every method, on several meshes, and simulated by several engines."""
+    """Both cases: by every method, on several meshes, on the mesh of the data, and on several engines."""
 
     studies: dict[str, Study]
     meshes: dict[str, Study]
+    same_mesh: dict[str, Study]
     comparisons: dict[str, Compared]
 
     @property
@@ -129,12 +130,15 @@ class DemoResult:
                     found.append(f"{name}: {' and '.join(row['engines'])} differ by {distance} m at B")
         return found
 
+    def _groups(self) -> tuple[dict[str, Study], ...]:
+        return self.studies, self.meshes, self.same_mesh
+
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal run demo --json` prints."""
         return {
             "status": "ok" if self.trusted else "failed",
             "doubts": self.doubts(),
-            "studies": {name: study.to_json() for name, study in {**self.studies, **self.meshes}.items()},
+            "studies": [study.to_json() for group in self._groups() for study in group.values()],
             "comparisons": {name: compared.to_json() for name, compared in self.comparisons.items()},
         }
 

@@ -29,7 +29,7 @@ def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
     """The result of the flow `name`; text among the parameters is read as YAML. Raises InputError, ComputationError."""
     server.start()
     # While the server starts, the workers and this process import what they need.
-    workers.warm_up()
+    ready = workers.warm_up()
     from prefect.exceptions import ParameterTypeError
 
     from shoal_flows.flows import FLOWS
@@ -38,6 +38,8 @@ def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
         raise InputError(f"flow: no flow {name!r}; there are {', '.join(FLOWS)}")
     flow = FLOWS[name]
     wanted = _parsed(name, inspect.signature(flow.fn), parameters)
+    with events.work("kernels (compiled on first use)"):
+        ready.result()
     server.wait()
     try:
         return flow(**wanted)

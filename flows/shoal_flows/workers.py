@@ -13,8 +13,6 @@ from typing import ParamSpec, TypeVar
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_PRELOADED = ["shoal.identification", "shoal.engines.gauss", "shoal.engines.compare"]
-
 
 def count() -> int:
     """Computations that run at a time."""
@@ -31,10 +29,9 @@ def run(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     return submit(function, *args, **kwargs).result()
 
 
-def warm_up() -> None:
-    """Start the processes; they import while the caller does something else."""
-    for _ in range(count()):
-        submit(os.getpid)
+def warm_up() -> Future[int]:
+    """Start the processes; they load and compile while the caller does something else. The result waits for that."""
+    return submit(os.getpid)
 
 
 @cache
@@ -43,7 +40,7 @@ def _pool() -> ProcessPoolExecutor:
     method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
     context = get_context(method)
     if method == "forkserver":
-        context.set_forkserver_preload(_PRELOADED)
+        context.set_forkserver_preload(["shoal_flows.preload"])
     pool = ProcessPoolExecutor(count(), mp_context=context)
     atexit.register(pool.shutdown, wait=False, cancel_futures=True)
     return pool

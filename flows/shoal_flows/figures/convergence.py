@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from shoal_flows.figures.style import GREY, METHODS, OTHER, canvas, log_ticks
+from shoal_flows.figures.style import GREY, METHODS, OTHER, canvas, log_ticks, styled
 from shoal_flows.jobs import Fit
 
 
+@styled
 def convergence(fits: Sequence[Fit], title: str) -> Figure:
     """Best fitness so far over the evaluations, both logarithmic; a marker stands where a method ended."""
     figure, axes = canvas(4.6)
@@ -33,6 +34,7 @@ def convergence(fits: Sequence[Fit], title: str) -> Figure:
         level = things * float(np.min(floor)) ** 2
         axes.axhline(level, color=GREY, linewidth=1, linestyle=(0, (1, 2)))
         axes.annotate("mesh error of the model", (1, level), (0, -4), textcoords="offset points", va="top", color=GREY)
+        axes.set_ylim(bottom=level / 6)
     axes.set_xscale("log")
     axes.set_yscale("log")
     log_ticks(axes)

@@ -8,24 +8,24 @@ import numpy as np
 from matplotlib.figure import Figure
 from shoal.engines.compare import Comparison
 
-from shoal_flows.figures.style import BLACK, ENGINES, GREY, OTHER, VERMILION, canvas, log_ticks
+from shoal_flows.figures.style import BLACK, ENGINES, GREY, OTHER, VERMILION, canvas, log_ticks, styled
 
 _WIDTHS = (5.0, 3.0, 1.8)
 _PAIRS = (BLACK, VERMILION, GREY)
 
 
+@styled
 def engines(comparison: Comparison, marker: str, title: str) -> Figure:
     """Above, x and y of a marker by every engine; below, the distance of each pair, logarithmic."""
     figure, (above, below) = canvas(6.2, nrows=2, sharex=True, height_ratios=[1.2, 1])
-    ends = []
     for k, (name, motion) in enumerate(comparison.trajectories.items()):
         style = {**ENGINES.get(name, OTHER), "linewidth": _WIDTHS[min(k, 2)]}
         path = motion.marker(marker)
         above.plot(motion.times, path[:, 0], label=name, **style)
         above.plot(motion.times, path[:, 1], **style)
-        ends.append((motion.times[len(motion.times) // 2], path[len(motion.times) // 2]))
-    for axis, value in zip("xy", ends[0][1], strict=True):
-        above.annotate(axis, (ends[0][0], value), (0, 8), textcoords="offset points")
+    times, path = next((m.times, m.marker(marker)) for m in comparison.trajectories.values())
+    for axis, value in zip("xy", path[-1], strict=True):
+        above.annotate(axis, (times[-1], value), (6, 0), textcoords="offset points", va="center")
     for k, ((one, a), (other, b)) in enumerate(combinations(comparison.trajectories.items(), 2)):
         distance = np.linalg.norm(a.marker(marker) - b.marker(marker), axis=1)
         style = {"color": _PAIRS[k % 3], "linestyle": "-" if k < 3 else "--"}

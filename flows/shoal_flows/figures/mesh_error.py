@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from shoal_flows.figures.style import BLUE, ORANGE, VERMILION, canvas, log_ticks
+from shoal_flows.figures.style import BLUE, ORANGE, VERMILION, canvas, log_ticks, styled
 from shoal_flows.jobs import Fit
 
 
+@styled
 def mesh_error(fits: Sequence[Fit], title: str) -> Figure:
     """Size of the true error of every parameter, of the error predicted from the mesh, and of the interval."""
     names = list(fits[0].estimate.truth)
@@ -22,7 +23,15 @@ def mesh_error(fits: Sequence[Fit], title: str) -> Figure:
         predicted = [abs(v.model_bias) if v.model_bias is not None else np.nan for v in values]
         half = [(v.upper - v.lower) / 2 for v in values]
         dots = {"linestyle": "none", "markersize": 9}
-        panel.plot(places, np.degrees(half), color=ORANGE, marker="_", markeredgewidth=2, label="95 % interval", **dots)
+        panel.plot(
+            places,
+            np.degrees(half),
+            color=ORANGE,
+            marker="_",
+            markeredgewidth=2,
+            label="half the 95 % interval",
+            **dots,
+        )
         panel.plot(places, np.degrees(predicted), color=BLUE, marker="D", label="predicted", fillstyle="none", **dots)
         panel.plot(places, np.degrees(true), color=VERMILION, marker="o", label="true error", **dots)
         panel.set_yscale("log")

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from shoal_flows.figures.style import METHODS, OTHER, canvas, log_ticks
+from shoal_flows.figures.style import METHODS, OTHER, canvas, log_ticks, styled
 from shoal_flows.jobs import Fit
 
 
+@styled
 def residuals(fits: Sequence[Fit], title: str) -> Figure:
     """Size of model minus measurement against time; methods that coincide lie on one line."""
     figure, axes = canvas()

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
 from io import BytesIO
-from typing import Any
+from typing import Any, ParamSpec
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+P = ParamSpec("P")
 
 # Okabe and Ito (2008), Color Universal Design.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -33,7 +37,7 @@ OTHER: dict[str, Any] = {"color": PURPLE, "linestyle": "-"}
 _RC: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 11,
-    "axes.titlesize": 12,
+    "axes.titlesize": 11,
     "axes.titlelocation": "left",
     "axes.titleweight": "bold",
     "axes.spines.top": False,
@@ -49,11 +53,21 @@ _RC: Any = {
 }
 
 
+def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Let a function draw in this look."""
+
+    @wraps(draw)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        with rc_context(_RC):
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
 def canvas(height: float = 4.2, **layout: Any) -> tuple[Figure, Any]:
     """A figure that stays legible at the width of a phone, and its axes; `layout` goes to `Figure.subplots`."""
-    with rc_context(_RC):
-        figure = Figure(figsize=(6.4, height))
-        return figure, figure.subplots(**layout)
+    figure = Figure(figsize=(6.4, height))
+    return figure, figure.subplots(**layout)
 
 
 def log_ticks(axes: Axes) -> None:

@@ -8,9 +8,10 @@ from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
 from shoal.trajectory import Status
 
-from shoal_flows.figures.style import BLUE, ORANGE, canvas
+from shoal_flows.figures.style import BLUE, ORANGE, canvas, styled
 
 
+@styled
 def sweep(result: Sweep, marker: str) -> Figure:
     """One value: displacement in x and y as lines. Two values: two maps. Raises InputError for more."""
     if len(result.grid) == 1:

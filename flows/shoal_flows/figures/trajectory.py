@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from shoal_flows.figures.style import BLACK, METHODS, OTHER, canvas
+from shoal_flows.figures.style import BLACK, METHODS, OTHER, canvas, styled
 from shoal_flows.jobs import Fit
 
 _UNITS = {"x": "m", "y": "m", "angle": "rad"}
 
 
-def trajectory(fit: Fit, title: str = "") -> Figure:
+@styled
+def trajectory(fit: Fit, title: str) -> Figure:
     """Each channel against time: circles are measured, the line is the model."""
     measurement, estimate = fit.estimate.measurement, fit.estimate
     channels = measurement.channels
@@ -31,6 +32,6 @@ def trajectory(fit: Fit, title: str = "") -> Figure:
         panel.plot(measurement.times, measurement.values[:, k], color=BLACK, label="measured", **dots)
         panel.set_ylabel(f"{channel.quantity} of {channel.marker} [{_UNITS[channel.quantity]}]")
     axes[0, 0].legend()
-    axes[0, 0].set_title(title or f"{estimate.problem}: {estimate.method}, RMS {estimate.rms:.2e}")
+    axes[0, 0].set_title(title)
     axes[-1, 0].set_xlabel("time [s]")
     return figure

@@ -8,18 +8,24 @@ from prefect import flow
 from shoal.engines.compare import Comparison
 
 from shoal_flows.flows.runner import side_by_side
-from shoal_flows.flows.study import Running, open_running
+from shoal_flows.flows.study import Draw, Running, open_running
 from shoal_flows.flows.tasks import measure, run_engines
 from shoal_flows.jobs import Cell
-from shoal_flows.pictures import Picture, draw_best, draw_convergence, draw_mesh_error, draw_residuals
-from shoal_flows.plan import CASES, ENGINES, SLOWEST_FIRST, TITLES, mesh_cells, method_cells
+from shoal_flows.pictures import Picture, draw_convergence, draw_mesh_error, draw_residuals, draw_trajectory
+from shoal_flows.plan import CASES, ENGINES, SAME_MESH, SLOWEST_FIRST, TITLES, mesh_cells, method_cells, same_mesh_cells
 from shoal_flows.results import Compared, DemoResult, Study
+
+METHOD_PICTURES: dict[str, Draw] = {
+    "convergence": draw_convergence,
+    "residuals": draw_residuals,
+    "trajectory": draw_trajectory,
+}
 
 
 @flow(name="demo", task_runner=side_by_side())
 def demo() -> DemoResult:
     """Identify both cases by every method and on four meshes; compare the engines on both scenes."""
-    measured = {case: measure.submit(case, None) for case in CASES}
+    measured = {case: measure.submit(case, None) for case in (*CASES, *SAME_MESH.values())}
     compared = {case: run_engines.submit(scene, ENGINES, {}) for case, scene in CASES.items()}
     with ExitStack() as stack:
 
@@ -29,31 +35,23 @@ def demo() -> DemoResult:
 
         studies = {case: begin("identify", method_cells(case)) for case in CASES}
         meshes = {case: begin("mesh error", mesh_cells(case)) for case in CASES}
+        same = {case: begin("same mesh", same_mesh_cells(case)) for case in CASES}
         # The longest first, so that no core waits for the other at the end.
-        queue = [(study, cell) for study in (*studies.values(), *meshes.values()) for cell in study.cells]
+        queue = [
+            (study, cell) for study in (*studies.values(), *meshes.values(), *same.values()) for cell in study.cells
+        ]
         for study, cell in sorted(queue, key=lambda item: SLOWEST_FIRST.index(item[1].method)):
             study.submit(cell)
         return DemoResult(
-            {case: _finish_methods(study) for case, study in studies.items()},
-            {case: _finish_meshes(study) for case, study in meshes.items()},
+            {case: _finish(study, **METHOD_PICTURES) for case, study in studies.items()},
+            {case: _finish(study, mesh_error=draw_mesh_error) for case, study in meshes.items()},
+            {case: _finish(study) for case, study in same.items()},
             {case: _compared(future.result()) for case, future in compared.items()},
         )
 
 
-def _finish_methods(study: Running) -> Study:
-    case = TITLES[study.cells[0].problem]
-    return study.finish(
-        {
-            "convergence": (draw_convergence, f"{case}: what each method pays"),
-            "residuals": (draw_residuals, f"{case}: what each method leaves"),
-            "trajectory": (draw_best, f"{case}: the fitted model runs through the data"),
-        }
-    )
-
-
-def _finish_meshes(study: Running) -> Study:
-    case = TITLES[study.cells[0].problem]
-    return study.finish({"mesh-error": (draw_mesh_error, f"{case}: a finer mesh, a truer answer")})
+def _finish(study: Running, **pictures: Draw) -> Study:
+    return study.finish(TITLES[study.cells[0].problem], pictures)
 
 
 def _compared(result: tuple[Comparison, Picture, str]) -> Compared:

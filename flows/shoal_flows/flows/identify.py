@@ -44,9 +44,4 @@ def identify(
     with open_running(f"{problem} · identify", cells, measurement) as study:
         for cell in cells:
             study.submit(cell)
-        return study.finish(
-            {
-                "convergence": (draw_convergence, f"{problem}: what each method pays"),
-                "residuals": (draw_residuals, f"{problem}: what each method leaves"),
-            }
-        )
+        return study.finish(problem, {"convergence": draw_convergence, "residuals": draw_residuals})

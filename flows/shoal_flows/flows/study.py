@@ -17,7 +17,7 @@ from shoal_flows.results import Study
 from shoal_flows.tracking.identification import log_outcome, open_study
 from shoal_flows.tracking.store import Run
 
-Draw = Callable[..., Picture]
+Draw = Callable[[Sequence[Fit], str], Picture]
 
 
 @dataclass
@@ -34,8 +34,8 @@ class Running:
         """Queue one of the optimisations."""
         self.futures[cell.name] = optimise.submit(cell, self.measurement, self.run.run_id)
 
-    def finish(self, pictures: Mapping[str, tuple[Draw, str]]) -> Study:
-        """Wait for all, draw what they found together (by name of the file: function and title), log it."""
+    def finish(self, title: str, pictures: Mapping[str, Draw]) -> Study:
+        """Wait for all, draw what they found together (functions by the name of the file), log it."""
         fits: list[Fit] = []
         failures: dict[str, str] = {}
         for cell in self.cells:
@@ -46,7 +46,7 @@ class Running:
                 failures[cell.name] = str(result)
         drawn = {}
         if fits:
-            waiting = {name: workers.submit(draw, fits, title) for name, (draw, title) in pictures.items()}
+            waiting = {name: workers.submit(draw, fits, title) for name, draw in pictures.items()}
             drawn = {name: picture.result() for name, picture in waiting.items()}
         log_outcome(self.run, fits, failures, {f"{name}.png": picture[0] for name, picture in drawn.items()})
         return Study(self.name, self.run.run_id, fits, failures, drawn)

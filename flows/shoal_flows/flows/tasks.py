@@ -42,8 +42,7 @@ def run_engines(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -
     with events.work(f"{scene} on {', '.join(engines)}"):
         comparison = workers.run(jobs.compared, scene, engines, values)
         marker = tracked.tip(comparison.scene)
-        title = f"{comparison.scene.name}: {marker} by each engine"
-        picture = workers.run(pictures.draw_engines, comparison, marker, title)
+        picture = workers.run(pictures.draw_engines, comparison, marker)
         return comparison, picture, tracked.log_comparison(comparison, picture[0])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shoal_flows.jobs import Fit
-from shoal_flows.plan import MESHES, mesh_values
+from shoal_flows.plan import MESHES, mesh_values, same_mesh_cells
 from shoal_flows.report.paper import TABLES
 from shoal_flows.report.words import covered, degrees, errors, length, power
 from shoal_flows.results import Compared, Study
@@ -75,10 +75,13 @@ def commands(case: str, scene: str, study: Study, compared: Compared) -> list[li
         values = mesh_values(elements, quadrature, step)
         options = " ".join(f"--set {path}={value}" for path, value in values.items())
         rows.append([f"mesh {label}", f"shoal identify {case} --method least-squares {options}"])
+    same = same_mesh_cells(case)[0]
+    options = " ".join(f"--set {path}={value}" for path, value in same.values.items())
+    rows.append(["same mesh", f"shoal identify {same.problem} --method {same.method} {options}"])
     engines = ",".join(compared.comparison.trajectories)
     return [*rows, ["engines", f"shoal compare {scene} --engines {engines}"]]
 
 
 def fingerprints(fits: list[Fit]) -> dict[str, str]:
     """Fingerprint of the identified scene by cell."""
-    return {fit.cell.name: fit.estimate.scene.fingerprint for fit in fits}
+    return {f"{fit.cell.problem}, {fit.cell.name}": fit.estimate.scene.fingerprint for fit in fits}

@@ -48,6 +48,7 @@ def _case(result: DemoResult, case: str) -> dict[str, Any]:
         "identified": words.identified(title, study),
         "swarms": words.against_swarms(title, study),
         "confirmed": words.confirmed(title, compared, study),
+        "same_mesh": words.same_mesh(title, result.same_mesh[case]),
         "mesh_words": words.mesh_sentence(title, mesh),
         "data": first.data if first else "none",
         "model": ", ".join(f"{name}={value}" for name, value in first.model.items()) if first else "nothing",
@@ -57,7 +58,9 @@ def _case(result: DemoResult, case: str) -> dict[str, Any]:
         "mesh_rows": tables.mesh_rows(mesh),
         "engine_rows": tables.engine_rows(compared),
         "commands": tables.commands(case, CASES[case], study, compared),
-        "fingerprints": [list(row) for row in tables.fingerprints([*study.fits, *mesh.fits]).items()],
+        "fingerprints": [
+            list(row) for row in tables.fingerprints([*study.fits, *mesh.fits, *result.same_mesh[case].fits]).items()
+        ],
         "figures": [_figure(title, name, study) for name in study.pictures],
         "engines_figure": _picture(
             compared.picture,
@@ -66,7 +69,7 @@ def _case(result: DemoResult, case: str) -> dict[str, Any]:
             "Above, the motions, drawn in falling widths so that each shows; below, what lies between them.",
         ),
         "mesh_figure": _picture(
-            mesh.pictures["mesh-error"],
+            mesh.pictures["mesh_error"],
             f"{words.mesh_sentence(title, mesh)} Points for true error, predicted error and interval on four meshes.",
             "True error, error predicted by the estimate, and half the 95 % interval, logarithmic.",
         ),
@@ -75,18 +78,16 @@ def _case(result: DemoResult, case: str) -> dict[str, Any]:
 
 _CAPTIONS = {
     "trajectory": (
-        "Measured positions of the tip as circles and the motion of the fitted model as a line through them.",
+        "measured positions of the tip as circles, the motion of the fitted model as a line through them.",
         "The best fit over the data.",
     ),
     "convergence": (
-        "Best fitness against counted evaluations for every method, both axes logarithmic: least squares and CasADi need "
-        "a hundred or fewer, the seeded swarm starts from the same point, the others need thousands or never arrive.",
-        "A marker stands where a method ended. Below the dotted line no method can go much: that is the mesh error.",
+        "best fitness against counted evaluations for every method, both axes logarithmic; the table has the numbers.",
+        "A marker stands where a method ended. The dotted line is what the model’s own mesh is off by.",
     ),
     "residuals": (
-        "Distance between model and data against time for every method: most coincide at about a millimetre, AFSA and "
-        "IAFSA as printed lie above.",
-        "What remains of the motion that the fitted model does not explain. Methods that found the minimum coincide.",
+        "distance of model and data against time for every method; methods that reach the same fit lie on one line.",
+        "What remains of the motion that the fitted model does not explain.",
     ),
 }
 

@@ -92,12 +92,19 @@ class ForwardModel:
     def _valid(self, points: Array) -> Array:
         """Which points are scenes at all, (points,): inside the box all are, outside a mass may be negative."""
         valid = np.ones(len(points), dtype=bool)
-        for k in np.flatnonzero(np.any((points < self.lower) | (points > self.upper), axis=1)):
-            try:
-                self.scene.with_values({p.path: float(points[k, j]) for j, p in enumerate(self._parameters)})
-            except InputError:
-                valid[k] = False
+        outside = np.any((points < self.lower) | (points > self.upper), axis=1)
+        # Limits of fields are intervals: where the extremes are accepted, so is what lies between.
+        extremes = (points[outside].min(axis=0), points[outside].max(axis=0)) if np.any(outside) else ()
+        if not all(self._is_scene(extreme) for extreme in extremes):
+            valid[outside] = [self._is_scene(point) for point in points[outside]]
         return valid
+
+    def _is_scene(self, point: Array) -> bool:
+        try:
+            self.scene.with_values({p.path: float(x) for p, x in zip(self._parameters, point, strict=True)})
+        except InputError:
+            return False
+        return True
 
     def _residuals(self, points: Array) -> Array:
         seen = self.observe(points, self.measurement.times)

@@ -1,0 +1,97 @@
+"""`shoal ui`: MLflow's pages over the runs, until Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from urllib.error import URLError
+from urllib.request import urlopen
+
+from rich.console import Console
+from shoal.errors import ComputationError, InputError
+
+from shoal_flows import settings
+
+_PATIENCE = 60.0
+
+
+def ui(host: str, port: int, *, prefect: bool = False) -> None:
+    """Serve MLflow, and with `prefect` Prefect's pages on the next port. Raises InputError, ComputationError."""
+    settings.apply()
+    console = Console(stderr=True, highlight=False)
+    ports = [port, port + 1] if prefect else [port]
+    for wanted in ports:
+        _check_free(host, wanted)
+    commands = [_mlflow(host, port), *([_prefect(host, port + 1)] if prefect else [])]
+    processes = [_start(command, f"{command[2]}-ui.log") for command in commands]
+    try:
+        _wait(processes[0], host, port)
+        console.print(f"MLflow:  http://{host}:{port}  (Ctrl-C stops it)", soft_wrap=True)
+        if prefect:
+            console.print(f"Prefect: http://{host}:{port + 1}", soft_wrap=True)
+        else:
+            where = f"PREFECT_HOME={os.environ['PREFECT_HOME']} {sys.executable} -m prefect server start"
+            console.print(f"Prefect's flow runs: {where}", soft_wrap=True)
+        while all(process.poll() is None for process in processes):
+            time.sleep(0.3)
+        raise ComputationError(f"a server ended by itself; see {settings.log_folder()}")
+    except KeyboardInterrupt:
+        console.print("stopped")
+    finally:
+        for process in processes:
+            _stop(process)
+
+
+def _mlflow(host: str, port: int) -> list[str]:
+    store = ["--backend-store-uri", os.environ["MLFLOW_TRACKING_URI"]]
+    if settings.uses_default_store():
+        store += ["--artifacts-destination", settings.artifact_folder().as_uri()]
+    address = ["--host", host, "--port", str(port), "--workers", "1"]
+    return [sys.executable, "-m", "mlflow", "server", *address, *store]
+
+
+def _prefect(host: str, port: int) -> list[str]:
+    return [sys.executable, "-m", "prefect", "server", "start", "--no-services", "--host", host, "--port", str(port)]
+
+
+def _start(command: list[str], log: str) -> subprocess.Popen[bytes]:
+    with (settings.log_folder() / log).open("wb") as out:
+        # Its own session: Ctrl-C reaches this process only, which then stops the server and its workers together.
+        return subprocess.Popen(
+            command, stdout=out, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
+        )
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGTERM)
+    try:
+        process.wait(10)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+def _check_free(host: str, port: int) -> None:
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise InputError(f"port: cannot listen on {host}:{port}: {reason}; choose another with --port") from None
+
+
+def _wait(process: subprocess.Popen[bytes], host: str, port: int) -> None:
+    deadline = time.monotonic() + _PATIENCE
+    reachable = "127.0.0.1" if host == "0.0.0.0" else host
+    while True:
+        with suppress(URLError, OSError), urlopen(f"http://{reachable}:{port}/health", timeout=5):
+            return
+        if process.poll() is not None or time.monotonic() > deadline:
+            raise ComputationError(f"the MLflow server did not start; see {settings.log_folder() / 'mlflow-ui.log'}")
+        time.sleep(0.2)

@@ -1,0 +1,43 @@
+"""Pictures are drawn without warnings, with labelled axes and a message in the title."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shoal.engines import get_engine
+from shoal.engines.compare import compare
+from shoal.engines.sweep import sweep
+from shoal.scene import load_scene
+from shoal_flows.figures import files
+from shoal_flows.figures.engines import engines
+from shoal_flows.figures.sweep import sweep as draw_sweep
+
+SCENE = load_scene("single-pendulum")
+
+
+@pytest.mark.parametrize("paths", [["initial.OA.angle"], ["initial.OA.angle", "initial.OA.rate"]])
+def test_sweeps(paths: list[str]) -> None:
+    result = sweep(SCENE, {path: np.linspace(0, 1, 4) for path in paths}, get_engine("gauss"), 0.5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = draw_sweep(result, "A")
+    title = figure.axes[0].get_title(loc="left")
+    assert "A" in title
+    assert "after 0.5 s" in title
+    assert "[rad" in figure.axes[-1].get_xlabel() + figure.axes[0].get_xlabel()
+
+
+def test_engines_over_each_other() -> None:
+    figure = engines(compare(SCENE, ["gauss", "casadi"]), "A", "both")
+    above, below = figure.axes
+    assert [text.get_text() for text in above.get_legend().get_texts()] == ["gauss", "casadi"]
+    assert "[m]" in above.get_ylabel()
+    assert "[s]" in below.get_xlabel()
+
+
+def test_files_are_png(tmp_path: Path) -> None:
+    files.trajectory(get_engine("gauss").simulate(SCENE), SCENE, tmp_path / "motion.png")
+    assert (tmp_path / "motion.png").read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,90 @@
+"""Flows on a server of their own, and what they leave in MLflow."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from shoal.errors import InputError
+from shoal_flows import run
+
+
+@pytest.fixture(scope="module")
+def study() -> Any:
+    """One identification by two methods."""
+    parameters = {"problem": "paper-case-1", "methods": "least-squares,iafsa-unseeded", "seeds": "[0]"}
+    return run.run_flow("identify", parameters)
+
+
+def _client() -> Any:
+    from mlflow import MlflowClient
+
+    return MlflowClient()
+
+
+def _children(parent: str) -> list[Any]:
+    client = _client()
+    experiment = client.get_run(parent).info.experiment_id
+    found = client.search_runs([experiment], f"tags.`mlflow.parentRunId` = '{parent}'")
+    return list(found)
+
+
+def test_a_study_is_a_parent_run_with_a_child_per_method(study: Any) -> None:
+    assert study.trusted
+    children = {child.data.params["method"]: child for child in _children(study.run_id)}
+    assert set(children) == {"least-squares", "iafsa-unseeded"}
+    assert all(child.info.status == "FINISHED" for child in children.values())
+    metrics = children["least-squares"].data.metrics
+    assert metrics["final/theta1"] == pytest.approx(0.785398, abs=1e-3)
+    assert metrics["final/evaluations"] <= 30
+    assert abs(metrics["error/theta1"]) < 1e-3
+
+
+def test_fitness_and_trajectory_are_series(study: Any) -> None:
+    (swarm,) = [c for c in _children(study.run_id) if c.data.params["method"] == "iafsa-unseeded"]
+    best = [m.value for m in _client().get_metric_history(swarm.info.run_id, "fitness/best")]
+    assert len(best) == 101
+    assert best == sorted(best, reverse=True)
+    tip = _client().get_metric_history(swarm.info.run_id, "tip/x")
+    assert 50 <= len(tip) <= 300
+    assert max(m.step for m in tip) == 500
+
+
+def test_artifacts_hold_the_full_trajectory_and_pictures(study: Any) -> None:
+    (child,) = [c for c in _children(study.run_id) if c.data.params["method"] == "least-squares"]
+    names = {Path(item.path).name for item in _client().list_artifacts(child.info.run_id)}
+    assert any(name.endswith((".csv", ".parquet")) for name in names)
+    assert any(name.endswith(".png") for name in names)
+    of_study = {Path(item.path).name for item in _client().list_artifacts(study.run_id)}
+    assert "overlay.html" in of_study
+
+
+def test_the_answer_is_plain_json(study: Any) -> None:
+    found = json.loads(json.dumps(study.to_json(), allow_nan=False, default=str))
+    assert found["status"] == "ok"
+
+
+def test_forward_sweep_and_compare_are_logged() -> None:
+    forward = run.run_flow("forward", {"scene": "single-pendulum"})
+    sweep = run.run_flow("sweep", {"scene": "single-pendulum", "vary": "{initial.OA.angle: [0, 1, 3]}"})
+    compare = run.run_flow("compare", {"scene": "single-pendulum", "engines": "gauss,casadi"})
+    for result in (forward, sweep, compare):
+        assert result.trusted
+        assert _client().get_run(result.run_id).info.status == "FINISHED"
+
+
+@pytest.mark.parametrize(
+    ("flow", "parameters", "word"),
+    [
+        ("dance", {}, "dance"),
+        ("forward", {"colour": "red"}, "colour"),
+        ("forward", {"scene": "nothing"}, "nothing"),
+        ("sweep", {"scene": "single-pendulum", "vary": "{initial.OA.angle: [0, 1]}"}, "vary"),
+    ],
+)
+def test_bad_parameters_are_refused_in_one_line(flow: str, parameters: dict[str, str], word: str) -> None:
+    with pytest.raises(InputError, match=word) as refusal:
+        run.run_flow(flow, parameters)
+    assert "\n" not in str(refusal.value)
