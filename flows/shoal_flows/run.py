@@ -10,7 +10,6 @@ import yaml
 from shoal.errors import InputError
 
 from shoal_flows import events, server, workers
-from shoal_flows.jsontext import as_json_text
 from shoal_flows.terminal import following, show
 
 
@@ -19,6 +18,8 @@ def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> bool:
     with following(f"flow {name}") as listener, events.listening(listener):
         result = run_flow(name, parameters)
     if as_json:
+        from shoal_flows.jsontext import as_json_text
+
         print(as_json_text(result.to_json()))  # noqa: T201 - this is the output
     else:
         show(result)
@@ -28,7 +29,7 @@ def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> bool:
 def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
     """The result of the flow `name`; text among the parameters is read as YAML. Raises InputError, ComputationError."""
     server.start()
-    # While the server starts, the workers and this process import what they need.
+    # What follows takes seconds to import; meanwhile the server and the workers start.
     ready = workers.warm_up()
     from prefect.exceptions import ParameterTypeError
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Lock
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich import box
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from shoal_flows.events import Listener
-from shoal_flows.results import Compared, DemoResult, Simulated, Study, Swept
+
+if TYPE_CHECKING:
+    from shoal_flows.results import Compared, DemoResult, Study
 
 
 @contextmanager
@@ -46,6 +48,8 @@ def following(what: str) -> Iterator[Listener]:
 
 def show(result: Any) -> None:
     """The table of a result."""
+    from shoal_flows.results import Compared, DemoResult, Simulated, Study, Swept
+
     console = Console(highlight=False)
     if isinstance(result, Study):
         _study(console, result)
@@ -83,7 +87,7 @@ def demo_tables(console: Console, result: DemoResult) -> None:
 
 def _worst_error(fit: Any) -> float:
     errors = [fit.estimate.parameters[name].value - true for name, true in fit.estimate.truth.items()]
-    return float(np.degrees(max(map(abs, errors), default=np.nan)))
+    return math.degrees(max(map(abs, errors), default=math.nan))
 
 
 def _study(console: Console, study: Study) -> None:

@@ -27,7 +27,9 @@ def test_sweeps(paths: list[str]) -> None:
     title = figure.axes[0].get_title(loc="left")
     assert "A" in title
     assert "after 0.5 s" in title
-    assert "[rad" in figure.axes[-1].get_xlabel() + figure.axes[0].get_xlabel()
+    labels = {axes.get_xlabel() for axes in figure.axes} | {axes.get_ylabel() for axes in figure.axes}
+    assert "initial.OA.angle [rad]" in labels
+    assert len(paths) == 1 or "initial.OA.rate [rad/s]" in labels
 
 
 def test_engines_over_each_other() -> None:

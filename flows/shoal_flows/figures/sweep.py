@@ -54,5 +54,12 @@ def _maps(result: Sweep, marker: str) -> Figure:
 
 
 def _labelled(path: str) -> str:
-    unit = {"angle": " [rad]", "length": " [m]", "height": " [m]", "width": " [m]", "density": " [kg/m³]"}
+    unit = {
+        "angle": " [rad]",
+        "rate": " [rad/s]",
+        "length": " [m]",
+        "height": " [m]",
+        "width": " [m]",
+        "density": " [kg/m³]",
+    }
     return path + unit.get(path.rpartition(".")[2], "")
