@@ -34,11 +34,13 @@ def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
     from prefect.exceptions import ParameterTypeError
 
     from shoal_flows.flows import FLOWS
+    from shoal_flows.tracking.store import connect
 
     if name not in FLOWS:
         raise InputError(f"flow: no flow {name!r}; there are {', '.join(FLOWS)}")
     flow = FLOWS[name]
     wanted = _parsed(name, inspect.signature(flow.fn), parameters)
+    connect()
     with events.work("kernels (compiled on first use)"):
         ready.result()
     server.wait()

@@ -28,6 +28,8 @@ def ui(host: str, port: int, *, prefect: bool = False) -> None:
     for wanted in ports:
         _check_free(host, wanted)
     commands = [_mlflow(host, port), *([_prefect(host, port + 1)] if prefect else [])]
+    # A service manager asks with SIGTERM for what a person does with Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     processes = [_start(command, f"{command[2]}-ui.log") for command in commands]
     try:
         _wait(processes[0], host, port)

@@ -82,6 +82,8 @@ def test_forward_sweep_and_compare_are_logged() -> None:
         ("forward", {"colour": "red"}, "colour"),
         ("forward", {"scene": "nothing"}, "nothing"),
         ("sweep", {"scene": "single-pendulum", "vary": "{initial.OA.angle: [0, 1]}"}, "vary"),
+        ("sweep", {"vary": "7"}, "vary"),
+        ("identify", {"methods": "[guess]"}, "guess"),
     ],
 )
 def test_bad_parameters_are_refused_in_one_line(flow: str, parameters: dict[str, str], word: str) -> None:

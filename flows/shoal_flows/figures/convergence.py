@@ -37,6 +37,9 @@ def convergence(fits: Sequence[Fit], title: str) -> Figure:
         axes.set_ylim(bottom=level / 6)
     axes.set_xscale("log")
     axes.set_yscale("log")
+    # Room for the legend above the lines.
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high * 1e3)
     log_ticks(axes)
     axes.set_title(title)
     axes.set_xlabel("model evaluations, every one counted")

@@ -17,13 +17,9 @@ from shoal.errors import ComputationError
 
 from shoal_flows import provenance, settings
 
-settings.apply()
-
-from mlflow import MlflowClient  # noqa: E402 - it reads the settings when it is imported
-from mlflow.entities import Metric, Param  # noqa: E402
-from mlflow.exceptions import MlflowException  # noqa: E402
-
 _BATCH = 1000
+_KIND = "custom_model_development"
+"""What makes MLflow open on runs and metrics instead of traces of language models."""
 _EXPERIMENTS = {
     "Identification": "Parameters found from measured motion: a parent per study, a child per method, case and seed.",
     "Comparison": "One scene on several engines: a parent run per scene, a child per engine.",
@@ -38,17 +34,17 @@ class Run:
 
     client: Any
     run_id: str
-    _metrics: list[Any] = field(default_factory=list)
-    _params: list[Any] = field(default_factory=list)
+    _metrics: list[tuple[str, float, int, int]] = field(default_factory=list)
+    _params: list[tuple[str, str]] = field(default_factory=list)
 
     def params(self, values: Mapping[str, Any]) -> None:
         """Settings, which never change; what is too long for MLflow is cut."""
-        self._params += [Param(name, str(value)[:6000]) for name, value in values.items()]
+        self._params += [(name, str(value)[:6000]) for name, value in values.items()]
 
     def metric(self, name: str, value: float, step: int = 0) -> None:
         """One number; what is not finite is left out."""
         if math.isfinite(value):
-            self._metrics.append(Metric(_plain(name), float(value), int(time.time() * 1000), step))
+            self._metrics.append((_plain(name), float(value), int(time.time() * 1000), step))
 
     def series(self, name: str, values: Iterable[tuple[int, float]]) -> None:
         """Numbers by step."""
@@ -68,8 +64,12 @@ class Run:
 
     def flush(self) -> None:
         """Send what was added, at most 1000 metrics and 100 settings a call."""
+        from mlflow.entities import Metric, Param
+
         while self._metrics or self._params:
-            self.client.log_batch(self.run_id, metrics=self._metrics[:_BATCH], params=self._params[:100])
+            metrics = [Metric(*row) for row in self._metrics[:_BATCH]]
+            params = [Param(*row) for row in self._params[:100]]
+            self.client.log_batch(self.run_id, metrics=metrics, params=params)
             del self._metrics[:_BATCH], self._params[:100]
 
 
@@ -86,7 +86,9 @@ def open_run(
 
     Raises ComputationError if MLflow cannot be reached.
     """
-    client = _client()
+    client = connect()
+    from mlflow.exceptions import MlflowException
+
     try:
         all_tags = {**_common_tags(), **(tags or {}), "mlflow.runName": name}
         if parent:
@@ -107,21 +109,27 @@ def open_run(
 
 
 @cache
-def _client() -> Any:
-    return MlflowClient()
+def connect() -> Any:
+    """MLflow's client, its database made if need be. MLflow reads the settings when it is imported, so not before."""
+    settings.apply()
+    from mlflow import MlflowClient
+
+    client = MlflowClient()
+    client.search_experiments(max_results=1)
+    return client
 
 
 @cache
 def _experiment(name: str) -> str:
     """The experiment of that name, made with its description when it is first used."""
-    client = _client()
+    client = connect()
     found = client.get_experiment_by_name(name)
     if found is not None:
         if found.lifecycle_stage == "deleted":
             client.restore_experiment(found.experiment_id)
         return str(found.experiment_id)
     location = (settings.artifact_folder() / name.lower()).as_uri() if settings.uses_default_store() else None
-    tags = {"mlflow.note.content": _EXPERIMENTS[name], "project": "shoal"}
+    tags = {"mlflow.note.content": _EXPERIMENTS[name], "project": "shoal", "mlflow.experimentKind": _KIND}
     return str(client.create_experiment(name, artifact_location=location, tags=tags))
 
 
@@ -138,4 +146,4 @@ def _plain(name: str) -> str:
     return re.sub(r"[^\w\-. /]", "_", name)
 
 
-__all__ = ["Run", "open_run"]
+__all__ = ["Run", "connect", "open_run"]

@@ -1,0 +1,33 @@
+"""One fit, one comparison and one sweep, shared by the tests of what is made of them."""
+
+from __future__ import annotations
+
+import pytest
+from shoal.engines.compare import Comparison
+from shoal.engines.sweep import Sweep
+from shoal.identification import Measurement
+from shoal_flows import jobs
+from shoal_flows.jobs import Cell, Fit
+
+PROBLEM = "paper-case-1"
+SCENE = "flexible-double-pendulum"
+
+
+@pytest.fixture(scope="session")
+def measurement() -> Measurement:
+    return jobs.measured(PROBLEM)
+
+
+@pytest.fixture(scope="session")
+def fits(measurement: Measurement) -> list[Fit]:
+    return [jobs.fit(Cell(PROBLEM, "least-squares", seed), measurement) for seed in (0, 1)]
+
+
+@pytest.fixture(scope="session")
+def comparison() -> Comparison:
+    return jobs.compared(SCENE, ["gauss", "exudyn", "casadi"], {})
+
+
+@pytest.fixture(scope="session")
+def sweep() -> Sweep:
+    return jobs.swept(SCENE, {"initial.OA.angle": (0.0, 1.0, 5)}, "gauss", None)

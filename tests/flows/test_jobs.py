@@ -1,0 +1,35 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shoal.engines.sweep import Sweep
+from shoal.errors import InputError
+from shoal_flows import jobs
+from shoal_flows.jobs import Fit
+
+
+def test_fit_carries_the_motion_of_what_it_found(fits: list[Fit]) -> None:
+    fit = fits[0]
+    assert fit.estimate.verdict.trusted
+    assert np.mean(np.sum(fit.residuals**2, axis=1)) == pytest.approx(fit.estimate.fitness, rel=1e-9)
+    assert fit.motion.times[0] == 0
+    assert fit.motion.times[-1] == fit.estimate.measurement.times[-1]
+    assert np.allclose(fit.motion.marker("B")[-1], fit.at_samples[-1], atol=1e-12)
+
+
+def test_sweep_covers_the_grid(sweep: Sweep) -> None:
+    assert sweep.grid["initial.OA.angle"].tolist() == [0, 0.25, 0.5, 0.75, 1]
+    assert sweep.ok
+
+
+@pytest.mark.parametrize("span", [(0.0, 1.0), (0.0, 1.0, 2.5), (0.0, 1.0, 0)])
+def test_sweep_refuses_what_is_no_grid(span: tuple[float, ...]) -> None:
+    with pytest.raises(InputError, match=r"vary: initial\.OA\.angle: needs \[low, high, count\]"):
+        jobs.swept("flexible-double-pendulum", {"initial.OA.angle": span}, "gauss", None)
+
+
+def test_unknown_names_are_refused_in_one_line() -> None:
+    with pytest.raises(InputError, match="no such scene"):
+        jobs.simulated("nowhere", "gauss", {})
+    with pytest.raises(InputError, match="vary: name at least one path"):
+        jobs.swept("flexible-double-pendulum", {}, "gauss", None)

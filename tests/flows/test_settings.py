@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+import os
+import socket
+from pathlib import Path
+
+import pytest
+from shoal.errors import InputError
+from shoal_flows import events, settings
+from shoal_flows.ui import ui
+
+
+def test_state_lies_below_the_home_and_the_user_wins(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(os, "environ", {"SHOAL_HOME": str(tmp_path), "PREFECT_HOME": "elsewhere"})
+    settings.apply()
+    assert os.environ["PREFECT_HOME"] == "elsewhere"
+    assert os.environ["MLFLOW_TRACKING_URI"] == f"sqlite:///{tmp_path}/mlflow.db"
+    assert os.environ["MLFLOW_DISABLE_TELEMETRY"] == os.environ["DO_NOT_TRACK"] == "true"
+    assert settings.uses_default_store()
+
+
+def test_ui_refuses_a_port_in_use_in_one_line() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(InputError, match=r"^port: cannot listen on 127.0.0.1:\d+: .*--port$"):
+            ui("127.0.0.1", taken.getsockname()[1])
+
+
+def test_work_is_announced_with_its_end() -> None:
+    heard: list[tuple[str, str]] = []
+    with events.listening(lambda name, state: heard.append((name, state))):
+        with events.work("one"):
+            pass
+        with pytest.raises(ValueError, match="no"), events.work("two"):
+            raise ValueError("no")
+    with events.work("unheard"):
+        pass
+    assert heard == [("one", "started"), ("one", "done"), ("two", "started"), ("two", "failed")]

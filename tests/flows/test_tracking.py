@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+from shoal.engines.compare import Comparison
+from shoal.engines.sweep import Sweep
+from shoal_flows.figures.style import png
+from shoal_flows.figures.trajectory import trajectory
+from shoal_flows.jobs import Cell, Fit
+from shoal_flows.tracking.engines import log_comparison, log_sweep
+from shoal_flows.tracking.identification import log_fit, log_outcome, open_study
+from shoal_flows.tracking.store import connect
+
+
+@pytest.fixture(scope="module")
+def client() -> Any:
+    return connect()
+
+
+def names(client: Any, run_id: str) -> set[str]:
+    return {artifact.path for artifact in client.list_artifacts(run_id)}
+
+
+def children(client: Any, run_id: str) -> list[Any]:
+    run = client.get_run(run_id)
+    return list(client.search_runs([run.info.experiment_id], f"tags.`mlflow.parentRunId` = '{run_id}'"))
+
+
+def test_study_is_logged_with_a_child_per_fit(client: Any, fits: list[Fit], tmp_path: Path) -> None:
+    picture = png(trajectory(fits[0], "title"))
+    with open_study("a study", [fit.cell for fit in fits], fits[0].estimate.measurement) as study:
+        for fit in fits:
+            log_fit(fit, picture, study.run_id)
+        log_outcome(study, fits, {"other": "went wrong"}, {"some.png": picture})
+    parent = client.get_run(study.run_id)
+    assert parent.info.status == "FINISHED"
+    assert parent.data.metrics["study/trusted"] == 2
+    assert parent.data.metrics["study/failed"] == 1
+    assert parent.data.tags["version.numpy"]
+    assert parent.data.tags["platform"]
+    assert names(client, study.run_id) == {"some.png", "summary.md", "overlay.html"}
+
+    estimate = fits[0].estimate
+    (child,) = (run for run in children(client, study.run_id) if run.data.params["seed"] == "0")
+    assert child.data.params["method"] == "least-squares"
+    assert child.data.params["mesh"] == "OA: 4, AB: 8"
+    assert child.data.params["scene.fingerprint"] == estimate.scene.fingerprint
+    assert child.data.metrics["final/fitness"] == estimate.fitness
+    assert child.data.metrics["final/evaluations"] == 18
+    error = estimate.parameters["theta1"].value - estimate.truth["theta1"]
+    assert child.data.metrics["error/theta1"] == pytest.approx(error)
+    assert child.data.metrics["interval/theta1/lower"] < estimate.truth["theta1"]
+    assert names(client, child.info.run_id) == {"trajectory.csv", "trajectory.png", "estimate.json"}
+    best = client.get_metric_history(child.info.run_id, "fitness/best")
+    assert [metric.value for metric in best] == [row[1] for row in estimate.iterations]
+    tip = client.get_metric_history(child.info.run_id, "tip/x")
+    assert len(tip) == 300
+    assert tip[-1].step == 500
+    file = client.download_artifacts(child.info.run_id, "trajectory.csv", str(tmp_path))
+    with Path(file).open() as lines:
+        rows = list(csv.DictReader(lines))
+    assert float(rows[-1]["B.x"]) == fits[0].motion.marker("B")[-1, 0]
+
+
+def test_failed_block_leaves_a_failed_run(client: Any, fits: list[Fit]) -> None:
+    with (
+        pytest.raises(RuntimeError),
+        open_study("broken", [Cell("paper-case-1", "afsa")], fits[0].estimate.measurement) as study,
+    ):
+        raise RuntimeError
+    assert client.get_run(study.run_id).info.status == "FAILED"
+
+
+def test_comparison_and_sweep_are_logged(client: Any, comparison: Comparison, sweep: Sweep) -> None:
+    run_id = log_comparison(comparison, b"\x89PNG")
+    metrics = client.get_run(run_id).data.metrics
+    assert metrics["difference/gauss-casadi/B/largest"] == pytest.approx(2.1e-5, rel=0.1)
+    assert {run.data.params["engine"] for run in children(client, run_id)} == {"gauss", "exudyn", "casadi"}
+    swept = log_sweep(sweep)
+    assert names(client, swept) == {"sweep.csv", "displacement-A.png", "displacement-B.png"}
+    assert client.get_run(swept).data.metrics["final/failed_points"] == 0
+
+
+def test_experiments_explain_themselves(client: Any, fits: list[Fit]) -> None:
+    with open_study("any", [fits[0].cell], fits[0].estimate.measurement):
+        pass
+    experiment = client.get_experiment_by_name("Identification")
+    assert experiment is not None
+    assert "a child per method" in experiment.tags["mlflow.note.content"]
+    assert experiment.artifact_location.endswith("/artifacts/identification")
