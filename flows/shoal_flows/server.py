@@ -20,6 +20,7 @@ from shoal.errors import ComputationError
 from shoal_flows import settings
 
 _PATIENCE = 120.0
+_COMMAND = ("prefect", "server", "start", "--no-services", "--no-ui", "--host", "127.0.0.1")
 _started: list[subprocess.Popen[bytes]] = []
 
 
@@ -32,10 +33,10 @@ def start() -> None:
     os.environ["PREFECT_API_URL"] = f"http://127.0.0.1:{port}/api"
     with (settings.log_folder() / "prefect-server.log").open("wb") as log:
         process = subprocess.Popen(
-            [sys.executable, "-m", "prefect", "server", "start", "--no-services", "--no-ui", "--port", str(port)],
+            [sys.executable, "-m", "shoal_flows.attached", *_COMMAND, "--port", str(port)],
             stdout=log,
             stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,
             # Ctrl-C is for the flow, which still has to report its end to the server.
             start_new_session=True,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -97,7 +98,7 @@ def open_run(
             all_tags["mlflow.note.content"] = description
         created = client.create_run(_experiment(experiment), tags=all_tags, run_name=name)
     except MlflowException as error:
-        raise ComputationError(f"MLflow: {str(error).splitlines()[0]}") from None
+        raise _unreachable(error) from None
     run = Run(client, created.info.run_id)
     try:
         yield run
@@ -110,13 +111,22 @@ def open_run(
 
 @cache
 def connect() -> Any:
-    """MLflow's client, its database made if need be. MLflow reads the settings when it is imported, so not before."""
+    """MLflow's client, its database made if need be. Raises ComputationError if MLflow cannot be reached."""
+    # MLflow reads the settings when it is imported.
     settings.apply()
     from mlflow import MlflowClient
+    from mlflow.exceptions import MlflowException
 
-    client = MlflowClient()
-    client.search_experiments(max_results=1)
+    try:
+        client = MlflowClient()
+        client.search_experiments(max_results=1)
+    except MlflowException as error:
+        raise _unreachable(error) from None
     return client
+
+
+def _unreachable(error: Exception) -> ComputationError:
+    return ComputationError(f"MLflow at {os.environ['MLFLOW_TRACKING_URI']}: {str(error).splitlines()[0]}")
 
 
 @cache
