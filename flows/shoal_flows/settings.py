@@ -36,7 +36,7 @@ def defaults(folder: Path) -> dict[str, str]:
 
 
 def artifact_folder() -> Path:
-    """Where the artifacts of the default database lie."""
+    """Where artifacts lie unless an MLflow server keeps them."""
     return home() / "artifacts"
 
 
@@ -47,6 +47,7 @@ def log_folder() -> Path:
     return folder
 
 
-def uses_default_store() -> bool:
-    """Whether runs go to the database below Shoal's home."""
-    return os.environ.get("MLFLOW_TRACKING_URI") == defaults(home())["MLFLOW_TRACKING_URI"]
+def tracking_server() -> str | None:
+    """The address of the MLflow server that takes the runs and their artifacts; None if they go to a database."""
+    address = os.environ["MLFLOW_TRACKING_URI"]
+    return address if address.startswith(("http:", "https:", "databricks")) else None

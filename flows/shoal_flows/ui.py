@@ -23,6 +23,8 @@ _PATIENCE = 60.0
 def ui(host: str, port: int, *, prefect: bool = False) -> None:
     """Serve MLflow, and with `prefect` Prefect's pages on the next port. Raises InputError, ComputationError."""
     settings.apply()
+    if address := settings.tracking_server():
+        raise InputError(f"MLFLOW_TRACKING_URI: the runs are on {address}; browse them there")
     console = Console(stderr=True, highlight=False)
     ports = [port, port + 1] if prefect else [port]
     for wanted in ports:
@@ -51,8 +53,7 @@ def ui(host: str, port: int, *, prefect: bool = False) -> None:
 
 def _mlflow(host: str, port: int) -> list[str]:
     store = ["--backend-store-uri", os.environ["MLFLOW_TRACKING_URI"]]
-    if settings.uses_default_store():
-        store += ["--artifacts-destination", settings.artifact_folder().as_uri()]
+    store += ["--artifacts-destination", settings.artifact_folder().as_uri()]
     address = ["--host", host, "--port", str(port), "--workers", "1"]
     return [sys.executable, "-m", "mlflow", "server", *address, *store]
 

@@ -16,7 +16,7 @@ def test_state_lies_below_the_home_and_the_user_wins(monkeypatch: pytest.MonkeyP
     assert os.environ["PREFECT_HOME"] == "elsewhere"
     assert os.environ["MLFLOW_TRACKING_URI"] == f"sqlite:///{tmp_path}/mlflow.db"
     assert os.environ["MLFLOW_DISABLE_TELEMETRY"] == os.environ["DO_NOT_TRACK"] == "true"
-    assert settings.uses_default_store()
+    assert settings.tracking_server() is None
 
 
 def test_ui_refuses_a_port_in_use_in_one_line() -> None:
@@ -25,6 +25,12 @@ def test_ui_refuses_a_port_in_use_in_one_line() -> None:
         taken.listen()
         with pytest.raises(InputError, match=r"^port: cannot listen on 127.0.0.1:\d+: .*--port$"):
             ui("127.0.0.1", taken.getsockname()[1])
+
+
+def test_ui_names_the_server_that_has_the_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", "http://tracking:5000")
+    with pytest.raises(InputError, match="the runs are on http://tracking:5000"):
+        ui("127.0.0.1", 5000)
 
 
 def test_work_is_announced_with_its_end() -> None:

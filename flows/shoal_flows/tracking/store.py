@@ -138,7 +138,7 @@ def _experiment(name: str) -> str:
         if found.lifecycle_stage == "deleted":
             client.restore_experiment(found.experiment_id)
         return str(found.experiment_id)
-    location = (settings.artifact_folder() / name.lower()).as_uri() if settings.uses_default_store() else None
+    location = None if settings.tracking_server() else (settings.artifact_folder() / name.lower()).as_uri()
     tags = {"mlflow.note.content": _EXPERIMENTS[name], "project": "shoal", "mlflow.experimentKind": _KIND}
     return str(client.create_experiment(name, artifact_location=location, tags=tags))
 
