@@ -65,21 +65,21 @@ def bias(tile, held, v, out):
 def acceleration(tile, arrays, room, tolerance):
     """The acceleration of the state in `room`, into room.a."""
     w = dynamics.raw(room)
-    dynamics.acceleration(tile, model.raw(arrays), w, w.z, w.zdot, tolerance, w.a)
+    dynamics.acceleration(tile, model.raw(arrays), w, 0.0, w.z, w.zdot, tolerance, w.a)
 
 
 @njit(cache=True)
 def force(tile, arrays, room):
     """The generalised force of the state in `room`, into room.a."""
     w = dynamics.raw(room)
-    dynamics.force(tile, model.raw(arrays), w, w.z, w.zdot, w.a)
+    dynamics.force(tile, model.raw(arrays), w, 0.0, w.z, w.zdot, w.a)
 
 
 @njit(cache=True)
 def project(tile, arrays, room, tolerance):
     """Make the state in `room` consistent."""
     w = dynamics.raw(room)
-    gauss.project(tile, model.raw(arrays), w.gauss, w.z, w.zdot, tolerance, 3)
+    gauss.project(tile, model.raw(arrays), w.gauss, 0.0, w.z, w.zdot, tolerance, 3)
 
 
 @pytest.fixture(scope="session")

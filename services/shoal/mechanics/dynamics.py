@@ -81,7 +81,7 @@ def _fold(tile: Tile, m: Arrays, f: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def force(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, f: Array) -> None:
+def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Array) -> None:
     """Applied and elastic generalised forces Q on the unknowns; z, zdot, f: (rows, lanes).
 
     Fills the derived rows of z and zdot that forces act on, and the dissipated power.
@@ -100,19 +100,19 @@ def force(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, f: Array) -> No
 
 
 @njit(cache=True, error_model="numpy")
-def acceleration(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
+def acceleration(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """The acceleration by Gauss's principle; z, zdot, a: (rows, lanes), a valid on the unknowns."""
-    force(tile, m, w, z, zdot, a)
+    force(tile, m, w, t, z, zdot, a)
     sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
     if m.constraints.size > 0:
-        gauss.constrain(tile, m, w.gauss, z, zdot, a, tolerance)
+        gauss.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
 
 
 @njit(cache=True, error_model="numpy")
-def settle(tile: Tile, m: Arrays, w: Work, tolerance: float, iterations: int = 3) -> None:
+def settle(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, iterations: int = 3) -> None:
     """Remove the drift of a constrained model (nothing to do where sharing expressed every joint)."""
     if m.constraints.size > 0:
-        gauss.project(tile, m, w.gauss, w.z, w.zdot, tolerance, iterations)
+        gauss.project(tile, m, w.gauss, t, w.z, w.zdot, tolerance, iterations)
 
 
 @njit(cache=True, error_model="numpy")

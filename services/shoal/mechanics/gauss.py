@@ -127,7 +127,7 @@ def _solve_semidefinite(
 
 
 @njit(cache=True, error_model="numpy")
-def constrain(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, a: Array, tolerance: float) -> None:
+def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, a: Array, tolerance: float) -> None:
     """Replace the free acceleration by the true one."""
     prepare(tile, m, m.mass_factor, m.pattern, q, w)
     constraints.bias(tile, m.constraints, v, w.gap)
@@ -144,7 +144,9 @@ def add_rates(tile: Tile, m: Arrays, w: GaussWork, x: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def project(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: float, iterations: int) -> None:
+def project(
+    tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, tolerance: float, iterations: int
+) -> None:
     """Move q and v back onto C = 0 and C_q v = 0 by the smallest change in the mass metric."""
     rows = m.constraints.size * len(tile)
     for _ in range(iterations):
@@ -156,11 +158,11 @@ def project(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: 
             break
         prepare(tile, m, m.mass_factor, m.pattern, q, w)
         apply(tile, m, w, tolerance, q)
-    project_rates(tile, m, w, q, v, tolerance)
+    project_rates(tile, m, w, t, q, v, tolerance)
 
 
 @njit(cache=True, error_model="numpy")
-def project_rates(tile: Tile, m: Arrays, w: GaussWork, q: Array, v: Array, tolerance: float) -> None:
+def project_rates(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, tolerance: float) -> None:
     """Move v back onto C_q v = 0 by the smallest change in the mass metric."""
     prepare(tile, m, m.mass_factor, m.pattern, q, w)
     for k in range(m.constraints.size):

@@ -55,10 +55,10 @@ def march(
     )
     for row in range(m.unknowns):
         copy(tile, w.before, row, w.z, row)
-    dynamics.settle(tile, m, w, tolerance, ASSEMBLY)
+    dynamics.settle(tile, m, w, 0.0, tolerance, ASSEMBLY)
     for i in range(m.unknowns * width):
         record.correction[i % width] = max(record.correction[i % width], abs(w.z[i] - w.before[i]))
-    dynamics.acceleration(tile, m, w, w.z, w.zdot, tolerance, w.a)
+    dynamics.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
 
     energy, start, dissipated = np.zeros(width), np.zeros(width), np.zeros(width)
     last_power = room.power.copy()
@@ -84,7 +84,7 @@ def march(
             for row in range(m.unknowns):
                 copy(tile, w.before, row, w.z, row)
                 copy(tile, w.before, m.unknowns + row, w.zdot, row)
-        advance(tile, scheme, m, w, step)
+        advance(tile, scheme, m, w, now, step)
         if m.frictions.size > 0:
             for lane in range(width):
                 dissipated[lane] += 0.5 * step * (last_power[lane] + w.power[lane])

@@ -63,8 +63,8 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Generali
 
 
 @njit(cache=True, error_model="numpy")
-def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, h: float) -> None:
-    """One step of h [s]; w.a holds the true acceleration at its beginning, and afterwards that at its end."""
+def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: float) -> float:
+    """One step of h [s] from the time t; w.a holds the true acceleration at its beginning, and afterwards that at its end."""
     width = len(tile)
     end = m.unknowns * width
     radius = scheme.spectral_radius
@@ -74,7 +74,7 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, h: float) -> 
     mass_factor = (1 - alpha_m) / (h * h * beta * (1 - alpha_f))
     damping_factor = gamma / (h * beta)
 
-    t = tangents.raw(scheme.tangent)
+    stiffness = tangents.raw(scheme.tangent)
     auxiliary, matrix, block = pointer(scheme.auxiliary), pointer(scheme.matrix), pointer(scheme.block)
     residual, multiplier = pointer(scheme.residual), pointer(scheme.multiplier)
     if scheme.started[0] == 0.0:
@@ -89,16 +89,26 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, h: float) -> 
         w.a[i] = 0.0
 
     for _ in range(ITERATIONS):
-        _residual(tile, m, w, multiplier, residual)
+        _residual(tile, m, w, t + h, multiplier, residual)
         tangents.assemble(
-            tile, m, t, w, w.z, multiplier, mass_factor, damping_factor, block, matrix, scheme.matrix.size // width
+            tile,
+            m,
+            stiffness,
+            w,
+            w.z,
+            multiplier,
+            mass_factor,
+            damping_factor,
+            block,
+            matrix,
+            scheme.matrix.size // width,
         )
-        sparse.factor(tile, t.pattern, matrix)
-        sparse.solve(tile, t.pattern, matrix, residual, 0)
+        sparse.factor(tile, stiffness.pattern, matrix)
+        sparse.solve(tile, stiffness.pattern, matrix, residual, 0)
         if m.constraints.size > 0:
             # H dq + C_q' dlambda = r, C_q dq = -C
             constraints.residual(tile, m.constraints, w.z, w.gauss.gap)
-            gauss.prepare(tile, m, matrix, t.pattern, w.z, w.gauss)
+            gauss.prepare(tile, m, matrix, stiffness.pattern, w.z, w.gauss)
             gauss.add_rates(tile, m, w.gauss, residual)
             gauss.apply(tile, m, w.gauss, scheme.rank_tolerance, residual)
             for k in range(m.constraints.size * width):
@@ -118,14 +128,15 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, h: float) -> 
     for i in range(end):
         auxiliary[i] += (1 - alpha_f) / (1 - alpha_m) * w.a[i]
     if m.constraints.size > 0:
-        gauss.project_rates(tile, m, w.gauss, w.z, w.zdot, scheme.rank_tolerance)
+        gauss.project_rates(tile, m, w.gauss, t + h, w.z, w.zdot, scheme.rank_tolerance)
+    return h
 
 
 @njit(cache=True, error_model="numpy")
-def _residual(tile: Tile, m: Arrays, w: Work, multiplier: Array, out: Array) -> None:
+def _residual(tile: Tile, m: Arrays, w: Work, t: float, multiplier: Array, out: Array) -> None:
     """out = Q - M a - C_q' lambda on the unknowns."""
     n = m.unknowns
-    dynamics.force(tile, m, w, w.z, w.zdot, out)
+    dynamics.force(tile, m, w, t, w.z, w.zdot, out)
     sparse.multiply(tile, m.pattern, m.mass, w.a, w.stage)
     for i in range(n * len(tile)):
         out[i] -= w.stage[i]

@@ -34,8 +34,8 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Leapfrog
 
 
 @njit(cache=True, error_model="numpy")
-def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, h: float) -> None:
-    """One step of h [s]."""
+def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, t: float, h: float) -> float:
+    """One step of h [s] from the time t."""
     end = m.unknowns * len(tile)
     for i in range(end):
         w.zdot[i] += 0.5 * h * w.a[i]
@@ -44,14 +44,15 @@ def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, h: float) -> None:
         for i in range(end):
             w.stage[i] = w.zdot[i]
             w.zdot[i] += 0.5 * h * w.a[i]
-        dynamics.acceleration(tile, m, w, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         for i in range(end):
             w.zdot[i] = w.stage[i] + 0.5 * h * w.a[i]
-        dynamics.settle(tile, m, w, scheme.rank_tolerance)
+        dynamics.settle(tile, m, w, t + h, scheme.rank_tolerance)
     else:
-        dynamics.acceleration(tile, m, w, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         for i in range(end):
             w.zdot[i] += 0.5 * h * w.a[i]
+    return h
 
 
 implement(Leapfrog, step)

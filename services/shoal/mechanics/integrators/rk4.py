@@ -29,8 +29,8 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Rk4:
 
 
 @njit(cache=True, error_model="numpy")
-def step(tile: Tile, scheme: Rk4, m: Arrays, w: Work, h: float) -> None:
-    """One step of h [s]; w.a holds the acceleration at its beginning, and afterwards that at its end."""
+def step(tile: Tile, scheme: Rk4, m: Arrays, w: Work, t: float, h: float) -> float:
+    """One step of h [s] from the time t; w.a holds the acceleration at its beginning, and afterwards that at its end."""
     end = m.unknowns * len(tile)
     v, q_sum, v_sum = end, 2 * end, 3 * end
     for i in range(end):
@@ -44,15 +44,16 @@ def step(tile: Tile, scheme: Rk4, m: Arrays, w: Work, h: float) -> None:
         for i in range(end):
             w.z[i] = w.stage[i] + part * w.zdot[i]
             w.zdot[i] = w.stage[v + i] + part * w.a[i]
-        dynamics.acceleration(tile, m, w, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        dynamics.acceleration(tile, m, w, t + part, w.z, w.zdot, scheme.rank_tolerance, w.a)
         for i in range(end):
             w.stage[q_sum + i] += weight * w.zdot[i]
             w.stage[v_sum + i] += weight * w.a[i]
     for i in range(end):
         w.z[i] = w.stage[i] + h / 6.0 * w.stage[q_sum + i]
         w.zdot[i] = w.stage[v + i] + h / 6.0 * w.stage[v_sum + i]
-    dynamics.settle(tile, m, w, scheme.rank_tolerance)
-    dynamics.acceleration(tile, m, w, w.z, w.zdot, scheme.rank_tolerance, w.a)
+    dynamics.settle(tile, m, w, t + h, scheme.rank_tolerance)
+    dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
+    return h
 
 
 implement(Rk4, step)

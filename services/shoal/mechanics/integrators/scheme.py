@@ -1,6 +1,6 @@
 """The one function every integrator provides, chosen by the type of its settings at compile time.
 
-`advance(tile, scheme, m, w, step)` moves the state in w by one step. An integrator is a file with a
+`advance(tile, scheme, m, w, t, step)` moves the state in w by one step. An integrator is a file with a
 NamedTuple of settings, its declared facts, and a compiled function with the signature of `advance`;
 compiled code then contains only the integrator that is used.
 """
@@ -26,8 +26,8 @@ class Facts(NamedTuple):
     stable_step_times_decay: float
 
 
-def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, step: float) -> None:
-    """Move the state by one step, by the integrator whose settings `scheme` are. Pointers."""
+def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, t: float, step: float) -> float:
+    """Move the state at the time t by one step of at most `step` [s]; returns the step taken. Pointers."""
     raise NotImplementedError(type(scheme).__name__)
 
 
@@ -35,7 +35,7 @@ def implement(settings: type, kernel: Any) -> None:
     """Let compiled calls of `advance` with settings of this type run `kernel`."""
 
     @overload(advance)
-    def choose(tile, scheme, m, w, step):  # type: ignore[no-untyped-def]
+    def choose(tile, scheme, m, w, t, step):  # type: ignore[no-untyped-def]
         if not (isinstance(scheme, types.BaseNamedTuple) and scheme.instance_class is settings):
             return None
-        return lambda tile, scheme, m, w, step: kernel(tile, scheme, m, w, step)
+        return lambda tile, scheme, m, w, t, step: kernel(tile, scheme, m, w, t, step)
