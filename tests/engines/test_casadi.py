@@ -236,7 +236,7 @@ def test_an_unstable_step_is_not_believed(step: float) -> None:
 def test_a_closed_loop_is_refused_in_one_line() -> None:
     data = load_scene("rigid-double-pendulum").model_dump()
     data["joints"]["B"] = {"first": {"body": "ground", "point": [2.0, 0.0]}, "second": {"body": "AB", "point": "end"}}
-    with pytest.raises(InputError, match=r"^joints\.\w+: closes a loop .*$"):
+    with pytest.raises(InputError, match=r"^joints\.B: engine casadi cannot do closed loops; use gauss .*$"):
         ENGINE.simulate(Scene.parse(data))
 
 
@@ -295,3 +295,30 @@ def test_shooting_refuses_what_it_cannot_do(change: dict[str, Any], message: str
     }
     with pytest.raises(InputError, match=f"^{message}"):
         identify_initial_angles(_flexible(), **(request | change))
+
+
+def _sprung(kind: str, **more: Any) -> Scene:
+    data = _mixed().model_dump(mode="json")
+    sides = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "C", "point": "end"}}
+    data["loads"] = {"S": {"kind": kind, **sides, "stiffness": 1.0, **more}}
+    return Scene.parse(data)
+
+
+def test_a_spring_rests_where_it_starts() -> None:
+    free = ENGINE.simulate(_mixed(), [0.0])
+    rest = float(np.hypot(0.3 + np.cos(0.1), -0.2 + np.sin(0.1)))
+    told, untold = (ENGINE.simulate(scene) for scene in (_sprung("spring", length=rest), _sprung("spring")))
+    assert told.ok
+    np.testing.assert_allclose(told.points, untold.points, atol=1e-12)
+    np.testing.assert_allclose(free.points[0], ENGINE.simulate(_sprung("spring"), [0.0]).points[0])
+
+
+def test_shooting_needs_a_spring_that_says_where_it_rests() -> None:
+    scene = _sprung("torsion-spring")
+    with pytest.raises(InputError, match=r"^loads\.S\.angle: shooting moves the start"):
+        identify_initial_angles(scene, ("initial.C.angle",), (0.1,), (-1,), (1,), [0.1], "on_C", np.zeros((1, 2)))
+
+
+def test_a_cable_is_not_wound_up() -> None:
+    with pytest.raises(InputError, match=r"^loads\.S\.angle: engine casadi winds up no cable"):
+        ENGINE.simulate(_sprung("torsion-spring", angle=4.0))

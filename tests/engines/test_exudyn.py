@@ -303,7 +303,16 @@ def test_beam_friction_needs_a_node():
         BEAM.simulate(scene)
 
 
+def test_beams_are_welded_in_line_only():
+    scene = every_joint(0.0).with_values({"joints.AB": {"kind": "weld", "first": {"body": "A", "point": "end"},
+                                                        "second": {"body": "B"}}})  # fmt: skip
+    straight = {"initial.B.angle": 0.3, "initial.B.rate": 2.0}
+    assert BEAM.simulate(scene.with_values(straight), [0.05]).ok
+    with pytest.raises(InputError, match="keeps no angle of a flexible rod but 0; use exudyn"):
+        BEAM.simulate(scene.with_values({"initial.B.rate": 2.0}))
+
+
 def test_names_of_the_variants():
     assert (FAST.name, BEAM.name) == ("exudyn", "exudyn-ge")
-    assert FAST.capabilities.closed_loops
+    assert "closed loops" in FAST.capabilities.features
     assert not FAST.capabilities.lanes

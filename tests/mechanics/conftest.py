@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
-from shoal.mechanics import constraints, dynamics, gauss, model, sparse
+from shoal.mechanics import constraints, dynamics, functions, gauss, model, sparse
 from shoal.mechanics.elements import ancf_cable
 from shoal.mechanics.vector import pointer
 
@@ -47,32 +47,34 @@ def multiply(tile, pattern, values, x, y):
 
 
 @njit(cache=True)
-def residual(tile, held, q, out):
-    constraints.residual(tile, constraints.raw(held), pointer(q), pointer(out))
+def residual(tile, held, drives, t, q, out):
+    constraints.residual(tile, constraints.raw(held), functions.raw(drives), t, pointer(q), pointer(out))
 
 
 @njit(cache=True)
-def jacobian(tile, held, unknowns, q, out):
-    constraints.jacobian(tile, constraints.raw(held), unknowns, pointer(q), pointer(out))
+def jacobian(tile, held, q, linear, out):
+    constraints.jacobian(tile, constraints.raw(held), pointer(q), linear, pointer(out))
 
 
 @njit(cache=True)
-def bias(tile, held, v, out):
-    constraints.bias(tile, constraints.raw(held), pointer(v), pointer(out))
+def bias(tile, held, drives, t, v, out):
+    constraints.bias(tile, constraints.raw(held), functions.raw(drives), t, pointer(v), pointer(out))
 
 
 @njit(cache=True)
 def acceleration(tile, arrays, room, tolerance):
     """The acceleration of the state in `room`, into room.a."""
-    w = dynamics.raw(room)
-    dynamics.acceleration(tile, model.raw(arrays), w, 0.0, w.z, w.zdot, tolerance, w.a)
+    m, w = model.raw(arrays), dynamics.raw(room)
+    dynamics.enter(m, w)
+    dynamics.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
 
 
 @njit(cache=True)
 def force(tile, arrays, room):
     """The generalised force of the state in `room`, into room.a."""
-    w = dynamics.raw(room)
-    dynamics.force(tile, model.raw(arrays), w, 0.0, w.z, w.zdot, w.a)
+    m, w = model.raw(arrays), dynamics.raw(room)
+    dynamics.enter(m, w)
+    dynamics.force(tile, m, w, 0.0, w.z, w.zdot, w.a)
 
 
 @njit(cache=True)

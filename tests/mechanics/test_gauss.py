@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shoal.mechanics.constraints import Constraints
+from shoal.mechanics.build import build
 from shoal.mechanics.dynamics import work_space
-from shoal.mechanics.model import Model, build
+from shoal.mechanics.model import Model
 from shoal.mechanics.simulate import simulate
+from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import SINGLE, WIDE
 from shoal.scene import Scene, load_scene
 
@@ -65,28 +66,40 @@ def _room(model: Model, q: Any, v: Any) -> tuple[Any, Any]:
     arrays = model.tile(SINGLE, ONE)
     room = work_space(SINGLE, arrays)
     room.z[: model.unknowns], room.zdot[: model.unknowns] = q, v
-    return arrays, room
+    return ready(SINGLE, arrays, room), room
 
 
-def _held(model: Model) -> Constraints:
-    return model.tile(SINGLE, ONE).constraints
+def _rows(model: Model, q: Any, *, moving: bool = False) -> Any:
+    """A state with its derived rows."""
+    d = model.derived
+    rows = [
+        (0.0 if moving else d.constant[r, 0])
+        + sum(d.coefficient[t, 0] * q[d.source[t]] for t in range(d.start[r], d.start[r + 1]))
+        for r in range(len(d.start) - 1)
+    ]
+    return np.concatenate([q, rows])
 
 
 def _residual(kernels: Any, model: Model, q: Any) -> Any:
     out = np.full(model.constraints.size, np.nan)
-    kernels.residual(SINGLE, _held(model), q.copy(), out)
+    arrays = model.tile(SINGLE, ONE)
+    kernels.residual(SINGLE, arrays.constraints, arrays.functions, 0.0, _rows(model, q), out)
     return out
 
 
 def _jacobian(kernels: Any, model: Model, q: Any) -> Any:
-    out = np.full(model.constraints.size * model.unknowns, np.nan)
-    kernels.jacobian(SINGLE, _held(model), model.unknowns, q.copy(), out)
-    return out.reshape(model.constraints.size, model.unknowns)
+    c = model.tile(SINGLE, ONE).constraints
+    out = np.full(len(c.column), np.nan)
+    kernels.jacobian(SINGLE, c, _rows(model, q), 1.0, out)
+    rows = np.zeros((c.size, model.unknowns))
+    rows[np.repeat(np.arange(c.size), np.diff(c.entry)), c.column] = out
+    return rows
 
 
 def _bias(kernels: Any, model: Model, v: Any) -> Any:
     out = np.full(model.constraints.size, np.nan)
-    kernels.bias(SINGLE, _held(model), v.copy(), out)
+    arrays = model.tile(SINGLE, ONE)
+    kernels.bias(SINGLE, arrays.constraints, arrays.functions, 0.0, _rows(model, v, moving=True), out)
     return out
 
 
@@ -145,13 +158,40 @@ def test_acceleration_is_the_constrained_minimiser(kernels: Any, scene: Scene, s
 def _repeated(model: Model, which: list[int]) -> Model:
     """The model with constraints added once more."""
     c = model.constraints
-    spans = [slice(c.start[k], c.start[k + 1]) for k in [*range(c.size), *which]]
-    start = np.cumsum([0, *(span.stop - span.start for span in spans)])
-    first, second, value = (np.concatenate([field[span] for span in spans]) for field in (c.first, c.second, c.value))
+    order = [*range(c.size), *which]
+
+    def again(starts: Any, *lists: Any) -> tuple[Any, ...]:
+        spans = [slice(starts[k], starts[k + 1]) for k in order]
+        ends = np.cumsum([0, *(span.stop - span.start for span in spans)])
+        return ends, *(np.concatenate([part[span] for span in spans]) for part in lists)
+
+    start, left, right, factor = again(c.start, c.left, c.right, c.factor)
+    entry, column = again(c.entry, c.column)
+    parts = [
+        (entry[n] + target - c.entry[k], source, coefficient)
+        for n, k in enumerate(order)
+        for target, source, coefficient in zip(c.target, c.source, c.coefficient, strict=True)
+        if c.entry[k] <= target < c.entry[k + 1]
+    ]
     return replace(
         model,
-        constraints=Constraints(len(spans), start, first, second, value),
+        constraints=c._replace(
+            size=len(order),
+            start=start,
+            left=left,
+            right=right,
+            factor=factor,
+            constant=c.constant[order],
+            drive=c.drive[order],
+            entry=entry,
+            column=column,
+            parts=len(parts),
+            target=np.array([target for target, _, _ in parts]),
+            source=np.array([source for _, source, _ in parts]),
+            coefficient=np.array([coefficient for _, _, coefficient in parts]),
+        ),
         constraint_names=tuple(model.constraint_names) + tuple(f"again {k}" for k in which),
+        shared_tiles={},
     )
 
 
@@ -195,6 +235,7 @@ def test_lanes_equal_singles(kernels: Any, scene: Scene) -> None:
     width = len(WIDE)
     arrays = model.tile(WIDE, ONE)
     room = work_space(WIDE, arrays)
+    arrays = ready(WIDE, arrays, room)
     states = [_random_state(model, seed) for seed in range(width)]
     for lane, (q, v) in enumerate(states):
         room.z.reshape(-1, width)[: model.unknowns, lane] = q

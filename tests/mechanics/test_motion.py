@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
 from shoal.engines.casadi import CasadiEngine
-from shoal.mechanics.integrators import INTEGRATORS
+from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Trajectory
@@ -39,9 +39,13 @@ def test_single_pendulum_against_the_elliptic_closed_form() -> None:
 @pytest.mark.parametrize("integrator", list(INTEGRATORS))
 def test_every_integrator_swings_the_single_pendulum(integrator: str) -> None:
     times = np.linspace(0, 2, 21)
-    run = _run(load_scene("single-pendulum"), times, integrator=integrator, step=1e-3)
+    run = _run(load_scene("single-pendulum"), times, integrator=integrator, step=1e-3, energy_tolerance=0.1)
     sn = ellipj(ellipk(0.5) - np.sqrt(9.81) * times, 0.5)[0]
-    np.testing.assert_allclose(run.angle("A"), 2 * np.arcsin(np.sqrt(0.5) * sn) - np.pi / 2, atol=5e-5)
+    np.testing.assert_allclose(
+        run.angle("A"),
+        2 * np.arcsin(np.sqrt(0.5) * sn) - np.pi / 2,
+        atol=5e-2 if facts(integrator).order == 1 else 5e-5,
+    )
 
 
 @pytest.mark.parametrize(
@@ -296,8 +300,8 @@ def test_requested_times_off_the_grid_agree_with_a_finer_run(
 @pytest.mark.parametrize("integrator", list(INTEGRATORS))
 def test_sampling_does_not_change_the_motion(integrator: str) -> None:
     scene = load_scene("flexible-double-pendulum")
-    few = _run(scene, [0.02], integrator=integrator)
-    many = _run(scene, np.linspace(0, 0.02, 97), integrator=integrator)
+    few = _run(scene, [0.02], integrator=integrator, energy_tolerance=0.1)
+    many = _run(scene, np.linspace(0, 0.02, 97), integrator=integrator, energy_tolerance=0.1)
     np.testing.assert_array_equal(few.points[-1], many.points[-1])
     # At time zero the rods are straight.
     np.testing.assert_allclose(

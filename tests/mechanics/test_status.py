@@ -166,11 +166,6 @@ GROUNDED = {"O": ("ground", [0.0, 0.0], "R", "start")}
             id="a-mass-point-that-cannot-move",
         ),
         pytest.param(
-            _machine({"R": CABLE, "S": ROD}, GROUNDED | {"A": ("R", [0.3, 0.0], "S", "start")}, {"E": ("S", "end")}),
-            r"joints\.A: a cable is joined at a node; bodies\.R has nodes every 0\.5 m",
-            id="a-joint-between-the-nodes-of-a-cable",
-        ),
-        pytest.param(
             _machine(
                 {"R": ROD, "S": ROD},
                 GROUNDED | {"A": ("R", "end", "S", "start"), "B": ("R", "start", "S", "start")},

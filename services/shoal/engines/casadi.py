@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from shoal.engines.capabilities import CAPABILITIES
 from shoal.engines.casadi_fixed_step import runge_kutta
 from shoal.engines.casadi_model import CasadiModel, casadi_model
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
@@ -24,18 +25,12 @@ _CHECK_INTERVAL = 0.01
 _STRETCH = 1.1
 """A marker farther from its ground point than this times the length of its chain is out of reach."""
 
-_CAPABILITIES = Capabilities(
-    elements=frozenset({"rigid", "ancf-cable"}),
-    joints=frozenset({"revolute"}),
-    integrators=frozenset({"cvodes", "rk4"}),
-    closed_loops=False,
-    lanes=False,
-)
-
 
 @dataclass(frozen=True)
 class CasadiEngine:
-    """Simulates open chains of rigid bodies and cables; the scene's own integrator and step are not used by CVODES.
+    """Simulates open chains of rigid bodies and cables under springs and constant loads.
+
+    CVODES does not use the scene's own integrator and step.
 
     integrator: `cvodes` (variable step; Adams, whose functional iteration needs no Jacobian and suits motion
         without damping) or `rk4` (the scene's step)
@@ -47,7 +42,11 @@ class CasadiEngine:
     tolerance: float = 1e-11
     max_steps: int = 1_000_000
     name: str = "casadi"
-    capabilities: Capabilities = _CAPABILITIES
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can simulate."""
+        return CAPABILITIES[self.name]
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene; `times` [s] are the sampling instants, else the scene's own. Raises InputError."""

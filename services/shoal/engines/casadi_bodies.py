@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from shoal.engines.casadi_element import CableElement, cable_element
+from shoal.engines.sections import Sections
 from shoal.scene import Rod
 from shoal.scene.record import Vector
 
@@ -75,6 +76,11 @@ class PlacedCable:
     def elements(self) -> Iterator[Any]:
         """Nodal values of each element, (8,)."""
         return (ca.vertcat(*pair) for pair in zip(self.nodes[:-1], self.nodes[1:], strict=True))
+
+    @property
+    def sections(self) -> Sections:
+        """The elements' masses and stiffnesses."""
+        return Sections.of(self.rod)
 
     def point(self, place: Vector) -> Any:
         """Position [m] of a place given as (s, 0), (2,)."""

@@ -10,20 +10,23 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from shoal.engines.capabilities import require
 from shoal.engines.casadi_bodies import PlacedCable
+from shoal.engines.casadi_loads import applied, dissipation, stored, with_rest
 from shoal.engines.casadi_tree import Tree, build_tree
-from shoal.scene import Scene, Solver
+from shoal.scene import PointMass, Scene, Solver
 from shoal.trajectory import Array
 
 
 @dataclass(frozen=True, eq=False)
 class CasadiModel:
-    """CasADi functions of the state x = (q, v, w): coordinates, their rates, and the work lost to friction [J].
+    """CasADi functions of the state x = (q, v, w): coordinates, their rates, and the work lost [J]:
+    that of friction and dampers less that of applied loads.
 
     bodies, markers: names in the scene's order; unknowns: length of q
     start: (angles [rad], rates [rad/s]), one of each per body -> x, (2 unknowns + 1,)
     rate: x -> dx/dt
-    energies: x -> kinetic, elastic and gravitational energy [J], (3,)
+    energies: x -> kinetic, elastic (with springs) and gravitational energy [J], (3,)
     places: x -> positions of the markers [m], (2, markers), and directions [rad], (markers,)
     root: the point of the ground [m] from which each marker's chain hangs, (2, markers)
     reach: length of that chain [m], (markers,)
@@ -44,6 +47,8 @@ class CasadiModel:
 
 def casadi_model(scene: Scene) -> CasadiModel:
     """The model of a scene; scenes that differ only in initial state and solver share one. Raises InputError."""
+    require("casadi", scene)
+    scene = with_rest(scene)
     bare = scene.model_copy(update={"name": "any", "description": "", "initial": {}, "solver": Solver()})
     return _build(bare.model_dump_json())
 
@@ -55,11 +60,11 @@ def _build(text: str) -> CasadiModel:
     q = tree.coordinates
     v = ca.SX.sym("v", q.numel())
     x = ca.vertcat(q, v, ca.SX.sym("w"))
-    kinetic, elastic, gravity = _kinetic(scene, tree, v), _elastic(tree), _gravity(scene, tree)
-    dissipation = _dissipation(scene, tree, v)
+    kinetic, elastic, gravity = _kinetic(scene, tree, v), _elastic(tree) + stored(scene, tree), _gravity(scene, tree)
+    resisting = ca.gradient(dissipation(scene, tree, v), v) - applied(scene, tree)
     momentum = ca.gradient(kinetic, v)
-    # Lagrange's equations: d/dt dT/dv - dT/dq + dU/dq + dD/dv = 0.
-    force = ca.gradient(kinetic - elastic - gravity, q) - ca.gradient(dissipation, v) - ca.jtimes(momentum, q, v)
+    # Lagrange's equations: d/dt dT/dv - dT/dq + dU/dq + dD/dv = Q.
+    force = ca.gradient(kinetic - elastic - gravity, q) - resisting - ca.jtimes(momentum, q, v)
     acceleration = _solve(ca.jacobian(momentum, v), force)
     rates = ca.SX.sym("rates", len(scene.bodies))
     start = ca.vertcat(tree.start, ca.jtimes(tree.start, tree.angles, rates), 0)
@@ -71,7 +76,7 @@ def _build(text: str) -> CasadiModel:
         markers=tuple(scene.markers),
         unknowns=q.numel(),
         start=ca.Function("start", [tree.angles, rates], [start]),
-        rate=ca.Function("rate", [x], [ca.vertcat(v, acceleration, 2 * dissipation)]),
+        rate=ca.Function("rate", [x], [ca.vertcat(v, acceleration, ca.dot(v, resisting))]),
         energies=ca.Function("energies", [x], [ca.vertcat(kinetic, elastic, gravity)]),
         places=ca.Function("places", [x], [points, angles]),
         root=np.array([tree.root[marker.body] for marker in scene.markers.values()]).T,
@@ -97,9 +102,11 @@ def _kinetic(scene: Scene, tree: Tree, v: Any) -> Any:
     for name, body in scene.bodies.items():
         placed = tree.placed[name]
         if isinstance(placed, PlacedCable):
-            for e in placed.elements():
+            for e, mass in zip(placed.elements(), placed.sections.mass, strict=True):
                 speed = ca.jtimes(e, tree.coordinates, v)
-                energy += placed.rod.mass_per_length / 2 * placed.element.square(speed, placed.h)
+                energy += mass / 2 * placed.element.square(speed, placed.h)
+        elif isinstance(body, PointMass):
+            energy += body.mass / 2 * ca.sumsqr(ca.jtimes(placed.point((0.0, 0.0)), tree.coordinates, v))
         else:
             speed = ca.jtimes(placed.point(body.centre_of_mass), tree.coordinates, v)
             spin = ca.jtimes(placed.angle(body.centre_of_mass), tree.coordinates, v)
@@ -111,9 +118,10 @@ def _elastic(tree: Tree) -> Any:
     energy = ca.SX(0)
     for placed in tree.placed.values():
         if isinstance(placed, PlacedCable):
-            for e in placed.elements():
-                axial, bending = placed.element.strain(e, placed.h)
-                energy += placed.rod.axial_stiffness / 2 * axial + placed.rod.bending_stiffness / 2 * bending
+            sections = placed.sections
+            for e, axial, bending in zip(placed.elements(), sections.axial, sections.bending, strict=True):
+                strain, curvature = placed.element.strain(e, placed.h)
+                energy += axial / 2 * strain + bending / 2 * curvature
     return energy
 
 
@@ -122,17 +130,8 @@ def _gravity(scene: Scene, tree: Tree) -> Any:
     for name, body in scene.bodies.items():
         placed = tree.placed[name]
         if isinstance(placed, PlacedCable):
-            for e in placed.elements():
-                moment += placed.rod.mass_per_length * placed.element.integral(e, placed.h)
+            for e, mass in zip(placed.elements(), placed.sections.mass, strict=True):
+                moment += mass * placed.element.integral(e, placed.h)
         else:
-            moment += body.mass * placed.point(body.centre_of_mass)
+            moment += body.mass * placed.point((0.0, 0.0) if isinstance(body, PointMass) else body.centre_of_mass)
     return -ca.dot(ca.DM(scene.gravity), moment)
-
-
-def _dissipation(scene: Scene, tree: Tree, v: Any) -> Any:
-    """Rayleigh's function: half the power [W] that the joints' friction takes."""
-    half = ca.SX(0)
-    for joint in scene.joints.values():
-        first, second = (tree.placed[side.body].angle(scene.location(side)) for side in (joint.first, joint.second))
-        half += joint.friction / 2 * ca.jtimes(first - second, tree.coordinates, v) ** 2
-    return half

@@ -15,7 +15,7 @@ from shoal.engines.casadi_fixed_step import runge_kutta
 from shoal.engines.casadi_model import CasadiModel, casadi_model
 from shoal.engines.contract import sampling_times
 from shoal.errors import InputError
-from shoal.scene import Scene
+from shoal.scene import Scene, Spring, TorsionSpring
 from shoal.trajectory import Array, Status
 
 _OPTIONS: dict[str, dict[str, Any]] = {
@@ -135,6 +135,11 @@ def _box(paths: Sequence[str], *sides: Sequence[float] | Array) -> tuple[Array, 
 
 def _shot(scene: Scene, paths: Sequence[str], times: Array, marker: str, step: float, directions: int) -> Any:
     """Function parameters -> path of the marker [m] with its derivatives below, (2 + 2 directions, samples)."""
+    for name, load in scene.loads.items():
+        if isinstance(load, Spring | TorsionSpring):
+            field = "length" if isinstance(load, Spring) else "angle"
+            if getattr(load, field) is None:
+                raise InputError(f"loads.{name}.{field}: shooting moves the start, so say where the spring rests")
     model = casadi_model(scene)
     p, size = ca.SX.sym("p", len(paths)), 2 * model.unknowns + 1
     initial = _initial_state(model, scene, paths, p)

@@ -16,8 +16,7 @@ import numpy as np
 
 from shoal.engines.casadi_bodies import Placed, PlacedCable, PlacedGround, PlacedRigid, cable_place, turned
 from shoal.engines.casadi_element import cable_element
-from shoal.errors import InputError
-from shoal.scene import GROUND, Attachment, Rod, Scene
+from shoal.scene import GROUND, Attachment, PointMass, Revolute, Rod, Scene
 from shoal.scene.record import Vector
 
 
@@ -44,7 +43,7 @@ class Tree:
 
 
 def build_tree(scene: Scene) -> Tree:
-    """Place every body of an open-chain scene. Raises InputError for a closed loop or an unknown element."""
+    """Place every body of a scene of open chains, which `capabilities.require` has accepted."""
     placed: dict[str, Placed] = {GROUND: PlacedGround()}
     straight: dict[str, Placed] = {GROUND: PlacedGround()}
     entry: dict[str, Vector] = {}
@@ -61,14 +60,13 @@ def build_tree(scene: Scene) -> Tree:
         if isinstance(body, Rod) and body.element == "ancf-cable":
             placed[name], free = _place_cable(name, body, inner, anchor)
             start += _straight_cable(body, inner, rest)
-        elif body.element == "rigid":
+        elif isinstance(body, PointMass):
+            free = []
+            placed[name] = PlacedRigid(anchor, ca.SX(0))
+        else:
             free = [ca.SX.sym(f"{name}_angle")]
             placed[name] = PlacedRigid(anchor - turned(free[0], inner), free[0])
             start.append(angle)
-        else:
-            raise InputError(
-                f"bodies.{name}.element: the casadi engine has no {body.element!r}; use rigid or ancf-cable"
-            )
         coordinates += free
         entry[name] = inner
         on_ground = parent.body == GROUND
@@ -87,18 +85,14 @@ def build_tree(scene: Scene) -> Tree:
 
 def _links(scene: Scene) -> Iterator[tuple[Attachment, Attachment]]:
     """Joints from the ground outwards, each as (place on the parent, place on the child)."""
-    reached, waiting = {GROUND}, dict(scene.joints)
+    reached, waiting = {GROUND}, list(scene.joints.values())
     while waiting:
-        for name, joint in list(waiting.items()):
+        for joint in list(waiting):
+            assert isinstance(joint, Revolute)
             known = [side.body in reached for side in (joint.first, joint.second)]
-            if all(known):
-                raise InputError(
-                    f"joints.{name}: closes a loop ({joint.first.body} to {joint.second.body}); "
-                    "the casadi engine simulates open chains, use another engine"
-                )
             if any(known):
                 parent, child = (joint.first, joint.second) if known[0] else (joint.second, joint.first)
-                del waiting[name]
+                waiting.remove(joint)
                 reached.add(child.body)
                 yield parent, child
 

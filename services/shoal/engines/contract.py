@@ -15,14 +15,23 @@ from shoal.trajectory import Array, Trajectory
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What an engine can simulate; the comparison and the tests read it."""
+    """What an engine can simulate; the comparison, the refusals and the tests read it.
+
+    elements, joints, loads: kinds, by the names a scene uses
+    features: what a scene may need beyond these (see `capabilities.FEATURES`)
+    lanes: whether many scenes run side by side in one compiled call
+    """
 
     elements: frozenset[str]
     joints: frozenset[str]
-    integrators: frozenset[str]
-    closed_loops: bool
+    loads: frozenset[str]
+    features: frozenset[str]
     lanes: bool
-    """Whether many scenes run side by side in one compiled call."""
+
+    @property
+    def all(self) -> frozenset[str]:
+        """Every name the engine knows; kinds and features have no name in common."""
+        return self.elements | self.joints | self.loads | self.features
 
 
 class Engine(Protocol):

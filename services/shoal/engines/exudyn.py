@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from shoal.engines.capabilities import CAPABILITIES, require
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
 from shoal.engines.exudyn_build import Beam, Machine, build, library
 from shoal.engines.exudyn_checks import judge
@@ -52,18 +53,13 @@ class ExudynEngine:
     @property
     def capabilities(self) -> Capabilities:
         """What Exudyn can simulate here."""
-        return Capabilities(
-            elements=frozenset({"rigid", "ancf-cable"}),
-            joints=frozenset({"revolute"}),
-            integrators=frozenset({self.integrator}),
-            closed_loops=True,
-            lanes=False,
-        )
+        return CAPABILITIES[self.name]
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene; a run that failed or is not believed carries its status. Raises InputError."""
         started = time.perf_counter()
         wanted = sampling_times(scene, times)
+        require(self.name, scene)
         exu = library()
         machine = build(exu, scene, self.beam)
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns)
@@ -89,6 +85,7 @@ class ExudynEngine:
     ) -> Trajectory:
         """Run one scene per lane, one after the other; a lane that failed is not a number and has its status."""
         started = time.perf_counter()
+        require(self.name, scene)
         lanes = check_lanes(scene, values)
         wanted = sampling_times(scene, times)
         runs = []
@@ -155,6 +152,7 @@ class ExudynEngine:
             "spectral_radius": 1.0 if self.integrator == "trapezoidal" else machine.scene.solver.spectral_radius,
             "newton": "modified" if self.modified_newton else "full",
             "step": steps.size,
+            "energy_check": "none: motion is prescribed" if machine.driven else "kinetic, elastic, springs, loads",
         }
 
     def _refused(self, scene: Scene, wanted: Array, message: str) -> Trajectory:

@@ -7,17 +7,21 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from shoal.engines.exudyn_pose import Pose, normal
-from shoal.scene import RigidBody, Rod
+from shoal.engines.poses import Pose, normal
+from shoal.scene import PointMass, RigidBody, Rod
 from shoal.trajectory import Array
 
 Place = tuple[float, float]
 
 
 class Motion(NamedTuple):
-    """One material point: position [m] (rows, 2), direction [rad] in (-pi, pi] or continuous, rate [rad/s], (rows,)."""
+    """One material point: position [m] and velocity [m/s] (rows, 2), direction [rad] and rate [rad/s], (rows,).
+
+    The direction lies in (-pi, pi] or is continuous.
+    """
 
     position: Array
+    velocity: Array
     direction: Array
     rate: Array
 
@@ -37,8 +41,8 @@ class Part(Protocol):
         """A new marker at a place [m] in the body's frame, for joints."""
         ...
 
-    def turn(self, system: System, place: Place) -> Any:
-        """A new marker that turns with the body there, for joint friction. Raises InputError."""
+    def turn(self, system: System, place: Place, angle: float = 0.0) -> Any:
+        """A new marker that turns with the body there, `angle` [rad] ahead of it. Raises InputError."""
         ...
 
     def motion(self, q: Array, v: Array, place: Place) -> Motion:
@@ -47,6 +51,10 @@ class Part(Protocol):
 
     def energy(self, q: Array, v: Array) -> Energy:
         """Energy of the whole body."""
+        ...
+
+    def damping(self, q: Array, v: Array) -> Array:
+        """Power lost in the material [W], (rows,)."""
         ...
 
 
@@ -69,58 +77,84 @@ class System:
         """Enter a marker of Exudyn's class `kind` at a local position [m] of one of its bodies."""
         return self.mbs.AddMarker(getattr(self.items, kind)(bodyNumber=body, localPosition=[*local, 0.0]))
 
+    def turned(self, body: Any, local: Place, angle: float) -> Any:
+        """Enter a marker with a direction: that of a body at a local position [m], turned by `angle` [rad]."""
+        c, s = np.cos(angle), np.sin(angle)
+        frame = [[c, -s, 0.0, local[0]], [s, c, 0.0, local[1]], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+        return self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=body, localHT=frame))
+
     def weigh(self, body: Any) -> None:
         """Let gravity act on the distributed mass of an element."""
+        self.accelerate(body, self.gravity)
+
+    def accelerate(self, body: Any, acceleration: Place, **options: Any) -> None:
+        """Let an acceleration [m/s^2] act on the distributed mass of an element."""
         marker = self.mbs.AddMarker(self.items.MarkerBodyMass(bodyNumber=body))
-        self.mbs.AddLoad(self.items.LoadMassProportional(markerNumber=marker, loadVector=[*self.gravity, 0.0]))
+        load = self.items.LoadMassProportional(markerNumber=marker, loadVector=[*acceleration, 0.0], **options)
+        self.mbs.AddLoad(load)
 
 
 @dataclass(frozen=True)
 class RigidPart:
-    """ObjectRigidBody2D, its node at the origin of the body's frame: zero inertia about the centre of mass is legal."""
+    """ObjectRigidBody2D, its node at the origin of the body's frame: zero inertia about the centre of mass is legal.
+
+    A point mass is a rigid body held at its centre of mass, where nothing turns it; its inertia is of no consequence.
+    """
 
     body: Any
+    node: Any
     columns: list[int]
-    given: Rod | RigidBody
+    mass: float
+    inertia: float
+    centre: Place
+    reference: float
+    """Angle [rad] at the start, from which Exudyn counts."""
 
     @classmethod
-    def add(cls, system: System, given: Rod | RigidBody, pose: Pose) -> RigidPart:
+    def add(cls, system: System, given: Rod | RigidBody | PointMass, pose: Pose) -> RigidPart:
         """Enter a rigid body at its initial pose."""
         items, mbs = system.items, system.mbs
-        start = [*pose.velocity, pose.rate]
+        if isinstance(given, PointMass):
+            centre, about_centre = (0.0, 0.0), given.mass
+        else:
+            centre, about_centre = given.centre_of_mass, given.inertia
         node, columns = system.node(
-            items.NodeRigidBody2D(referenceCoordinates=[*pose.origin, pose.angle], initialVelocities=start)
+            items.NodeRigidBody2D(
+                referenceCoordinates=[*pose.origin, pose.angle], initialVelocities=[*pose.velocity, pose.rate]
+            )
         )
-        x, y = given.centre_of_mass
-        inertia = given.inertia + given.mass * (x * x + y * y)
+        inertia = about_centre + given.mass * (centre[0] ** 2 + centre[1] ** 2)
         body = mbs.AddObject(
-            items.ObjectRigidBody2D(mass=given.mass, inertia=inertia, centerOfMass=[x, y], nodeNumber=node)
+            items.ObjectRigidBody2D(mass=given.mass, inertia=inertia, centerOfMass=[*centre], nodeNumber=node)
         )
-        marker = system.marker("MarkerBodyPosition", body, (x, y))
+        marker = system.marker("MarkerBodyPosition", body, centre)
         weight = [given.mass * system.gravity[0], given.mass * system.gravity[1], 0.0]
         mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVector=weight))
-        return cls(body, columns, given)
+        return cls(body, node, columns, given.mass, about_centre, centre, pose.angle)
 
     def hold(self, system: System, place: Place) -> Any:
         """See Part."""
         return system.marker("MarkerBodyPosition", self.body, place)
 
-    def turn(self, system: System, place: Place) -> Any:
+    def turn(self, system: System, place: Place, angle: float = 0.0) -> Any:
         """See Part."""
-        return system.marker("MarkerBodyRigid", self.body, place)
+        return system.turned(self.body, place, angle)
 
     def motion(self, q: Array, v: Array, place: Place) -> Motion:
         """See Part."""
         x, y, angle = self.columns
-        return Motion(q[:, [x, y]] + self._arm(q, place), q[:, angle], v[:, angle])
+        arm = self._arm(q, place)
+        return Motion(q[:, [x, y]] + arm, v[:, [x, y]] + v[:, [angle]] * normal(arm), q[:, angle], v[:, angle])
 
     def energy(self, q: Array, v: Array) -> Energy:
         """See Part."""
-        x, y, angle = self.columns
-        arm = self._arm(q, self.given.centre_of_mass)
-        speed = v[:, [x, y]] + v[:, [angle]] * normal(arm)
-        kinetic = self.given.mass * np.sum(speed**2, axis=1) / 2 + self.given.inertia * v[:, angle] ** 2 / 2
-        return Energy(kinetic, np.zeros(len(q)), self.given.mass * (q[:, [x, y]] + arm))
+        centre = self.motion(q, v, self.centre)
+        kinetic = self.mass * np.sum(centre.velocity**2, axis=1) / 2 + self.inertia * centre.rate**2 / 2
+        return Energy(kinetic, np.zeros(len(q)), self.mass * centre.position)
+
+    def damping(self, q: Array, v: Array) -> Array:
+        """See Part."""
+        return np.zeros(len(q))
 
     def _arm(self, q: Array, place: Place) -> Array:
         axis = np.stack([np.cos(q[:, self.columns[2]]), np.sin(q[:, self.columns[2]])], axis=1)

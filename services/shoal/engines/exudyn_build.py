@@ -11,9 +11,15 @@ import numpy as np
 from shoal.engines.exudyn_beam import BeamPart
 from shoal.engines.exudyn_bodies import Part, RigidPart, System
 from shoal.engines.exudyn_cable import CablePart
-from shoal.engines.exudyn_pose import initial_poses
+from shoal.engines.exudyn_connectors import Exchange
+from shoal.engines.exudyn_ends import Ends
+from shoal.engines.exudyn_ground import GroundPart, add_moving_point
+from shoal.engines.exudyn_joints import Gap, add_friction, add_joint
+from shoal.engines.exudyn_loads import add_load
+from shoal.engines.exudyn_record import Indices
+from shoal.engines.poses import initial_poses, span
 from shoal.errors import InputError
-from shoal.scene import GROUND, Attachment, Rod, Scene
+from shoal.scene import GROUND, DrivenAngle, Rod, Scene
 from shoal.trajectory import Array
 
 Beam = Literal["ancf-cable", "geometrically-exact"]
@@ -36,6 +42,11 @@ class Machine:
     container: Any
     """Owns the system; Exudyn frees both when it goes."""
     parts: dict[str, Part]
+    gaps: list[Gap]
+    exchanges: list[Exchange]
+    """Springs, friction and applied loads."""
+    span: float
+    """Size of the machine at the start [m]."""
     reference: Array
     """Coordinates [m or rad] of the undeformed start, from which Exudyn counts, (unknowns,)."""
 
@@ -46,44 +57,36 @@ class Machine:
 
     @property
     def constraints(self) -> int:
-        """Number of constraint equations."""
-        return 2 * len(self.scene.joints)
+        """Number of constraint equations, those included that Exudyn keeps but does not need."""
+        return len(self.mbs.systemData.GetAECoordinates())
+
+    @property
+    def driven(self) -> bool:
+        """Whether motion is prescribed: then energy comes and goes through constraints, and is not followed."""
+        joints = self.scene.joints.values()
+        return bool(self.scene.ground_points) or any(isinstance(joint, DrivenAngle) for joint in joints)
 
     def gap(self, q: Array, v: Array) -> float:
-        """Largest distance [m] between places that a joint holds together; q, v: (rows, unknowns)."""
-        gaps = [
-            np.linalg.norm(self._position(joint.first, q, v) - self._position(joint.second, q, v), axis=1)
-            for joint in self.scene.joints.values()
-        ]
-        return float(np.max(gaps))
+        """Largest opening of a joint [m, or rad]; q, v: (rows, unknowns)."""
+        return max((float(np.max(gap(q, v))) for gap in self.gaps), default=0.0)
 
-    def energy(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Total energy and its kinetic plus elastic share [J], (rows,) each."""
-        shares = [part.energy(q, v) for part in self.parts.values()]
+    def energy(self, t: Array, q: Array, v: Array, rows: Indices) -> tuple[Array, Array]:
+        """Total energy and its kinetic plus elastic share [J] at `rows` of times t [s], (rows,) each."""
+        shares = [part.energy(q[rows], v[rows]) for part in self.parts.values()]
         moving = np.sum([share.kinetic + share.elastic for share in shares], axis=0)
+        # A torsion spring counts its turns along all times.
+        moving = moving + sum((exchange.stored(t, q, v)[rows] for exchange in self.exchanges), np.zeros(len(rows)))
         height = np.sum([share.moment for share in shares], axis=0) @ np.array(self.scene.gravity)
         return moving - height, moving
 
-    def friction_power(self, q: Array, v: Array) -> Array:
-        """Power lost in the joints [W], (rows,)."""
-        power = np.zeros(len(q))
-        for joint in self.scene.joints.values():
-            if joint.friction:
-                power += joint.friction * (self._rate(joint.second, q, v) - self._rate(joint.first, q, v)) ** 2
-        return power
-
-    def _position(self, end: Attachment, q: Array, v: Array) -> Array:
-        place = self.scene.location(end)
-        return np.array([place]) if end.body == GROUND else self.parts[end.body].motion(q, v, place).position
-
-    def _rate(self, end: Attachment, q: Array, v: Array) -> Array:
-        if end.body == GROUND:
-            return np.zeros(len(q))
-        return self.parts[end.body].motion(q, v, self.scene.location(end)).rate
+    def lost_power(self, t: Array, q: Array, v: Array) -> Array:
+        """Power lost in friction, dampers and materials less that of applied loads [W] at times t [s], (rows,)."""
+        power = sum((exchange.lost(t, q, v) for exchange in self.exchanges), np.zeros(len(t)))
+        return np.asarray(sum((part.damping(q, v) for part in self.parts.values()), power))
 
 
 def build(exu: Any, scene: Scene, beam: Beam) -> Machine:
-    """Enter bodies, gravity, joints and friction at the initial state. Raises InputError for a loop that is open."""
+    """Enter bodies, gravity, joints and loads at the initial state. Raises InputError for a joint that is open."""
     items = importlib.import_module("exudyn.itemInterface")
     poses = initial_poses(scene)
     container = exu.SystemContainer()
@@ -97,20 +100,16 @@ def build(exu: Any, scene: Scene, beam: Beam) -> Machine:
             parts[name] = CablePart.add(system, body, poses[name])
         else:
             parts[name] = BeamPart.add(system, body, poses[name])
-    ground = mbs.AddObject(items.ObjectGround())
-    for joint in scene.joints.values():
-        holds, turns = [], []
-        for end in (joint.first, joint.second):
-            place = scene.location(end)
-            if end.body == GROUND:
-                holds.append(system.marker("MarkerBodyPosition", ground, place))
-                turns.append(system.marker("MarkerBodyRigid", ground, place))
-            else:
-                holds.append(parts[end.body].hold(system, place))
-                turns += [parts[end.body].turn(system, place)] if joint.friction else []
-        mbs.AddObject(items.ObjectJointRevolute2D(markerNumbers=holds))
-        if joint.friction:
-            mbs.AddObject(items.ObjectConnectorTorsionalSpringDamper(markerNumbers=turns, damping=joint.friction))
+    ground = GroundPart.add(system)
+    places: dict[str, Part] = {**parts, GROUND: ground}
+    for point, path in scene.ground_points.items():
+        name = f"{GROUND}.{point}"
+        places[name] = add_moving_point(system, ground, path, poses[name])
+    ends = Ends(scene, system, places, poses)
+    gaps = [add_joint(ends, name, joint) for name, joint in scene.joints.items()]
+    friction = (add_friction(ends, name, joint) for name, joint in scene.joints.items())
+    exchanges = [exchange for exchange in friction if exchange is not None]
+    exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    return Machine(scene, mbs, container, parts, np.array(reference))
+    return Machine(scene, mbs, container, parts, gaps, exchanges, span(scene, poses), np.array(reference))

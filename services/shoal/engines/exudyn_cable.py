@@ -9,6 +9,7 @@ useReducedOrderIntegration 0 takes 5 Gauss points for the axial strain and 3 for
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -16,7 +17,8 @@ import numpy as np
 
 from shoal.engines.exudyn_bodies import Energy, Motion, Place, System
 from shoal.engines.exudyn_chain import Chain, cross, gauss
-from shoal.engines.exudyn_pose import Pose, normal
+from shoal.engines.poses import Pose, normal
+from shoal.engines.sections import Sections
 from shoal.scene import Rod
 from shoal.trajectory import Array
 
@@ -25,71 +27,111 @@ LOBATTO_3 = (np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3)
 
 @dataclass(frozen=True)
 class CablePart(Chain):
-    """A chain of ObjectANCFCable2D; coordinates of a node: r and r'."""
+    """A chain of ObjectANCFCable2D; coordinates of a node: r and r'.
+
+    rest: the nodal vectors of the unstrained elements, (elements, 4, 2).
+    """
+
+    rest: Array
 
     @classmethod
     def add(cls, system: System, rod: Rod, pose: Pose) -> CablePart:
-        """Enter a straight rod at its initial pose."""
-        items, turn = system.items, pose.rate * normal(pose.axis)
-        nodes, columns = [], []
+        """Enter an unstrained rod at its initial pose."""
+        items, sections = system.items, Sections.of(rod)
+        nodes, columns, vectors = [], [], []
         for s in np.linspace(0.0, rod.length, rod.elements + 1):
+            axis, lead = complex(rod.axis(s)), pose.angle + float(rod.turn(s))
+            place, slope = (axis.real, axis.imag), np.array([np.cos(lead), np.sin(lead)])
             node, places = system.node(
                 items.NodePoint2DSlope1(
-                    referenceCoordinates=[*pose.position((s, 0.0)), *pose.axis],
-                    initialVelocities=[*pose.speed((s, 0.0)), *turn],
+                    referenceCoordinates=[*pose.position(place), *slope],
+                    initialVelocities=[*pose.speed(place), *(pose.rate * normal(slope))],
                 )
             )
+            vectors.append([pose.position(place), slope])
             nodes.append(node)
             columns.append(places)
         elements = []
-        for pair in pairwise(nodes):
+        for k, pair in enumerate(pairwise(nodes)):
             cable = items.ObjectANCFCable2D(
                 length=rod.length / rod.elements,
-                massPerLength=rod.mass_per_length,
-                bendingStiffness=rod.bending_stiffness,
-                axialStiffness=rod.axial_stiffness,
+                massPerLength=sections.mass[k],
+                bendingStiffness=sections.bending[k],
+                axialStiffness=sections.axial[k],
+                bendingDamping=rod.retardation * sections.bending[k],
+                axialDamping=rod.retardation * sections.axial[k],
                 nodeNumbers=list(pair),
+                strainIsRelativeToReference=float(bool(rod.curvature)),
                 useReducedOrderIntegration=0 if rod.quadrature == "full" else 2,
             )
             elements.append(system.mbs.AddObject(cable))
             system.weigh(elements[-1])
-        return cls(rod, elements, np.array([first + last for first, last in pairwise(columns)]))
+        rest = np.array([first + last for first, last in pairwise(vectors)])
+        return cls(rod, sections, elements, np.array([first + last for first, last in pairwise(columns)]), rest)
 
     def hold(self, system: System, place: Place) -> Any:
         """See Part."""
         index, xi = self.find(place)
         return system.marker("MarkerBodyPosition", self.elements[index], ((1 + xi) * self.size / 2, 0.0))
 
-    def turn(self, system: System, place: Place) -> Any:
+    def turn(self, system: System, place: Place, angle: float = 0.0) -> Any:
         """See Part."""
         index, xi = self.find(place)
-        return system.marker("MarkerBodyRigid", self.elements[index], ((1 + xi) * self.size / 2, 0.0))
+        return system.turned(self.elements[index], ((1 + xi) * self.size / 2, 0.0), angle)
 
     def motion(self, q: Array, v: Array, place: Place) -> Motion:
         """See Part."""
         index, xi = self.find(place)
         shape, slope, _ = self._shapes(np.array([xi]))
-        position = self.values(shape, q)[:, index, 0]
-        tangent, turn = self.values(slope, q)[:, index, 0], self.values(slope, v)[:, index, 0]
+        position, velocity = (self.values(shape, x)[:, index, 0] for x in (q, v))
+        tangent, turn = (self.values(slope, x)[:, index, 0] for x in (q, v))
         rate = cross(tangent, turn) / np.sum(tangent**2, axis=1)
-        return Motion(position, np.arctan2(tangent[:, 1], tangent[:, 0]), rate)
+        return Motion(position, velocity, np.arctan2(tangent[:, 1], tangent[:, 0]), rate)
 
     def energy(self, q: Array, v: Array) -> Energy:
         """See Part."""
-        full = self.rod.quadrature == "full"
-        points, weights = gauss(5) if full else LOBATTO_3
-        tangent = self.values(self._shapes(points)[1], q)
-        strain = np.linalg.norm(tangent, axis=-1) - 1
-        elastic = self.rod.axial_stiffness / 2 * self.total(weights, strain**2)
-        points, weights = gauss(3) if full else gauss(2)
-        _, slope, bend = self._shapes(points)
-        tangent = self.values(slope, q)
-        curvature = cross(tangent, self.values(bend, q)) / np.sum(tangent**2, axis=-1)
-        elastic += self.rod.bending_stiffness / 2 * self.total(weights, curvature**2)
+        (axial, bending), rules = self._strains(q, v), self._rules
+        elastic = self.total(rules[0][1], axial[0] ** 2, self.sections.axial / 2)
+        elastic += self.total(rules[1][1], bending[0] ** 2, self.sections.bending / 2)
         points, weights = gauss(4)
         shape = self._shapes(points)[0]
-        kinetic = self.rod.mass_per_length / 2 * self.total(weights, np.sum(self.values(shape, v) ** 2, axis=-1))
-        return Energy(kinetic, elastic, self.moment(self.values(shape, q), weights))
+        kinetic = self.total(weights, np.sum(self.values(shape, v) ** 2, axis=-1), self.sections.mass / 2)
+        return Energy(kinetic, elastic, self.total(weights, self.values(shape, q), self.sections.mass))
+
+    def damping(self, q: Array, v: Array) -> Array:
+        """See Part: retardation * (EA (strain rate)^2 + EI (curvature rate)^2)."""
+        if not self.rod.retardation:
+            return np.zeros(len(q))
+        (axial, bending), rules = self._strains(q, v), self._rules
+        power = self.total(rules[0][1], axial[1] ** 2, self.sections.axial)
+        return self.rod.retardation * (power + self.total(rules[1][1], bending[1] ** 2, self.sections.bending))
+
+    @property
+    def _rules(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Points and weights, axial then bending."""
+        return (gauss(5), gauss(3)) if self.rod.quadrature == "full" else (LOBATTO_3, gauss(2))
+
+    @cached_property
+    def _rest(self) -> tuple[Array, Array]:
+        """Stretch and curvature [1/m] of the unstrained elements at their points, (elements, points)."""
+        if not self.rod.curvature:
+            return np.array(1.0), np.array(0.0)
+        (axial_points, _), (bending_points, _) = self._rules
+        tangent = np.einsum("pf,efc->epc", self._shapes(axial_points)[1], self.rest)
+        slope, bend = (np.einsum("pf,efc->epc", shape, self.rest) for shape in self._shapes(bending_points)[1:])
+        return np.linalg.norm(tangent, axis=-1), cross(slope, bend) / np.sum(slope**2, axis=-1)
+
+    def _strains(self, q: Array, v: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Axial strain and curvature [1/m], each with its rate, at their points, (rows, elements, points)."""
+        (axial_points, _), (bending_points, _) = self._rules
+        tangent, turn = (self.values(self._shapes(axial_points)[1], x) for x in (q, v))
+        stretch = np.linalg.norm(tangent, axis=-1)
+        _, slope, bend = self._shapes(bending_points)
+        s, s_t, b, b_t = (self.values(shape, x) for shape in (slope, bend) for x in (q, v))
+        square = np.sum(s**2, axis=-1)
+        curvature = cross(s, b) / square
+        change = (cross(s_t, b) + cross(s, b_t) - 2 * curvature * np.sum(s * s_t, axis=-1)) / square
+        return (stretch - self._rest[0], np.sum(tangent * turn, axis=-1) / stretch), (curvature - self._rest[1], change)
 
     def _shapes(self, xi: Array) -> tuple[Array, Array, Array]:
         """Hermite polynomials and their first two derivatives by s [1/m], (points, 4) each."""

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.engines.exudyn_bodies import Place
+from shoal.engines.sections import Sections
 from shoal.scene import Rod
 from shoal.trajectory import Array
 
@@ -29,6 +30,7 @@ class Chain:
     """A rod as elements of equal length along it; columns: coordinates of each element, (elements, nodes, per node)."""
 
     rod: Rod
+    sections: Sections
     elements: list[Any]
     columns: npt.NDArray[np.int64]
 
@@ -48,10 +50,9 @@ class Chain:
         here: Array = q[:, self.columns].reshape(len(q), elements, functions, -1)
         return np.asarray(np.einsum("pf,refc->repc", shape, here))
 
-    def total(self, weights: Array, density: Array) -> Array:
-        """Integral over the rod of what is given at the points of every element, (rows, elements, points, ...)."""
-        return np.tensordot(density.sum(axis=1), weights * self.size / 2, axes=(1, 0))
+    def total(self, weights: Array, density: Array, factor: Array) -> Array:
+        """Integral over the rod of a density at the points of every element, (rows, elements, points, ...).
 
-    def moment(self, position: Array, weights: Array) -> Array:
-        """Mass times centre of mass [kg m], (rows, 2)."""
-        return self.rod.mass_per_length * self.total(weights, position)
+        factor: of each element, (elements,).
+        """
+        return np.tensordot(np.einsum("e,re...->r...", factor, density), weights * self.size / 2, axes=(1, 0))

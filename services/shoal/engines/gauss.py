@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from shoal.engines.capabilities import CAPABILITIES
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
@@ -24,13 +25,7 @@ class GaussEngine:
     @property
     def capabilities(self) -> Capabilities:
         """What it can simulate."""
-        return Capabilities(
-            elements=frozenset({"rigid", "ancf-cable"}),
-            joints=frozenset({"revolute"}),
-            integrators=frozenset({"leapfrog", "rk4", "generalized-alpha"}),
-            closed_loops=True,
-            lanes=True,
-        )
+        return CAPABILITIES[self.name]
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene; see `Engine`."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.identification import expression
 from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.measurement import Measurement, measure
@@ -18,7 +17,7 @@ from shoal.identification.methods import Outcome, get_method
 from shoal.identification.methods.least_squares import linearise as difference
 from shoal.identification.problem import Problem
 from shoal.identification.uncertainty import Linearisation, autocorrelation, combinations, linearise, spread
-from shoal.scene import Rod, Scene
+from shoal.scene import Rod, Scene, expression
 from shoal.trajectory import Array
 
 _BAD_FIT = 0.2

@@ -11,8 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
-from shoal.identification import expression
-from shoal.scene import Scene, load_scene
+from shoal.scene import Scene, expression, load_scene
 from shoal.scene.load import names, read_named
 from shoal.scene.record import NonNegative, Positive, Record, one_line
 

@@ -1,8 +1,8 @@
-"""Points and directions of bodies as affine functions of the coordinates, in complex numbers.
+"""Points and directions of bodies as affine functions of the coordinates.
 
-A planar vector is one complex number x + iy, and every coordinate pair (x, y) of the model one
-complex unknown. A point of a rigid body is then r + p e with complex p, and what joints share is
-eliminated by substituting such expressions: no multiplier, no drift.
+A planar vector is one complex number x + iy; a coordinate is a real unknown with a complex coefficient. What joints
+share is eliminated by substituting such expressions: a point shared by two bodies, a direction kept by a weld, a
+place on a fixed line (one unknown). No multiplier, no drift.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 Number = Any
-"""A complex scalar, or an array of one complex number per lane."""
+"""A real or complex scalar, or an array of one number per lane."""
 
 
 def is_zero(value: Number) -> bool:
@@ -24,31 +24,31 @@ def is_zero(value: Number) -> bool:
 
 @dataclass(frozen=True)
 class Affine:
-    """constant + sum of coefficient * pair; pairs are numbered complex unknowns."""
+    """constant + sum of coefficient * unknown; unknowns are real and numbered, coefficients complex."""
 
     terms: Mapping[int, Number]
     constant: Number = 0.0
 
     def __add__(self, other: Affine) -> Affine:
         terms = dict(self.terms)
-        for pair, coefficient in other.terms.items():
-            terms[pair] = terms[pair] + coefficient if pair in terms else coefficient
-        kept = {pair: coefficient for pair, coefficient in terms.items() if not is_zero(coefficient)}
+        for unknown, coefficient in other.terms.items():
+            terms[unknown] = terms[unknown] + coefficient if unknown in terms else coefficient
+        kept = {unknown: coefficient for unknown, coefficient in terms.items() if not is_zero(coefficient)}
         return Affine(kept, self.constant + other.constant)
 
     def __mul__(self, factor: Number) -> Affine:
-        return Affine({pair: c * factor for pair, c in self.terms.items()}, self.constant * factor)
+        return Affine({unknown: c * factor for unknown, c in self.terms.items()}, self.constant * factor)
 
     def __sub__(self, other: Affine) -> Affine:
         return self + other * -1.0
 
     @property
-    def pair(self) -> int | None:
-        """The pair this is, if it is just one."""
-        if len(self.terms) == 1 and is_zero(self.constant):
-            pair, coefficient = next(iter(self.terms.items()))
-            if np.all(coefficient == 1.0):
-                return pair
+    def pair(self) -> tuple[int, int] | None:
+        """The two unknowns that are the x and y of this vector, if it is just that."""
+        if len(self.terms) == 2 and is_zero(self.constant):
+            (first, x), (second, y) = self.terms.items()
+            if np.all(x == 1.0) and np.all(y == 1j):
+                return first, second
         return None
 
 

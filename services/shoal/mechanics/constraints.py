@@ -1,149 +1,283 @@
-"""Constraints that are at most quadratic in the coordinates: C = q'Aq + b'q + c, one kernel for all.
+"""Constraints that are at most quadratic in the coordinates: C = sum of factor u w + c + f(t), one kernel for all.
 
-C_q = 2Aq + b and the bias C_qq v v = 2 v'Av follow from the same lists (mechanics of every planar joint).
+u and w are rows of the state: unknowns, or components of vectors that are affine in them. As differences of points
+are formed before they are multiplied, the round-off of C does not grow with the distance from the origin. C_q, the
+bias C_qq v v + f''(t) and the third derivative of C follow from the same lists. The Jacobian is sparse: entry e is
+the column `column[e]` of the constraint whose range in `entry` contains e.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
+from shoal.mechanics import functions
 from shoal.mechanics.affine import Affine, Number
+from shoal.mechanics.functions import Functions
 from shoal.mechanics.tile import Array, Index, Tile
 from shoal.mechanics.vector import pointer
 
+Drive = tuple[Callable[[Any], Any], Sequence[float]]
+"""A function of time, and the knots between which it is one polynomial."""
+
 
 class Constraints(NamedTuple):
-    """Term t of constraint k in start[k]:start[k+1] is value[t] * q[first[t]] * q[second[t]].
+    """Product p of constraint k in start[k]:start[k+1] is factor[p] * z[left[p]] * z[right[p]]; left = -1 stands for 1.
 
-    second = -1 marks a linear term, first = -1 a constant.
+    constant: c, (constraints, lanes). drive: number of the function f of every constraint (-1: none). Part r of the
+    Jacobian adds coefficient[r] * z[source[r]] to the entry target[r]; source = -1 stands for 1.
     """
 
     size: int
     start: Index
-    first: Index
-    second: Index
-    value: Array
+    left: Index
+    right: Index
+    factor: Array
+    constant: Array
+    drive: Index
+    entry: Index
+    column: Index
+    parts: int
+    target: Index
+    source: Index
+    coefficient: Array
+
+
+@dataclass(frozen=True)
+class Held:
+    """One constraint before it has rows: Re or Im of conj(u) w, plus a constant and a function of time."""
+
+    name: str
+    u: Affine
+    w: Affine
+    crossed: bool
+    constant: Number
+    drive: Drive | None
+
+    def products(self, rows: Callable[[Affine], tuple[int, int]]) -> list[tuple[int, int, Number, Affine, Affine]]:
+        """(left row, right row, factor, left vector, right vector); left row -1 for a linear term.
+
+        The vectors are times a component: (row of x or y) is the real part of vector * conj(1 or i).
+        """
+        u, w = self.u, self.w
+        sign = 1.0
+        if not w.terms:
+            u, w, sign = w, u, (-1.0 if self.crossed else 1.0)
+        y = rows(w)
+        if not u.terms:
+            parts = (-np.imag(u.constant), np.real(u.constant)) if self.crossed else _split(u.constant)
+            return [(-1, y[k], sign * parts[k], u, w) for k in range(2) if np.any(parts[k])]
+        x = rows(u)
+        if self.crossed:
+            return [(x[0], y[1], 1.0, u, w), (x[1], y[0], -1.0, u, w)]
+        return [(x[0], y[0], 1.0, u, w), (x[1], y[1], 1.0, u, w)]
+
+
+def _split(value: Number) -> tuple[Number, Number]:
+    return np.real(value), np.imag(value)
 
 
 class Terms:
-    """Collects the terms of constraints, per lane, before they are packed into tiles."""
+    """Collects constraints before their vectors have rows."""
 
     def __init__(self) -> None:
-        self.names: list[str] = []
-        self.start = [0]
-        self.first: list[int] = []
-        self.second: list[int] = []
-        self.values: list[Number] = []
+        self.held: list[Held] = []
 
-    def _add(self, first: int, second: int, value: Number) -> None:
-        if np.any(value):
-            self.first.append(first)
-            self.second.append(second)
-            self.values.append(value)
+    def dot(self, name: str, u: Affine, w: Affine, constant: Number = 0.0, drive: Drive | None = None) -> None:
+        """u . w + constant + drive(t) = 0."""
+        self.held.append(Held(name, u, w, False, constant, drive))
 
-    def _close(self, name: str) -> None:
-        self.names.append(name)
-        self.start.append(len(self.first))
+    def cross(self, name: str, u: Affine, w: Affine, constant: Number = 0.0, drive: Drive | None = None) -> None:
+        """u x w + constant + drive(t) = 0."""
+        self.held.append(Held(name, u, w, True, constant, drive))
 
-    def unit_length(self, name: str, vector: Affine) -> None:
-        """|vector|^2 - 1 = 0."""
-        items = list(vector.terms.items())
-        for index, (k, b) in enumerate(items):
-            square = np.real(np.conj(b) * b)
-            self._add(2 * k, 2 * k, square)
-            self._add(2 * k + 1, 2 * k + 1, square)
-            for m, c in items[index + 1 :]:
-                h = 2 * np.conj(b) * c
-                self._add(2 * k, 2 * m, np.real(h))
-                self._add(2 * k + 1, 2 * m + 1, np.real(h))
-                self._add(2 * k, 2 * m + 1, -np.imag(h))
-                self._add(2 * k + 1, 2 * m, np.imag(h))
-            linear = 2 * np.conj(vector.constant) * b
-            self._add(2 * k, -1, np.real(linear))
-            self._add(2 * k + 1, -1, -np.imag(linear))
-        self._add(-1, -1, np.abs(vector.constant) ** 2 - 1.0)
-        self._close(name)
+    def vanish(self, name: str, vector: Affine, drives: tuple[Drive, Drive] | None = None) -> None:
+        """vector + drives(t) = 0, two linear constraints [m]."""
+        for axis, part in enumerate((1.0, 1j)):
+            self.dot(name, Affine({}, part), vector, 0.0, drives[axis] if drives else None)
 
-    def vanish(self, name: str, vector: Affine) -> None:
-        """vector = 0, two linear constraints [m]."""
-        for part in range(2):
-            for k, b in vector.terms.items():
-                x, y = (np.real(b), -np.imag(b)) if part == 0 else (np.imag(b), np.real(b))
-                self._add(2 * k, -1, x)
-                self._add(2 * k + 1, -1, y)
-            self._add(-1, -1, np.real(vector.constant) if part == 0 else np.imag(vector.constant))
-            self._close(name)
+
+def assemble(
+    terms: Terms, rows: Callable[[Affine], tuple[int, int]], stack: Callable[[list[Number]], Array], driven: int
+) -> Constraints:
+    """The lists of the collected constraints. Their functions of time are numbered from `driven` on, in their order."""
+    start, entry = [0], [0]
+    lefts: list[int] = []
+    rights: list[int] = []
+    factors: list[Number] = []
+    column: list[int] = []
+    parts: list[tuple[int, int, Number]] = []
+    drive = []
+    for held in terms.held:
+        found: dict[int, int] = {}
+        for left, right, factor, u, w in held.products(rows):
+            lefts.append(left)
+            rights.append(right)
+            factors.append(factor)
+            for row, vector, other in ((left, u, right), (right, w, left)):
+                if row < 0:
+                    continue
+                upright = row == rows(vector)[1]
+                for unknown, value in vector.terms.items():
+                    coefficient = factor * _split(value)[upright]
+                    if not np.any(coefficient):
+                        continue
+                    if unknown not in found:
+                        found[unknown] = len(column)
+                        column.append(unknown)
+                    parts.append((found[unknown], other, coefficient))
+        start.append(len(lefts))
+        entry.append(len(column))
+        drive.append(-1 if held.drive is None else driven)
+        driven += held.drive is not None
+
+    def index(values: list[int]) -> Index:
+        return np.array(values, dtype=np.int64)
+
+    return Constraints(
+        len(terms.held),
+        index(start),
+        index(lefts),
+        index(rights),
+        stack(factors),
+        stack([held.constant for held in terms.held]),
+        index(drive),
+        index(entry),
+        index(column),
+        len(parts),
+        index([target for target, _, _ in parts]),
+        index([source for _, source, _ in parts]),
+        stack([coefficient for _, _, coefficient in parts]),
+    )
 
 
 @njit(cache=True, error_model="numpy")
 def raw(constraints: Constraints) -> Constraints:
     """The same constraints with pointers in place of arrays."""
     c = constraints
-    return Constraints(c.size, pointer(c.start), pointer(c.first), pointer(c.second), pointer(c.value))
+    return Constraints(
+        c.size,
+        pointer(c.start),
+        pointer(c.left),
+        pointer(c.right),
+        pointer(c.factor),
+        pointer(c.constant),
+        pointer(c.drive),
+        pointer(c.entry),
+        pointer(c.column),
+        c.parts,
+        pointer(c.target),
+        pointer(c.source),
+        pointer(c.coefficient),
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def residual(tile: Tile, constraints: Constraints, q: Array, value: Array) -> None:
-    """C(q); value: (constraints, lanes)."""
+def residual(tile: Tile, constraints: Constraints, drives: Functions, t: float, z: Array, value: Array) -> None:
+    """C(q, t); value: (constraints, lanes). The derived rows of z must be filled."""
     width = len(tile)
     for k in range(constraints.size):
+        drive = functions.evaluate(drives, constraints.drive[k], t, 0)
         for lane in range(width):
-            value[k * width + lane] = 0.0
-        for t in range(constraints.start[k], constraints.start[k + 1]):
-            i, j = constraints.first[t], constraints.second[t]
+            value[k * width + lane] = constraints.constant[k * width + lane] + drive
+        for p in range(constraints.start[k], constraints.start[k + 1]):
+            left, right = constraints.left[p], constraints.right[p]
             for lane in range(width):
-                term = constraints.value[t * width + lane]
-                if i >= 0:
-                    term *= q[i * width + lane]
-                if j >= 0:
-                    term *= q[j * width + lane]
-                value[k * width + lane] += term
+                product = constraints.factor[p * width + lane] * z[right * width + lane]
+                if left >= 0:
+                    product *= z[left * width + lane]
+                value[k * width + lane] += product
 
 
 @njit(cache=True, error_model="numpy")
-def jacobian(tile: Tile, constraints: Constraints, unknowns: int, q: Array, out: Array) -> None:
-    """C_q(q); out: (constraints * unknowns, lanes)."""
+def rates(tile: Tile, constraints: Constraints, drives: Functions, t: float, out: Array) -> None:
+    """C_t(t), so that C_q v = -C_t; out: (constraints, lanes)."""
     width = len(tile)
-    for i in range(constraints.size * unknowns * width):
+    for k in range(constraints.size):
+        drive = functions.evaluate(drives, constraints.drive[k], t, 1)
+        for lane in range(width):
+            out[k * width + lane] = drive
+
+
+@njit(cache=True, error_model="numpy")
+def jacobian(tile: Tile, constraints: Constraints, z: Array, linear: float, out: Array) -> None:
+    """The Jacobian with 1 replaced by `linear`; out: (entries, lanes). Of z and 1: C_q; of zdot and 0: dC_q/dt."""
+    width = len(tile)
+    for i in range(constraints.entry[constraints.size] * width):
         out[i] = 0.0
-    for k in range(constraints.size):
-        for t in range(constraints.start[k], constraints.start[k + 1]):
-            i, j = constraints.first[t], constraints.second[t]
-            if i < 0:
-                continue
-            row = (k * unknowns + i) * width
+    for r in range(constraints.parts):
+        target, source = constraints.target[r] * width, constraints.source[r] * width
+        if source < 0:
             for lane in range(width):
-                other = q[j * width + lane] if j >= 0 else 1.0
-                out[row + lane] += constraints.value[t * width + lane] * other
-            if j >= 0:
-                row = (k * unknowns + j) * width
-                for lane in range(width):
-                    out[row + lane] += constraints.value[t * width + lane] * q[i * width + lane]
+                out[target + lane] += linear * constraints.coefficient[r * width + lane]
+        else:
+            for lane in range(width):
+                out[target + lane] += constraints.coefficient[r * width + lane] * z[source + lane]
 
 
 @njit(cache=True, error_model="numpy")
-def bias(tile: Tile, constraints: Constraints, v: Array, out: Array) -> None:
-    """eta = C_qq v v, so that C_q a = -eta; out: (constraints, lanes)."""
+def bias(tile: Tile, constraints: Constraints, drives: Functions, t: float, zdot: Array, out: Array) -> None:
+    """eta = C_qq v v + C_tt, so that C_q a = -eta; out: (constraints, lanes). Derived rows of zdot must be filled."""
     width = len(tile)
     for k in range(constraints.size):
+        drive = functions.evaluate(drives, constraints.drive[k], t, 2)
         for lane in range(width):
-            out[k * width + lane] = 0.0
-        for t in range(constraints.start[k], constraints.start[k + 1]):
-            i, j = constraints.first[t], constraints.second[t]
-            if i >= 0 and j >= 0:
+            out[k * width + lane] = drive
+        for p in range(constraints.start[k], constraints.start[k + 1]):
+            left, right = constraints.left[p], constraints.right[p]
+            if left >= 0:
                 for lane in range(width):
                     out[k * width + lane] += (
-                        2.0 * constraints.value[t * width + lane] * v[i * width + lane] * v[j * width + lane]
+                        2.0
+                        * constraints.factor[p * width + lane]
+                        * zdot[left * width + lane]
+                        * zdot[right * width + lane]
                     )
 
 
 @njit(cache=True, error_model="numpy")
-def drift(tile: Tile, constraints: Constraints, q: Array, gap: Array, worst: Array) -> None:
-    """Raise worst (lanes,) to the largest |C(q)|; gap is work space, (constraints, lanes)."""
+def add_power(
+    tile: Tile, constraints: Constraints, drives: Functions, t: float, multiplier: Array, power: Array
+) -> None:
+    """Subtract the power [W] that driven constraints supply, lambda C_t, from power (lanes,)."""
     width = len(tile)
-    residual(tile, constraints, q, gap)
+    for k in range(constraints.size):
+        if constraints.drive[k] >= 0:
+            rate = functions.evaluate(drives, constraints.drive[k], t, 1)
+            for lane in range(width):
+                power[lane] -= multiplier[k * width + lane] * rate
+
+
+@njit(cache=True, error_model="numpy")
+def add_product(tile: Tile, constraints: Constraints, matrix: Array, x: Array, out: Array) -> None:
+    """out += C_q x for the entries of a Jacobian; out: (constraints, lanes)."""
+    width = len(tile)
+    for k in range(constraints.size):
+        for e in range(constraints.entry[k], constraints.entry[k + 1]):
+            for lane in range(width):
+                out[k * width + lane] += matrix[e * width + lane] * x[constraints.column[e] * width + lane]
+
+
+@njit(cache=True, error_model="numpy")
+def subtract_transposed(tile: Tile, constraints: Constraints, matrix: Array, multiplier: Array, out: Array) -> None:
+    """out -= C_q' multiplier; out: (unknowns, lanes)."""
+    width = len(tile)
+    for k in range(constraints.size):
+        for e in range(constraints.entry[k], constraints.entry[k + 1]):
+            for lane in range(width):
+                out[constraints.column[e] * width + lane] -= matrix[e * width + lane] * multiplier[k * width + lane]
+
+
+@njit(cache=True, error_model="numpy")
+def drift(
+    tile: Tile, constraints: Constraints, drives: Functions, t: float, z: Array, gap: Array, worst: Array
+) -> None:
+    """Raise worst (lanes,) to the largest |C(q, t)|; gap is work space, (constraints, lanes)."""
+    width = len(tile)
+    residual(tile, constraints, drives, t, z, gap)
     for k in range(constraints.size * width):
         worst[k % width] = max(worst[k % width], abs(gap[k]))

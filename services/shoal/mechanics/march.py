@@ -7,24 +7,30 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, model
+from shoal.mechanics import constraints, dynamics, gauss, model
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.integrators.scheme import advance
+from shoal.mechanics.integrators.scheme import adaptive, advance, interpolate
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.tile import Array, Index, Tile
-from shoal.mechanics.vector import copy
+from shoal.mechanics.vector import pointer
 
 ASSEMBLY = 30
 """Iterations that may assemble a mechanism whose stated start is only roughly consistent."""
 CHECKS = 64
-"""Energy and drift are looked at about so many times in a run."""
+"""Energy and drift are looked at about so many times in a run of fixed steps."""
+CHECK_EVERY = 4
+"""An adaptive run is looked at every so many steps, each of which is worth a dozen looks."""
+LOBATTO = 0.5 - 0.5 / np.sqrt(5.0)
+"""Inner node of the four-point Lobatto rule on the unit interval, of order 6; its weights are 1/12 and 5/12."""
 
 
 class Record(NamedTuple):
-    """What a march leaves behind. samples: (times * marker rows, lanes); the rest: (lanes,).
+    """What a march leaves behind. samples: (times * markers * 5, lanes), of each marker its
+    point, its direction, and the continuous angle [rad] at the end of the step; the rest: (lanes,).
 
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest kinetic + elastic energy [J];
     drift: largest violation of a constraint; correction: largest change that made the start consistent.
+    Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
 
     samples: Array
@@ -32,6 +38,9 @@ class Record(NamedTuple):
     energy_scale: Array
     drift: Array
     correction: Array
+    steps: Array
+    evaluations: Array
+    reached: Array
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -46,52 +55,102 @@ def march(
     marker_rows: Index,
     tolerance: float,
 ) -> Record:
-    """March `steps` steps from the state in `room` and sample the marker rows at `times` [s] (increasing)."""
+    """March from the state in `room` and sample the marker rows at `times` [s] (increasing).
+
+    Schemes of fixed step take `steps` steps of `step` [s]; adaptive ones end at the last of the times and
+    take at most `steps`. What was not reached stays nan.
+    """
     width = len(tile)
     m, w = model.raw(arrays), dynamics.raw(room)
-    per_sample = marker_rows.size * width
+    dynamics.enter(m, w)
+    end = m.unknowns * width
+    markers = marker_rows.size // 4
+    per_sample = 5 * markers * width
     record = Record(
-        np.full(len(times) * per_sample, np.nan), np.zeros(width), np.zeros(width), np.zeros(width), np.zeros(width)
+        np.full(len(times) * per_sample, np.nan),
+        np.zeros(width),
+        np.zeros(width),
+        np.zeros(width),
+        np.zeros(width),
+        np.zeros(width),
+        np.zeros(width),
+        np.zeros(width),
     )
-    for row in range(m.unknowns):
-        copy(tile, w.before, row, w.z, row)
+    past = np.empty(3 * end)
+    inside_q, inside_v = np.zeros(m.rows * width), np.zeros(m.rows * width)
+    for i in range(end):
+        past[i] = w.z[i]
     dynamics.settle(tile, m, w, 0.0, tolerance, ASSEMBLY)
-    for i in range(m.unknowns * width):
-        record.correction[i % width] = max(record.correction[i % width], abs(w.z[i] - w.before[i]))
+    for i in range(end):
+        record.correction[i % width] = max(record.correction[i % width], abs(w.z[i] - past[i]))
     dynamics.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
 
     energy, start, dissipated = np.zeros(width), np.zeros(width), np.zeros(width)
-    last_power = room.power.copy()
+    last_power, power = room.power.copy(), np.zeros(width)
     gap = np.empty(m.constraints.size * width)
     _energy(tile, m, w, start, record.energy_scale)
-    check_every = max(1, steps // CHECKS)
-    sample = 0
-    for number in range(steps + 1):
-        # The instant is counted, not summed, so that requested times fall on steps exactly.
-        now = number * step
-        while sample < len(times) and times[sample] <= now + 1e-9 * step:
-            x = 1.0 if abs(times[sample] - now) <= 1e-9 * step else 1.0 - (now - times[sample]) / step
-            _interpolate(tile, m, w, x, step)
-            dynamics.derive(tile, m, w.stage, m.rows, False)
+    free = adaptive(scheme)
+    loaded = dynamics.loaded(m)
+    ending = times[-1] if free else steps * step
+    check_every = CHECK_EVERY if free else max(1, steps // CHECKS)
+    turns, above = np.zeros(markers * width), np.zeros(markers * width)
+    _count_turns(tile, m, w, marker_rows, turns, above)
+    turns[:] = 0.0
+    now, taken, number, sample = 0.0, step, 0, 0
+    while True:
+        while sample < len(times) and times[sample] <= now + 1e-9 * taken:
+            if abs(times[sample] - now) <= 1e-9 * taken:
+                for i in range(end):
+                    inside_q[i] = w.z[i]
+            else:
+                x = 1.0 - (now - times[sample]) / taken
+                interpolate(tile, scheme, m, w, pointer(past), x, taken, pointer(inside_q), pointer(inside_v))
+            dynamics.derive(tile, m, pointer(inside_q), m.rows, False)
             first = sample * per_sample
-            for k in range(marker_rows.size):
+            for k in range(markers):
+                for row in range(4):
+                    to, source = first + (5 * k + row) * width, marker_rows[4 * k + row] * width
+                    for lane in range(width):
+                        record.samples[to + lane] = inside_q[source + lane]
                 for lane in range(width):
-                    record.samples[first + k * width + lane] = w.stage[marker_rows[k] * width + lane]
+                    x = w.z[marker_rows[4 * k + 2] * width + lane]
+                    y = w.z[marker_rows[4 * k + 3] * width + lane]
+                    record.samples[first + (5 * k + 4) * width + lane] = np.arctan2(y, x) + turns[k * width + lane]
             sample += 1
-        if number == steps:
+        if number == steps or now >= ending:
             break
-        if sample < len(times) and times[sample] < now + step * (1 - 1e-9):
-            for row in range(m.unknowns):
-                copy(tile, w.before, row, w.z, row)
-                copy(tile, w.before, m.unknowns + row, w.zdot, row)
-        advance(tile, scheme, m, w, now, step)
-        if m.frictions.size > 0:
+        if (free and loaded) or (sample < len(times) and (free or times[sample] < now + step * (1 - 1e-9))):
+            for i in range(end):
+                past[i], past[end + i], past[2 * end + i] = w.z[i], w.zdot[i], w.a[i]
+        rest = ending - now
+        begin = now
+        taken = advance(tile, scheme, m, w, now, rest if free else step)
+        number += 1
+        dynamics.remember(tile, m, w)
+        _count_turns(tile, m, w, marker_rows, turns, above)
+        # Fixed steps are counted, not summed, so that requested times fall on steps exactly.
+        now = (ending if taken >= rest else now + taken) if free else number * step
+        if loaded:
             for lane in range(width):
-                dissipated[lane] += 0.5 * step * (last_power[lane] + w.power[lane])
-                last_power[lane] = w.power[lane]
-        if (number + 1) % check_every == 0 or number + 1 == steps:
+                power[lane] = w.power[lane]
+            if free:
+                for x in (LOBATTO, 1.0 - LOBATTO):
+                    interpolate(tile, scheme, m, w, pointer(past), x, taken, pointer(inside_q), pointer(inside_v))
+                    inside = pointer(inside_q), pointer(inside_v)
+                    if m.driven:
+                        dynamics.acceleration(tile, m, w, begin + x * taken, *inside, tolerance, w.stage)
+                    else:
+                        dynamics.force(tile, m, w, begin + x * taken, *inside, w.stage)
+                    for lane in range(width):
+                        dissipated[lane] += taken * 5.0 / 12.0 * w.power[lane]
+            weight = 1.0 / 12.0 if free else 0.5
+            for lane in range(width):
+                dissipated[lane] += weight * taken * (last_power[lane] + power[lane])
+                last_power[lane] = power[lane]
+        if number % check_every == 0 or number == steps or now >= ending:
             _energy(tile, m, w, energy, record.energy_scale)
-            constraints.drift(tile, m.constraints, w.z, gap, record.drift)
+            dynamics.derive(tile, m, w.z, m.held_rows, False)
+            constraints.drift(tile, m.constraints, m.functions, now, w.z, gap, record.drift)
             alive = False
             for lane in range(width):
                 error = abs(energy[lane] + dissipated[lane] - start[lane])
@@ -100,7 +159,25 @@ def march(
                 alive = alive or np.isfinite(error)
             if not alive:
                 break
+    for lane in range(width):
+        record.steps[lane] = number
+        record.evaluations[lane] = scheme.evaluations[0]
+        record.reached[lane] = now
     return record
+
+
+@njit(cache=True, error_model="numpy")
+def _count_turns(tile: Tile, m: Arrays, w: Work, marker_rows: Index, turns: Array, above: Array) -> None:
+    """Add 2 pi to `turns` (markers, lanes) where a marker's direction has passed the negative x axis."""
+    width = len(tile)
+    gauss.derive(tile, m, w.z, m.held_rows, m.rows, False)
+    for k in range(marker_rows.size // 4):
+        x, y = marker_rows[4 * k + 2] * width, marker_rows[4 * k + 3] * width
+        for lane in range(width):
+            now = 1.0 if w.z[y + lane] >= 0.0 else 0.0
+            if w.z[x + lane] < 0.0:
+                turns[k * width + lane] += 2.0 * np.pi * (above[k * width + lane] - now)
+            above[k * width + lane] = now
 
 
 @njit(cache=True, error_model="numpy")
@@ -112,17 +189,3 @@ def _energy(tile: Tile, m: Arrays, w: Work, total: Array, scale: Array) -> None:
         total[lane] = moving + w.energy[2 * width + lane]
         if not moving <= scale[lane]:
             scale[lane] = moving
-
-
-@njit(cache=True, error_model="numpy")
-def _interpolate(tile: Tile, m: Arrays, w: Work, x: float, step: float) -> None:
-    """Coordinates at the fraction x of the last step, by cubic Hermite interpolation, into w.stage."""
-    end = m.unknowns * len(tile)
-    if x == 1.0:
-        for i in range(end):
-            w.stage[i] = w.z[i]
-        return
-    h00, h10 = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2 * step
-    h01, h11 = x * x * (3 - 2 * x), x * x * (x - 1) * step
-    for i in range(end):
-        w.stage[i] = h00 * w.before[i] + h10 * w.before[end + i] + h01 * w.z[i] + h11 * w.zdot[i]

@@ -1,13 +1,14 @@
-"""Scene -> Model: numbered coordinates and the arrays that the compiled kernels work on.
+"""The model: numbered coordinates and the arrays that the compiled kernels work on.
 
 The rows of a state are the unknowns q, then rows derived from them (points and directions of
-bodies that do not own the coordinates; first those that forces act on, then those of markers).
+bodies that do not own the coordinates; first those that forces act on, then those that constraints
+hold, then those of markers).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -15,16 +16,19 @@ import numpy as np
 from numba import njit
 
 from shoal.errors import InputError
-from shoal.mechanics import constraints, friction, sparse
-from shoal.mechanics.affine import Affine, Number, fixed
-from shoal.mechanics.constraints import Constraints, Terms
-from shoal.mechanics.elements import ancf_cable
+from shoal.mechanics import constraints, drives, forces, functions, gate, saddle, sparse
+from shoal.mechanics.constraints import Constraints
+from shoal.mechanics.drives import Drives
+from shoal.mechanics.elements import ancf_cable, ancf_full, beam
 from shoal.mechanics.elements.ancf_cable import AncfCables
-from shoal.mechanics.friction import Frictions
-from shoal.mechanics.placement import Placement, RigidFrame, as_complex, place
+from shoal.mechanics.elements.ancf_full import AncfFull
+from shoal.mechanics.elements.beam import Beams
+from shoal.mechanics.forces import Forces
+from shoal.mechanics.functions import Functions
+from shoal.mechanics.saddle import Saddle
 from shoal.mechanics.tile import Array, Index, Tile, pack
 from shoal.mechanics.vector import pointer
-from shoal.scene import GROUND, Rod, Scene
+from shoal.scene import Scene
 
 
 class Derived(NamedTuple):
@@ -36,40 +40,89 @@ class Derived(NamedTuple):
     constant: Array
 
 
+class Elements(NamedTuple):
+    """The flexible elements by family: one line here, in `raw` and in dynamics.py for each kernel."""
+
+    cables_full: AncfCables
+    cables_reduced: AncfCables
+    cubics: Beams
+    quintics: Beams
+    solids: AncfFull
+    two_point_solids: AncfFull
+
+
+class Gates(NamedTuple):
+    """Addresses of the kernels of dynamics.py and tangent.py for one width."""
+
+    force: int
+    acceleration: int
+    settle: int
+    energies: int
+    assemble: int
+
+
 class Arrays(NamedTuple):
-    """All a kernel needs of one tile of lanes."""
+    """All a kernel needs of one tile of lanes. method, baumgarte: how accelerations are found."""
+
+    home: Array
+    gates: Gates
 
     unknowns: int
     force_rows: int
+    held_rows: int
     rows: int
+    method: int
+    baumgarte: float
+    projects: bool
+    driven: bool
     derived: Derived
     pattern: sparse.Pattern
     mass: Array
     mass_factor: Array
+    mass_root: Array
     weight: Array
-    cables_full: AncfCables
-    cables_reduced: AncfCables
-    frictions: Frictions
+    elements: Elements
+    forces: Forces
+    drives: Drives
+    functions: Functions
     constraints: Constraints
+    saddle: Saddle
 
 
 @njit(cache=True, error_model="numpy")
 def raw(m: Arrays) -> Arrays:
     """The same numbers with pointers in place of arrays, for use inside the time loop."""
-    d = m.derived
+    d, e = m.derived, m.elements
     return Arrays(
+        pointer(m.home),
+        m.gates,
         m.unknowns,
         m.force_rows,
+        m.held_rows,
         m.rows,
+        m.method,
+        m.baumgarte,
+        m.projects,
+        m.driven,
         Derived(pointer(d.start), pointer(d.source), pointer(d.coefficient), pointer(d.constant)),
         sparse.raw(m.pattern),
         pointer(m.mass),
         pointer(m.mass_factor),
+        pointer(m.mass_root),
         pointer(m.weight),
-        ancf_cable.raw(m.cables_full),
-        ancf_cable.raw(m.cables_reduced),
-        friction.raw(m.frictions),
+        Elements(
+            ancf_cable.raw(e.cables_full),
+            ancf_cable.raw(e.cables_reduced),
+            beam.raw(e.cubics),
+            beam.raw(e.quintics),
+            ancf_full.raw(e.solids),
+            ancf_full.raw(e.two_point_solids),
+        ),
+        forces.raw(m.forces),
+        drives.raw(m.drives),
+        functions.raw(m.functions),
         constraints.raw(m.constraints),
+        saddle.raw(m.saddle),
     )
 
 
@@ -83,7 +136,9 @@ class Model:
     """A scene turned into numbers, for one or many lanes; never modified.
 
     q0, v0: initial coordinates and rates, (unknowns, lanes). Arrays of lane-dependent numbers are
-    (rows, lanes) or (rows, 1).
+    (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
+    their turns from [rad], (forces, lanes) or (forces, 1). owners: for each family of elements the
+    body of every element.
     """
 
     scene: Scene
@@ -91,15 +146,21 @@ class Model:
     q0: Array
     v0: Array
     force_rows: int
+    held_rows: int
     derived: Derived
     mass_entries: dict[tuple[int, int], Array]
     weight: Array
-    cables_full: AncfCables
-    cables_reduced: AncfCables
-    frictions: Frictions
+    elements: Elements
+    owners: tuple[tuple[str, ...], ...]
+    forces: Forces
+    start_angles: Array
+    drives: Drives
+    functions: Functions
     constraints: Constraints
     constraint_names: tuple[str, ...]
     marker_rows: Index
+    method: int
+    baumgarte: float
     shared_tiles: dict[int, Arrays] = field(default_factory=dict, compare=False, repr=False)
     """Arrays by tile width, where no number but the initial state depends on the lane."""
 
@@ -107,9 +168,11 @@ class Model:
     def varies(self) -> bool:
         """Whether lanes differ in more than their initial state."""
         d = self.derived
-        numbers = (self.mass_values, self.weight, self.cables_full.coefficients, self.cables_reduced.coefficients)
-        others = (self.frictions.coefficient, self.constraints.value, d.coefficient, d.constant)
-        return any(values.shape[1] > 1 for values in (*numbers, *others))
+        numbers = [self.mass_values, self.weight, self.forces.law, self.drives.coefficient, self.drives.factor]
+        numbers += [family.coefficients for family in self.elements]
+        numbers += [self.constraints.factor, self.constraints.constant, self.constraints.coefficient]
+        numbers += [d.coefficient, d.constant]
+        return any(values.shape[1] > 1 for values in numbers)
 
     @property
     def unknowns(self) -> int:
@@ -122,9 +185,14 @@ class Model:
         return self.unknowns + len(self.derived.start) - 1
 
     @property
-    def elements(self) -> int:
+    def flexible(self) -> int:
         """Number of flexible elements."""
-        return self.cables_full.size + self.cables_reduced.size
+        return sum(family.size for family in self.elements)
+
+    @property
+    def elastic(self) -> bool:
+        """Whether anything stores elastic energy."""
+        return self.flexible > 0 or bool(np.any(self.forces.law[0::7])) or bool(np.any(self.forces.table >= 0))
 
     @cached_property
     def mass_pattern(self) -> tuple[sparse.Pattern, dict[tuple[int, int], int]]:
@@ -135,6 +203,29 @@ class Model:
     def mass_values(self) -> Array:
         """The mass matrix in its pattern, (slots, lanes) or (slots, 1)."""
         return scatter(*self.mass_pattern, self.mass_entries)
+
+    @cached_property
+    def _saddle_pattern(self) -> tuple[sparse.Pattern, dict[tuple[int, int], int], Index, Index]:
+        return saddle.analyse(self.unknowns, self.mass_entries, self.constraints)
+
+    def _saddle(self, packed: Callable[[Array], Array]) -> Saddle:
+        """The sparse saddle point problem, where there are enough constraints to need it."""
+        count = self.constraints.size
+        none = np.zeros(0, dtype=np.int64)
+        if count <= saddle.SMALL:
+            return Saddle(0, 0, _EMPTY, none, np.zeros(0), none, none)
+        pattern, slots, place, entries = self._saddle_pattern
+        multiplier = np.zeros(len(place), dtype=np.int64)
+        multiplier[place[self.unknowns :]] = 1
+        return Saddle(
+            len(place),
+            pattern.slots,
+            pattern,
+            place,
+            packed(scatter(pattern, slots, self.mass_entries)),
+            entries,
+            multiplier,
+        )
 
     def tile(self, tile: Tile, lanes: slice) -> Arrays:
         """The arrays of one tile of lanes. Raises InputError if a mass matrix is singular."""
@@ -156,20 +247,43 @@ class Model:
         if not np.all((inverse > 0) & np.isfinite(inverse)):
             raise InputError(f"{self.scene.name}: the mass matrix is singular; some coordinate moves no mass")
         d, c = self.derived, self.constraints
+        e = self.elements
         return Arrays(
+            gate.home(),
+            Gates(0, 0, 0, 0, 0),
             self.unknowns,
             self.force_rows,
+            self.held_rows,
             self.rows,
+            self.method,
+            self.baumgarte,
+            self.scene.solver.project,
+            bool(np.any(self.constraints.drive >= 0)),
             Derived(d.start, d.source, packed(d.coefficient), packed(d.constant)),
             pattern,
             mass,
             factor,
+            np.sqrt(inverse),
             packed(self.weight),
-            self.cables_full._replace(coefficients=packed(self.cables_full.coefficients)),
-            self.cables_reduced._replace(coefficients=packed(self.cables_reduced.coefficients)),
-            self.frictions._replace(coefficient=packed(self.frictions.coefficient)),
-            c._replace(value=packed(c.value)),
+            Elements(
+                e.cables_full._replace(coefficients=packed(e.cables_full.coefficients)),
+                e.cables_reduced._replace(coefficients=packed(e.cables_reduced.coefficients)),
+                e.cubics._replace(coefficients=packed(e.cubics.coefficients), reference=packed(e.cubics.reference)),
+                e.quintics._replace(
+                    coefficients=packed(e.quintics.coefficients), reference=packed(e.quintics.reference)
+                ),
+                e.solids._replace(coefficients=packed(e.solids.coefficients)),
+                e.two_point_solids._replace(coefficients=packed(e.two_point_solids.coefficients)),
+            ),
+            self.forces._replace(law=packed(self.forces.law)),
+            self.drives._replace(coefficient=packed(self.drives.coefficient), factor=packed(self.drives.factor)),
+            self.functions,
+            c._replace(factor=packed(c.factor), constant=packed(c.constant), coefficient=packed(c.coefficient)),
+            self._saddle(packed),
         )
+
+
+_EMPTY, _ = sparse.analyse(0, [])
 
 
 def scatter(pattern: sparse.Pattern, slot: dict[tuple[int, int], int], entries: dict[tuple[int, int], Array]) -> Array:
@@ -179,171 +293,3 @@ def scatter(pattern: sparse.Pattern, slot: dict[tuple[int, int], int], entries: 
     for key, value in entries.items():
         values[slot[key]] = value
     return values
-
-
-def with_start(model: Model, scene: Scene, lanes: int) -> Model:
-    """The same model with the initial state of a scene that differs in nothing else."""
-    placement = place(scene)
-    q0, v0 = _real_pairs(placement.positions), _real_pairs(placement.velocities)
-    return replace(model, scene=scene, lanes=lanes, q0=q0, v0=v0)
-
-
-def build(scene: Scene, lanes: int = 1) -> Model:
-    """Assemble the model of a scene whose numbers may be arrays over lanes. Raises InputError."""
-    placement = place(scene)
-    rows = _Rows(len(placement.positions))
-    mass: dict[tuple[int, int], Number] = {}
-    weight = [0.0 + 0.0j] * len(placement.positions)
-    cables: dict[str, tuple[list[list[int]], list[Number]]] = {"full": ([], []), "reduced": ([], [])}
-    gravity = as_complex(scene.gravity)
-    for name, body in scene.bodies.items():
-        frame = placement.frames[name]
-        if isinstance(frame, RigidFrame):
-            c = as_complex(body.centre_of_mass)
-            inertia = body.inertia + body.mass * np.abs(c) ** 2
-            vectors = [frame.origin, frame.axis]
-            _add_mass(mass, vectors, [[body.mass, body.mass * c], [body.mass * np.conj(c), inertia]])
-            _add_load(weight, vectors, [body.mass * gravity, body.mass * np.conj(c) * gravity])
-        else:
-            assert isinstance(body, Rod)
-            length = np.asarray(frame.element_length)
-            matrix = ancf_cable.mass_matrix(body.mass_per_length, length)
-            load = [part * gravity for part in ancf_cable.weight(body.mass_per_length, length)]
-            numbers = ancf_cable.coefficients(length, body.axial_stiffness, body.bending_stiffness)
-            family = cables[body.quadrature]
-            for number in range(body.elements):
-                vectors = frame.element(number)
-                _add_mass(mass, vectors, matrix)
-                _add_load(weight, vectors, load)
-                family[0].append([row for vector in vectors for row in rows.of(vector)])
-                family[1].extend(numbers)
-    friction_rows, friction_values = [], []
-    for joint in scene.joints.values():
-        if np.any(joint.friction):
-            directions = [
-                fixed(1.0)
-                if side.body == GROUND
-                else placement.frames[side.body].direction(as_complex(scene.location(side)))
-                for side in (joint.first, joint.second)
-            ]
-            friction_rows.append([row for direction in directions for row in rows.of(direction)])
-            friction_values.append(joint.friction)
-    force_rows = rows.count
-    marker_rows = []
-    for marker in scene.markers.values():
-        frame, p = placement.frames[marker.body], as_complex(scene.location(marker))
-        marker_rows.append([*rows.of(frame.point(p)), *rows.of(frame.direction(p))])
-    terms = _constraint_terms(placement)
-    return Model(
-        scene=scene,
-        lanes=lanes,
-        q0=_real_pairs(placement.positions),
-        v0=_real_pairs(placement.velocities),
-        force_rows=force_rows,
-        derived=rows.derived(),
-        mass_entries=_real_entries(mass),
-        weight=_real_pairs(weight),
-        cables_full=_cable_family(cables["full"]),
-        cables_reduced=_cable_family(cables["reduced"]),
-        frictions=Frictions(len(friction_rows), _index(friction_rows).ravel(), _stack(friction_values)),
-        constraints=Constraints(
-            len(terms.names), _index(terms.start), _index(terms.first), _index(terms.second), _stack(terms.values)
-        ),
-        constraint_names=tuple(terms.names),
-        marker_rows=_index(marker_rows),
-    )
-
-
-def _constraint_terms(placement: Placement) -> Terms:
-    terms = Terms()
-    for name, vector in placement.unit_vectors:
-        terms.unit_length(name, vector)
-    for name, gap in placement.closures:
-        terms.vanish(name, gap)
-    return terms
-
-
-class _Rows:
-    """Hands out the rows of vectors: a pair's own, or derived ones."""
-
-    def __init__(self, pairs: int) -> None:
-        self.count = 2 * pairs
-        self._vectors: list[Affine] = []
-        self._known: dict[int, tuple[int, int]] = {}
-
-    def of(self, vector: Affine) -> tuple[int, int]:
-        """Rows of x and y of a vector."""
-        if vector.pair is not None:
-            return 2 * vector.pair, 2 * vector.pair + 1
-        if id(vector) not in self._known:
-            self._known[id(vector)] = (self.count, self.count + 1)
-            self._vectors.append(vector)
-            self.count += 2
-        return self._known[id(vector)]
-
-    def derived(self) -> Derived:
-        """All derived rows handed out so far."""
-        start, source = [0], []
-        coefficients: list[Number] = []
-        constants: list[Number] = []
-        for vector in self._vectors:
-            for part in (np.real, np.imag):
-                for pair, c in vector.terms.items():
-                    x, y = (np.real(c), -np.imag(c)) if part is np.real else (np.imag(c), np.real(c))
-                    for row, coefficient in ((2 * pair, x), (2 * pair + 1, y)):
-                        if np.any(coefficient):
-                            source.append(row)
-                            coefficients.append(coefficient)
-                start.append(len(source))
-                constants.append(part(vector.constant))
-        return Derived(_index(start), _index(source), _stack(coefficients), _stack(constants))
-
-
-def _add_mass(mass: dict[tuple[int, int], Number], vectors: list[Affine], matrix: list[list[Number]]) -> None:
-    """Add T^H M T for the body coordinates `vectors` = T q, T = 1/2 sum conj(v_a) M_ab v_b."""
-    for a, left in enumerate(vectors):
-        for b, right in enumerate(vectors):
-            for i, ci in left.terms.items():
-                for j, cj in right.terms.items():
-                    if i >= j:
-                        mass[i, j] = mass.get((i, j), 0.0) + np.conj(ci) * matrix[a][b] * cj
-
-
-def _add_load(load: list[Number], vectors: list[Affine], forces: list[Number]) -> None:
-    for vector, force in zip(vectors, forces, strict=True):
-        for pair, coefficient in vector.terms.items():
-            load[pair] = load[pair] + np.conj(coefficient) * force
-
-
-def _real_entries(mass: dict[tuple[int, int], Number]) -> dict[tuple[int, int], Array]:
-    """Real lower-triangle entries of a Hermitian matrix of pairs."""
-    entries: dict[tuple[int, int], Array] = {}
-    for (i, j), h in mass.items():
-        real, imag = np.real(h), np.imag(h)
-        entries[2 * i, 2 * j] = real
-        entries[2 * i + 1, 2 * j + 1] = real
-        if np.any(imag) and i != j:
-            entries[2 * i, 2 * j + 1] = -imag
-            entries[2 * i + 1, 2 * j] = imag
-    return entries
-
-
-def _real_pairs(pairs: Iterable[Number]) -> Array:
-    return _stack([part for value in pairs for part in (np.real(value), np.imag(value))])
-
-
-def _stack(values: list[Number]) -> Array:
-    """One row per value, (rows, lanes), or (rows, 1) if no value depends on the lane."""
-    lanes = max((np.size(value) for value in values), default=1)
-    out = np.empty((len(values), lanes))
-    for row, value in enumerate(values):
-        out[row] = value
-    return out
-
-
-def _index(values: list[int] | list[list[int]]) -> Index:
-    return np.array(values, dtype=np.int64)
-
-
-def _cable_family(family: tuple[list[list[int]], list[Number]]) -> AncfCables:
-    return AncfCables(len(family[0]), _index(family[0]).ravel(), _stack(family[1]))

@@ -1,278 +1,362 @@
-"""Scene -> coordinates: which pairs exist, how every body hangs on them, and where they start.
+"""Scene -> coordinates: which unknowns exist, how every body hangs on them, and where they start.
 
-Bodies are placed by walking the joints from the ground. A cable brings a pair for the position and
-one for the slope of every node; a rigid body (a point r and a unit vector e, |e| = 1) is expressed
-by the joint points it has, so that chains stay banded, and brings e only if it has fewer than two.
-A revolute joint is a shared position.
+Bodies are placed by walking the joints from the ground. A flexible rod brings the vectors of its nodes; a rigid body
+(a point r and a unit vector e, |e| = 1) is expressed by the joint points it has, so that chains stay banded, and
+brings e only if it has fewer than two and no joint keeps its angle to a body that has one. What sharing cannot
+express becomes a constraint: closed loops, lines that move, distances, driven motion, slopes of welded rods.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine, Number, fixed
-from shoal.mechanics.elements import ancf_cable
-from shoal.scene import GROUND, Attachment, Revolute, Rod, Scene
-
-
-def as_complex(vector: tuple[Number, Number]) -> Number:
-    """x + iy."""
-    return vector[0] + 1j * np.asarray(vector[1]) if np.ndim(vector[0]) or np.ndim(vector[1]) else complex(*vector)
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Initial position [m] and direction of a body's frame, velocity [m/s] and rate [rad/s]; complex, per lane."""
-
-    position: Number
-    direction: Number
-    velocity: Number
-    rate: Number
-
-    def point(self, p: Number) -> Number:
-        """Initial position of the material point p."""
-        return self.position + self.direction * p
-
-    def point_velocity(self, p: Number) -> Number:
-        """Initial velocity of the material point p."""
-        return self.velocity + 1j * self.rate * self.direction * p
-
-
-@dataclass(frozen=True)
-class RigidFrame:
-    """A rigid body: position r of its origin and unit vector e, both affine in the coordinates."""
-
-    origin: Affine
-    axis: Affine
-
-    def point(self, p: Number) -> Affine:
-        """The material point p = x + iy [m]."""
-        offset: Affine = self.axis * p
-        return self.origin + offset
-
-    def direction(self, p: Number) -> Affine:
-        """A vector along the body's x axis."""
-        return self.axis
-
-
-@dataclass(frozen=True)
-class CableFrame:
-    """A cable: positions and slopes of its equally spaced nodes."""
-
-    length: Number
-    positions: tuple[Affine, ...]
-    slopes: tuple[Affine, ...]
-
-    @property
-    def element_length(self) -> Number:
-        """Length of one element [m]."""
-        return self.length / (len(self.positions) - 1)
-
-    def element(self, number: int) -> list[Affine]:
-        """(r1, r1', r2, r2') of an element."""
-        at = number
-        return [self.positions[at], self.slopes[at], self.positions[at + 1], self.slopes[at + 1]]
-
-    def _shape(self, p: Number, shape: Any) -> Affine:
-        count = len(self.positions) - 1
-        place = np.real(p) / np.asarray(self.length) * count
-        number = min(int(np.min(place) + 1e-9), count - 1)
-        if np.max(place) > number + 1 + 1e-9:
-            raise InputError("markers: a marker must stay in one element of its cable while a length varies")
-        weights = shape(place - number, np.asarray(self.element_length))
-        total = fixed(0.0)
-        for weight, vector in zip(weights, self.element(number), strict=True):
-            total = total + vector * weight
-        return total
-
-    def point(self, p: Number) -> Affine:
-        """The material point at the arc length p [m]."""
-        node = self.node(p)
-        return self._shape(p, ancf_cable.position_shape) if node is None else self.positions[node]
-
-    def direction(self, p: Number) -> Affine:
-        """The slope r' at the arc length p [m]."""
-        node = self.node(p)
-        return self._shape(p, ancf_cable.slope_shape) if node is None else self.slopes[node]
-
-    def node(self, p: Number) -> int | None:
-        """The node at the arc length p, if there is one."""
-        place = np.real(p) / self.length * (len(self.positions) - 1)
-        nearest = int(np.rint(np.asarray(place).flat[0]))
-        return nearest if np.all(np.abs(place - nearest) < 1e-9) else None
-
-
-Frame = RigidFrame | CableFrame
+from shoal.mechanics.constraints import Drive, Terms
+from shoal.mechanics.elements import ELEMENTS
+from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame, is_on_axis
+from shoal.mechanics.groups import (
+    JointPoint,
+    Orientations,
+    is_stiff,
+    joint_points,
+    kept_turn,
+    moving,
+    orientations,
+    place_of,
+)
+from shoal.mechanics.pose import Pose, as_complex, unit
+from shoal.scene import (
+    GROUND,
+    Attachment,
+    Coupling,
+    Distance,
+    DrivenAngle,
+    Function,
+    PointMass,
+    Rod,
+    Scene,
+    Slider,
+    Weld,
+)
 
 
 @dataclass
 class Placement:
-    """All pairs with their initial values, and the frame of every body."""
+    """All unknowns with their initial values, the frame of every body, and the constraints."""
 
     positions: list[Number] = field(default_factory=list)
     velocities: list[Number] = field(default_factory=list)
     frames: dict[str, Frame] = field(default_factory=dict)
     poses: dict[str, Pose] = field(default_factory=dict)
-    unit_vectors: list[tuple[str, Affine]] = field(default_factory=list)
-    """Directions of rigid bodies, whose length the constraints keep at one."""
-    closures: list[tuple[str, Affine]] = field(default_factory=list)
-    """Differences that loops require to vanish where sharing cannot express them."""
+    drivers: dict[str, Affine] = field(default_factory=dict)
+    """Moving points of the ground: pairs of unknowns whose motion is prescribed."""
+    terms: Terms = field(default_factory=Terms)
 
     def new_pair(self, position: Number, velocity: Number) -> Affine:
-        """Another pair of coordinates, with its initial value and rate."""
-        self.positions.append(position)
-        self.velocities.append(velocity)
-        return Affine({len(self.positions) - 1: 1.0})
+        """Two more unknowns, the x and y of a vector, with its initial value and rate."""
+        first = len(self.positions)
+        for part in (np.real, np.imag):
+            self.positions.append(part(position))
+            self.velocities.append(part(velocity))
+        return Affine({first: 1.0 + 0.0j, first + 1: 1.0j})
 
+    def new_along(self, base: Number, direction: Number, position: Number, velocity: Number) -> Affine:
+        """One more unknown, the way along a fixed direction from `base`."""
+        self.positions.append(np.real(np.conj(direction) * (position - base)))
+        self.velocities.append(np.real(np.conj(direction) * velocity))
+        return Affine({len(self.positions) - 1: direction}, base)
 
-@dataclass
-class _JointPoint:
-    """Places that revolute joints hold together; `where` is known once a body that has it is placed."""
+    def start_of(self, where: Affine) -> tuple[Number, Number]:
+        """Initial position and velocity of a vector."""
+        position, velocity = where.constant, 0.0
+        for unknown, coefficient in where.terms.items():
+            position = position + coefficient * self.positions[unknown]
+            velocity = velocity + coefficient * self.velocities[unknown]
+        return position, velocity
 
-    name: str
-    places: list[tuple[str, Number]]
-    where: Affine | None = None
+    def point(self, scene: Scene, at: Attachment) -> Affine:
+        """The place of an attachment."""
+        owner, p = place_of(scene, at)
+        if owner == GROUND:
+            return fixed(p)
+        return self.drivers[owner] if at.body == GROUND else self.frames[owner].point(p)
+
+    def direction(self, scene: Scene, at: Attachment) -> Affine:
+        """The direction of the body at an attachment; that of the ground is +X."""
+        if at.body == GROUND:
+            return fixed(1.0 + 0.0j)
+        return self.frames[at.body].direction(as_complex(scene.location(at)))
 
 
 def place(scene: Scene) -> Placement:
-    """Walk the joints from the ground and give every body its coordinates and initial state."""
+    """Give every body its coordinates and initial state, and state what they must satisfy. Raises InputError."""
     result = Placement()
-    joint_points = _joint_points(scene)
-    waiting = dict(scene.bodies)
+    points, turning = joint_points(scene), orientations(scene)
+    for name, path in scene.ground_points.items():
+        _place_driver(name, path.x, path.y, points, result)
+    waiting = list(scene.bodies)
     while waiting:
-        name = next(name for name in waiting if any(_touches(p, name) and p.where is not None for p in joint_points))
-        del waiting[name]
-        _place_body(scene, name, [p for p in joint_points if _touches(p, name)], result)
+        name = _next(scene, waiting, points, result)
+        waiting.remove(name)
+        mine = [point for point in points if point.touches(name)]
+        pose = _pose(scene, name, mine, turning, result)
+        result.poses[name] = pose
+        body = scene.bodies[name]
+        if isinstance(body, PointMass):
+            _place_point(name, mine, pose, result)
+        elif isinstance(body, Rod) and body.element != "rigid":
+            _place_beam(scene, name, body, mine, pose, result)
+        else:
+            _place_rigid(name, mine, pose, turning, result)
+    for point in points:
+        if point.line and not point.on_line and point.where is not None:
+            joint, base, direction = point.line
+            result.terms.cross(joint, fixed(direction), point.where - fixed(base))
+    _add_joints(scene, result)
     return result
 
 
-def _touches(point: _JointPoint, body: str) -> bool:
-    return any(name == body for name, _ in point.places)
+def _place_driver(name: str, x: Function, y: Function, points: list[JointPoint], result: Placement) -> None:
+    """A moving point of the ground is a pair of unknowns that constraints drive."""
+    begin, rate = _value_and_rate(x), _value_and_rate(y)
+    pair = result.new_pair(begin[0] + 1j * rate[0], begin[1] + 1j * rate[1])
+    result.drivers[moving(name)] = pair
+    drives = ((lambda t: -x(t), x.knots), (lambda t: -y(t), y.knots))
+    result.terms.vanish(f"{GROUND}.{name}", pair, drives)
+    for point in points:
+        if point.touches(moving(name)):
+            if point.where is not None:
+                raise InputError(f"joints.{point.name}: joins the moving point {name} to a fixed one")
+            point.where = pair
 
 
-def _joint_points(scene: Scene) -> list[_JointPoint]:
-    """Group the places that revolute joints share, transitively; grounded groups are known from the start."""
-    groups: list[_JointPoint] = []
-    for name, joint in scene.joints.items():
-        if not isinstance(joint, Revolute):
+def _value_and_rate(f: Function) -> tuple[float, float]:
+    h = 1e-6
+    before, now, after = (float(v) for v in f(np.array([0.0, h, 2 * h])))
+    return before, (4 * now - 3 * before - after) / (2 * h)
+
+
+def _next(scene: Scene, waiting: list[str], points: list[JointPoint], result: Placement) -> str:
+    """The next body whose start is known: by a joint point, by its own field, by a slider's line."""
+    known: list[Callable[[str], bool]] = [
+        lambda name: any(point.touches(name) and point.where is not None for point in points),
+        lambda name: scene.start(name).position is not None,
+        lambda name: any(point.touches(name) and point.line for point in points),
+        lambda name: _rail(scene, name, result) is not None,
+    ]
+    for is_known in known:
+        for name in waiting:
+            if is_known(name):
+                return name
+    raise InputError(f"initial.{waiting[0]}.position: say where {waiting[0]} starts; no joint point tells it")
+
+
+def _rail(scene: Scene, name: str, result: Placement) -> tuple[Number, Number, Number] | None:
+    """Initial base point and velocity of a slider that the body is on, and the body's place on it."""
+    for joint in scene.joints.values():
+        if not isinstance(joint, Slider) or joint.second.body != name:
             continue
-        places = [_place_of(scene, joint.first), _place_of(scene, joint.second)]
-        merged = [g for g in groups if any(_same(p, q) for p in g.places for q in places)]
-        groups = [g for g in groups if g not in merged]
-        for group in merged:
-            places += [p for p in group.places if not any(_same(p, q) for q in places)]
-        groups.append(_JointPoint(name, places))
-    for group in groups:
-        bodies = [body for body, _ in group.places]
-        for body in bodies:
-            if bodies.count(body) > 1:
-                raise InputError(f"joints.{group.name}: two places of {body} cannot be joined into one point")
-        grounded = [position for body, position in group.places if body == GROUND]
-        if grounded:
-            group.where = fixed(grounded[0])
-    return groups
+        if joint.first.body == GROUND or joint.first.body in result.frames:
+            position, velocity = result.start_of(result.point(scene, joint.first))
+            return position, velocity, as_complex(scene.location(joint.second))
+    return None
 
 
-def _place_of(scene: Scene, attachment: Attachment) -> tuple[str, Number]:
-    return attachment.body, as_complex(scene.location(attachment))
-
-
-def _same(one: tuple[str, Number], other: tuple[str, Number]) -> bool:
-    return one[0] == other[0] and bool(np.all(np.abs(one[1] - other[1]) < 1e-12))
-
-
-def _place_body(scene: Scene, name: str, points: list[_JointPoint], result: Placement) -> None:
-    body = scene.bodies[name]
-    local = {id(point): next(p for owner, p in point.places if owner == name) for point in points}
-    known = [point for point in points if point.where is not None]
-    open_points = [point for point in points if point.where is None]
-    pose = _initial_pose(scene, name, known[0], local[id(known[0])], result)
-    result.poses[name] = pose
-    if isinstance(body, Rod) and body.element != "rigid":
-        frame: Frame = _cable(name, body, points, local, pose, result)
-    else:
-        anchors = [*known, *open_points][:2]
-        for point in anchors:
-            if point.where is None:
-                p = local[id(point)]
-                point.where = result.new_pair(pose.point(p), pose.point_velocity(p))
-        frame = rigid = _rigid(anchors, local, pose, result)
-        result.unit_vectors.append((name, rigid.axis))
-        for point in known[2:]:
-            assert point.where is not None
-            result.closures.append((point.name, point.where - rigid.point(local[id(point)])))
-    result.frames[name] = frame
-    for point in open_points:
-        point.where = point.where or frame.point(local[id(point)])
-
-
-def _initial_pose(scene: Scene, name: str, anchor: _JointPoint, p: Number, result: Placement) -> Pose:
+def _pose(scene: Scene, name: str, mine: list[JointPoint], turning: Orientations, result: Placement) -> Pose:
     start = scene.start(name)
-    direction = np.exp(1j * np.asarray(start.angle)) if np.ndim(start.angle) else complex(np.exp(1j * start.angle))
-    assert anchor.where is not None
-    position, velocity = _start_of(anchor.where, result)
-    return Pose(position - direction * p, direction, velocity - 1j * start.rate * direction * p, start.rate)
-
-
-def _rigid(anchors: list[_JointPoint], local: dict[int, Number], pose: Pose, result: Placement) -> RigidFrame:
-    first = anchors[0]
-    p = local[id(first)]
-    assert first.where is not None
-    if len(anchors) == 2:
-        assert anchors[1].where is not None
-        axis = (anchors[1].where - first.where) * (1.0 / (local[id(anchors[1])] - p))
+    root, relative = turning.root(name)
+    stated = [body for body in scene.bodies if turning.root(body)[0] == root and body in scene.initial]
+    leader = stated[0] if stated and name not in scene.initial else name
+    rate = 0.0 if root == GROUND else scene.start(leader).rate
+    if root == GROUND:
+        direction = relative
+    elif leader == name:
+        direction = unit(start.angle)
     else:
-        axis = result.new_pair(pose.direction, 1j * pose.rate * pose.direction)
-    return RigidFrame(first.where + axis * (-p), axis)
+        direction = unit(scene.start(leader).angle) * np.conj(turning.root(leader)[1]) * relative
+    known = [point for point in mine if point.where is not None]
+    if known:
+        assert known[0].where is not None
+        position, velocity = result.start_of(known[0].where)
+        p = known[0].local(name)
+    elif start.position is not None:
+        position, velocity, p = as_complex(start.position), as_complex(start.velocity), 0.0j
+    elif lines := [point for point in mine if point.line]:
+        assert lines[0].line is not None
+        position, velocity, p = lines[0].line[1], 0.0j, lines[0].local(name)
+    else:
+        rail = _rail(scene, name, result)
+        assert rail is not None
+        position, velocity, p = rail
+    return Pose(position - direction * p, direction, velocity - 1j * rate * direction * p, rate)
 
 
-def _check_fit(name: str, rod: Rod, planned: Number, point: _JointPoint, result: Placement) -> None:
-    """A cable starts straight: raises InputError if a joint holds it somewhere else."""
+def _make(point: JointPoint, position: Number, velocity: Number, result: Placement) -> Affine:
+    """The coordinates of a joint point that has none yet."""
+    if point.line is None:
+        point.where = result.new_pair(position, velocity)
+    else:
+        _, base, direction = point.line
+        point.where, point.on_line = result.new_along(base, direction, position, velocity), True
+    return point.where
+
+
+def _place_point(name: str, mine: list[JointPoint], pose: Pose, result: Placement) -> None:
+    for point in mine[:1]:
+        point.where = point.where or _make(point, pose.position, pose.velocity, result)
+    origin = mine[0].where if mine else result.new_pair(pose.position, pose.velocity)
+    assert origin is not None
+    result.frames[name] = PointFrame(name, origin)
+
+
+def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, turning: Orientations, result: Placement) -> None:
+    root, relative = turning.root(name)
+    ranked = sorted(mine, key=lambda point: (point.where is None, point.line is None))
+    anchors = ranked[: 1 if root in turning.axis else 2]
+    for point in anchors:
+        if point.where is None:
+            p = point.local(name)
+            _make(point, pose.point(p), pose.point_velocity(p), result)
+    wheres = [(point.local(name), point.where) for point in anchors if point.where is not None]
+    if not wheres:
+        wheres = [(0.0j, result.new_pair(pose.position, pose.velocity))]
+    (p, where), *second = wheres
+    if root not in turning.axis:
+        if second:
+            axis = (second[0][1] - where) * (1.0 / (second[0][0] - p))
+        else:
+            axis = result.new_pair(pose.direction, 1j * pose.rate * pose.direction)
+        turning.axis[root] = axis * np.conj(relative)
+        result.terms.dot(name, axis, axis, -1.0)
+    frame = RigidFrame(where + turning.axis[root] * (-relative * p), turning.axis[root] * relative)
+    result.frames[name] = frame
+    for point in ranked:
+        if point in anchors:
+            continue
+        here = frame.point(point.local(name))
+        if point.where is None:
+            point.where = here
+        else:
+            result.terms.vanish(point.name, point.where - here)
+
+
+def _place_beam(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: Pose, result: Placement) -> None:
+    element = ELEMENTS[rod.element]
+    shared: dict[int, JointPoint] = {}
+    inner: list[JointPoint] = []
+    for point in mine:
+        p = point.local(name)
+        if point.where is not None:
+            _check_fit(name, rod, pose.point(rod.axis(np.real(p))), point, result)
+        place = np.real(p) / rod.length * rod.elements
+        node = int(np.rint(np.asarray(place).flat[0]))
+        if np.any(np.abs(place - node) > 1e-9) or not is_on_axis(p):
+            inner.append(point)
+        else:
+            shared[node] = point
+    nodes = []
+    for node in range(rod.elements + 1):
+        s = rod.length * node / rod.elements
+        reference = element.nodal_vectors(rod, s)
+        vectors = [(pose.direction * r, 1j * pose.rate * pose.direction * r) for r in reference]
+        r, v = pose.point(rod.axis(s)), pose.point_velocity(rod.axis(s))
+        joint = shared.get(node)
+        position = result.new_pair(r, v) if joint is None else joint.where or _make(joint, r, v, result)
+        clamp = _clamp(scene, name, rod, node)
+        slopes = []
+        for number, (value, rate) in enumerate(vectors):
+            if clamp is not None and number == element.clamped:
+                slopes.append(result.new_along(0.0j, clamp * element.clamp_turn, value, 0.0j))
+            else:
+                slopes.append(result.new_pair(value, rate))
+        nodes.append((position, *slopes))
+    frame = BeamFrame(name, element, rod.length, tuple(nodes))
+    result.frames[name] = frame
+    for point in inner:
+        here = frame.point(point.local(name))
+        if point.where is None:
+            point.where = here
+        else:
+            result.terms.vanish(point.name, point.where - here)
+
+
+def _clamp(scene: Scene, name: str, rod: Rod, node: int) -> Number | None:
+    """Direction in which a weld to the ground holds the rod at a node."""
+    for joint in scene.joints.values():
+        if not isinstance(joint, Weld) or {joint.first.body, joint.second.body} != {GROUND, name}:
+            continue
+        side = joint.second if joint.second.body == name else joint.first
+        if np.all(np.abs(scene.location(side)[0] - rod.length * node / rod.elements) < 1e-9 * rod.length):
+            turn = kept_turn(scene, joint)
+            return turn if joint.second.body == name else np.conj(turn)
+    return None
+
+
+def _check_fit(name: str, rod: Rod, planned: Number, point: JointPoint, result: Placement) -> None:
+    """A flexible rod starts in its reference shape: raises InputError if a joint holds it somewhere else."""
     assert point.where is not None
-    held, _ = _start_of(point.where, result)
+    held, _ = result.start_of(point.where)
     if np.any(np.abs(held - planned) > 1e-6 * rod.length):
         raise InputError(
             f"initial.{name}.angle: joint {point.name} holds {name} {np.max(np.abs(held - planned)):.3g} m away from "
-            f"where the straight rod would start; a cable starts straight and unstrained"
+            f"where the unstrained rod would start; a flexible rod starts unstrained"
         )
 
 
-def _start_of(where: Affine, result: Placement) -> tuple[Number, Number]:
-    """Initial position and velocity of a vector."""
-    position, velocity = where.constant, 0.0
-    for pair, coefficient in where.terms.items():
-        position = position + coefficient * result.positions[pair]
-        velocity = velocity + coefficient * result.velocities[pair]
-    return position, velocity
+def _add_joints(scene: Scene, result: Placement) -> None:
+    """The joints that sharing could not express."""
+    terms = result.terms
+    for name, joint in scene.joints.items():
+        if isinstance(joint, Coupling):
+            total = fixed(0.0j)
+            for term in joint.terms:
+                axis = 1.0 if term.axis == "x" else -1j
+                total = total + result.point(scene, term.at) * (term.factor * axis)
+            terms.dot(name, fixed(1.0), total, 0.0, _minus(joint.value))
+            continue
+        first, second = joint.first, joint.second
+        if isinstance(joint, Slider) and (first.body != GROUND or isinstance(first.point, str)):
+            line = result.direction(scene, first) * unit(joint.direction)
+            terms.cross(name, line, result.point(scene, second) - result.point(scene, first))
+        elif isinstance(joint, Distance):
+            gap = result.point(scene, second) - result.point(scene, first)
+            if joint.length is None:
+                terms.dot(name, gap, gap, -(np.abs(result.start_of(gap)[0]) ** 2))
+            else:
+                terms.dot(name, gap, gap, 0.0, _minus_square(joint.length))
+        elif isinstance(joint, DrivenAngle):
+            if not (is_stiff(scene, first.body) and is_stiff(scene, second.body)):
+                raise InputError(f"joints.{name}: drives the angle of a flexible rod; weld a rigid body to it instead")
+            a, b = result.direction(scene, first), result.direction(scene, second)
+            terms.dot(name, a, b, 0.0, (_composed(np.cos, joint.angle), joint.angle.knots))
+            terms.cross(name, a, b, 0.0, (_composed(np.sin, joint.angle), joint.angle.knots))
+        turn = kept_turn(scene, joint)
+        flexible = [side for side in (first, second) if not is_stiff(scene, side.body)]
+        if turn is not None and flexible and not (isinstance(joint, Weld) and _is_clamp(scene, joint, result)):
+            terms.cross(name, result.direction(scene, first) * turn, result.direction(scene, second))
 
 
-def _cable(
-    name: str, rod: Rod, points: list[_JointPoint], local: dict[int, Number], pose: Pose, result: Placement
-) -> CableFrame:
-    positions: list[Affine] = []
-    slopes: list[Affine] = []
-    shared = {}
-    for point in points:
-        if point.where is not None:
-            _check_fit(name, rod, pose.point(local[id(point)]), point, result)
-        place = np.real(local[id(point)]) / rod.length * rod.elements
-        node = int(np.rint(np.asarray(place).flat[0]))
-        if np.any(np.abs(place - node) > 1e-9):
-            raise InputError(
-                f"joints.{point.name}: a cable is joined at a node; bodies.{name} has nodes every "
-                f"{rod.length / rod.elements:g} m (change bodies.{name}.elements or the point)"
-            )
-        shared[node] = point
-    for node in range(rod.elements + 1):
-        p = rod.length * node / rod.elements
-        joint = shared.get(node)
-        if joint is not None and joint.where is not None:
-            positions.append(joint.where)
-        else:
-            positions.append(result.new_pair(pose.point(p), pose.point_velocity(p)))
-        slopes.append(result.new_pair(pose.direction, 1j * pose.rate * pose.direction))
-    return CableFrame(rod.length, tuple(positions), tuple(slopes))
+def _is_clamp(scene: Scene, joint: Weld, result: Placement) -> bool:
+    """Whether the weld is to the ground at a node, where the slope has one unknown only."""
+    sides = {side.body: side for side in (joint.first, joint.second)}
+    if GROUND not in sides:
+        return False
+    side = next(side for body, side in sides.items() if body != GROUND)
+    frame = result.frames[side.body]
+    return isinstance(frame, BeamFrame) and frame.node(as_complex(scene.location(side))) is not None
+
+
+def _minus(f: Function) -> Drive:
+    return (lambda t: -f(t)), f.knots
+
+
+def _minus_square(f: Function) -> Drive:
+    return (lambda t: -(f(t) ** 2)), f.knots
+
+
+def _composed(outer: Callable[[Number], Number], f: Function) -> Callable[[Number], Number]:
+    return lambda t: -outer(f(t))

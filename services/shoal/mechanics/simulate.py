@@ -12,13 +12,17 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import stability
-from shoal.mechanics.dynamics import work_space
-from shoal.mechanics.integrators import choose, facts
-from shoal.mechanics.march import march
-from shoal.mechanics.model import Model, build, with_start
+from shoal.mechanics import forces, stability, swarm_motion
+from shoal.mechanics.build import build, with_start
+from shoal.mechanics.dynamics import derived_rows, work_space
+from shoal.mechanics.groups import start_angle
+from shoal.mechanics.integrators import Choice, choose, facts, pick
+from shoal.mechanics.march import Record, march
+from shoal.mechanics.model import Model
+from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import Array, pack, tiles, unpack
-from shoal.scene import GROUND, Rod, Scene
+from shoal.scene import GROUND, Attachment, Revolute, Scene, Weld
+from shoal.scene.joints import places
 from shoal.trajectory import Status, Trajectory
 
 REACH_MARGIN = 1.1
@@ -26,28 +30,47 @@ DRIFT_TOLERANCE = 1e-6
 
 
 def simulate(
-    scene: Scene, times: Array, values: Mapping[str, Array] | None = None, *, threads: int | None = None
+    scene: Scene,
+    times: Array,
+    values: Mapping[str, Array] | None = None,
+    *,
+    threads: int | None = None,
+    search: swarm_motion.Search | None = None,
 ) -> Trajectory:
     """Motion of a scene, or of one scene per lane, sampled at `times` [s].
 
-    values: path in the scene -> one number per lane. Lanes are computed in tiles, tiles on threads.
+    values: path in the scene -> one number per lane. Lanes are computed in tiles, tiles on threads. search: how a
+    swarm seeks the accelerations, where `solver.acceleration` names one (default: as the paper does).
     Raises InputError if the scene cannot be modelled or its step is beyond the stability limit.
     """
     begin = time.perf_counter()
     lanes = len(next(iter(values.values()))) if values else 1
-    model, limit = _model_and_limit(scene, values or {}, lanes)
+    asked, evidence = scene.solver, dict[str, Any]()
+    if swarm_motion.asked_for(scene):
+        scene, search = swarm_motion.suited(scene, lanes), search or swarm_motion.Search()
+    else:
+        search = None
+    model, choice = _model_and_choice(scene, values or {}, lanes, float(times[-1]))
     if times[-1] > 0:
-        _check_step(scene, limit)
+        _check_step(scene, choice)
     step = scene.solver.step
-    steps = int(np.ceil(times[-1] / step - 1e-9))
+    steps = scene.solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / step - 1e-9))
     tile, parts = tiles(lanes)
 
     def run(part: slice) -> tuple[Array, ...]:
         arrays = model.tile(tile, part)
         room = work_space(tile, arrays)
+        arrays = ready(tile, arrays, room)
         room.z[: model.unknowns * len(tile)] = pack(model.q0, part, tile)
         room.zdot[: model.unknowns * len(tile)] = pack(model.v0, part, tile)
-        scheme = choose(scene.solver, model, tile, part)
+        if model.forces.size:
+            derived_rows(tile, arrays, room)
+            room.memory[:] = forces.initial_memory(tile, arrays.forces, room.z, pack(model.start_angles, part, tile))
+        if search is not None:
+            record, found = swarm_motion.march(search, asked, arrays, room, steps, times, model.marker_rows)
+            evidence.update(found)
+            return tuple(unpack(field, part, tile) for field in record)
+        scheme = choose(scene.solver, model, tile, part, choice.name)
         record = march(
             tile, scheme, arrays, room, step, steps, times, model.marker_rows.ravel(), scene.solver.rank_tolerance
         )
@@ -55,12 +78,12 @@ def simulate(
 
     workers = min(threads or os.cpu_count() or 1, len(parts))
     results = [run(part) for part in parts] if workers == 1 else list(_pool(workers).map(run, parts))
-    samples, error, scale, drift, correction = (np.concatenate(field, axis=1) for field in zip(*results, strict=True))
-    samples = samples.reshape(len(times), len(scene.markers), 4, lanes)
+    record = Record(*(np.concatenate(field, axis=1) for field in zip(*results, strict=True)))
+    samples = record.samples.reshape(len(times), len(scene.markers), 5, lanes)
     points = samples[:, :, :2]
     angles = _angles(scene, model, samples[:, :, 2:])
-    energy_drift = _relative(error[0], scale[0], scene, model)
-    status, message = _verdict(scene, model, points, energy_drift, drift[0])
+    energy_drift = _relative(record.energy_error[0], record.energy_scale[0], scene, model)
+    status, message = _verdict(scene, model, record, choice, points, energy_drift)
     return Trajectory(
         engine="gauss",
         times=times,
@@ -69,11 +92,11 @@ def simulate(
         angles=angles,
         status=status,
         energy_drift=energy_drift,
-        constraint_drift=drift[0],
-        steps=steps,
+        constraint_drift=record.drift[0],
+        steps=int(np.max(record.steps)),
         wall_s=time.perf_counter() - begin,
         message=message,
-        model=_facts(scene, model, limit, float(np.max(correction))),
+        model=_facts(scene, model, choice, record) | evidence,
     )
 
 
@@ -83,42 +106,41 @@ def _pool(workers: int) -> ThreadPoolExecutor:
 
 
 @lru_cache(maxsize=64)
-def _prepared(scene_json: str) -> tuple[Model, float]:
-    """Model and stability limit of a scene; repeated runs, and lanes that only start differently, share them."""
+def _prepared(scene_json: str, horizon: float) -> tuple[Model, Choice]:
+    """Model and integrator of a scene; repeated runs, and lanes that only start differently, share them."""
     scene = Scene.model_validate_json(scene_json)
-    model = build(scene)
-    return model, _limit(scene, model)
+    model = build(scene, horizon=horizon)
+    return model, pick(scene.solver, model, stability.step_limit)
 
 
-def _model_and_limit(scene: Scene, values: Mapping[str, Array], lanes: int) -> tuple[Model, float]:
-    """The model of all lanes, and the smallest stability limit [s] at the scene's own start."""
+def _model_and_choice(scene: Scene, values: Mapping[str, Array], lanes: int, end: float) -> tuple[Model, Choice]:
+    """The model of all lanes, and the integrator, whose stability limit is the smallest at the scene's own start."""
+    horizon = max(end, scene.solver.duration)
     if all(path.startswith("initial.") for path in values):
-        model, limit = _prepared(scene.model_dump_json())
-        return (with_start(model, scene.with_lanes(values), lanes) if values else model), limit
-    model = build(scene.with_lanes(values), lanes)
-    return model, _limit(scene, model)
+        model, choice = _prepared(scene.model_dump_json(), horizon)
+        return (with_start(model, scene.with_lanes(values), lanes) if values else model), choice
+    model = build(scene.with_lanes(values), lanes, horizon)
+    return model, pick(scene.solver, model, stability.step_limit)
 
 
-def _limit(scene: Scene, model: Model) -> float:
-    return stability.step_limit(model, facts(scene.solver.integrator))
-
-
-def _check_step(scene: Scene, limit: float) -> None:
+def _check_step(scene: Scene, choice: Choice) -> None:
     """Raises InputError if the step is beyond the stability limit."""
-    if scene.solver.step > limit:
+    if scene.solver.step > choice.limit:
         raise InputError(
-            f"solver.step: {scene.solver.step:g} s is beyond the stability limit {limit:.3e} s of "
-            f"{scene.solver.integrator} for this scene; use a smaller step or solver.integrator=generalized-alpha"
+            f"solver.step: {scene.solver.step:g} s is beyond the stability limit {choice.limit:.3e} s of "
+            f"{choice.name} for this scene; use a smaller step or solver.integrator=generalized-alpha"
         )
 
 
 def _angles(scene: Scene, model: Model, directions: Array) -> Array:
-    """Angles [rad] of the marker directions (samples, markers, 2, lanes), continuous from the initial angles on."""
-    raw = np.arctan2(directions[:, :, 1], directions[:, :, 0])
-    first = np.empty((1, *raw.shape[1:]))
+    """Angles [rad] of the markers, continuous from the initial ones on; directions: (samples, markers, 3, lanes)."""
+    angle = np.arctan2(directions[:, :, 1], directions[:, :, 0])
+    near = directions[:, :, 2]
+    angle += 2 * np.pi * np.rint((near - angle) / (2 * np.pi))
     for index, marker in enumerate(scene.markers.values()):
-        first[0, index] = model.scene.start(marker.body).angle
-    return np.unwrap(np.concatenate([first, raw]), axis=0)[1:]
+        start = start_angle(model.scene, marker)
+        angle[:, index] += 2 * np.pi * np.rint((start - np.angle(np.exp(1j * np.asarray(start)))) / (2 * np.pi))
+    return angle
 
 
 def _relative(error: Array, scale: Array, scene: Scene, model: Model) -> Array:
@@ -127,22 +149,33 @@ def _relative(error: Array, scale: Array, scene: Scene, model: Model) -> Array:
     A machine that never moves has none: then its weight lifted by its reach and the energy of stretching its
     rods set the scale, as far as round-off goes.
     """
-    stiff = max(np.max(c.coefficients[1::3], initial=0.0) for c in (model.cables_full, model.cables_reduced))
-    floor = 1e-9 * float(np.max(np.abs(model.weight))) * _reach(scene) + 1e-12 * float(stiff)
+    stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
+    floor = 1e-9 * float(np.max(np.abs(model.weight))) * _size(scene) + 1e-12 * float(stiff)
     relative: Array = error / np.maximum(scale, floor + 1e-300)
     return relative
 
 
 def _verdict(
-    scene: Scene, model: Model, points: Array, energy_drift: Array, drift: Array
+    scene: Scene, model: Model, record: Record, choice: Choice, points: Array, energy_drift: Array
 ) -> tuple[tuple[Status, ...], str]:
     """Status of every lane, and the reason for the first that is not ok."""
     reach = _reach(scene) * REACH_MARGIN
     farthest = np.max(_distance_to_ground(scene, points), axis=(0, 1))
+    adaptive = facts(choice.name).adaptive
+    drift, steps, reached = record.drift[0], record.steps[0], record.reached[0]
     statuses, message = [], ""
     for lane in range(model.lanes):
-        if not (np.isfinite(farthest[lane]) and np.isfinite(energy_drift[lane])):
-            status, reason = Status.DIVERGED, "the motion is not finite; use a smaller step"
+        finite = np.isfinite(farthest[lane]) and np.isfinite(energy_drift[lane])
+        if not finite and np.isfinite(energy_drift[lane]) and adaptive and steps[lane] >= scene.solver.max_steps:
+            status = Status.FAILED
+            reason = (
+                f"{steps[lane]:.0f} steps of {choice.name} led to {reached[lane]:.4g} s only; "
+                "raise solver.max_steps or solver.relative_tolerance"
+            )
+        elif not finite:
+            status = Status.DIVERGED
+            advice = "no step is short enough for it" if adaptive else "use a smaller step"
+            reason = f"the motion is not finite; {advice}"
         elif farthest[lane] > reach:
             status = Status.OUT_OF_REACH
             reason = f"a marker is {farthest[lane]:.3g} m away, the reach is {reach:.3g} m"
@@ -160,35 +193,59 @@ def _verdict(
 
 def _distance_to_ground(scene: Scene, points: Array) -> Array:
     """Distance of every marker to the nearest anchor on the ground [m], (samples, markers, lanes)."""
-    sides = (side for joint in scene.joints.values() for side in (joint.first, joint.second))
+    sides = (side for joint in scene.joints.values() if isinstance(joint, _TETHERS) for side in _ends(joint))
     anchors = [scene.location(side) for side in sides if side.body == GROUND]
-    distances = [np.hypot(points[:, :, 0] - x, points[:, :, 1] - y) for x, y in anchors]
+    distances = [np.hypot(points[:, :, 0] - x, points[:, :, 1] - y) for x, y in anchors or [(0.0, 0.0)]]
     return np.asarray(np.min(distances, axis=0))
 
 
+_TETHERS = Revolute | Weld
+
+
+def _ends(joint: Revolute | Weld) -> tuple[Attachment, Attachment]:
+    return joint.first, joint.second
+
+
 def _reach(scene: Scene) -> float:
-    """No point can be farther from an anchor of its machine than all bodies stretched out in a line [m]."""
-    sides = [side for joint in scene.joints.values() for side in (joint.first, joint.second)]
-    places = [*sides, *scene.markers.values()]
+    """No point can be farther from an anchor of its machine than all bodies stretched out in a line [m].
+
+    Infinite for machines with bodies that only sliders, springs or nothing at all hold.
+    """
+    held, frontier = {GROUND}, [GROUND]
+    while frontier:
+        here = frontier.pop()
+        for joint in scene.joints.values():
+            if isinstance(joint, _TETHERS) and here in (ends := {side.body for side in _ends(joint)}):
+                frontier += (new := ends - held)
+                held |= new
+    if scene.ground_points or not held >= set(scene.bodies):
+        return float(np.inf)
+    return _size(scene)
+
+
+def _size(scene: Scene) -> float:
+    """All bodies stretched out in a line [m]."""
+    sides = [side for joint in scene.joints.values() for side in places(joint)]
+    attached = [*sides, *scene.markers.values()]
     total = 0.0
     for name, body in scene.bodies.items():
-        used = [scene.location(place) for place in places if place.body == name]
-        if isinstance(body, Rod):
-            used += [body.points["start"], body.points["end"]]
+        used = [*(scene.location(place) for place in attached if place.body == name), *body.points.values()]
         total += max(np.hypot(a[0] - b[0], a[1] - b[1]) for a in used for b in used)
     return float(total)
 
 
-def _facts(scene: Scene, model: Model, limit: float, correction: float) -> dict[str, Any]:
+def _facts(scene: Scene, model: Model, choice: Choice, record: Record) -> dict[str, Any]:
     """What was computed, for the record."""
     return {
         "unknowns": model.unknowns,
-        "elements": model.elements,
+        "elements": model.flexible,
         "constraints": len(model.constraint_names),
-        "integrator": scene.solver.integrator,
+        "integrator": choice.name,
+        "integrator_reason": choice.reason,
         "step": scene.solver.step,
-        "stability_limit": limit if np.isfinite(limit) else None,
-        "initial_correction": correction,
+        "stability_limit": choice.limit if np.isfinite(choice.limit) else None,
+        "evaluations": int(np.max(record.evaluations)),
+        "initial_correction": float(np.max(record.correction)),
         "bodies": {
             name: {"element": body.element, **({"elements": body.elements} if body.element != "rigid" else {})}
             for name, body in scene.bodies.items()

@@ -130,6 +130,27 @@ def solve(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) ->
         subtract_dot(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
 
 
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def forward(tile: Tile, pattern: Pattern, factors: Array, root: Array, x: Array, first: int) -> None:
+    """x <- D^-1/2 L^-1 x in the rows of x from `first` on; root: D^-1/2, (n, lanes). Pointers."""
+    size = pattern.size
+    for i in range(size):
+        begin, end = pattern.across[i], pattern.across[i + 1]
+        subtract_dot(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
+    for i in range(size):
+        scale(tile, x, first + i, root, i)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def backward(tile: Tile, pattern: Pattern, factors: Array, root: Array, x: Array, first: int) -> None:
+    """x <- L^-T D^-1/2 x in the rows of x from `first` on; root: D^-1/2, (n, lanes). Pointers."""
+    size = pattern.size
+    for k in range(size - 1, -1, -1):
+        scale(tile, x, first + k, root, k)
+        begin, end = pattern.column[k], pattern.column[k + 1]
+        subtract_dot(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
+
+
 @njit(cache=True, error_model="numpy")
 def multiply(tile: Tile, pattern: Pattern, values: Array, x: Array, y: Array) -> None:
     """y = A x for the unfactored symmetric matrix (slots, lanes); x, y: (rows, lanes). Pointers."""

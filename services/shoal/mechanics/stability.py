@@ -15,7 +15,7 @@ from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
 from shoal.mechanics.sparse import Pattern
-from shoal.mechanics.tangent import stiffness_at, tangent_tile
+from shoal.mechanics.tangent import ready, stiffness_at, tangent_tile
 from shoal.mechanics.tile import Array, pack, tiles, unpack
 
 _DENSE = 200
@@ -23,14 +23,14 @@ _DENSE = 200
 
 def highest_frequency(model: Model) -> float:
     """Highest eigenfrequency over all lanes [rad/s]; 0 if nothing is elastic."""
-    if model.elements == 0:
+    if not model.elastic:
         return 0.0
     return float(np.sqrt(max(0.0, _largest_eigenvalue(model, damping=False))))
 
 
 def highest_damping_rate(model: Model) -> float:
-    """Largest decay rate of the joint friction at the initial state, over all lanes [1/s]."""
-    if model.frictions.size == 0:
+    """Largest decay rate of friction and damping at the initial state, over all lanes [1/s]."""
+    if model.forces.size == 0 and not any(b.damped for b in (model.elements.cubics, model.elements.quintics)):
         return 0.0
     return max(0.0, _largest_eigenvalue(model, damping=True))
 
@@ -52,6 +52,7 @@ def _largest_eigenvalue(model: Model, damping: bool) -> float:
         tangent = tangent_tile(model, tile, part)
         arrays = model.tile(tile, part)
         room = work_space(tile, arrays)
+        arrays = ready(tile, arrays, room)
         room.z[: model.unknowns * len(tile)] = pack(model.q0, part, tile)
         values = stiffness_at(tile, arrays, tangent, room, 0.0)
         if damping:

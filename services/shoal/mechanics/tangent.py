@@ -2,100 +2,107 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
-from shoal.mechanics import dynamics, friction, model, sparse
+from shoal.mechanics import dynamics, forces, gate, model, sparse
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.elements import ancf_cable
-from shoal.mechanics.model import Arrays, Model, scatter
+from shoal.mechanics.elements import ancf_cable, ancf_full, beam
+from shoal.mechanics.model import Arrays, Gates, Model, scatter
 from shoal.mechanics.tile import Array, Index, Tile, pack
-from shoal.mechanics.vector import add_product, pointer
+from shoal.mechanics.vector import add_product, pointer, shift
 
 
 class Tangent(NamedTuple):
     """Pattern of H = c_M M + c_D D + K and the lists that assemble it, for one tile.
 
-    Contribution t adds coefficient[t] * block[source[t]] to slot[t]; `block` holds the 8 x 8 tangents
-    of the full, then the reduced cables. The friction lists do the same for the products of levers.
-    curvature[t] is the slot of constraint term t (-1: the term is not quadratic).
+    Contribution k adds coefficient[k] * block[source[k]] to slot[k]; `block` holds the square tangents of all
+    elements, family by family, then those of the force elements: `blocks` rows. Curvature k adds
+    bend[k] * multiplier[owner[k]] to curvature[k].
     """
 
     pattern: sparse.Pattern
     mass: Array
-    elastic_count: int
+    blocks: int
+    contributions: int
     source: Index
     slot: Index
     coefficient: Array
-    friction_count: int
-    friction_source: Index
-    friction_slot: Index
-    friction_coefficient: Array
+    curvatures: int
     curvature: Index
+    owner: Index
+    bend: Array
 
 
-def tangent_tile(scene_model: Model, tile: Tile, lanes: slice) -> Tangent:
+def tangent_tile(model: Model, tile: Tile, lanes: slice) -> Tangent:
     """Analyse the tangent of a model and pack its numbers for one tile of lanes."""
-    rows = np.concatenate([scene_model.cables_full.rows, scene_model.cables_reduced.rows])
-    elastic = _contributions(scene_model, rows.reshape(-1, ancf_cable.ROWS).tolist())
-    viscous = _contributions(scene_model, scene_model.frictions.rows.reshape(-1, 4).tolist())
-    entries = {key for key, *_ in elastic} | {key for key, *_ in viscous} | set(scene_model.mass_entries)
-    quadratic = [
-        (max(i, j), min(i, j)) if i >= 0 and j >= 0 else None
-        for i, j in zip(scene_model.constraints.first.tolist(), scene_model.constraints.second.tolist(), strict=True)
-    ]
-    entries |= {key for key in quadratic if key is not None}
-    pattern, slot = sparse.analyse(scene_model.unknowns, entries)
-
-    def lists(contributions: list[tuple[tuple[int, int], int, Array]]) -> tuple[int, Index, Index, Array]:
-        lane_count = max((c.size for *_, c in contributions), default=1)
-        values = np.empty((len(contributions), lane_count))
-        for row, (*_, c) in enumerate(contributions):
-            values[row] = c
-        return (
-            len(contributions),
-            np.array([source for _, source, _ in contributions], dtype=np.int64),
-            np.array([slot[key] for key, *_ in contributions], dtype=np.int64),
-            pack(values, lanes, tile),
-        )
-
+    found, blocks = _contributions(model)
+    entries = {key for key, *_ in found} | set(model.mass_entries)
+    curved = _curvatures(model)
+    entries |= {key for key, *_ in curved}
+    pattern, slot = sparse.analyse(model.unknowns, entries)
     return Tangent(
         pattern,
-        pack(scatter(pattern, slot, scene_model.mass_entries), lanes, tile),
-        *lists(elastic),
-        *lists(viscous),
-        np.array([-1 if key is None else slot[key] for key in quadratic], dtype=np.int64),
+        pack(scatter(pattern, slot, model.mass_entries), lanes, tile),
+        blocks,
+        len(found),
+        np.array([source for _, source, _ in found], dtype=np.int64),
+        np.array([slot[key] for key, *_ in found], dtype=np.int64),
+        pack(_stack(found), lanes, tile),
+        len(curved),
+        np.array([slot[key] for key, *_ in curved], dtype=np.int64),
+        np.array([owner for _, owner, _ in curved], dtype=np.int64),
+        pack(_stack(curved), lanes, tile),
     )
 
 
-def _contributions(scene_model: Model, blocks: list[list[int]]) -> list[tuple[tuple[int, int], int, Array]]:
-    """((row, column), position in the stored blocks, coefficient) for the lower triangle of all blocks."""
-    expansions: dict[int, list[tuple[int, Array]]] = {}
-    d = scene_model.derived
+def _stack(found: list[tuple[tuple[int, int], int, Array]]) -> Array:
+    values = np.empty((len(found), max((np.size(c) for *_, c in found), default=1)))
+    for row, (*_, c) in enumerate(found):
+        values[row] = c
+    return values
 
-    def expand(row: int) -> list[tuple[int, Array]]:
-        if row not in expansions:
-            if row < scene_model.unknowns:
-                expansions[row] = [(row, np.ones(1))]
-            else:
-                r = row - scene_model.unknowns
-                terms = range(d.start[r], d.start[r + 1])
-                expansions[row] = [(int(d.source[t]), d.coefficient[t]) for t in terms]
-        return expansions[row]
 
+def _expand(model: Model, row: int) -> list[tuple[int, Array]]:
+    """The unknowns that a row depends on, with their factors."""
+    if row < model.unknowns:
+        return [(row, np.ones(1))]
+    d, r = model.derived, row - model.unknowns
+    return [(int(d.source[t]), d.coefficient[t]) for t in range(d.start[r], d.start[r + 1])]
+
+
+def _curvatures(model: Model) -> list[tuple[tuple[int, int], int, Array]]:
+    """((row, column), constraint, second derivative) for the lower triangle."""
+    c = model.constraints
     found = []
-    for number, rows in enumerate(blocks):
-        size = len(rows)
-        for a in range(size):
-            for b in range(size):
-                position = number * size * size + a * size + b
-                for i, ci in expand(rows[a]):
-                    for j, cj in expand(rows[b]):
-                        if i >= j:
-                            found.append(((i, j), position, ci * cj))
+    for k in range(c.size):
+        for p in range(c.start[k], c.start[k + 1]):
+            if c.left[p] < 0:
+                continue
+            for i, ci in _expand(model, int(c.left[p])):
+                for j, cj in _expand(model, int(c.right[p])):
+                    value = c.factor[p] * ci * cj
+                    found.append(((max(i, j), min(i, j)), k, 2.0 * value if i == j else value))
     return found
+
+
+def _contributions(model: Model) -> tuple[list[tuple[tuple[int, int], int, Array]], int]:
+    """((row, column), position in the stored blocks, coefficient) for the lower triangle, and the blocks' length."""
+    found = []
+    position = 0
+    for family in (*model.elements, model.forces):
+        size = len(family.rows) // family.size if family.size else 0
+        for rows in family.rows.reshape(family.size, size).tolist():
+            for a in range(size):
+                for b in range(size):
+                    for i, ci in _expand(model, rows[a]):
+                        for j, cj in _expand(model, rows[b]):
+                            if i >= j:
+                                found.append(((i, j), position + a * size + b, ci * cj))
+            position += size * size
+    return found, position
 
 
 @njit(cache=True, error_model="numpy")
@@ -104,16 +111,54 @@ def raw(t: Tangent) -> Tangent:
     return Tangent(
         sparse.raw(t.pattern),
         pointer(t.mass),
-        t.elastic_count,
+        t.blocks,
+        t.contributions,
         pointer(t.source),
         pointer(t.slot),
         pointer(t.coefficient),
-        t.friction_count,
-        pointer(t.friction_source),
-        pointer(t.friction_slot),
-        pointer(t.friction_coefficient),
+        t.curvatures,
         pointer(t.curvature),
+        pointer(t.owner),
+        pointer(t.bend),
     )
+
+
+@njit(cache=True, error_model="numpy")
+def _stiffness_blocks(tile: Tile, m: Arrays, w: Work, z: Array, block: Array) -> None:
+    """The tangents of all elements, family by family, then of the forces."""
+    e = m.elements
+    first = 0
+    ancf_cable.tangent(tile, e.cables_full, ancf_cable.FULL_AXIAL, ancf_cable.FULL_BENDING, z, w.element, block, first)
+    first += 64 * e.cables_full.size
+    ancf_cable.tangent(
+        tile, e.cables_reduced, ancf_cable.REDUCED_AXIAL, ancf_cable.REDUCED_BENDING, z, w.element, block, first
+    )
+    first += 64 * e.cables_reduced.size
+    beam.tangent(tile, e.cubics, z, w.element, block, first)
+    first += 64 * e.cubics.size
+    beam.tangent(tile, e.quintics, z, w.element, block, first)
+    first += 144 * e.quintics.size
+    ancf_full.tangent(tile, e.solids, z, w.element, block, first)
+    first += 144 * e.solids.size
+    ancf_full.tangent(tile, e.two_point_solids, z, w.element, block, first)
+    first += 144 * e.two_point_solids.size
+    forces.tangent(tile, m.forces, m.functions, z, w.memory, w.element, block, first)
+
+
+@njit(cache=True, error_model="numpy")
+def _damping_blocks(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, block: Array, size: int) -> None:
+    """The same of the damping."""
+    e = m.elements
+    for i in range(size * len(tile)):
+        block[i] = 0.0
+    first = 64 * (e.cables_full.size + e.cables_reduced.size)
+    if e.cubics.damped:
+        beam.damping(tile, e.cubics, z, w.element, block, first)
+    first += 64 * e.cubics.size
+    if e.quintics.damped:
+        beam.damping(tile, e.quintics, z, w.element, block, first)
+    first += 144 * (e.quintics.size + e.solids.size + e.two_point_solids.size)
+    forces.damping(tile, m.forces, z, zdot, w.element, block, first)
 
 
 @njit(cache=True, error_model="numpy")
@@ -132,46 +177,47 @@ def assemble(
 ) -> None:
     """values = mass_factor M + damping_factor D + K(z) + curvature of the constraints; (slots, lanes).
 
-    multiplier: one lambda per constraint, (constraints, lanes); block: work space, (elements * 64, lanes).
-    The derived rows of z must be filled. Pointers.
+    multiplier: one lambda per constraint, (constraints, lanes); block: work space of 2 t.blocks rows.
+    The derived rows of z, and those of w.zdot where anything is damped, must be filled. Pointers.
     """
+    arguments = (gate.typed(m.home, m), gate.typed(w.home, w), z, damping_factor, block, t.blocks)
+    gate.call(m.gates.assemble, (tile, *arguments))
     width = len(tile)
     for i in range(slots * width):
         values[i] = mass_factor * t.mass[i]
-    full = m.cables_full.size
-    ancf_cable.tangent(tile, m.cables_full, ancf_cable.FULL_AXIAL, ancf_cable.FULL_BENDING, z, w.element, block, 0)
-    ancf_cable.tangent(
-        tile,
-        m.cables_reduced,
-        ancf_cable.REDUCED_AXIAL,
-        ancf_cable.REDUCED_BENDING,
-        z,
-        w.element,
-        block,
-        64 * full,
-    )
-    for k in range(t.elastic_count):
+    for k in range(t.contributions):
         add_product(tile, values, t.slot[k], t.coefficient, k, block, t.source[k])
-    previous = -1
-    for k in range(t.friction_count):
-        joint, a, b = t.friction_source[k] // 16, t.friction_source[k] % 16 // 4, t.friction_source[k] % 4
-        if joint != previous:
-            friction.levers(tile, m.frictions, joint, z, w.element)
-            previous = joint
-        for lane in range(width):
-            c = damping_factor * m.frictions.coefficient[joint * width + lane]
-            values[t.friction_slot[k] * width + lane] += (
-                t.friction_coefficient[k * width + lane] * c * w.element[a * width + lane] * w.element[b * width + lane]
-            )
-    c = m.constraints
-    for number in range(c.size):
-        for term in range(c.start[number], c.start[number + 1]):
-            if t.curvature[term] >= 0:
-                scale = 2.0 if c.first[term] == c.second[term] else 1.0
-                for lane in range(width):
-                    values[t.curvature[term] * width + lane] += (
-                        scale * multiplier[number * width + lane] * c.value[term * width + lane]
-                    )
+    for k in range(t.curvatures):
+        add_product(tile, values, t.curvature[k], t.bend, k, multiplier, t.owner[k])
+
+
+@njit(cache=True, error_model="numpy")
+def _assemble_gate(tile, pm, pw, z, damping_factor, block, blocks):  # type: ignore[no-untyped-def]
+    """K + damping_factor D of every element and force, block by block."""
+    m, w = gate.load(pm), gate.load(pw)
+    width = len(tile)
+    _stiffness_blocks(tile, m, w, z, block)
+    if damping_factor != 0.0 and (m.forces.size > 0 or m.elements.cubics.damped or m.elements.quintics.damped):
+        other = shift(block, blocks * width)
+        _damping_blocks(tile, m, w, z, w.zdot, other, blocks)
+        for i in range(blocks * width):
+            block[i] += damping_factor * other[i]
+
+
+_GATES: dict[int, Gates] = {}
+
+
+def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
+    """The same arrays with a home of their own and the gates for this width, compiled or taken from the cache."""
+    if len(tile) not in _GATES:
+        _GATES[len(tile)] = dynamics.gates(tile, arrays, room, _assemble_address)
+    return arrays._replace(home=gate.home(), gates=_GATES[len(tile)])
+
+
+def _assemble_address(width: Any, m: Any, w: Any) -> int:
+    """The gate of the element tangents for one width."""
+    rows = types.CPointer(types.float64)
+    return gate.address(_assemble_gate, (width, m, w, rows, types.float64, rows, types.int64))
 
 
 @njit(cache=True, error_model="numpy")
@@ -179,10 +225,12 @@ def stiffness_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work, dampi
     """K + damping_factor D at the state in `room`, without constraints; (slots, lanes)."""
     width = len(tile)
     m, t, w = model.raw(arrays), raw(tangent), dynamics.raw(room)
+    dynamics.enter(m, w)
     dynamics.derive(tile, m, w.z, m.force_rows, False)
-    block = np.empty(64 * (m.cables_full.size + m.cables_reduced.size) * width)
+    dynamics.derive(tile, m, w.zdot, m.force_rows, True)
+    block = np.empty(2 * tangent.blocks * width + 1)
     values = np.empty(tangent.mass.size)
-    multiplier = np.zeros(m.constraints.size * width)
+    multiplier = np.zeros(m.constraints.size * width + 1)
     assemble(
         tile,
         m,

@@ -29,6 +29,16 @@ def pointer(typing_context, array):  # type: ignore[no-untyped-def]
     return types.CPointer(array.dtype)(array), generate
 
 
+@intrinsic
+def shift(typing_context, base, offset):  # type: ignore[no-untyped-def]
+    """The pointer `offset` entries further on."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.gep(arguments[0], [arguments[1]])
+
+    return base(base, offset), generate
+
+
 def _row(builder: Any, base: Any, row: Any, width: int) -> Any:
     vector = ir.VectorType(ir.DoubleType(), width)
     first = builder.gep(base, [builder.mul(row, ir.Constant(row.type, width))])
@@ -56,6 +66,7 @@ def _operation(combine: Any, operands: int) -> Any:
 _copy = _operation(lambda b, y, x: x, 1)
 _clear = _operation(lambda b, y: ir.Constant(y.type, [0.0] * y.type.count), 0)
 _add = _operation(lambda b, y, x: b.fadd(y, x), 1)
+_subtract = _operation(lambda b, y, x: b.fsub(y, x), 1)
 _scale = _operation(lambda b, y, a: b.fmul(y, a), 1)
 _add_product = _operation(lambda b, y, a, x: b.fadd(y, b.fmul(a, x, flags=_CONTRACT), flags=_CONTRACT), 2)
 _subtract_product = _operation(lambda b, y, a, x: b.fsub(y, b.fmul(a, x, flags=_CONTRACT), flags=_CONTRACT), 2)
@@ -77,6 +88,12 @@ def clear(typing_context, tile, y, i):  # type: ignore[no-untyped-def]
 def add(typing_context, tile, y, i, x, j):  # type: ignore[no-untyped-def]
     """Row i of y += row j of x."""
     return _add(tile, (y, i, x, j))
+
+
+@intrinsic
+def subtract(typing_context, tile, y, i, x, j):  # type: ignore[no-untyped-def]
+    """Row i of y -= row j of x."""
+    return _subtract(tile, (y, i, x, j))
 
 
 @intrinsic

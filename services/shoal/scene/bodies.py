@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from shoal.scene.record import NonNegative, Positive, Record, Vector
 
-Element = Literal["rigid", "ancf-cable"]
+Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full"]
 Quadrature = Literal["full", "reduced"]
+Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
+
+_POINTS = 24
+"""Quadrature points along a curved rod."""
 
 
 class Rod(Record):
-    """A straight, prismatic, homogeneous rod along its body's x axis, starting at its origin.
+    """A homogeneous rod that starts at its body's origin along the x axis.
 
     Lengths in m, density in kg/m^3, moduli in Pa. `height` is the thickness in the plane of
-    motion. `element` is the model of the rod: `rigid`, or `ancf-cable` (the gradient-deficient
-    Bernoulli-Euler element) with `elements` elements of equal length. `quadrature` is `full`
-    (Gauss, 5 points axial and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points bending).
+    motion. `element` is the model of the rod, with `elements` elements of equal length: `rigid`,
+    `ancf-cable` (cubic, Bernoulli-Euler), `ancf-quintic` (the same of higher order) or `ancf-full`
+    (with shear and stretch of the section). `quadrature` of a cable is `full` (Gauss, 5 points axial
+    and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points bending). `law` is that of
+    ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature of the unstrained axis over
+    its arc length. `end_height`, `end_width`: the section at the far end of a tapered rod (each
+    element has the section of its middle). `retardation` [s]: Kelvin-Voigt damping, stress
+    E (strain + retardation * strain rate).
     """
 
     kind: Literal["rod"] = "rod"
@@ -31,6 +41,11 @@ class Rod(Record):
     element: Element = "rigid"
     elements: Annotated[int, Field(ge=1, le=10_000)] = 1
     quadrature: Quadrature = "full"
+    law: Law = "plane-stress"
+    curvature: tuple[float, ...] = ()
+    end_height: Positive | None = None
+    end_width: Positive | None = None
+    retardation: NonNegative = 0.0
 
     @model_validator(mode="after")
     def _slender_and_complete(self) -> Rod:
@@ -40,49 +55,95 @@ class Rod(Record):
             raise ValueError(f"width {self.width:g} m is larger than the length {self.length:g} m; a rod is slender")
         if self.element != "rigid" and self.youngs_modulus is None:
             raise ValueError(f"youngs_modulus is missing; element {self.element} needs it (Pa)")
+        if self.element == "ancf-full":
+            if self.curvature:
+                raise ValueError("curvature: an ancf-full rod is straight; use ancf-cable or ancf-quintic")
+            if self.retardation:
+                raise ValueError("retardation: ancf-full has no material damping; use ancf-cable or ancf-quintic")
+            if self.poisson_ratio >= 0.5:
+                raise ValueError(f"poisson_ratio {self.poisson_ratio:g} must be below 0.5 for ancf-full")
         return self
 
     @property
+    def tapered(self) -> bool:
+        """Whether the section changes along the rod."""
+        return self.end_height is not None or self.end_width is not None
+
+    def section(self, x: Any) -> tuple[Any, Any]:
+        """Height and width [m] at the fraction x of the length."""
+        end_height = self.height if self.end_height is None else self.end_height
+        end_width = self.width if self.end_width is None else self.end_width
+        return self.height + (end_height - self.height) * x, self.width + (end_width - self.width) * x
+
+    @property
     def area(self) -> float:
-        """Cross-section [m^2]."""
+        """Cross-section at the start [m^2]."""
         return self.width * self.height
 
     @property
     def mass_per_length(self) -> float:
-        """Line density [kg/m]."""
+        """Line density at the start [kg/m]."""
         return self.density * self.area
 
     @property
     def mass(self) -> float:
         """Mass [kg]."""
-        return self.mass_per_length * self.length
+        total: float = sum(mass for mass, _ in self._pieces())
+        return total
 
     @property
     def inertia(self) -> float:
         """Moment of inertia about the centre of mass [kg m^2] of the slender rod (no rotary part)."""
-        return self.mass * self.length**2 / 12
+        x, y = self.centre_of_mass
+        total: float = sum(mass * abs(place - x - 1j * y) ** 2 for mass, place in self._pieces())
+        return total
 
     @property
     def centre_of_mass(self) -> Vector:
         """Position of the centre of mass in the body's frame [m]."""
-        return (self.length / 2, 0.0)
+        centre = sum(mass * place for mass, place in self._pieces()) / self.mass
+        return (centre.real, centre.imag)
+
+    def _pieces(self) -> list[tuple[Any, Any]]:
+        """Masses [kg] at places x + iy [m] that have the rod's mass, centre and inertia (Gauss's quadrature)."""
+        nodes, weights = np.polynomial.legendre.leggauss(_POINTS if self.curvature else 3)
+        pieces = []
+        for x, weight in zip((nodes + 1) / 2, weights / 2, strict=True):
+            height, width = self.section(x)
+            pieces.append((self.density * height * width * self.length * weight, self.axis(x * self.length)))
+        return pieces
+
+    def axis(self, s: Any) -> Any:
+        """Point x + iy [m] of the unstrained axis at the arc length s."""
+        if not self.curvature:
+            return s + 0j
+        nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
+        along = zip((nodes + 1) / 2, weights / 2, strict=True)
+        return sum(weight * s * np.exp(1j * self.turn(x * s)) for x, weight in along)
+
+    def turn(self, s: Any) -> Any:
+        """Angle [rad] of the unstrained axis at the arc length s."""
+        return sum(k * s ** (power + 1) / (power + 1) for power, k in enumerate(self.curvature)) + 0.0 * s
 
     @property
     def axial_stiffness(self) -> float:
-        """EA [N]."""
+        """EA [N] at the start."""
         assert self.youngs_modulus is not None
         return self.youngs_modulus * self.area
 
     @property
     def bending_stiffness(self) -> float:
-        """EI [N m^2], bending in the plane of motion."""
+        """EI [N m^2] at the start, bending in the plane of motion."""
         assert self.youngs_modulus is not None
         return self.youngs_modulus * self.width * self.height**3 / 12
 
     @property
     def points(self) -> dict[str, Vector]:
-        """Named points in the body's frame [m]."""
-        return {"start": (0.0, 0.0), "centre": (self.length / 2, 0.0), "end": (self.length, 0.0)}
+        """Named points in the body's frame [m]; on a flexible rod they are places on its axis."""
+        if self.element != "rigid" or not self.curvature:
+            return {"start": (0.0, 0.0), "centre": (self.length / 2, 0.0), "end": (self.length, 0.0)}
+        middle, end = self.axis(self.length / 2), self.axis(self.length)
+        return {"start": (0.0, 0.0), "centre": (middle.real, middle.imag), "end": (end.real, end.imag)}
 
 
 class RigidBody(Record):
@@ -104,4 +165,17 @@ class RigidBody(Record):
         return {"start": (0.0, 0.0), **self.named_points}
 
 
-Body = Annotated[Rod | RigidBody, Field(discriminator="kind")]
+class PointMass(Record):
+    """A mass [kg] without extension."""
+
+    kind: Literal["point-mass"] = "point-mass"
+    mass: Positive
+    element: Literal["rigid"] = "rigid"
+
+    @property
+    def points(self) -> dict[str, Vector]:
+        """The one point there is."""
+        return {"start": (0.0, 0.0)}
+
+
+Body = Annotated[Rod | RigidBody | PointMass, Field(discriminator="kind")]

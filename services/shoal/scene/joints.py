@@ -1,28 +1,146 @@
-"""Joints, and the attachments by which joints and markers name a place on a body."""
+"""Joints, and the attachments by which joints, loads and markers name a place on a body."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-from shoal.scene.record import NonNegative, Record, Vector
+from pydantic import BeforeValidator, Field
+
+from shoal.scene.function import Function
+from shoal.scene.record import Angle, NonNegative, Positive, Record, Vector
 
 GROUND = "ground"
 
 
 class Attachment(Record):
-    """A place on a body: a named point, or coordinates in the body's frame [m]. `ground` has only coordinates."""
+    """A place on a body: a named point, or coordinates in the body's frame [m].
+
+    On the ground, coordinates are fixed, and a name is that of one of the scene's moving points.
+    """
 
     body: str
     point: str | Vector = "start"
 
 
+class MovingPoint(Record):
+    """A point of the ground that moves: coordinates [m] as functions of time."""
+
+    x: Function = Function(number=0.0)
+    y: Function = Function(number=0.0)
+
+
 class Revolute(Record):
-    """Two places stay together; the bodies turn freely but for viscous friction [N m s/rad]."""
+    """Two places stay together; the bodies turn freely but for friction.
+
+    friction: viscous [N m s/rad]; coulomb: dry friction torque [N m], smoothed as tanh(rate / coulomb_speed).
+    """
 
     kind: Literal["revolute"] = "revolute"
     first: Attachment
     second: Attachment
     friction: NonNegative = 0.0
+    coulomb: NonNegative = 0.0
+    coulomb_speed: Positive = 1e-2
 
 
-Joint = Revolute
+class Weld(Record):
+    """Two places stay together and the bodies keep their relative angle [rad] (default: that of the start)."""
+
+    kind: Literal["weld"] = "weld"
+    first: Attachment
+    second: Attachment
+    angle: Angle | None = None
+
+
+class Slider(Record):
+    """The second place moves on a line through the first one, fixed to the first body.
+
+    direction: angle [rad] of the line in the first body's frame. rotation: whether the second body may turn against
+    the first. friction: viscous [N s/m]; coulomb [N], smoothed as tanh(speed / coulomb_speed).
+    """
+
+    kind: Literal["slider"] = "slider"
+    first: Attachment
+    second: Attachment
+    direction: Angle = 0.0
+    rotation: Literal["free", "locked"] = "free"
+    friction: NonNegative = 0.0
+    coulomb: NonNegative = 0.0
+    coulomb_speed: Positive = 1e-2
+
+
+class Distance(Record):
+    """Two places keep a distance [m] (default: that of the start), or one that is a function of time."""
+
+    kind: Literal["distance"] = "distance"
+    first: Attachment
+    second: Attachment
+    length: Function | None = None
+
+
+class Parallel(Record):
+    """The directions of two bodies stay parallel."""
+
+    kind: Literal["parallel"] = "parallel"
+    first: Attachment
+    second: Attachment
+
+
+class Perpendicular(Record):
+    """The directions of two bodies stay perpendicular."""
+
+    kind: Literal["perpendicular"] = "perpendicular"
+    first: Attachment
+    second: Attachment
+
+
+class DrivenAngle(Record):
+    """The angle [rad] from the first body's direction to the second's is a function of time."""
+
+    kind: Literal["driven-angle"] = "driven-angle"
+    first: Attachment
+    second: Attachment
+    angle: Function
+
+
+class CoupledCoordinate(Record):
+    """A coordinate of a place, with its factor in a coupling."""
+
+    at: Attachment
+    axis: Literal["x", "y"]
+    factor: float = 1.0
+
+
+class Coupling(Record):
+    """The sum of factor * coordinate equals a function of time [m]."""
+
+    kind: Literal["coupling"] = "coupling"
+    terms: Annotated[tuple[CoupledCoordinate, ...], Field(min_length=1)]
+    value: Function = Function(number=0.0)
+
+
+def _revolute_if_unsaid(data: Any) -> Any:
+    return {"kind": "revolute", **data} if isinstance(data, dict) else data
+
+
+Joint = Annotated[
+    Annotated[
+        Revolute | Weld | Slider | Distance | Parallel | Perpendicular | DrivenAngle | Coupling,
+        Field(discriminator="kind"),
+    ],
+    BeforeValidator(_revolute_if_unsaid),
+]
+"""A joint without a kind is a revolute one."""
+JOINT_KINDS = ("revolute", "weld", "slider", "distance", "parallel", "perpendicular", "driven-angle", "coupling")
+
+
+def sides(joint: Joint) -> dict[str, Attachment]:
+    """The attachments of a joint, by the path of their field."""
+    if isinstance(joint, Coupling):
+        return {f"terms.{number}.at": term.at for number, term in enumerate(joint.terms)}
+    return {"first": joint.first, "second": joint.second}
+
+
+def places(joint: Joint) -> tuple[Attachment, ...]:
+    """The attachments of a joint."""
+    return tuple(sides(joint).values())

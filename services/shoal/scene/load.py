@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from shoal.errors import InputError
+from shoal.scene.parametric import parametric
 from shoal.scene.scene import Scene
 
 
@@ -71,6 +72,8 @@ def scene_names() -> list[str]:
 
 def load_scene(name: str) -> Scene:
     """The built-in scene of that name, or the scene in that YAML file as it is now. Raises InputError."""
+    if (data := parametric(name)) is not None:
+        return Scene.parse(data, name)
     return _built_in(name) if name in scene_names() else _read(name)
 
 

@@ -28,11 +28,24 @@ Angle = Annotated[float, AfterValidator(_plausible_angle)]
 Vector = tuple[float, float]
 
 
+_TAGS = {
+    "bodies": {"rod", "rigid-body", "point-mass"},
+    "joints": {
+        "revolute", "prismatic", "spherical", "fixed", "weld", "slider", "distance", "parallel", "perpendicular",
+        "driven-angle", "coupling",
+    },
+    "loads": {"spring", "torsion-spring", "force", "torque", "distributed-force"},
+}  # fmt: skip
+"""Kinds by which pydantic tells the members of a field apart; it puts them into the path after the member's name."""
+
+
 def one_line(error: ValidationError, what: str) -> InputError:
     """Turn pydantic's report into one line that names the field, the value and what is right."""
     first = error.errors()[0]
-    tags = {"rod", "rigid-body", "revolute", "file", "engine"}
-    path = ".".join(str(part) for part in first["loc"] if part not in tags)
+    parts = [str(part) for part in first["loc"]]
+    if parts[2:] and parts[2] in _TAGS.get(parts[0], ()):
+        del parts[2]
+    path = ".".join(part for part in parts if part not in {"file", "engine"})
     message = first["msg"].removeprefix("Value error, ")
     others = error.error_count() - 1
     more = f" (and {others} more)" if others else ""

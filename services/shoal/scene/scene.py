@@ -12,8 +12,11 @@ import numpy.typing as npt
 from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
+from shoal.scene import joints as joint_types
+from shoal.scene import loads as load_types
 from shoal.scene.bodies import Body
-from shoal.scene.joints import GROUND, Attachment, Joint
+from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
+from shoal.scene.loads import DistributedForce, Load
 from shoal.scene.record import Angle, Record, Vector, one_line
 from shoal.scene.solver import Solver
 
@@ -21,14 +24,19 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
 
 
 class InitialState(Record):
-    """Absolute angle [rad], counter-clockwise from +X, and rate [rad/s] of a body at time zero."""
+    """Absolute angle [rad], counter-clockwise from +X, and rate [rad/s] of a body at time zero.
+
+    position [m] and velocity [m/s] of its frame's origin are for bodies that no joint places.
+    """
 
     angle: Angle = 0.0
     rate: float = 0.0
+    position: Vector | None = None
+    velocity: Vector = (0.0, 0.0)
 
 
 class Scene(Record):
-    """A planar machine in SI units: bodies, joints, markers, initial state, gravity, solver settings.
+    """A planar machine in SI units: bodies, joints, loads, markers, initial state, gravity, solver settings.
 
     Raises pydantic's ValidationError; `Scene.parse` and `with_values` raise `InputError` in one line.
     """
@@ -38,6 +46,8 @@ class Scene(Record):
     gravity: Vector = (0.0, -9.81)
     bodies: Annotated[dict[Name, Body], Field(min_length=1)]
     joints: dict[Name, Joint] = {}
+    loads: dict[Name, Load] = {}
+    ground_points: dict[Name, MovingPoint] = {}
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
     initial: dict[str, InitialState] = {}
     solver: Solver = Solver()
@@ -47,10 +57,15 @@ class Scene(Record):
         if GROUND in self.bodies:
             raise ValueError("bodies.ground: the name 'ground' is taken by the fixed frame")
         for name, joint in self.joints.items():
-            for side in ("first", "second"):
-                self._check_attachment(f"joints.{name}.{side}", getattr(joint, side))
-            if joint.first.body == joint.second.body:
+            for field, side in joint_types.sides(joint).items():
+                self._check_attachment(f"joints.{name}.{field}", side)
+            if not isinstance(joint, joint_types.Coupling) and joint.first.body == joint.second.body:
                 raise ValueError(f"joints.{name}: joins {joint.first.body!r} to itself; a joint needs two bodies")
+        for name, load in self.loads.items():
+            for field, side in load_types.sides(load).items():
+                self._check_attachment(f"loads.{name}.{field}", side)
+            if isinstance(load, DistributedForce) and getattr(self.bodies.get(load.body), "kind", "") != "rod":
+                raise ValueError(f"loads.{name}.body: {load.body!r} is not a rod of this scene")
         for name, marker in self.markers.items():
             if marker.body == GROUND:
                 raise ValueError(f"markers.{name}.body: a marker sits on a body, not on the ground")
@@ -58,16 +73,20 @@ class Scene(Record):
         for name in self.initial:
             if name not in self.bodies:
                 raise ValueError(f"initial.{name}: no such body; the bodies are {', '.join(self.bodies)}")
-        loose = [name for name in self.bodies if name not in self._connected()]
+        loose = [name for name in self.bodies if name not in self._placed()]
         if loose:
-            raise ValueError(f"bodies.{loose[0]}: no chain of joints connects it to the ground")
+            raise ValueError(
+                f"bodies.{loose[0]}: no chain of joints connects it to the ground; a body that flies free needs "
+                f"initial.{loose[0]}.position"
+            )
         return self
 
     def _check_attachment(self, where: str, attachment: Attachment) -> None:
         if attachment.body == GROUND:
-            if isinstance(attachment.point, str):
+            if isinstance(attachment.point, str) and attachment.point not in self.ground_points:
                 raise ValueError(
-                    f"{where}.point: a place on the ground is given as [x, y] in m, found {attachment.point!r}"
+                    f"{where}.point: a place on the ground is given as [x, y] in m or as the name of one of the "
+                    f"ground_points, found {attachment.point!r}"
                 )
             return
         if attachment.body not in self.bodies:
@@ -81,18 +100,20 @@ class Scene(Record):
             )
         if body.element != "rigid" and not isinstance(attachment.point, str):
             x, y = attachment.point
-            if y != 0 or not 0 <= x <= body.length:
+            if (y != 0 and body.element != "ancf-full") or not 0 <= x <= body.length:
                 raise ValueError(
                     f"{where}.point: [{x:g}, {y:g}] is not on the axis of {attachment.body}; "
                     f"use [s, 0] with 0 <= s <= {body.length:g}"
                 )
 
-    def _connected(self) -> set[str]:
-        reached, frontier = {GROUND}, [GROUND]
+    def _placed(self) -> set[str]:
+        """Bodies whose start the joints tell, from the ground or from a body that says its position."""
+        reached = {GROUND, *(name for name, start in self.initial.items() if start.position is not None)}
+        frontier = list(reached)
         while frontier:
             here = frontier.pop()
             for joint in self.joints.values():
-                ends = {joint.first.body, joint.second.body}
+                ends = {side.body for side in joint_types.places(joint)}
                 if here in ends:
                     frontier += (new := ends - reached)
                     reached |= new
@@ -107,7 +128,9 @@ class Scene(Record):
             raise one_line(error, source) from None
 
     def location(self, attachment: Attachment) -> Vector:
-        """Coordinates [m] of an attachment in its body's (or the ground's) frame."""
+        """Coordinates [m] of an attachment in its body's (or the ground's) frame; on a flexible rod (s, y)."""
+        if attachment.body == GROUND and isinstance(attachment.point, str):
+            return (0.0, 0.0)
         if isinstance(attachment.point, str):
             return self.bodies[attachment.body].points[attachment.point]
         return attachment.point

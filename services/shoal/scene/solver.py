@@ -8,22 +8,53 @@ from pydantic import Field
 
 from shoal.scene.record import Positive, Record
 
-IntegratorName = Literal["leapfrog", "rk4", "generalized-alpha"]
+Acceleration = Literal[
+    "projection", "kkt", "augmented-lagrangian", "proximal", "baumgarte", "afsa", "iafsa", "iafsa-printed"
+]
+IntegratorName = Literal[
+    "auto",
+    "leapfrog",
+    "semi-implicit-euler",
+    "rk4",
+    "dop853",
+    "radau5",
+    "generalized-alpha",
+    "energy-momentum",
+    "implicit-gauss",
+]
 
 
 class Solver(Record):
     """How the motion is computed.
 
     `duration` and `step` are in s; `samples` output times are spread evenly over the duration, the
-    first one sampling interval after the start. `spectral_radius` is rho_infinity of
-    generalized-alpha. `energy_tolerance` is the relative energy error beyond which a run is rejected.
+    first one sampling interval after the start. `integrator: auto` picks by the stiffness of the scene.
+    Adaptive integrators (dop853, radau5) keep the error of each step below `absolute_tolerance` +
+    `relative_tolerance` times the size of the state; `step` is then their first step, `max_step` [s] the
+    longest (no limit if null: a machine at rest may then skip what a drive does later), and `max_steps` the most
+    they may take. `spectral_radius` is rho_infinity of generalized-alpha. `acceleration` is how Gauss's principle
+    is solved, `baumgarte` [1/s] the rate of Baumgarte's stabilisation, `project` whether drift is removed after
+    every step, `rank_tolerance` how far from a singular position counts as singular. `energy_tolerance` is the
+    relative energy error beyond which a run is rejected. The accelerations `afsa`, `iafsa` and `iafsa-printed` let
+    `swarm_size` fish search for `swarm_iterations` iterations in every time step (the paper's section 4.2, with its
+    numbers); `swarm_seed` makes them repeatable.
     """
 
     duration: Positive = 1.0
     step: Positive = 1e-3
-    integrator: IntegratorName = "leapfrog"
+    integrator: IntegratorName = "auto"
     samples: Annotated[int, Field(ge=1, le=10_000_000)] = 50
+    relative_tolerance: Annotated[float, Field(ge=1e-14, le=1e-1)] = 1e-12
+    absolute_tolerance: Positive = 1e-13
+    max_step: Positive | None = None
+    max_steps: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1_000_000
     spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0
     newton_tolerance: Positive = 1e-10
-    rank_tolerance: Positive = 1e-9
+    acceleration: Acceleration = "projection"
+    swarm_size: Annotated[int, Field(ge=2, le=100_000)] = 40
+    swarm_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 100
+    swarm_seed: Annotated[int, Field(ge=0)] = 0
+    baumgarte: Positive = 20.0
+    project: bool = True
+    rank_tolerance: Positive = 1e-5
     energy_tolerance: Positive = 1e-2

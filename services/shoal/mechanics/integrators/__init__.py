@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from shoal.mechanics.integrators import generalized_alpha, leapfrog, rk4
+import numpy as np
+
+from shoal.mechanics.integrators import (
+    dop853,
+    energy_momentum,
+    generalized_alpha,
+    implicit_gauss,
+    leapfrog,
+    radau5,
+    rk4,
+    semi_implicit_euler,
+)
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
 from shoal.mechanics.tile import Tile
@@ -12,9 +24,26 @@ from shoal.scene import Solver
 
 INTEGRATORS: dict[str, Any] = {
     "leapfrog": leapfrog,
+    "semi-implicit-euler": semi_implicit_euler,
     "rk4": rk4,
+    "dop853": dop853,
+    "radau5": radau5,
     "generalized-alpha": generalized_alpha,
+    "energy-momentum": energy_momentum,
+    "implicit-gauss": implicit_gauss,
 }
+
+
+STRIDES = 100
+"""With functions of time, an adaptive integrator takes at least so many steps unless the scene says otherwise."""
+
+
+class Choice(NamedTuple):
+    """Which integrator runs, why, and the largest step [s] it may take (infinite if nothing limits it)."""
+
+    name: str
+    reason: str
+    limit: float
 
 
 def facts(name: str) -> Facts:
@@ -23,6 +52,27 @@ def facts(name: str) -> Facts:
     return declared
 
 
-def choose(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Any:
-    """Settings of the solver's integrator for one tile of lanes."""
-    return INTEGRATORS[solver.integrator].settings(solver, model, tile, lanes)
+def pick(solver: Solver, model: Model, limit: Callable[[Model, Facts], float]) -> Choice:
+    """The integrator that a solver names, or for `auto` the one that suits the model.
+
+    limit: largest stable step of a model under an integrator's facts, `stability.step_limit`.
+    """
+    if solver.integrator != "auto":
+        return Choice(solver.integrator, "named by the scene", limit(model, facts(solver.integrator)))
+    if model.flexible == 0:
+        if solver.step > limit(model, facts("rk4")):
+            return Choice("radau5", "auto: springs or friction are faster than the step", np.inf)
+        return Choice("dop853", "auto: nothing is stiff", np.inf)
+    stable = limit(model, facts("leapfrog"))
+    if solver.step <= stable:
+        return Choice("leapfrog", f"auto: the step is within the stability limit {stable:.3e} s of leapfrog", stable)
+    reason = f"auto: the step is beyond the stability limit {stable:.3e} s of leapfrog"
+    return Choice("generalized-alpha", reason, limit(model, facts("generalized-alpha")))
+
+
+def choose(solver: Solver, model: Model, tile: Tile, lanes: slice, name: str | None = None) -> Any:
+    """Settings of the solver's integrator, or of the one that was picked for `auto`, for one tile of lanes."""
+    if solver.max_step is None and model.functions.size > 0:
+        # A machine at rest must not leap over what a drive does later.
+        solver = solver.model_copy(update={"max_step": solver.duration / STRIDES})
+    return INTEGRATORS[name or solver.integrator].settings(solver, model, tile, lanes)

@@ -13,60 +13,46 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, gauss, sparse
-from shoal.mechanics import tangent as tangents
+from shoal.mechanics import gauss
 from shoal.mechanics.dynamics import Work
+from shoal.mechanics.integrators import newton
+from shoal.mechanics.integrators.dense import cubic
+from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.tangent import Tangent, tangent_tile
 from shoal.mechanics.tile import Array, Tile
 from shoal.mechanics.vector import pointer
 from shoal.scene import Solver
 
-ITERATIONS = 30
-
 
 class GeneralizedAlpha(NamedTuple):
-    """Settings, and the room that implicit steps need. auxiliary: the method's own acceleration, (unknowns, lanes)."""
+    """Settings and room. auxiliary: the method's own acceleration, (unknowns, lanes)."""
 
     spectral_radius: float
-    newton_tolerance: float
-    rank_tolerance: float
-    tangent: Tangent
+    newton: Newton
     auxiliary: Array
     started: Array
-    matrix: Array
-    block: Array
-    residual: Array
-    multiplier: Array
+    evaluations: Array
 
 
-FACTS = Facts(order=2, explicit=False, stable_step_times_frequency=np.inf, stable_step_times_decay=np.inf)
+FACTS = Facts(
+    order=2,
+    explicit=False,
+    good_for="stiff elastic machines at steps that do not resolve their fast vibrations, damped as one wishes",
+)
 
 
 def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> GeneralizedAlpha:
     """Settings for one tile of lanes."""
-    width = len(tile)
-    tangent = tangent_tile(model, tile, lanes)
-    return GeneralizedAlpha(
-        solver.spectral_radius,
-        solver.newton_tolerance,
-        solver.rank_tolerance,
-        tangent,
-        np.zeros(model.unknowns * width),
-        np.zeros(1),
-        np.zeros(tangent.mass.size),
-        np.zeros(max(1, 64 * model.elements) * width),
-        np.zeros(model.rows * width),
-        np.zeros(max(1, model.constraints.size) * width),
-    )
+    room = newton_room(solver, model, tile, lanes)
+    auxiliary = np.zeros(model.unknowns * len(tile))
+    return GeneralizedAlpha(solver.spectral_radius, room, auxiliary, np.zeros(1), np.zeros(1))
 
 
 @njit(cache=True, error_model="numpy")
 def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: float) -> float:
-    """One step of h [s] from the time t; w.a holds the true acceleration at its beginning, and afterwards that at its end."""
-    width = len(tile)
-    end = m.unknowns * width
+    """One step of h [s] from the time t; w.a holds the true acceleration before and after."""
+    end = m.unknowns * len(tile)
     radius = scheme.spectral_radius
     alpha_m, alpha_f = (2 * radius - 1) / (radius + 1), radius / (radius + 1)
     gamma = 0.5 + alpha_f - alpha_m
@@ -74,9 +60,7 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
     mass_factor = (1 - alpha_m) / (h * h * beta * (1 - alpha_f))
     damping_factor = gamma / (h * beta)
 
-    stiffness = tangents.raw(scheme.tangent)
-    auxiliary, matrix, block = pointer(scheme.auxiliary), pointer(scheme.matrix), pointer(scheme.block)
-    residual, multiplier = pointer(scheme.residual), pointer(scheme.multiplier)
+    auxiliary = pointer(scheme.auxiliary)
     if scheme.started[0] == 0.0:
         scheme.started[0] = 1.0
         for i in range(end):
@@ -87,67 +71,12 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
         w.zdot[i] += h * ((1 - gamma) * auxiliary[i] + gamma * predicted)
         auxiliary[i] = predicted
         w.a[i] = 0.0
-
-    for _ in range(ITERATIONS):
-        _residual(tile, m, w, t + h, multiplier, residual)
-        tangents.assemble(
-            tile,
-            m,
-            stiffness,
-            w,
-            w.z,
-            multiplier,
-            mass_factor,
-            damping_factor,
-            block,
-            matrix,
-            scheme.matrix.size // width,
-        )
-        sparse.factor(tile, stiffness.pattern, matrix)
-        sparse.solve(tile, stiffness.pattern, matrix, residual, 0)
-        if m.constraints.size > 0:
-            # H dq + C_q' dlambda = r, C_q dq = -C
-            constraints.residual(tile, m.constraints, w.z, w.gauss.gap)
-            gauss.prepare(tile, m, matrix, stiffness.pattern, w.z, w.gauss)
-            gauss.add_rates(tile, m, w.gauss, residual)
-            gauss.apply(tile, m, w.gauss, scheme.rank_tolerance, residual)
-            for k in range(m.constraints.size * width):
-                multiplier[k] += w.gauss.multiplier[k]
-        largest = 0.0
-        for i in range(end):
-            w.z[i] += residual[i]
-            w.zdot[i] += damping_factor * residual[i]
-            w.a[i] += mass_factor * residual[i]
-            if abs(residual[i]) > largest:  # a lane that is no number anymore does not keep the others waiting
-                largest = abs(residual[i])
-        if largest <= scheme.newton_tolerance:
-            break
-    for i in range(end):
-        if not abs(residual[i]) <= 1e3 * scheme.newton_tolerance:
-            w.z[i] = np.nan  # the iteration did not converge: the lane must not go on with a plausible number
+    scheme.evaluations[0] += newton.solve(tile, m, w, newton.raw(scheme.newton), t + h, mass_factor, damping_factor)
     for i in range(end):
         auxiliary[i] += (1 - alpha_f) / (1 - alpha_m) * w.a[i]
     if m.constraints.size > 0:
-        gauss.project_rates(tile, m, w.gauss, t + h, w.z, w.zdot, scheme.rank_tolerance)
+        gauss.project_rates(tile, m, w.gauss, t + h, w.z, w.zdot, scheme.newton.rank_tolerance)
     return h
 
 
-@njit(cache=True, error_model="numpy")
-def _residual(tile: Tile, m: Arrays, w: Work, t: float, multiplier: Array, out: Array) -> None:
-    """out = Q - M a - C_q' lambda on the unknowns."""
-    n = m.unknowns
-    dynamics.force(tile, m, w, t, w.z, w.zdot, out)
-    sparse.multiply(tile, m.pattern, m.mass, w.a, w.stage)
-    for i in range(n * len(tile)):
-        out[i] -= w.stage[i]
-    if m.constraints.size > 0:
-        constraints.jacobian(tile, m.constraints, n, w.z, w.gauss.jacobian)
-        for k in range(m.constraints.size):
-            for i in range(n):
-                for lane in range(len(tile)):
-                    out[i * len(tile) + lane] -= (
-                        w.gauss.jacobian[(k * n + i) * len(tile) + lane] * multiplier[k * len(tile) + lane]
-                    )
-
-
-implement(GeneralizedAlpha, step)
+implement(GeneralizedAlpha, step, FACTS, cubic)

@@ -1,41 +1,96 @@
-"""The one function every integrator provides, chosen by the type of its settings at compile time.
+"""The functions every integrator provides, chosen by the type of its settings at compile time.
 
-`advance(tile, scheme, m, w, t, step)` moves the state in w by one step. An integrator is a file with a
-NamedTuple of settings, its declared facts, and a compiled function with the signature of `advance`;
-compiled code then contains only the integrator that is used.
+`advance(tile, scheme, m, w, t, h)` moves the state in w by one step, `interpolate` gives the motion inside
+the last step. An integrator is a file with a NamedTuple of settings, its declared facts, and a compiled
+function with the signature of `advance`; compiled code then contains only the integrator that is used.
+
+Settings carry a field `evaluations`, (1,): how many times the step has evaluated the forces so far.
 """
 
 from __future__ import annotations
 
+from types import FunctionType
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba import types
 from numba.extending import overload
 
 from shoal.mechanics.dynamics import Work
+from shoal.mechanics.integrators import dense
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.tile import Tile
+from shoal.mechanics.tile import Array, Tile
 
 
 class Facts(NamedTuple):
-    """What an integrator promises: order in time, and the largest stable step times frequency and times decay rate."""
+    """What an integrator promises.
+
+    order: in time. stable_step_times_frequency, stable_step_times_decay: the largest stable step times the
+    highest frequency and times the fastest decay rate. adaptive: chooses its steps by its tolerances.
+    conserves: the energy of a frictionless machine stays what it was, but for round-off and Newton's tolerance.
+    """
 
     order: int
     explicit: bool
-    stable_step_times_frequency: float
-    stable_step_times_decay: float
+    good_for: str
+    stable_step_times_frequency: float = np.inf
+    stable_step_times_decay: float = np.inf
+    adaptive: bool = False
+    conserves: bool = False
 
 
-def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, t: float, step: float) -> float:
-    """Move the state at the time t by one step of at most `step` [s]; returns the step taken. Pointers."""
+def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, t: float, h: float) -> float:
+    """Move the state at the time t by one step; returns the step taken [s]. Pointers.
+
+    h: the step to take, or for adaptive schemes the rest of the run, which is the most they may take.
+    A scheme that cannot go on with a lane writes nan into its state.
+    """
     raise NotImplementedError(type(scheme).__name__)
 
 
-def implement(settings: type, kernel: Any) -> None:
-    """Let compiled calls of `advance` with settings of this type run `kernel`."""
+def interpolate(
+    tile: Tile, scheme: Any, m: Arrays, w: Work, past: Array, x: float, h: float, q: Array, v: Array
+) -> None:
+    """Coordinates and rates at the fraction x of the last step, of h [s], into q and v, (rows, lanes). Pointers.
 
-    @overload(advance)
-    def choose(tile, scheme, m, w, t, step):  # type: ignore[no-untyped-def]
-        if not (isinstance(scheme, types.BaseNamedTuple) and scheme.instance_class is settings):
+    past: coordinates, rates and accelerations at its beginning, (3 * unknowns, lanes); those at its end are in w.
+    """
+    raise NotImplementedError(type(scheme).__name__)
+
+
+def adaptive(scheme: Any) -> bool:
+    """Whether the scheme chooses its steps itself."""
+    raise NotImplementedError(type(scheme).__name__)
+
+
+def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quintic) -> None:
+    """Let compiled calls with settings of this type run the kernel `step`, and `inside` for the motion within it.
+
+    The parameters of the kernels are named as those of `advance` and `interpolate`.
+    """
+
+    def ours(scheme: Any) -> bool:
+        return isinstance(scheme, types.BaseNamedTuple) and scheme.instance_class is settings
+
+    @overload(advance, jit_options={"error_model": "numpy"})
+    def choose_step(tile, scheme, m, w, t, h):  # type: ignore[no-untyped-def]
+        return _body(step) if ours(scheme) else None
+
+    @overload(interpolate, jit_options={"error_model": "numpy"})
+    def choose_inside(tile, scheme, m, w, past, x, h, q, v):  # type: ignore[no-untyped-def]
+        return _body(inside) if ours(scheme) else None
+
+    @overload(adaptive)
+    def choose_adaptive(scheme):  # type: ignore[no-untyped-def]
+        if not ours(scheme):
             return None
-        return lambda tile, scheme, m, w, t, step: kernel(tile, scheme, m, w, t, step)
+        return (lambda scheme: True) if facts.adaptive else (lambda scheme: False)
+
+
+def _body(kernel: Any) -> Any:
+    """The Python function of a kernel without its annotations, which differ from scheme to scheme.
+
+    Compiled in place of the call: a call of the compiled kernel would be one more layer to optimise.
+    """
+    function = kernel.py_func
+    return FunctionType(function.__code__, function.__globals__, function.__name__)

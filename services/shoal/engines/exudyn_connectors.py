@@ -1,0 +1,141 @@
+"""Springs, dampers and friction inside Exudyn: one law over a distance, an angle or the way along a line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shoal.engines.exudyn_chain import cross
+from shoal.engines.exudyn_ends import Ends
+from shoal.scene import Attachment, Function
+from shoal.trajectory import Array
+
+
+class Exchange(NamedTuple):
+    """What a force element does with energy, from times [s] (rows,), q and v (rows, unknowns).
+
+    stored: energy [J], (rows,); lost: power it takes out of the machine [W], negative where it feeds it, (rows,).
+    """
+
+    stored: Callable[[Array, Array, Array], Array]
+    lost: Callable[[Array, Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class Law:
+    """Force [N or N m] of an elongation x [m or rad] and its rate: k x + k3 x^3 + table(x) + c x' + F tanh(x'/v)."""
+
+    stiffness: float = 0.0
+    cubic: float = 0.0
+    damping: float = 0.0
+    coulomb: float = 0.0
+    speed: float = 1.0
+    elastic: Function | None = None
+
+    @property
+    def linear(self) -> bool:
+        """Whether Exudyn's own linear law is enough; it takes no negative stiffness."""
+        return self.stiffness >= 0 and not (self.cubic or self.coulomb or self.elastic)
+
+    def force(self, x: Array, rate: Array) -> Array:
+        """The force that resists x and its rate."""
+        return self.stiffness * x + self.cubic * x**3 + self.resisting(x, rate)
+
+    def stored(self, x: Array) -> Array:
+        """Energy [J] of the polynomial part."""
+        return self.stiffness / 2 * x**2 + self.cubic / 4 * x**4
+
+    def resisting(self, x: Array, rate: Array) -> Array:
+        """The rest of the force, whose work is followed along the way."""
+        force = self.damping * rate + self.coulomb * np.tanh(rate / self.speed)
+        return force if self.elastic is None else force + self.elastic(x)
+
+    def options(self, keyword: str) -> dict[str, Any]:
+        """What Exudyn's connectors need to know; keyword: their name for a force in Python."""
+        options: dict[str, Any] = {"stiffness": max(self.stiffness, 0.0), "damping": self.damping}
+        if not self.linear:
+            # Exudyn gives the measure as it counts it; what it has for an offset comes last.
+            def force(_mbs: Any, _t: float, _item: int, x: float, rate: float, *more: float) -> float:
+                offset = more[2] if keyword == "springTorqueUserFunction" else 0.0
+                return float(self.force(np.array([x - offset]), np.array([rate]))[0])
+
+            options[keyword] = force
+        return options
+
+
+def add_spring(ends: Ends, first: Attachment, second: Attachment, law: Law, length: float | None) -> Exchange:
+    """Enter a law over the distance of two places; length: where x is 0 [m], else that of the start."""
+
+    def measure(q: Array, v: Array) -> tuple[Array, Array]:
+        a, b = ends.motion(first, q, v), ends.motion(second, q, v)
+        apart = b.position - a.position
+        distance = np.linalg.norm(apart, axis=1)
+        return distance, np.sum(apart * (b.velocity - a.velocity), axis=1) / np.maximum(distance, 1e-300)
+
+    if length is None:
+        one, other = (ends.start(side) for side in (first, second))
+        length = float(np.linalg.norm(other - one))
+    rest = length
+    ends.system.mbs.AddObject(
+        ends.system.items.ObjectConnectorSpringDamper(
+            markerNumbers=[ends.hold(first), ends.hold(second)],
+            referenceLength=rest,
+            **law.options("springForceUserFunction"),
+        )
+    )
+    return _exchange(law, lambda q, v: (measure(q, v)[0] - rest, measure(q, v)[1]))
+
+
+def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, angle: float | None) -> Exchange:
+    """Enter a law over the angle between two bodies; angle: where x is 0 [rad], else that of the start."""
+    start = ends.start_turn(first, second)
+    rest = start if angle is None else angle
+    items, mbs, options = ends.system.items, ends.system.mbs, law.options("springTorqueUserFunction")
+    if law.stiffness or law.cubic or law.elastic:
+        # A data coordinate lets Exudyn count full turns.
+        options |= {
+            "markerNumbers": ends.level(first, second, start),
+            "nodeNumber": mbs.AddNode(items.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1)),
+            "offset": rest - start,
+        }
+    else:
+        options["markerNumbers"] = [ends.turn(first), ends.turn(second)]
+    mbs.AddObject(items.ObjectConnectorTorsionalSpringDamper(**options))
+
+    def measure(q: Array, v: Array) -> tuple[Array, Array]:
+        a, b = ends.motion(first, q, v), ends.motion(second, q, v)
+        angle = np.unwrap(np.concatenate([[start], b.direction - a.direction]))[1:]
+        return angle - rest, b.rate - a.rate
+
+    return _exchange(law, measure)
+
+
+def add_rail(ends: Ends, first: Attachment, second: Attachment, direction: float, law: Law) -> Exchange:
+    """Enter a law over the way along a line of the first body; direction: its angle [rad] in that body."""
+    ends.system.mbs.AddObject(
+        ends.system.items.ObjectConnectorLinearSpringDamper(
+            markerNumbers=[ends.turn(first), ends.turn(second)],
+            axisMarker0=[np.cos(direction), np.sin(direction), 0.0],
+            **law.options("springForceUserFunction"),
+        )
+    )
+
+    def measure(q: Array, v: Array) -> tuple[Array, Array]:
+        a, b = ends.motion(first, q, v), ends.motion(second, q, v)
+        line = np.stack([np.cos(a.direction + direction), np.sin(a.direction + direction)], axis=1)
+        apart = b.position - a.position
+        speed = np.sum(line * (b.velocity - a.velocity), axis=1) + a.rate * cross(line, apart)
+        return np.sum(line * apart, axis=1), speed
+
+    return _exchange(law, measure)
+
+
+def _exchange(law: Law, measure: Callable[[Array, Array], tuple[Array, Array]]) -> Exchange:
+    def lost(t: Array, q: Array, v: Array) -> Array:
+        x, rate = measure(q, v)
+        return law.resisting(x, rate) * rate
+
+    return Exchange(lambda t, q, v: law.stored(measure(q, v)[0]), lost)

@@ -1,0 +1,67 @@
+"""The places of a scene inside Exudyn: which part has them, markers on them, and how they move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from shoal.engines.exudyn_bodies import Motion, Part, Place, System
+from shoal.engines.exudyn_chain import Chain
+from shoal.engines.poses import Pose, lead, local, owner
+from shoal.errors import InputError
+from shoal.scene import Attachment, PointMass, Scene
+from shoal.trajectory import Array
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Attachments of a scene on the parts of a system; poses: where the parts start."""
+
+    scene: Scene
+    system: System
+    parts: dict[str, Part]
+    poses: dict[str, Pose]
+
+    def part(self, at: Attachment) -> tuple[Part, Place]:
+        """The part that an attachment is on, and its place there [m]."""
+        return self.parts[owner(at)], self.scene.location(at)
+
+    def hold(self, at: Attachment) -> Any:
+        """A new marker with the position of an attachment."""
+        part, place = self.part(at)
+        return part.hold(self.system, place)
+
+    def turn(self, at: Attachment, angle: float = 0.0) -> Any:
+        """A new marker with the position and the direction of an attachment, `angle` [rad] ahead of it."""
+        part, place = self.part(at)
+        return part.turn(self.system, place, angle)
+
+    def level(self, first: Attachment, second: Attachment, turn: float) -> list[Any]:
+        """Two new markers with the same direction while the second body is `turn` [rad] ahead of the first."""
+        if isinstance(self.part(second)[0], Chain):
+            return [self.turn(first, turn), self.turn(second)]
+        return [self.turn(first), self.turn(second, -turn)]
+
+    def motion(self, at: Attachment, q: Array, v: Array) -> Motion:
+        """How an attachment moves."""
+        part, place = self.part(at)
+        return part.motion(q, v, place)
+
+    def start(self, at: Attachment) -> Array:
+        """Where an attachment is at the start [m], (2,)."""
+        return self.poses[owner(at)].position(local(self.scene, at))
+
+    def start_turn(self, first: Attachment, second: Attachment) -> float:
+        """Angle from the first direction to the second at the start, over full turns [rad]."""
+        one, other = (self.poses[owner(side)].angle + lead(self.scene, side) for side in (first, second))
+        return other - one
+
+    def is_point(self, at: Attachment) -> bool:
+        """Whether an attachment is on a point mass, which has no direction."""
+        return isinstance(self.scene.bodies.get(at.body), PointMass)
+
+    def require_direction(self, field: str, *sides: Attachment) -> None:
+        """Raises InputError for a point mass."""
+        for side in sides:
+            if self.is_point(side):
+                raise InputError(f"{field}: {side.body} is a point mass, which has no angle")

@@ -1,0 +1,159 @@
+"""Where the forces of a model at rest balance: Newton's method and descent of the potential, on the constraints.
+
+Both work in a basis Z of the free directions with Z' M Z = I, so that lengths are in kg^1/2 m and the eigenvalues of
+the reduced stiffness Z' (K + sum lambda_k C_k,qq) Z are squared frequencies. Descent replaces them by their absolute
+values, so that it leaves saddles and maxima (Dauphin et al. 2014), and shortens its step as Levenberg and Marquardt do.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from shoal.mechanics.evaluate import Evaluation, Evaluator
+from shoal.mechanics.freedom import Freedom, Metric
+from shoal.mechanics.tile import Array
+
+CLOSE = 1e-11
+"""Converged: a correction of the bodies [rms displacement / size of the machine] below this,"""
+STALLED = 1e-7
+"""or one below this that round-off keeps from getting smaller."""
+ZERO = 1e-12
+"""Squared frequencies below this times the largest one (at least 1 rad^2/s^2) are zero."""
+LONGEST = 0.2
+"""Longest step of the descent, as a fraction of the machine's size."""
+FAR = 30.0
+"""A machine that has moved by so many times its own size falls for ever."""
+SEEN = 1e-9
+"""Unbalanced forces below this fraction of all forces are round-off."""
+
+
+class View(NamedTuple):
+    """A state at rest: its forces, the free directions, the multipliers, and the unbalanced force along Z."""
+
+    evaluation: Evaluation
+    freedom: Freedom
+    multipliers: Array
+    unbalanced: Array
+
+
+class Found(NamedTuple):
+    """Where an iteration ended. correction: its last, relative to the machine's size."""
+
+    q: Array
+    converged: bool
+    iterations: int
+    correction: float
+    message: str = ""
+
+
+class Balance:
+    """The balance of forces of one model at time t [s]. size: of the machine [m]; mass: of all bodies [kg]."""
+
+    def __init__(self, evaluator: Evaluator, t: float, size: float, mass: float) -> None:
+        self.evaluator, self.t = evaluator, t
+        self.metric = Metric(evaluator.mass)
+        self.size, self.unit = size, size * np.sqrt(mass)
+
+    def look(self, q: Array, load: float = 1.0) -> View:
+        """Forces, free directions and multipliers at q."""
+        evaluation = self.evaluator.at(q, t=self.t, load=load)
+        freedom = self.metric.freedom(evaluation.jacobian)
+        lagrange = freedom.multipliers(evaluation.force)
+        return View(evaluation, freedom, lagrange, freedom.basis.T @ evaluation.force)
+
+    def hessian(self, q: Array, view: View, load: float = 1.0) -> Array:
+        """The reduced stiffness [rad^2/s^2]."""
+        full = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
+        basis = view.freedom.basis
+        return np.asarray(basis.T @ (full @ basis))
+
+    def residual(self, view: View) -> float:
+        """Unbalanced force over the elastic and the applied force, all in the metric of M^-1."""
+        evaluation = view.evaluation
+        parts = (evaluation.elastic, evaluation.force - evaluation.elastic)
+        scale = max(self.metric.size(part) for part in parts)
+        return float(np.linalg.norm(view.unbalanced)) / scale if scale > 0 else 0.0
+
+    def restore(self, q: Array) -> tuple[Array, float]:
+        """The nearest place (metric of M) where the joints close, and how far they still gape."""
+        if self.evaluator.model.constraints.size == 0:
+            return q, 0.0
+        gap = np.inf
+        for _ in range(12):
+            evaluation = self.evaluator.at(q, t=self.t)
+            gap = float(np.max(np.abs(evaluation.gap)))
+            if not gap > 1e-14:
+                break
+            move = self.metric.freedom(evaluation.jacobian).shift(-evaluation.gap)
+            q = q + move
+            if np.max(np.abs(move)) < 1e-15 * np.max(np.abs(q), initial=1.0):
+                break
+        return q, gap
+
+    def newton(self, q: Array, load: float = 1.0, most: int = 20) -> Found:
+        """Newton's method with full steps."""
+        last = np.inf
+        for iteration in range(1, most + 1):
+            view = self.look(q, load)
+            stiffness = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
+            basis = view.freedom.basis
+            back = view.freedom.shift(-view.evaluation.gap)
+            along = stiffness @ basis
+            try:
+                y = np.linalg.solve(basis.T @ along, view.unbalanced - basis.T @ (stiffness @ back))
+            except np.linalg.LinAlgError:
+                return Found(q, False, iteration, last, "the tangent stiffness is singular")
+            q = q + back + basis @ y
+            correction = float(np.linalg.norm(y)) / self.unit + float(np.max(np.abs(back), initial=0.0))
+            if not correction < 3.0:
+                break
+            if correction < CLOSE or (correction < STALLED and correction > 0.3 * last):
+                return Found(q, True, iteration, correction)
+            last = correction
+        return Found(q, False, iteration, last, "Newton's method does not converge")
+
+    def descend(self, q: Array, load: float = 1.0, most: int = 400) -> Found:
+        """Go down in the potential until nothing pulls any more (which is so on a summit, too)."""
+        q, _ = self.restore(q)
+        begin, shift, correction = q, 0.0, np.inf
+        view = self.look(q, load)
+        for iteration in range(1, most + 1):
+            curvature, modes = scipy.linalg.eigh(self.hessian(q, view, load))
+            pull = modes.T @ view.unbalanced
+            zero = zero_level(curvature)
+            if self.residual(view) < SEEN**1.3:
+                return Found(q, True, iteration, correction)
+            potential = view.evaluation.potential
+            noise = 1e-13 * (abs(view.evaluation.strain) + abs(view.evaluation.gravity) + abs(potential))
+            while True:
+                y = pull / (np.maximum(np.abs(curvature), zero) + shift)
+                length = float(np.linalg.norm(y))
+                if length > LONGEST * self.unit:
+                    y *= LONGEST * self.unit / length
+                trial, gap = self.restore(q + view.freedom.basis @ (modes @ y))
+                correction = float(np.linalg.norm(y)) / self.unit
+                self.evaluator.remember(trial)
+                ahead = self.look(trial, load)
+                change = ahead.evaluation.potential - potential
+                if gap < 1e-10 and change <= noise:
+                    break
+                if correction < CLOSE:
+                    good = self.residual(view) < np.sqrt(SEEN)
+                    self.evaluator.remember(q)
+                    return Found(q, good, iteration, correction, "" if good else "the descent of the potential stalls")
+                shift = max(4.0 * shift, float(np.linalg.norm(pull)) / max(float(np.linalg.norm(y)), 1e-300))
+            held = bool(np.all(curvature > zero))
+            q, view, shift = trial, ahead, shift / 8.0 if correction > 1e-6 else 0.0
+            if held and correction < CLOSE:
+                return Found(q, True, iteration, correction)
+            if float(np.max(np.abs(q - begin))) > FAR * self.size:
+                return Found(q, False, iteration, correction, "falls without end")
+        return Found(q, False, most, correction, f"not at rest after {most} steps downhill")
+
+
+def zero_level(curvature: Array) -> float:
+    """Below this a squared frequency [rad^2/s^2] is zero to working accuracy."""
+    return ZERO * max(1.0, float(np.max(np.abs(curvature), initial=0.0)))

@@ -1,0 +1,361 @@
+"""A door to the compiled kernels for one state of a model: forces, constraints, energies and tangents, as arrays.
+
+The equations of motion are M a = Q - C_q' lambda with C(q, t) = 0; at rest, Q(q, 0, t) = C_q' lambda.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse
+from numba import njit
+
+from shoal.mechanics import constraints, dynamics, forces, functions, model
+from shoal.mechanics.affine import Affine
+from shoal.mechanics.build import build
+from shoal.mechanics.dynamics import Work, derived_rows, work_space
+from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.sparse import Pattern
+from shoal.mechanics.tangent import ready, stiffness_at, tangent_tile
+from shoal.mechanics.tile import SINGLE, Array, Tile
+from shoal.mechanics.vector import pointer
+from shoal.scene import Scene
+
+Sparse = scipy.sparse.csr_array
+_LANE = slice(0, 1)
+_STIFF = {
+    "cables_full": (3, 1),
+    "cables_reduced": (3, 1),
+    "cubics": (4, 1),
+    "quintics": (4, 1),
+    "solids": (10, 2),
+    "two_point_solids": (10, 2),
+}
+"""Coefficients of an element by family, and how many of them are not stiffnesses (they come first)."""
+
+
+@njit(cache=True, error_model="numpy")
+def _look(
+    tile: Tile, arrays: Arrays, room: Work, t: float, gap: Array, rate: Array, bias: Array, jacobian: Array
+) -> None:
+    """Force (into room.a), energies (room.energy) and constraints of the state in `room`."""
+    m, w = model.raw(arrays), dynamics.raw(room)
+    dynamics.enter(m, w)
+    dynamics.derive(tile, m, w.z, m.rows, False)
+    dynamics.derive(tile, m, w.zdot, m.rows, True)
+    dynamics.force(tile, m, w, t, w.z, w.zdot, w.a)
+    dynamics.energies(tile, m, w)
+    constraints.residual(tile, m.constraints, m.functions, t, w.z, pointer(gap))
+    constraints.rates(tile, m.constraints, m.functions, t, pointer(rate))
+    constraints.bias(tile, m.constraints, m.functions, t, w.zdot, pointer(bias))
+    constraints.jacobian(tile, m.constraints, w.z, 1.0, pointer(jacobian))
+
+
+@njit(cache=True, error_model="numpy")
+def _elastic(tile: Tile, arrays: Arrays, room: Work) -> None:
+    """The elastic part of the force, into room.a."""
+    m, w = model.raw(arrays), dynamics.raw(room)
+    dynamics.enter(m, w)
+    dynamics.elastic_force(tile, m, w, w.z, w.a, False)
+
+
+@njit(cache=True, error_model="numpy")
+def _accelerate(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: float) -> None:
+    """The acceleration by Gauss's principle, into room.a."""
+    m, w = model.raw(arrays), dynamics.raw(room)
+    dynamics.enter(m, w)
+    dynamics.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
+
+
+@njit(cache=True, error_model="numpy")
+def _remember(tile: Tile, arrays: Arrays, room: Work) -> None:
+    """Count the turns of angle forces."""
+    m, w = model.raw(arrays), dynamics.raw(room)
+    dynamics.remember(tile, m, w)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One state, looked at.
+
+    force: generalised force Q, elastic and applied, without the constraints, (unknowns,); elastic: its elastic part.
+    gap: C(q, t); rate: C_t; bias: C_qq v v + C_tt, so that C_q a = -bias; each (constraints,).
+    jacobian: C_q, (constraints, unknowns). kinetic, strain, gravity: energies [J]; applied: potential [J] of the loads
+    that are constant at the time of the state (nan with loads that turn with a body, which have none).
+    """
+
+    force: Array
+    elastic: Array
+    gap: Array
+    rate: Array
+    bias: Array
+    jacobian: Sparse
+    kinetic: float
+    strain: float
+    gravity: float
+    applied: float
+
+    @property
+    def potential(self) -> float:
+        """Strain energy, gravity and applied loads together [J]."""
+        return self.strain + self.gravity + self.applied
+
+
+class Points(NamedTuple):
+    """Vectors that are affine in the coordinates: matrix (vectors, unknowns) and constant (vectors,), complex."""
+
+    matrix: npt.NDArray[np.complex128]
+    constant: npt.NDArray[np.complex128]
+
+    def at(self, q: Array) -> npt.NDArray[np.complex128]:
+        """The vectors x + iy at the coordinates q."""
+        return self.matrix @ q + self.constant
+
+
+def points(vectors: Sequence[Affine], unknowns: int) -> Points:
+    """Vectors of a placement as one matrix."""
+    matrix = np.zeros((len(vectors), unknowns), dtype=complex)
+    constant = np.zeros(len(vectors), dtype=complex)
+    for k, vector in enumerate(vectors):
+        constant[k] = complex(vector.constant)
+        for unknown, coefficient in vector.terms.items():
+            matrix[k, unknown] += complex(coefficient)
+    return Points(matrix, constant)
+
+
+class Evaluator:
+    """Evaluates a model of one lane at any state; not for threads, as it keeps the turns that angle forces counted."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self._arrays = model.tile(SINGLE, _LANE)
+        self._room = work_space(SINGLE, self._arrays)
+        self._arrays = ready(SINGLE, self._arrays, self._room)
+        self._tangent = tangent_tile(model, SINGLE, _LANE)
+        self.mass = _symmetric(self._tangent.pattern, self._tangent.mass)
+        self._rows = _expansion(model)
+        self._enter(model.q0[:, 0], None)
+        derived_rows(SINGLE, self._arrays, self._room)
+        start = model.start_angles[:, 0]
+        self._room.memory[:] = forces.initial_memory(SINGLE, self._arrays.forces, self._room.z, start)
+
+    @classmethod
+    def of(cls, scene: Scene, *, horizon: float = 0.0) -> Evaluator:
+        """The evaluator of a scene; horizon [s]: latest time that will be asked for. Raises InputError."""
+        return cls(build(scene, horizon=horizon))
+
+    @property
+    def turns(self) -> Array:
+        """The continuous angles [rad] that angle forces have counted, (forces,); may be set."""
+        return self._room.memory.copy()
+
+    @turns.setter
+    def turns(self, angles: Array) -> None:
+        self._room.memory[:] = angles
+
+    def remember(self, q: Array) -> None:
+        """Count the turns of angle forces after a move of less than half a turn to q."""
+        self._enter(q, None)
+        _remember(SINGLE, self._arrays, self._room)
+
+    def at(self, q: Array, v: Array | None = None, t: float = 0.0, *, load: float = 1.0) -> Evaluation:
+        """Look at the state q, v (default: at rest) at time t [s]; `load` scales gravity and applied loads."""
+        self._enter(q, v)
+        arrays, room, n = self._loaded(load), self._room, self.model.unknowns
+        held = arrays.constraints
+        gap, rate, bias = (np.zeros(held.size) for _ in range(3))
+        entries = np.zeros(len(held.column))
+        _look(SINGLE, arrays, room, t, gap, rate, bias, entries)
+        force = room.a[:n].copy()
+        kinetic, strain, gravity = (float(part) for part in room.energy)
+        applied = self._applied(arrays, t)
+        _elastic(SINGLE, arrays, room)
+        jacobian = Sparse((entries, held.column, held.entry), shape=(held.size, n))
+        return Evaluation(force, room.a[:n].copy(), gap, rate, bias, jacobian, kinetic, strain, gravity, applied)
+
+    def acceleration(self, q: Array, v: Array, t: float = 0.0) -> Array:
+        """The acceleration by Gauss's principle, (unknowns,)."""
+        self._enter(q, v)
+        _accelerate(SINGLE, self._arrays, self._room, t, self.model.scene.solver.rank_tolerance)
+        return self._room.a[: self.model.unknowns].copy()
+
+    def stiffness(
+        self, q: Array, t: float = 0.0, *, multipliers: Array | None = None, load: float = 1.0
+    ) -> scipy.sparse.csc_array:
+        """-dQ/dq at rest, (unknowns, unknowns), with the curvature sum lambda_k C_k,qq of the constraints.
+
+        Forces that turn with a body make it unsymmetric.
+        """
+        self._enter(q, None)
+        arrays = self._loaded(load)
+        values = stiffness_at(SINGLE, arrays, self._tangent, self._room, 0.0)
+        if multipliers is not None:
+            tangent = self._tangent
+            np.add.at(values, tangent.curvature, tangent.bend * multipliers[tangent.owner])
+        return scipy.sparse.csc_array(_symmetric(self._tangent.pattern, values) + self._load_stiffness(arrays, t))
+
+    def damping(self, q: Array, v: Array | None = None, *, dry: bool = False) -> scipy.sparse.csc_array:
+        """-dQ/dv, (unknowns, unknowns); dry: with the slope of smoothed dry friction, which is huge at rest."""
+        self._enter(q, v)
+        arrays = self._arrays
+        if not dry:
+            law = arrays.forces.law.copy()
+            law[forces.COULOMB :: forces.LAW] = 0.0
+            arrays = arrays._replace(forces=arrays.forces._replace(law=law))
+        both = stiffness_at(SINGLE, arrays, self._tangent, self._room, 1.0)
+        values = both - stiffness_at(SINGLE, arrays, self._tangent, self._room, 0.0)
+        damped = arrays.elements.cubics.damped or arrays.elements.quintics.damped or arrays.forces.size > 0
+        return _symmetric(self._tangent.pattern, values if damped else 0.0 * values)
+
+    def strain_energies(self, q: Array) -> dict[str, float]:
+        """Strain energy [J] of every flexible body."""
+        bodies = dict.fromkeys(name for owners in self.model.owners for name in owners)
+        return {body: self._energy(q, self._only(lambda owner, _: owner == body)) for body in bodies}
+
+    def element_forces(self, q: Array, v: Array, body: str) -> list[Array]:
+        """Elastic and viscous generalised force of each element of a flexible body by itself, (unknowns,) each."""
+        count = sum(owners.count(body) for owners in self.model.owners)
+        found = []
+        for wanted in range(count):
+            chosen = self._only(lambda owner, number, wanted=wanted: owner == body and number == wanted)
+            found.append(self._force(q, v, chosen))
+        return found
+
+    @property
+    def follows(self) -> bool:
+        """Whether a load turns with a body, so that there is no potential."""
+        return self._arrays.drives.following > 0
+
+    def _enter(self, q: Array, v: Array | None) -> None:
+        n = self.model.unknowns
+        self._room.z[:n] = q
+        self._room.zdot[:n] = 0.0 if v is None else v
+        if self.model.constraints.size == 0 and self.model.forces.size == 0:
+            self._room.power[:] = 0.0
+
+    def _loaded(self, load: float) -> Arrays:
+        """The arrays with gravity and applied loads scaled."""
+        arrays = self._arrays
+        if load == 1.0:
+            return arrays
+        law = arrays.forces.law.copy()
+        law[forces.AMPLITUDE :: forces.LAW] *= load
+        drives = arrays.drives
+        return arrays._replace(
+            weight=arrays.weight * load,
+            forces=arrays.forces._replace(law=law),
+            drives=drives._replace(coefficient=drives.coefficient * load, factor=drives.factor * load),
+        )
+
+    def _only(self, wanted: Any) -> Arrays:
+        """The arrays with the stiffness of some elements (owner, number in its body) and no springs."""
+        arrays = self._arrays
+        families = {}
+        for (name, (size, first)), owners in zip(_STIFF.items(), self.model.owners, strict=True):
+            family = getattr(arrays.elements, name)
+            values = family.coefficients.reshape(-1, size).copy()
+            for row, owner in enumerate(owners):
+                if not wanted(owner, row - owners.index(owner)):
+                    values[row, first:] = 0.0
+            families[name] = family._replace(coefficients=values.ravel())
+        law = np.zeros_like(arrays.forces.law)
+        law[forces.SPEED :: forces.LAW] = 1.0
+        none = np.full_like(arrays.forces.table, -1)
+        drives = arrays.drives
+        return arrays._replace(
+            weight=0.0 * arrays.weight,
+            elements=arrays.elements._replace(**families),
+            forces=arrays.forces._replace(law=law, table=none, energy=none),
+            drives=drives._replace(coefficient=0.0 * drives.coefficient, factor=0.0 * drives.factor),
+        )
+
+    def _force(self, q: Array, v: Array | None, arrays: Arrays) -> Array:
+        """The force of chosen parts; their energies are left in the room."""
+        self._enter(q, v)
+        gap, rate, bias = (np.zeros(arrays.constraints.size) for _ in range(3))
+        entries = np.zeros(len(arrays.constraints.column))
+        _look(SINGLE, arrays, self._room, 0.0, gap, rate, bias, entries)
+        return self._room.a[: self.model.unknowns].copy()
+
+    def _energy(self, q: Array, arrays: Arrays) -> float:
+        self._force(q, None, arrays)
+        return float(self._room.energy[1])
+
+    def _strengths(self, arrays: Arrays, numbers: Array, t: float) -> Array:
+        """Functions of time by number, -1 for the constant 1."""
+        found = [1.0 if k < 0 else functions.evaluate(arrays.functions, int(k), t, 0) for k in numbers]
+        return np.array(found)
+
+    def _torques(self, arrays: Arrays, t: float) -> list[tuple[int, float]]:
+        """(force element, applied torque [N m]) of motors."""
+        law = arrays.forces.law.reshape(-1, forces.LAW)
+        return [
+            (k, law[k, forces.AMPLITUDE] * functions.evaluate(arrays.functions, int(arrays.forces.drive[k]), t, 0))
+            for k in range(arrays.forces.size)
+            if arrays.forces.drive[k] >= 0 and law[k, forces.AMPLITUDE] != 0.0
+        ]
+
+    def _applied(self, arrays: Arrays, t: float) -> float:
+        """Potential of the applied loads [J]; the derived rows must be filled."""
+        drives, z = arrays.drives, self._room.z
+        if drives.following:
+            return float("nan")
+        strength = self._strengths(arrays, drives.fixed_function, t)
+        total = -float(np.sum(drives.coefficient * strength * z[drives.row])) if drives.fixed else 0.0
+        rows = arrays.forces.rows.reshape(-1, forces.ROWS)
+        for k, torque in self._torques(arrays, t):
+            ax, ay, bx, by = z[rows[k, :4]]
+            last = self._room.memory[k]
+            change = np.angle(complex(bx, by) * complex(ax, -ay) * np.exp(-1j * last))
+            total -= torque * (last + change)
+        return total
+
+    def _load_stiffness(self, arrays: Arrays, t: float) -> scipy.sparse.csc_array:
+        """-dQ/dq of motors and of forces that turn with a body."""
+        drives, z, n = arrays.drives, self._room.z, self.model.unknowns
+        parts: list[tuple[Array, Array, Array]] = []
+        strength = self._strengths(arrays, drives.following_function, t)
+        for k in range(drives.following):
+            rows = drives.rows[4 * k : 4 * k + 4]
+            dx, dy = z[rows[2:]]
+            size = np.hypot(dx, dy)
+            fx, fy = drives.factor[2 * k : 2 * k + 2] * strength[k]
+            # d/dd of R d/|d| with R = [[fx, -fy], [fy, fx]]: R (I - n n')/|d|
+            normal = np.array([[dy * dy, -dx * dy], [-dx * dy, dx * dx]]) / size**3
+            parts.append((rows[:2], rows[2:], -np.array([[fx, -fy], [fy, fx]]) @ normal))
+        pairs = arrays.forces.rows.reshape(-1, forces.ROWS)
+        for k, torque in self._torques(arrays, t):
+            for rows, sign in ((pairs[k, :2], -1.0), (pairs[k, 2:4], 1.0)):
+                x, y = z[rows]
+                square = (x * x + y * y) ** 2
+                # The second derivatives of atan2(y, x).
+                turn = np.array([[2 * x * y, y * y - x * x], [y * y - x * x, -2 * x * y]]) / square
+                parts.append((rows, rows, -torque * sign * turn))
+        if not parts:
+            return scipy.sparse.csc_array((n, n))
+        row = np.concatenate([np.repeat(to, 2) for to, _, _ in parts])
+        column = np.concatenate([np.tile(source, 2) for _, source, _ in parts])
+        value = np.concatenate([block.ravel() for _, _, block in parts])
+        size = self.model.rows
+        block = scipy.sparse.csr_array((value, (row, column)), shape=(size, size))
+        return scipy.sparse.csc_array(self._rows.T @ block @ self._rows)
+
+
+def _expansion(model: Model) -> Sparse:
+    """dz/dq: all rows of a state by the unknowns."""
+    d, n = model.derived, model.unknowns
+    row = np.concatenate([np.arange(n), n + np.repeat(np.arange(len(d.start) - 1), np.diff(d.start))])
+    column = np.concatenate([np.arange(n), d.source])
+    value = np.concatenate([np.ones(n), d.coefficient[:, 0] if len(d.source) else np.zeros(0)])
+    return Sparse((value, (row, column)), shape=(model.rows, n))
+
+
+def _symmetric(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
+    """The matrix whose lower triangle lies in the slots of a pattern."""
+    n = pattern.size
+    lower = scipy.sparse.csc_array((values[n:], pattern.row, pattern.column), shape=(n, n))
+    return scipy.sparse.csc_array(lower + lower.T + scipy.sparse.diags_array(values[:n]))

@@ -1,0 +1,114 @@
+"""The machine taken apart: every body with coordinates of its own, no joints, and all the loads that act on it.
+
+Each vector of a body is affine in the machine's coordinates, so the coordinates of the free bodies are S q + s, their
+rates S v and their accelerations S a; what their balance then lacks is what the joints do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse
+
+from shoal.mechanics.affine import Affine
+from shoal.mechanics.build import build
+from shoal.mechanics.evaluate import Evaluator, Points, points
+from shoal.mechanics.forces import LAW
+from shoal.mechanics.frames import BeamFrame, Frame, PointFrame
+from shoal.mechanics.placement import Placement, place
+from shoal.mechanics.tile import Array
+from shoal.scene import InitialState, RigidBody, Scene
+
+
+class FreeBodies:
+    """The bodies of a model without its joints. horizon [s]: latest time that will be asked for.
+
+    evaluator, placement, mass: of the free bodies. Friction in joints is not among their loads.
+    """
+
+    def __init__(self, evaluator: Evaluator, horizon: float) -> None:
+        whole = evaluator.model
+        joined = place(whole.scene)
+        scene, added = _with_inertia(_without_joints(whole.scene, joined))
+        model = build(scene, horizon=horizon)
+        # Springs at rest as they start keep the natural values of the whole machine; joint friction came before them.
+        rubbing = whole.forces.size - model.forces.size
+        law = whole.forces.law[LAW * rubbing :]
+        angles = whole.start_angles[rubbing:]
+        model = replace(model, forces=model.forces._replace(law=law), start_angles=angles, shared_tiles={})
+        self.scene = whole.scene
+        self.placement = place(model.scene)
+        self.evaluator = Evaluator(model)
+        self.evaluator.turns = evaluator.turns[rubbing:]
+        self.mass = self.evaluator.mass - self._turning(added)
+        self._map = _coordinates(self.placement, joined, whole.unknowns)
+
+    def _turning(self, added: dict[str, float]) -> scipy.sparse.csc_array:
+        """The mass matrix of inertias alone [kg m^2]."""
+        diagonal = np.zeros(self.unknowns)
+        for name, inertia in added.items():
+            for row in vectors(self.placement.frames[name])[1].pair or ():
+                diagonal[row] = inertia
+        return scipy.sparse.csc_array(scipy.sparse.diags_array(diagonal))
+
+    @property
+    def unknowns(self) -> int:
+        """Number of coordinates of the free bodies."""
+        return self.evaluator.model.unknowns
+
+    def state(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """Coordinates, rates and accelerations of the free bodies."""
+        matrix = self._map.matrix.real
+        return matrix @ q + self._map.constant.real, matrix @ v, matrix @ a
+
+
+def _without_joints(scene: Scene, placement: Placement) -> Scene:
+    """The scene with every body flying free from where the joints placed it."""
+    initial = {}
+    for name in scene.bodies:
+        pose, start = placement.poses[name], scene.start(name)
+        angle = start.angle + float(np.angle(pose.direction * np.exp(-1j * start.angle)))
+        where, speed = complex(pose.position), complex(pose.velocity)
+        initial[name] = InitialState.model_construct(
+            angle=angle,
+            rate=float(pose.rate),
+            position=(where.real, where.imag),
+            velocity=(speed.real, speed.imag),
+        )
+    return scene.model_copy(update={"joints": {}, "initial": initial})
+
+
+def _with_inertia(scene: Scene) -> tuple[Scene, dict[str, float]]:
+    """A body without inertia about its centre can move as a part of a machine but not alone: it is lent 1 kg m^2."""
+    lent = {name: 1.0 for name, body in scene.bodies.items() if isinstance(body, RigidBody) and body.inertia == 0.0}
+    bodies = {
+        name: body.model_copy(update={"inertia": lent[name]}) if name in lent else body
+        for name, body in scene.bodies.items()
+    }
+    return scene.model_copy(update={"bodies": bodies}), lent
+
+
+def vectors(frame: Frame) -> list[Affine]:
+    """The vectors that are a body's own coordinates when it is free."""
+    if isinstance(frame, PointFrame):
+        return [frame.origin]
+    if isinstance(frame, BeamFrame):
+        return [vector for node in frame.nodes for vector in node]
+    return [frame.origin, frame.axis]
+
+
+def _coordinates(free: Placement, joined: Placement, unknowns: int) -> Points:
+    """Coordinates of the free bodies by those of the machine; real."""
+    pairs = [(free.drivers[name], joined.drivers[name]) for name in free.drivers]
+    for name, frame in free.frames.items():
+        pairs += zip(vectors(frame), vectors(joined.frames[name]), strict=True)
+    matrix = np.zeros((len(free.positions), unknowns), dtype=complex)
+    constant = np.zeros(len(free.positions), dtype=complex)
+    found = points([there for _, there in pairs], unknowns)
+    for k, (here, _) in enumerate(pairs):
+        assert here.pair is not None
+        x, y = here.pair
+        matrix[x], matrix[y] = found.matrix[k].real, found.matrix[k].imag
+        constant[x], constant[y] = found.constant[k].real, found.constant[k].imag
+    return Points(matrix, constant)

@@ -1,0 +1,64 @@
+"""The directions that the constraints leave free, and the constraint forces, in the metric of the mass matrix."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from shoal.mechanics.tile import Array
+
+RANK = 1e-8
+"""A combination of constraints, each of unit length, that is shorter than this depends on the others."""
+
+
+class Freedom(NamedTuple):
+    """The tangent space of the constraints at one state.
+
+    basis: Z, with C_q Z = 0 and Z' M Z = I, (unknowns, degrees of freedom). rank: that of C_q. dependent: combinations
+    w of constraints with w' C_q = 0, orthonormal after scaling each row of C_q to unit length, (constraints, defect).
+    across, inverse: factors of the pseudo-inverse of C_q in that metric.
+    """
+
+    basis: Array
+    rank: int
+    dependent: Array
+    across: Array
+    inverse: Array
+
+    def multipliers(self, force: Array) -> Array:
+        """The lambda of least norm for which Q - C_q' lambda is smallest in the metric of M^-1."""
+        return np.asarray(self.inverse @ (self.across.T @ force))
+
+    def shift(self, gap: Array) -> Array:
+        """The smallest d (metric of M) with C_q d = gap, as far as C_q reaches."""
+        return np.asarray(self.across @ (self.inverse.T @ gap))
+
+
+class Metric:
+    """The mass matrix, factored once."""
+
+    def __init__(self, mass: Any) -> None:
+        self._lower = np.linalg.cholesky(np.asarray(mass.toarray()))
+
+    def size(self, force: Array) -> float:
+        """The norm of a generalised force in the metric of M^-1 [kg^1/2 m/s^2]."""
+        return float(np.linalg.norm(scipy.linalg.solve_triangular(self._lower, force, lower=True)))
+
+    def freedom(self, jacobian: Any) -> Freedom:
+        """The tangent space of the constraints with the Jacobian C_q (sparse)."""
+        lower, n = self._lower, len(self._lower)
+        count = jacobian.shape[0]
+        if count == 0:
+            basis = scipy.linalg.solve_triangular(lower, np.eye(n), lower=True, trans="T")
+            return Freedom(basis, 0, np.zeros((0, 0)), np.zeros((n, 0)), np.zeros((0, 0)))
+        rows = scipy.linalg.solve_triangular(lower, jacobian.toarray().T, lower=True)
+        lengths = np.linalg.norm(rows, axis=0)
+        scale = np.divide(1.0, lengths, out=np.ones_like(lengths), where=lengths > 0)
+        left, sizes, right = np.linalg.svd(rows * scale)
+        rank = int(np.sum(sizes > RANK))
+        back = scipy.linalg.solve_triangular(lower, left, lower=True, trans="T")
+        inverse = scale[:, None] * (right[:rank].T / sizes[:rank])
+        dependent = scale[:, None] * right[rank:].T
+        return Freedom(back[:, rank:], rank, dependent, back[:, :rank], inverse)

@@ -1,0 +1,217 @@
+"""The explicit Runge-Kutta method of Dormand and Prince of order 8 with step control and its own dense output.
+
+Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.10; the coefficients are those that
+scipy publishes. After each step the drift from the constraints is projected away.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from scipy.integrate import DOP853
+
+from shoal.mechanics import dynamics
+from shoal.mechanics.dynamics import Work
+from shoal.mechanics.integrators import control
+from shoal.mechanics.integrators.control import RESOLUTION, Control, control_room
+from shoal.mechanics.integrators.scheme import Facts, implement
+from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.tile import Array, Tile
+from shoal.mechanics.vector import pointer
+from shoal.scene import Solver
+
+STAGES = 12
+"""Stage 12 is the end of the step, stages 13 to 15 serve the dense output alone."""
+ORDER_OF_ERROR = 8
+
+
+def _tableau() -> tuple[Array, Array]:
+    """Weights (16, 16) and instants (16,) of all stages."""
+    weights, instants = np.zeros((16, 16)), np.zeros(16)
+    weights[:STAGES, :STAGES], instants[:STAGES] = DOP853.A, DOP853.C
+    weights[STAGES, :STAGES], instants[STAGES] = DOP853.B, 1.0
+    weights[STAGES + 1 :], instants[STAGES + 1 :] = DOP853.A_EXTRA, DOP853.C_EXTRA
+    return weights, instants
+
+
+WEIGHTS, INSTANTS = _tableau()
+ERROR_3, ERROR_5 = np.array(DOP853.E3), np.array(DOP853.E5)
+DENSE = np.array(DOP853.D)
+
+
+class Dop853(NamedTuple):
+    """Settings and room.
+
+    slope_q, slope_v: rates and accelerations of the stages, (16 * unknowns, lanes). stage_q, stage_v, stage_a: one
+    state, (rows, lanes). begin, dense: when the last step began [s], and whether its dense stages are there.
+    """
+
+    rank_tolerance: float
+    control: Control
+    slope_q: Array
+    slope_v: Array
+    stage_q: Array
+    stage_v: Array
+    stage_a: Array
+    begin: Array
+    dense: Array
+    evaluations: Array
+
+
+FACTS = Facts(
+    order=8,
+    explicit=True,
+    adaptive=True,
+    good_for="rigid machines, and references: any accuracy for few evaluations where nothing is stiff",
+)
+
+
+def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Dop853:
+    """Settings for one tile of lanes."""
+    slopes, state = 16 * model.unknowns * len(tile), model.rows * len(tile)
+    sizes = (slopes, slopes, state, state, state, 1, 1, 1)
+    return Dop853(solver.rank_tolerance, control_room(solver, tile), *(np.zeros(size) for size in sizes))
+
+
+@njit(cache=True, error_model="numpy")
+def _raw(s: Dop853) -> Dop853:
+    """The same with pointers in place of arrays."""
+    return Dop853(
+        s.rank_tolerance,
+        control.raw(s.control),
+        pointer(s.slope_q),
+        pointer(s.slope_v),
+        pointer(s.stage_q),
+        pointer(s.stage_v),
+        pointer(s.stage_a),
+        pointer(s.begin),
+        pointer(s.dense),
+        pointer(s.evaluations),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _stage(tile: Tile, scheme: Dop853, m: Arrays, w: Work, h: float, number: int, q: Array, v: Array) -> None:
+    """Coordinates and rates of a stage, from w.before and the slopes of the stages before it. Uses w.stage."""
+    end = m.unknowns * len(tile)
+    slope_q, slope_v = scheme.slope_q, scheme.slope_v
+    for i in range(2 * end):
+        w.stage[i] = 0.0
+    for j in range(number):
+        weight = WEIGHTS[number, j]
+        if weight != 0.0:
+            for i in range(end):
+                w.stage[i] += weight * slope_q[j * end + i]
+                w.stage[end + i] += weight * slope_v[j * end + i]
+    for i in range(end):
+        q[i] = w.before[i] + h * w.stage[i]
+        v[i] = w.before[end + i] + h * w.stage[end + i]
+
+
+@njit(cache=True, error_model="numpy")
+def _keep(tile: Tile, scheme: Dop853, m: Arrays, number: int, v: Array, a: Array) -> None:
+    """The slopes of a stage."""
+    end = m.unknowns * len(tile)
+    slope_q, slope_v = scheme.slope_q, scheme.slope_v
+    for i in range(end):
+        slope_q[number * end + i] = v[i]
+        slope_v[number * end + i] = a[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _errors(tile: Tile, scheme: Dop853, m: Arrays, h: float) -> None:
+    """The error of every lane from the methods of order 3 and 5 inside (Hairer, Norsett, Wanner I, eq. II.10.17)."""
+    width = len(tile)
+    end = m.unknowns * width
+    slope_q, slope_v = scheme.slope_q, scheme.slope_v
+    c = scheme.control
+    for lane in range(width):
+        third, fifth = 0.0, 0.0
+        for i in range(lane, end, width):
+            q3, q5, v3, v5 = 0.0, 0.0, 0.0, 0.0
+            for j in range(STAGES):
+                q3, q5 = q3 + ERROR_3[j] * slope_q[j * end + i], q5 + ERROR_5[j] * slope_q[j * end + i]
+                v3, v5 = v3 + ERROR_3[j] * slope_v[j * end + i], v5 + ERROR_5[j] * slope_v[j * end + i]
+            third += (q3 * c.weight_q[lane]) ** 2 + (v3 * c.weight_v[lane]) ** 2
+            fifth += (q5 * c.weight_q[lane]) ** 2 + (v5 * c.weight_v[lane]) ** 2
+        both = fifth + 0.01 * third
+        c.error[lane] = h * fifth / np.sqrt(both * 2 * m.unknowns) if both != 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> float:
+    """One step from the time t, of at most h [s]; returns its length. w.a holds the acceleration before and after."""
+    rest, room = h, _raw(scheme)
+    c = room.control
+    room.begin[0], room.dense[0] = t, 0.0
+    if not control.begin(tile, m, w, c):
+        return rest
+    _keep(tile, room, m, 0, w.zdot, w.a)
+    h = control.first_trial(c, rest)
+    rejected = False
+    while True:
+        for number in range(1, STAGES):
+            _stage(tile, room, m, w, h, number, w.z, w.zdot)
+            dynamics.acceleration(
+                tile, m, w, t + INSTANTS[number] * h, w.z, w.zdot, room.rank_tolerance, w.a
+            )  # fmt: skip
+            _keep(tile, room, m, number, w.zdot, w.a)
+        room.evaluations[0] += STAGES - 1
+        _stage(tile, room, m, w, h, STAGES, w.z, w.zdot)
+        control.weigh(tile, m, w, c)
+        _errors(tile, room, m, h)
+        error = control.worst(tile, c)
+        if error <= 1.0:
+            break
+        rejected = True
+        h = control.shorter(error, h, ORDER_OF_ERROR)
+        if h < RESOLUTION * (t + rest):
+            if not control.give_up(tile, m, w, c):
+                return rest
+            h = control.first_trial(c, rest)
+    control.accept(c, error, h, ORDER_OF_ERROR, rejected)
+    dynamics.settle(tile, m, w, t + h, room.rank_tolerance)
+    dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, room.rank_tolerance, w.a)
+    room.evaluations[0] += 1
+    return h
+
+
+@njit(cache=True, error_model="numpy")
+def inside(tile: Tile, scheme: Dop853, m: Arrays, w: Work, past: Array, x: float, h: float, q: Array, v: Array) -> None:
+    """The motion at the fraction x of the last step, of order 7; the three stages it needs are made on demand."""
+    room = _raw(scheme)
+    end = m.unknowns * len(tile)
+    slope_q, slope_v = room.slope_q, room.slope_v
+    if room.dense[0] == 0.0:
+        room.dense[0] = 1.0
+        room.evaluations[0] += 3
+        _keep(tile, room, m, STAGES, w.zdot, w.a)
+        q_, v_, a_ = room.stage_q, room.stage_v, room.stage_a
+        for number in range(STAGES + 1, 16):
+            _stage(tile, room, m, w, h, number, q_, v_)
+            instant = room.begin[0] + INSTANTS[number] * h
+            dynamics.acceleration(tile, m, w, instant, q_, v_, room.rank_tolerance, a_)
+            _keep(tile, room, m, number, v_, a_)
+    for i in range(end):
+        q[i] = w.before[i] + _dense(end, i, slope_q, w.z[i] - w.before[i], x, h)
+        v[i] = w.before[end + i] + _dense(end, i, slope_v, w.zdot[i] - w.before[end + i], x, h)
+
+
+@njit(cache=True, error_model="numpy")
+def _dense(end: int, i: int, slope: Array, change: float, x: float, h: float) -> float:
+    """Change of one entry up to the fraction x of the step (Hairer, Norsett, Wanner I, section II.6)."""
+    first, last = h * slope[i], h * slope[STAGES * end + i]
+    value: float = 0.0
+    for k in range(3, -1, -1):
+        part: float = 0.0
+        for j in range(16):
+            part += DENSE[k, j] * slope[j * end + i]
+        value = (value + h * part) * (x if k % 2 == 1 else 1.0 - x)
+    value = (value + 2.0 * change - first - last) * x
+    value = (value + first - change) * (1.0 - x)
+    return (value + change) * x
+
+
+implement(Dop853, step, FACTS, inside)

@@ -1,0 +1,148 @@
+"""The energy-momentum step: the midpoint rule with the force that does exactly the work of the elastic energy.
+
+Gonzalez, Time integration and discrete Hamiltonian systems, 1996, and, with constraints, Mechanical systems subject to
+holonomic constraints, 1999. M (v1 - v0) = h (F - C_q' lambda), q1 - q0 = h (v0 + v1)/2, C(q1) = 0. The constraints are
+quadratic, so that C_q at the midpoint is their exact difference quotient and lambda does no work.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics import constraints, dynamics, sparse
+from shoal.mechanics.dynamics import Work
+from shoal.mechanics.integrators import newton
+from shoal.mechanics.integrators.dense import cubic
+from shoal.mechanics.integrators.newton import Newton, newton_room
+from shoal.mechanics.integrators.scheme import Facts, implement
+from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.tile import Array, Tile
+from shoal.mechanics.vector import pointer
+from shoal.scene import Solver
+
+ROUND_OFF = 1e-15
+
+
+class EnergyMomentum(NamedTuple):
+    """Settings and room.
+
+    middle: the midpoint, change: what the step changes, both (rows, lanes). elastic: energy at its beginning [J],
+    (lanes,).
+    """
+
+    newton: Newton
+    middle: Array
+    change: Array
+    elastic: Array
+    evaluations: Array
+
+
+FACTS = Facts(
+    order=2,
+    explicit=False,
+    conserves=True,
+    good_for="long free motion of stiff elastic machines: their energy stays what it was at any step",
+)
+
+
+def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> EnergyMomentum:
+    """Settings for one tile of lanes."""
+    rows, width = model.rows * len(tile), len(tile)
+    room = newton_room(solver, model, tile, lanes)
+    return EnergyMomentum(room, np.zeros(rows), np.zeros(rows), np.zeros(width), np.zeros(1))
+
+
+@njit(cache=True, error_model="numpy")
+def _raw(s: EnergyMomentum) -> EnergyMomentum:
+    """The same with pointers in place of arrays."""
+    return EnergyMomentum(
+        newton.raw(s.newton), pointer(s.middle), pointer(s.change), pointer(s.elastic), pointer(s.evaluations)
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: float, f: Array) -> None:
+    """The force of the step that led from w.before to w.z, into f: at the midpoint, corrected along the step.
+
+    The correction c M (q1 - q0) makes the elastic force do the work U(q0) - U(q1). The mass matrix in it gives every
+    coordinate its own unit; it vanishes where elements know their exact mean force (Simo and Tarnow 1992).
+    """
+    width = len(tile)
+    end = m.unknowns * width
+    middle, change = scheme.middle, scheme.change
+    for i in range(end):
+        middle[i] = 0.5 * (w.before[i] + w.z[i])
+        change[i] = w.z[i] - w.before[i]
+    dynamics.elastic_force(tile, m, w, middle, f, True)
+    dynamics.derive(tile, m, w.before, m.force_rows, False)
+    dynamics.derive(tile, m, w.z, m.force_rows, False)
+    dynamics.add_mean_force(tile, m, w, w.before, w.z, f)
+    dynamics.energies(tile, m, w)
+    sparse.multiply(tile, m.pattern, m.mass, change, w.stage)
+    for lane in range(width):
+        work, square = 0.0, 0.0
+        for i in range(lane, end, width):
+            work += f[i] * change[i]
+            square += w.stage[i] * change[i]
+        after = w.energy[width + lane]
+        excess = after - scheme.elastic[lane] + work
+        noise = ROUND_OFF * (after + scheme.elastic[lane])
+        factor = excess / square if abs(excess) > noise and square > 0 else 0.0
+        for i in range(lane, end, width):
+            f[i] -= factor * w.stage[i]
+    # What has no potential acts as it does half-way: the whole force less its elastic part.
+    for i in range(end):
+        change[i] /= h
+    dynamics.force(tile, m, w, t + 0.5 * h, middle, change, w.stage)
+    for i in range(end):
+        change[i] *= h
+        f[i] += w.stage[i]
+    dynamics.elastic_force(tile, m, w, middle, w.stage, False)
+    for i in range(end):
+        f[i] -= w.stage[i]
+
+
+@njit(cache=True, error_model="numpy")
+def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: float) -> float:
+    """One step of h [s] from the time t."""
+    width = len(tile)
+    end = m.unknowns * width
+    room = _raw(scheme)
+    residual, change = room.newton.residual, room.change
+    dynamics.energies(tile, m, w)
+    for lane in range(width):
+        room.elastic[lane] = w.energy[width + lane]
+    for i in range(end):
+        w.before[i] = w.z[i]
+        w.z[i] += h * w.zdot[i]
+    for _ in range(newton.ITERATIONS):
+        room.evaluations[0] += 1
+        mean_force(tile, room, m, w, t, h, residual)
+        for i in range(end):
+            change[i] = 2.0 / (h * h) * (change[i] - h * w.zdot[i])
+        sparse.multiply(tile, m.pattern, m.mass, change, w.stage)
+        for i in range(end):
+            residual[i] -= w.stage[i]
+        newton.add_reactions(tile, m, w, room.newton, room.middle)
+        # The unknown is the midpoint, which moves half as far as the end.
+        dynamics.derive(tile, m, w.z, m.held_rows, False)
+        constraints.residual(tile, m.constraints, m.functions, t + h, w.z, w.gauss.gap)
+        for k in range(m.constraints.size * width):
+            w.gauss.gap[k] *= 0.5
+        newton.correct(tile, m, w, room.newton, room.middle, 4.0 / (h * h), 2.0 / h)
+        for i in range(end):
+            w.z[i] += 2.0 * residual[i]
+        if newton.largest_change(tile, m, room.newton) <= room.newton.tolerance:
+            break
+    newton.mark_failures(tile, m, w, room.newton)
+    for i in range(end):
+        w.zdot[i] = 2.0 * (w.z[i] - w.before[i]) / h - w.zdot[i]
+    room.evaluations[0] += 1
+    dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, room.newton.rank_tolerance, w.a)
+    return h
+
+
+implement(EnergyMomentum, step, FACTS, cubic)

@@ -1,0 +1,70 @@
+"""The full state of a scene's motion at requested times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from shoal.errors import ComputationError, InputError
+from shoal.mechanics import forces, stability
+from shoal.mechanics.build import build
+from shoal.mechanics.dynamics import derived_rows, work_space
+from shoal.mechanics.evaluate import Evaluator
+from shoal.mechanics.integrators import choose, facts, pick
+from shoal.mechanics.march import march
+from shoal.mechanics.tangent import ready
+from shoal.mechanics.tile import SINGLE, Array
+from shoal.scene import Scene
+
+_LANE = slice(0, 1)
+
+
+class State(NamedTuple):
+    """Coordinates, rates and accelerations (unknowns,) at a time [s], and the turns of angle forces (forces,)."""
+
+    time: float
+    q: Array
+    v: Array
+    a: Array
+    turns: Array
+
+
+def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]]:
+    """States at times >= 0 [s], each reached from the start by whole steps no longer than the scene's.
+
+    Raises InputError if the scene cannot be modelled, ComputationError if the motion is not finite.
+    """
+    if not len(times) or not all(np.isfinite(t) and t >= 0 for t in times):
+        raise InputError("times: give times of at least 0 s")
+    model = build(scene, horizon=max(times))
+    choice = pick(scene.solver, model, stability.step_limit)
+    if max(times) > 0 and scene.solver.step > choice.limit:
+        raise InputError(
+            f"solver.step: {scene.solver.step:g} s is beyond the stability limit {choice.limit:.3e} s of "
+            f"{choice.name} for this scene; use a smaller step or solver.integrator=generalized-alpha"
+        )
+    evaluator = Evaluator(model)
+    n = model.unknowns
+    none = np.zeros(0, dtype=np.int64)
+    found = []
+    for time in times:
+        arrays = model.tile(SINGLE, _LANE)
+        room = work_space(SINGLE, arrays)
+        arrays = ready(SINGLE, arrays, room)
+        room.z[:n], room.zdot[:n] = model.q0[:, 0], model.v0[:, 0]
+        derived_rows(SINGLE, arrays, room)
+        room.memory[:] = forces.initial_memory(SINGLE, arrays.forces, room.z, model.start_angles[:, 0])
+        steps = max(1, int(np.ceil(time / scene.solver.step - 1e-9))) if time > 0 else 0
+        step = time / steps if steps else scene.solver.step
+        scheme = choose(scene.solver, model, SINGLE, _LANE, choice.name)
+        if facts(choice.name).adaptive:
+            steps, step = (scene.solver.max_steps if steps else 0), scene.solver.step
+        march(SINGLE, scheme, arrays, room, step, steps, np.array([time]), none, scene.solver.rank_tolerance)
+        q, v = room.z[:n].copy(), room.zdot[:n].copy()
+        if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))):
+            raise ComputationError(f"{scene.name}: the motion is not finite at {time:g} s; use a smaller step")
+        evaluator.turns = room.memory
+        found.append(State(float(time), q, v, evaluator.acceleration(q, v, time), room.memory.copy()))
+    return evaluator, found

@@ -1,0 +1,95 @@
+"""Normal force, shear force and bending moment along a flexible rod, from the balance of its elements.
+
+What the neighbours exert on the two ends of an element is M_e a - Q_e, its inertia less its elastic, viscous and
+distributed forces. Its part on a nodal position is a force, and that on the nodal vectors d does the work of the
+moment sum d x f in a turn of the node. Unlike forces from the strains at a place, these are in exact balance with the
+loads on any mesh.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics.elements import ELEMENTS
+from shoal.mechanics.evaluate import Evaluator
+from shoal.mechanics.frames import BeamFrame
+from shoal.mechanics.free_bodies import FreeBodies
+from shoal.mechanics.pose import as_complex
+from shoal.mechanics.tile import Array
+from shoal.scene import Attachment, DistributedForce, Rod, Scene
+from shoal.scene.joints import places
+from shoal.scene.loads import sides
+
+
+class Sections(NamedTuple):
+    """Section forces at both ends of every element of a rod, in order, (2 elements,) each.
+
+    s: arc length [m]. normal [N]: tension is positive. shear [N]: of the part beyond on the part before, positive
+    along the normal to the left of the axis. moment [N m]: positive where it bends the rod to the left. nan for an
+    element on which a point load or a joint acts between its nodes.
+    """
+
+    s: Array
+    normal: Array
+    shear: Array
+    moment: Array
+
+
+def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: str) -> Sections:
+    """Section forces of a flexible rod at a state (coordinates, rates, accelerations). Raises InputError."""
+    scene = evaluator.model.scene
+    body = scene.bodies.get(rod)
+    if not isinstance(body, Rod) or body.element == "rigid":
+        raise InputError(f"{rod}: section forces need a flexible rod of the scene")
+    bodies = FreeBodies(evaluator, t)
+    at, rate, change = bodies.state(q, v, a)
+    frame = bodies.placement.frames[rod]
+    assert isinstance(frame, BeamFrame)
+    element = ELEMENTS[body.element]
+    length = float(frame.element_length)
+    broken = _interrupted(scene, rod, body)
+    load = as_complex(scene.gravity)
+    along = [d for d in scene.loads.values() if isinstance(d, DistributedForce) and d.body == rod]
+    rows: list[tuple[float, float, float, float]] = []
+    for number, elastic in enumerate(bodies.evaluator.element_forces(at, rate, rod)):
+        height, width = body.section((number + 0.5) / body.elements)
+        pairs = [vector.pair for vector in frame.vectors(number)]
+        vectors = np.array([complex(at[x], at[y]) for x, y in pairs])
+        changes = np.array([complex(change[x], change[y]) for x, y in pairs])
+        inertia = np.array(element.mass(body.density, height, width, length)) @ changes
+        weight = np.array(element.weight(body.density, height, width, length)) * load
+        unit = np.array(element.weight(1.0, 1.0, 1.0, length))
+        for one in along:
+            weight = weight + unit * as_complex(one.force) * float(one.scale(np.array(t)))
+        inner = np.array([complex(elastic[x], elastic[y]) for x, y in pairs])
+        ends = inertia - inner - weight
+        order = len(ends) // 2
+        for end in range(2):
+            part = slice(end * order, (end + 1) * order)
+            s = (number + end) * length
+            direction = frame.direction(complex(s))
+            tangent = sum((c * at[unknown] for unknown, c in direction.terms.items()), complex(direction.constant))
+            tangent = tangent / abs(tangent)
+            sign = 1.0 if end == 1 else -1.0
+            force = sign * np.conj(tangent) * ends[part][0]
+            moment = sign * float(np.sum(np.imag(np.conj(vectors[part][1:]) * ends[part][1:])))
+            row = (float(force.real), float(force.imag), moment)
+            rows.append((s, *row) if number not in broken else (s, np.nan, np.nan, np.nan))
+    s, normal, shear, bending = np.array(rows).T
+    return Sections(s, normal, shear, bending)
+
+
+def _interrupted(scene: Scene, name: str, rod: Rod) -> set[int]:
+    """Elements with a load or a joint between their nodes."""
+    attached: list[Attachment] = [side for joint in scene.joints.values() for side in places(joint)]
+    attached += [side for load in scene.loads.values() for side in sides(load).values()]
+    found = set()
+    for side in attached:
+        if side.body == name:
+            place = scene.location(side)[0] / rod.length * rod.elements
+            if abs(place - round(place)) > 1e-9:
+                found.add(int(place))
+    return found

@@ -1,0 +1,351 @@
+"""Static equilibrium of a scene, with large deflections: a stable place where all forces balance, or the reason why not.
+
+A machine that its own stiffness holds is loaded step by step by Newton's method; steps are halved where a step does
+not converge, turns a body by too much or ends in an unstable place. A machine without stiffness of its own (a
+pendulum, a chain), and one that snaps through, goes down in its potential instead. Dry friction is left out, and
+drives stand still where they are at the stated time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from shoal.mechanics.balance import Balance, Found, zero_level
+from shoal.mechanics.evaluate import Evaluator, Points, points
+from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
+from shoal.mechanics.groups import start_angle
+from shoal.mechanics.placement import Placement, place
+from shoal.mechanics.reactions import Reactions, reactions_of
+from shoal.mechanics.tile import Array
+from shoal.scene import Scene
+from shoal.trajectory import plain
+
+TURN = 0.8
+"""Largest turn [rad] of any body or section in one load step."""
+SMALLEST = 1.0 / 1024
+"""Smallest load step."""
+GAPE = 1e-9
+"""Joints that gape by more than this [m, relative to the machine's size] are not closed."""
+
+
+class Held(StrEnum):
+    """How the search for an equilibrium ended. Only `ok` may be believed."""
+
+    OK = "ok"
+    UNSTABLE = "unstable"
+    UNHELD = "nothing-holds"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A state of rest, and the evidence for it.
+
+    balanced: whether the forces balance, stably or not. q: coordinates; multipliers: lambda of the constraints, Q = C_q' lambda. markers: names; points [m], (markers, 2);
+    angles [rad], counted over full turns from the start, (markers,). energy: strain, gravity, applied [J], and the
+    strain energy of every flexible body. residual: unbalanced force relative to all forces; gap: worst violation of a
+    joint; correction: the last one, relative to the machine's size. eigenvalues: of the reduced stiffness in the
+    metric of the mass [rad^2/s^2], lowest first; all positive means stable. steps: load steps. reactions: in joints.
+    """
+
+    scene: Scene
+    time: float
+    status: Held
+    message: str
+    balanced: bool
+    q: Array
+    multipliers: Array
+    markers: tuple[str, ...]
+    points: Array
+    angles: Array
+    energy: dict[str, float]
+    strain_energy: dict[str, float]
+    residual: float
+    gap: float
+    correction: float
+    eigenvalues: Array
+    iterations: int
+    steps: int
+    reactions: Reactions | None
+    turns: Array = field(repr=False)
+
+    @property
+    def ok(self) -> bool:
+        """Whether this is a stable equilibrium."""
+        return self.status is Held.OK
+
+    @property
+    def stable(self) -> bool:
+        """Whether every small displacement is pulled back."""
+        return bool(np.all(np.real(self.eigenvalues) > zero_level(self.eigenvalues)))
+
+    def marker(self, name: str) -> Array:
+        """Position of a marker [m], (2,)."""
+        return np.asarray(self.points[self.markers.index(name)])
+
+    def angle(self, name: str) -> float:
+        """Direction at a marker [rad]."""
+        return float(self.angles[self.markers.index(name)])
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, which `shoal statics --json` prints."""
+        return {
+            "status": str(self.status),
+            "message": self.message,
+            "time": self.time,
+            "stable": self.stable,
+            "markers": {
+                name: {"x": plain(self.marker(name)[0]), "y": plain(self.marker(name)[1]), "angle": self.angle(name)}
+                for name in self.markers
+            },
+            "energy": self.energy,
+            "strain_energy": self.strain_energy,
+            "residual": self.residual,
+            "constraint_gap": self.gap,
+            "correction": plain(self.correction),
+            "eigenvalues": plain(np.real(self.eigenvalues)[:6]),
+            "iterations": self.iterations,
+            "load_steps": self.steps,
+            "reactions": self.reactions.to_json() if self.reactions else {},
+        }
+
+
+def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True) -> Equilibrium:
+    """The equilibrium that a machine at rest reaches from the start of its scene, with drives as they are at `time` [s].
+
+    leave_unstable: go on from an unstable equilibrium (a column beyond its buckling load) to a stable one, where the
+    loads have a potential. Raises InputError if the scene cannot be modelled.
+    """
+    evaluator = Evaluator.of(scene, horizon=time)
+    return _Search(scene, evaluator, time).run(leave_unstable)
+
+
+class _Search:
+    """One search for an equilibrium."""
+
+    def __init__(self, scene: Scene, evaluator: Evaluator, time: float) -> None:
+        self.scene, self.evaluator, self.time = scene, evaluator, time
+        self.placement = place(scene)
+        unknowns = evaluator.model.unknowns
+        self.directions = points(_directions(self.placement), unknowns)
+        self.marker_points = points([self.placement.point(scene, at) for at in scene.markers.values()], unknowns)
+        self.marker_lines = points([self.placement.direction(scene, at) for at in scene.markers.values()], unknowns)
+        self.angles = np.array([float(start_angle(scene, at)) for at in scene.markers.values()])
+        mass = sum(float(body.mass) for body in scene.bodies.values())
+        self.balance = Balance(evaluator, time, machine_size(scene), mass)
+        self.iterations = self.steps = 0
+
+    def run(self, leave_unstable: bool) -> Equilibrium:
+        q = self._assembled()
+        q, gap = self.balance.restore(q)
+        if gap > GAPE * self.balance.size:
+            return self._ending(q, Held.FAILED, f"the joints cannot be closed: they gape by {gap:.2g}")
+        has_potential = not self.evaluator.follows
+        message = ""
+        found = self._loaded(q)
+        if found is None or not found.converged:
+            if has_potential:
+                if found is not None:
+                    message = "snapped or buckled on the way; "
+                found = self._count(self.balance.descend(q if found is None else found.q))
+                self._follow(found.q)
+            elif found is None:
+                found = self._count(self.balance.newton(q))
+        for attempt in range(4):
+            if not found.converged:
+                break
+            eigenvalues, lowest = self._eigen(found.q)
+            zero = zero_level(eigenvalues)
+            if not (leave_unstable and has_potential) or np.real(eigenvalues[0]) > -zero:
+                break
+            message = "left an unstable equilibrium; "
+            kick = 1e-3 * self.balance.size / np.max(np.abs(lowest)) * (1 + attempt)
+            found = self._count(self.balance.descend(found.q + kick * lowest))
+            self._follow(found.q)
+        if found.converged:
+            refined = self._count(self.balance.newton(found.q, most=6))
+            if refined.converged and self._turn(found.q, refined.q) < 1e-3:
+                found = refined
+                self._follow(found.q)
+        return self._judge(found, message)
+
+    def _judge(self, found: Found, message: str) -> Equilibrium:
+        eigenvalues, lowest = self._eigen(found.q)
+        zero = zero_level(eigenvalues)
+        view = self.balance.look(found.q)
+        residual = self.balance.residual(view)
+        if not found.converged:
+            if found.message == "falls without end":
+                moved = found.q - self.evaluator.model.q0[:, 0]
+                return self._ending(found.q, Held.UNHELD, f"nothing holds {self._movers(moved)}; it falls without end")
+            return self._ending(found.q, Held.FAILED, message + found.message, found)
+        if residual > 1e-5:
+            text = f"{message}the forces do not balance, {residual:.1g} of them is left"
+            return self._ending(found.q, Held.FAILED, text, found)
+        if len(eigenvalues) and np.any(np.abs(np.imag(eigenvalues)) > 1e-9 * np.abs(eigenvalues) + zero):
+            return self._ending(found.q, Held.UNSTABLE, "forces that follow the motion make it flutter", found)
+        if len(eigenvalues) and np.real(eigenvalues[0]) < -zero:
+            text = f"unstable: it leaves with exp(t * {np.sqrt(-np.real(eigenvalues[0])):.4g}/s); moves first: "
+            return self._ending(found.q, Held.UNSTABLE, message + text + self._movers(lowest), found)
+        if len(eigenvalues) and np.real(eigenvalues[0]) <= zero:
+            text = f"{message}nothing holds {self._movers(lowest)}; it may rest in other places as well"
+            return self._ending(found.q, Held.UNHELD, text, found)
+        return self._ending(found.q, Held.OK, message.rstrip("; "), found)
+
+    def _ending(self, q: Array, status: Held, message: str, found: Found | None = None) -> Equilibrium:
+        view = self.balance.look(q)
+        e = view.evaluation
+        at = self.marker_points.at(q)
+        balanced = status is not Held.FAILED and found is not None
+        rest = np.zeros_like(q)
+        return Equilibrium(
+            scene=self.scene,
+            time=self.time,
+            status=status,
+            message=message,
+            balanced=balanced,
+            q=q,
+            multipliers=view.multipliers,
+            markers=tuple(self.scene.markers),
+            points=np.column_stack([at.real, at.imag]),
+            angles=self.angles.copy(),
+            energy={"strain": e.strain, "gravity": e.gravity, "applied": float(e.applied)},
+            strain_energy=self.evaluator.strain_energies(q),
+            residual=self.balance.residual(view),
+            gap=float(np.max(np.abs(e.gap), initial=0.0)),
+            correction=found.correction if found else float("inf"),
+            eigenvalues=self._eigen(q)[0],
+            iterations=self.iterations,
+            steps=self.steps,
+            reactions=reactions_of(self.evaluator, q, rest, rest, self.time) if balanced else None,
+            turns=self.evaluator.turns,
+        )
+
+    def _assembled(self) -> Array:
+        """The start of the scene, moved with its drives up to the stated time."""
+        q = self.evaluator.model.q0[:, 0].copy()
+        if self.time > 0 and np.any(self.evaluator.model.constraints.drive >= 0):
+            for instant in np.linspace(0.0, self.time, 33):
+                self.balance.t = float(instant)
+                q, _ = self.balance.restore(q)
+                self._follow(q)
+        self.balance.t = self.time
+        return q
+
+    def _loaded(self, q: Array) -> Found | None:
+        """Load step by step; None if the unloaded machine has no stiffness that holds it."""
+        if not self._firm(q, 0.0):
+            return None
+        unloaded = self._count(self.balance.newton(q, 0.0))
+        if not unloaded.converged or self._turn(q, unloaded.q) > TURN or not self._firm(unloaded.q, 0.0):
+            return None
+        q, load, step = unloaded.q, 0.0, 1.0
+        self._follow(q)
+        before, before_load = q, 0.0
+        correction = unloaded.correction
+        while load < 1.0:
+            ahead = min(1.0, load + step)
+            guess = q + (q - before) * ((ahead - load) / (load - before_load)) if load > before_load else q
+            found = self._count(self.balance.newton(guess, ahead))
+            if found.converged and self._turn(q, found.q) < TURN and self._firm(found.q, ahead):
+                before, before_load = q, load
+                q, load = found.q, ahead
+                correction = found.correction
+                self._follow(q)
+                self.steps += 1
+                step *= 1.5
+            else:
+                step /= 2.0
+                if step < SMALLEST:
+                    text = f"the loads cannot be raised beyond {load:.4g} of their size"
+                    return Found(q, False, found.iterations, correction, text)
+        return Found(q, True, self.iterations, correction)
+
+    def _firm(self, q: Array, load: float) -> bool:
+        """Whether the reduced stiffness pulls every displacement back."""
+        view = self.balance.look(q, load)
+        matrix = self.balance.hessian(q, view, load)
+        if self.evaluator.follows and load > 0:
+            return True
+        values = scipy.linalg.eigvalsh(matrix)
+        return bool(np.all(values > zero_level(values)))
+
+    def _eigen(self, q: Array) -> tuple[Array, Array]:
+        """Eigenvalues of the reduced stiffness (complex with loads that follow), and the displacement of the lowest."""
+        view = self.balance.look(q)
+        matrix = self.balance.hessian(q, view)
+        if not len(matrix):
+            return np.zeros(0), np.zeros_like(q)
+        if not self.evaluator.follows:
+            values, modes = scipy.linalg.eigh(matrix)
+            return values, view.freedom.basis @ modes[:, 0]
+        found, shapes = scipy.linalg.eig(matrix)
+        order = np.argsort(found.real)
+        lowest = view.freedom.basis @ np.real(shapes[:, order[0]])
+        return (found if np.any(found.imag) else found.real)[order], lowest
+
+    def _count(self, found: Found) -> Found:
+        self.iterations += found.iterations
+        return found
+
+    def _turn(self, one: Array, other: Array) -> float:
+        """Largest turn [rad] of a body or section between two states."""
+        change = np.angle(self.directions.at(other) * np.conj(self.directions.at(one)))
+        return float(np.max(np.abs(change), initial=0.0))
+
+    def _follow(self, q: Array) -> None:
+        """Count the turns of springs and markers."""
+        self.evaluator.remember(q)
+        now = self.marker_lines.at(q)
+        self.angles = self.angles + np.angle(now * np.exp(-1j * self.angles))
+
+    def _movers(self, displacement: Array) -> str:
+        """The bodies that a displacement moves, most of all first."""
+        sizes = {}
+        for name, frame in self.placement.frames.items():
+            moving = points(_vectors(frame, self.balance.size), len(displacement)).matrix @ displacement
+            sizes[name] = float(np.max(np.abs(moving)))
+        largest = max(sizes.values())
+        ranked = sorted((name for name in sizes if sizes[name] > 0.1 * largest), key=lambda name: -sizes[name])
+        return ", ".join(ranked[:4]) + (", ..." if len(ranked) > 4 else "")
+
+
+def machine_size(scene: Scene) -> float:
+    """A length [m] that displacements are compared with: all bodies in a line, or the distances between places."""
+    total = 0.0
+    for body in scene.bodies.values():
+        places = [complex(*point) for point in body.points.values()]
+        total += max(abs(a - b) for a in places for b in places)
+    if total > 0:
+        return float(total)
+    starts = [complex(*(start.position or (0.0, 0.0))) for start in scene.initial.values()]
+    return float(max((abs(a - b) for a in starts for b in starts), default=0.0)) or 1.0
+
+
+def _directions(placement: Placement) -> list[Any]:
+    """The direction of every rigid body and of every node of a rod."""
+    found = []
+    for frame in placement.frames.values():
+        if isinstance(frame, RigidFrame):
+            found.append(frame.axis)
+        elif isinstance(frame, BeamFrame):
+            count = len(frame.nodes)
+            found += [frame.direction(complex(float(frame.length) * k / (count - 1))) for k in range(count)]
+    return found
+
+
+def _vectors(frame: Any, size: float) -> list[Any]:
+    """Vectors [m] that tell how a body moves."""
+    if isinstance(frame, PointFrame):
+        return [frame.origin]
+    if isinstance(frame, RigidFrame):
+        return [frame.origin, frame.origin + frame.axis * size]
+    return [node[0] for node in frame.nodes]
+
+
+__all__ = ["Equilibrium", "Held", "Points", "machine_size", "statics"]

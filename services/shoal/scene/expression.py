@@ -1,0 +1,138 @@
+"""Arithmetic expressions in named numbers, read without `eval`: what a user may write in a scene or a problem.
+
+There are numbers, names, + - * / **, the constants `pi` and `e` and the functions below; of these, step(x) is
+0 below 0 and 1 from 0 on, and ramp(x) goes from 0 at x = 0 to 1 at x = 1 with two continuous derivatives.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from functools import lru_cache, reduce
+from typing import Any
+
+import numpy as np
+
+from shoal.errors import InputError
+
+Number = Any
+"""A float, or a numpy array of any shape and precision."""
+
+
+def _ramp(x: Number) -> Number:
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0))
+
+
+_ONE: dict[str, Callable[[Number], Number]] = {
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "tanh": np.tanh,
+    "sqrt": np.sqrt,
+    "exp": np.exp,
+    "log": np.log,
+    "abs": np.abs,
+    "step": lambda x: np.heaviside(x, 1.0),
+    "ramp": _ramp,
+}
+_MANY: dict[str, Callable[[Number, Number], Number]] = {"min": np.minimum, "max": np.maximum}
+_CONSTANTS = {"pi": math.pi, "e": math.e}
+_BINARY: dict[type[ast.operator], Callable[[Number, Number], Number]] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
+}
+_PLAIN = (ast.Expression, ast.Name, ast.BinOp, ast.UnaryOp, ast.UAdd, ast.USub, ast.Load, *_BINARY)
+_LONGEST = 500
+_DEEPEST = 100
+
+
+def names(text: str) -> set[str]:
+    """Names an expression needs a value for (not `pi`, `e`, functions). Raises InputError if it is not arithmetic."""
+    used = {node.id for node in ast.walk(_parse(text)) if isinstance(node, ast.Name)}
+    return used - {*_ONE, *_MANY, *_CONSTANTS}
+
+
+def evaluate(text: str, values: Mapping[str, float]) -> float:
+    """The value of an expression; nan where arithmetic has none (a division by zero). Raises InputError."""
+    return float(evaluate_array(text, values))
+
+
+def evaluate_array(text: str, values: Mapping[str, Number]) -> Number:
+    """As `evaluate`, entry by entry for arrays that broadcast; precision is that of the arrays."""
+    with np.errstate(all="ignore"):
+        value = np.asarray(_value(_parse(text).body, {**_CONSTANTS, **values}))
+    return np.where(np.isfinite(value), value, np.nan)
+
+
+@lru_cache(maxsize=256)
+def _parse(text: str) -> ast.Expression:
+    if len(text) > _LONGEST:
+        raise InputError(f"expression: longer than {_LONGEST} characters")
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise InputError(f"expression: {text!r} is not arithmetic") from None
+    _check(tree, text)
+    return tree
+
+
+def _check(tree: ast.Expression, text: str) -> None:
+    """Refuse whatever is not arithmetic, level by level, so that what is left is shallow enough to recurse into."""
+    level: list[ast.AST] = [tree]
+    for _ in range(_DEEPEST):
+        inner: list[ast.AST] = []
+        for node in level:
+            if isinstance(node, ast.Call):
+                _check_call(node, text)
+                inner += node.args
+            else:
+                _check_plain(node, text)
+                inner += ast.iter_child_nodes(node)
+        level = inner
+    if level:
+        raise InputError(f"expression: nested deeper than {_DEEPEST}")
+
+
+def _check_plain(node: ast.AST, text: str) -> None:
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        try:
+            if math.isfinite(node.value):  # type: ignore[arg-type]
+                return
+        except OverflowError:  # an integer beyond the floats
+            pass
+        raise InputError(f"expression: {text!r} has a number beyond 1e308")
+    if not isinstance(node, _PLAIN):
+        raise InputError(
+            f"expression: {text!r} has {type(node).__name__}; use numbers, names, + - * / ** and functions"
+        )
+
+
+def _check_call(node: ast.Call, text: str) -> None:
+    name = node.func.id if isinstance(node.func, ast.Name) else None
+    if name not in _ONE and name not in _MANY:
+        raise InputError(f"expression: {text!r} calls what is none of {', '.join([*_ONE, *_MANY])}")
+    if node.keywords or (len(node.args) != 1 if name in _ONE else len(node.args) < 2):
+        raise InputError(f"expression: {name} takes {'one number' if name in _ONE else 'two numbers or more'}")
+
+
+def _value(node: Any, values: Mapping[str, Number]) -> Number:
+    if isinstance(node, ast.Constant):
+        return float(node.value)  # type: ignore[arg-type]
+    if isinstance(node, ast.Name):
+        if node.id not in values:
+            raise InputError(f"expression: {node.id!r} is not known; there are {', '.join(sorted(values))}")
+        return values[node.id]
+    if isinstance(node, ast.UnaryOp):
+        inner = _value(node.operand, values)
+        return -inner if isinstance(node.op, ast.USub) else inner
+    if isinstance(node, ast.BinOp):
+        return _BINARY[type(node.op)](_value(node.left, values), _value(node.right, values))
+    arguments = [_value(argument, values) for argument in node.args]
+    return _ONE[node.func.id](*arguments) if node.func.id in _ONE else reduce(_MANY[node.func.id], arguments)

@@ -1,0 +1,101 @@
+"""Functions of time as a user writes them: a number, an expression in `t`, or a table."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import field_validator, model_serializer, model_validator
+
+from shoal.errors import InputError
+from shoal.scene import expression as arithmetic
+from shoal.scene.record import Record
+
+Array = npt.NDArray[Any]
+_MOST_ROWS = 20_000
+
+
+class Function(Record):
+    """A function of time t [s]: written `0.5`, `"0.1*sin(3*t)"`, `{expression: ...}` or `{table: [[t, value], ...]}`.
+
+    A table needs times that increase; `smooth` (the default) draws a cubic spline through it (not-a-knot, two
+    continuous derivatives), otherwise straight lines. Outside its times a table keeps its end values.
+    """
+
+    number: float | None = None
+    expression: str | None = None
+    table: tuple[tuple[float, float], ...] | None = None
+    smooth: bool = True
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_forms(cls, data: Any) -> Any:
+        if isinstance(data, str):
+            return {"expression": data}
+        if isinstance(data, int | float) and not isinstance(data, bool):
+            return {"number": data}
+        if not isinstance(data, dict | Function):
+            raise ValueError('a function of time is a number, an expression such as "0.1*sin(3*t)", or a table')
+        return data
+
+    @field_validator("expression")
+    @classmethod
+    def _in_time(cls, text: str | None) -> str | None:
+        if text is not None:
+            try:
+                unknown = arithmetic.names(text) - {"t"}
+            except InputError as error:
+                raise ValueError(str(error).removeprefix("expression: ")) from None
+            if unknown:
+                raise ValueError(f"{text!r} has {sorted(unknown)[0]!r}, which is not known; the time is `t`")
+        return text
+
+    @field_validator("table")
+    @classmethod
+    def _in_order(cls, table: tuple[tuple[float, float], ...] | None) -> tuple[tuple[float, float], ...] | None:
+        if table is not None:
+            if not 2 <= len(table) <= _MOST_ROWS:
+                raise ValueError(f"a table has 2 to {_MOST_ROWS} rows [t, value], found {len(table)}")
+            for row, ((before, _), (after, _)) in enumerate(pairwise(table)):
+                if after <= before:
+                    raise ValueError(f"times must increase, found {after:g} after {before:g} in row {row + 1}")
+        return table
+
+    @model_validator(mode="after")
+    def _one_of_three(self) -> Self:
+        given = [name for name in ("number", "expression", "table") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of number, expression and table, found {' and '.join(given) or 'none'}")
+        if "smooth" in self.model_fields_set and self.table is None:
+            raise ValueError("smooth: belongs to a table")
+        return self
+
+    @model_serializer
+    def _as_written(self) -> Any:
+        if self.table is not None:
+            return {"table": self.table, "smooth": self.smooth}
+        return self.number if self.number is not None else self.expression
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times between which the function is one polynomial [s]; none for an expression."""
+        return tuple(time for time, _ in self.table or ())
+
+    def __call__(self, t: Array) -> Array:
+        """Values at the times t [s], of the shape and precision of t; nan where there is none."""
+        t = np.asarray(t)
+        if self.expression is not None:
+            value = arithmetic.evaluate_array(self.expression, {"t": t})
+            return np.array(np.broadcast_to(value, t.shape))
+        if self.table is None:
+            assert self.number is not None
+            return np.full(t.shape, self.number)
+        times, values = np.array(self.table).T
+        if not self.smooth:
+            return np.asarray(np.interp(t.astype(float), times, values))
+        # Importing scipy takes longer than reading a scene.
+        from scipy.interpolate import CubicSpline
+
+        return np.asarray(CubicSpline(times, values)(np.clip(t.astype(float), times[0], times[-1])))

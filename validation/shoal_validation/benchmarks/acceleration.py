@@ -1,0 +1,218 @@
+"""Ways to solve Gauss's principle side by side: the compiled ones, and the paper's swarms at every time step.
+
+Two tables. The first, on the double pendulum, has no singular position: cost and accuracy of every solver with the
+same time step of semi-implicit Euler, and an ablation of the swarms. The second drives a linkage of two four-bars
+through its singular positions for 10 s, with and without removal of drift, against the closed form: coupled cranks
+are one pendulum whose angle from the upright obeys phi'' = kappa sin phi, phi = 2 am(t/2 | -4 kappa).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from scipy.integrate import solve_ivp
+from shoal.mechanics.simulate import simulate
+from shoal.mechanics.swarm_motion import Search, Switches
+from shoal.scene import Scene, load_scene
+from shoal.trajectory import Array, Status, Trajectory
+
+COMPILED = ("projection", "kkt", "augmented-lagrangian", "proximal", "baumgarte")
+SWARMS = ("afsa", "iafsa", "iafsa-printed")
+EULER = "semi-implicit-euler"
+UNSEEDED = {"seed_traditional": False, "seed_previous": False}
+ABLATIONS: dict[str, dict[str, bool]] = {
+    "": {},
+    "no mutation": {"mutation": False},
+    "no velocity": {"velocity": False},
+    "previous seed only": {"seed_traditional": False},
+    "previous seed only, no mutation": {"seed_traditional": False, "mutation": False},
+    "no seeds": UNSEEDED,
+    "no seeds, no mutation": {**UNSEEDED, "mutation": False},
+    "no seeds, no velocity": {**UNSEEDED, "velocity": False},
+}
+FORGETFUL = {"iafsa-printed": {"P_g of step 3-7": {"keep_best": False}}}
+
+LOOPS = 2
+GRAVITY = 9.81
+KAPPA = GRAVITY * ((LOOPS + 1) / 2 + LOOPS) / ((LOOPS + 1) / 3 + LOOPS)
+"""1/s^2; LOOPS + 1 cranks and LOOPS couplers, uniform bars of 1 kg and 1 m."""
+
+COMPILED_STEP = 1e-3
+SWARM_STEP = 5e-3
+"""s; a swarm needs 10 ms for each."""
+
+TURNED = 0.1
+"""A coupler that has turned so far [rad] has left the branch on which it only translates."""
+OFF = 1e-6
+"""Constraints violated by more have drifted; markers farther off than projection by more [m] are wrong."""
+
+
+@dataclass(frozen=True)
+class CostRow:
+    """One solver on one machine, all with the same time step.
+
+    seconds: per time step; evaluations: of the acceleration, or by a swarm of Gauss's function, per time step
+    error: mean relative error of the acceleration in the mass metric, nan where it is not sought by a swarm
+    path: largest distance of a marker from where projection leads [m]
+    """
+
+    name: str
+    seconds: float
+    evaluations: float
+    error: float
+    path: float
+    status: Status
+
+
+@dataclass(frozen=True)
+class PassageRow:
+    """One solver through the singular positions: distance to the closed form at the end [m], and what became of it."""
+
+    name: str
+    integrator: str
+    step: float
+    project: bool
+    error: float
+    energy_drift: float
+    constraint_drift: float
+    status: Status
+    verdict: str
+
+
+def measure_cost(scene_name: str, step: float, steps: int, solvers: tuple[str, ...] = COMPILED) -> Iterator[CostRow]:
+    """Compiled solvers, swarms and ablations on one scene; a row as soon as it is known."""
+    settings = {"solver.integrator": EULER, "solver.step": step, "solver.duration": steps * step}
+    scene = load_scene(scene_name).with_values(settings)
+    times = np.linspace(0.0, steps * step, 11)[1:]
+    true = simulate(scene, times)
+    for solver in solvers:
+        yield cost(solver, with_solver(scene, solver), times, true, None)
+    for solver in SWARMS:
+        parts = {"": {}} if solver == "afsa" else {**ABLATIONS, **FORGETFUL.get(solver, {})}
+        for name, switches in parts.items():
+            search = Search(switches=Switches(**switches))
+            yield cost(", ".join(filter(None, (solver, name))), with_solver(scene, solver), times, true, search)
+
+
+def cost(name: str, scene: Scene, times: Array, true: Trajectory, search: Search | None) -> CostRow:
+    """One row; compiled solvers run once before the time is taken."""
+    if search is None:
+        simulate(scene, times)
+    run = simulate(scene, times, search=search)
+    swarm = run.model.get("swarm", {"evaluations": run.model["evaluations"], "error": np.nan})
+    path = float(np.max(np.linalg.norm(run.points - true.points, axis=2)))
+    return CostRow(name, run.wall_s / run.steps, swarm["evaluations"] / run.steps, swarm["error"], path, run.status[0])
+
+
+def measure_passage(duration: float = 10.0, search: Search | None = None) -> Iterator[PassageRow]:
+    """Every solver with and without removal of drift; a row as soon as it is known.
+
+    The compiled ones by rk4 and, as projection and kkt, by the swarms' own time step, which sets their error.
+    """
+    runs = [(solver, "rk4", COMPILED_STEP) for solver in COMPILED]
+    runs += [(solver, EULER, SWARM_STEP) for solver in ("projection", "kkt", *SWARMS)]
+    for solver, integrator, step in runs:
+        for project in (True, False):
+            yield passage(solver, integrator, step, project, duration, search)
+
+
+def passage(
+    solver: str, integrator: str, step: float, project: bool, duration: float, search: Search | None = None
+) -> PassageRow:
+    """One solver through the singular positions of the linkage."""
+    settings = {"solver.integrator": integrator, "solver.step": step, "solver.project": project}
+    scene = with_solver(linkage().with_values({**settings, "solver.duration": duration}), solver)
+    times = np.linspace(0.0, duration, 101)[1:]
+    run = simulate(scene, times, search=search)
+    exact = crank_end(times)
+    error = float(np.linalg.norm(run.marker("B0")[-1] - exact[-1]))
+    allowed = 10 * _error_of_projection(integrator, step, duration) + OFF
+    return PassageRow(
+        solver, integrator, step, project, error, float(run.energy_drift[0]), float(run.constraint_drift[0]),
+        run.status[0], verdict(run, error, allowed),
+    )  # fmt: skip
+
+
+def verdict(run: Trajectory, error: float, allowed: float) -> str:
+    """What became of a passage; allowed: error at the end that the time step explains [m]."""
+    if not np.all(np.isfinite(run.points)) or run.status[0] is Status.DIVERGED:
+        return "diverged"
+    if np.max(np.abs(np.sin(run.angle("coupler1")))) > TURNED or np.max(np.abs(np.sin(run.angle("coupler2")))) > TURNED:
+        return "wrong branch"
+    if run.constraint_drift[0] > OFF:
+        return "drifted"
+    if error > allowed:
+        return "silently wrong" if run.ok else "wrong, and said so"
+    return "ok"
+
+
+@cache
+def _error_of_projection(integrator: str, step: float, duration: float) -> float:
+    """Distance to the closed form [m] that the time step alone causes."""
+    settings = {"solver.integrator": integrator, "solver.step": step, "solver.duration": duration}
+    run = simulate(linkage().with_values(settings), np.array([duration]))
+    return float(np.linalg.norm(run.marker("B0")[-1] - crank_end(run.times)[-1]))
+
+
+@cache
+def linkage() -> Scene:
+    """The N-four-bar with markers that show whether its couplers turn."""
+    scene = load_scene(f"n-four-bar-{LOOPS}")
+    watched = {f"coupler{k}": {"body": f"coupler{k}", "point": "end"} for k in range(1, LOOPS + 1)}
+    data = scene.model_dump(mode="json")
+    return Scene.parse({**data, "markers": {**data["markers"], **watched}})
+
+
+def crank_end(times: Array) -> Array:
+    """B0 = (sin phi, cos phi) [m], (samples, 2); phi [rad] by scipy to 13 digits."""
+
+    def rate(_time: float, y: Array) -> Array:
+        return np.array([y[1], KAPPA * np.sin(y[0])])
+
+    run = solve_ivp(rate, (0.0, float(times[-1])), [0.0, 1.0], "DOP853", times, rtol=1e-13, atol=1e-13)
+    return np.stack([np.sin(run.y[0]), np.cos(run.y[0])], axis=1)
+
+
+def with_solver(scene: Scene, solver: str) -> Scene:
+    """The scene with another way to the acceleration."""
+    return scene.with_values({"solver.acceleration": solver})
+
+
+def print_cost(console: Console, title: str, rows: Iterator[CostRow]) -> None:
+    """The first table."""
+    table = Table(title, "ms a step", "evaluations a step", "error of a", "off path [m]", "status", box=box.SIMPLE_HEAD)
+    for row in rows:
+        error = "" if np.isnan(row.error) else f"{row.error:.1e}"
+        table.add_row(
+            row.name, f"{row.seconds * 1e3:.4f}", f"{row.evaluations:.0f}", error, f"{row.path:.1e}", str(row.status)
+        )
+    console.print(table)
+
+
+def print_passage(console: Console, rows: Iterator[PassageRow]) -> None:
+    """The second table."""
+    heads = ("singular passage", "step", "drift removed", "error [m]", "energy", "constraints", "status", "verdict")
+    table = Table(*heads, box=box.SIMPLE_HEAD)
+    for row in rows:
+        numbers = (f"{row.error:.1e}", f"{row.energy_drift:.1e}", f"{row.constraint_drift:.1e}")
+        how = f"{row.integrator} {row.step:g} s"
+        table.add_row(row.name, how, "yes" if row.project else "no", *numbers, str(row.status), row.verdict)
+    console.print(table)
+
+
+def main() -> None:
+    """Measure and print."""
+    console = Console(highlight=False, width=150)
+    print_cost(console, "rigid double pendulum, 1e-3 s", measure_cost("rigid-double-pendulum", 1e-3, 100))
+    print_cost(console, "flexible double pendulum, 5e-4 s", measure_cost("flexible-double-pendulum", 5e-4, 100, ()))
+    print_passage(console, measure_passage())
+
+
+if __name__ == "__main__":
+    main()

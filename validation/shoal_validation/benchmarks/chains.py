@@ -1,0 +1,255 @@
+"""A chain of rigid bodies in space beside MuJoCo and Exudyn, and how the cost grows with the number of bodies.
+
+Every figure is the median time of one step on one core in one process, over a run of many steps from the
+same state: a chain that hangs in revolute joints about alternating axes, from a gently curved start at rest.
+
+- ours: classical Runge-Kutta, four accelerations a step, with the energy balance of every step
+- MuJoCo: `mj_step` with its RK4 integrator, same step, contacts and constraints off, no geoms. It factors a mass
+  matrix, whose cost grows with the cube of the depth of a tree; its users' machines are wider than deep
+- Exudyn, tree: ObjectKinematicTree, also minimal coordinates and RK44, with the sparse solver
+- Exudyn, bodies: six coordinates a body and five constraints a joint, generalized-alpha, modified Newton, Tait-Bryan
+  angles and the sparse solver, the fastest of its ways at this step. An implicit step may be longer than an
+  explicit one; how much longer depends on what is asked of the result
+
+`gap` is how far the tip is from ours at the end of the run [m].
+"""
+
+from __future__ import annotations
+
+import importlib
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from shoal.engines.exudyn_build import library
+from shoal.mechanics.spatial.articulated import accelerate
+from shoal.mechanics.spatial.description import SpatialChain
+from shoal.mechanics.spatial.march import march
+from shoal.mechanics.spatial.simulate import simulate
+from shoal.mechanics.spatial.tableau import RK4
+from shoal.mechanics.spatial.tree import build, room
+
+from shoal_validation.benchmarks.timing import median_time
+
+Array = npt.NDArray[np.float64]
+
+BODIES = (50, 100, 200, 400, 800)
+STEP = 1e-3
+GRAVITY = (0.0, -6.0, -7.8)
+MOMENTS = (0.002, 0.084, 0.085)
+"""About the centre [kg m^2], of a link of 1 m and 1 kg."""
+
+
+@dataclass(frozen=True)
+class ChainRow:
+    """One engine on one chain: seconds a step, times ours, distance of its tip from ours [m]."""
+
+    name: str
+    bodies: int
+    seconds: float
+    ratio: float
+    gap: float
+
+
+def chain(bodies: int) -> SpatialChain:
+    """Links of 1 m along x, joints about y and z in turn, at angles of 0.1 sin k."""
+    return SpatialChain.parse(
+        {
+            "name": f"chain-{bodies}",
+            "gravity": GRAVITY,
+            "bodies": {
+                f"B{k}": {"mass": 1.0, "inertia": MOMENTS, "centre_of_mass": [0.5, 0, 0]} for k in range(bodies)
+            },
+            "joints": {
+                f"J{k}": {
+                    "body": f"B{k}",
+                    "parent": f"B{k - 1}" if k else "ground",
+                    "axis": _axis(k),
+                    "on_parent": {"position": [1.0 if k else 0.0, 0.0, 0.0]},
+                }
+                for k in range(bodies)
+            },
+            "initial": {f"J{k}": {"coordinate": angle} for k, angle in enumerate(_angles(bodies))},
+            "points": {"tip": {"body": f"B{bodies - 1}", "position": [1.0, 0.0, 0.0]}},
+        }
+    )
+
+
+def measure(sizes: tuple[int, ...] = BODIES, repeats: int = 5) -> Iterator[ChainRow]:
+    """All engines on chains of these sizes; a row as soon as it is known."""
+    for bodies in sizes:
+        steps = max(20, 20_000 // bodies)
+        ours, tip = own_step(bodies, steps, repeats)
+        yield ChainRow("ours, one acceleration", bodies, own_acceleration(bodies), float("nan"), 0.0)
+        yield ChainRow("ours, one step", bodies, ours, 1.0, 0.0)
+        few = min(200, max(10, 400_000 // bodies**2))
+        for name, run, count in (
+            ("MuJoCo, one step", mujoco_run, few),
+            ("Exudyn, tree, one step", exudyn_tree_run, few),
+            ("Exudyn, bodies, one step", exudyn_bodies_run, 20),
+        ):
+            seconds, there = run(bodies, count, repeats if bodies < 400 else min(3, repeats))
+            yield ChainRow(name, bodies, seconds, seconds / ours, float(np.linalg.norm(there - tip(count * STEP))))
+
+
+def own_acceleration(bodies: int) -> float:
+    """Seconds of one call of the articulated-body recursion."""
+    model = build(chain(bodies))
+    work, out = room(model.tree), np.zeros(bodies)
+    return median_time(lambda: accelerate(model.tree, work, model.q0, model.v0, out), 200)
+
+
+def own_step(bodies: int, steps: int, repeats: int) -> tuple[float, Callable[[float], Array]]:
+    """Seconds a step of the compiled loop; and where the tip is at a given time."""
+    what = chain(bodies)
+    model = build(what)
+    work, end = room(model.tree), np.array([steps * STEP])
+
+    def run() -> None:
+        march(model.tree, work, RK4, np.concatenate([model.q0, model.v0, [0.0]]), end, STEP, 0.0)
+
+    return median_time(run, repeats) / steps, lambda at: simulate(what, [at], step=STEP).point("tip")[0]
+
+
+def mujoco_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:
+    """Seconds a step of mj_step, and the tip at the end."""
+    mujoco = importlib.import_module("mujoco")
+    # Built by calls: its XML may not be nested as deeply as the longest chain.
+    spec = mujoco.MjSpec()
+    spec.option.timestep, spec.option.gravity = STEP, GRAVITY
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    link = spec.worldbody
+    for k in range(bodies):
+        link = link.add_body(
+            pos=[1.0 if k else 0.0, 0.0, 0.0], mass=1.0, ipos=[0.5, 0.0, 0.0], inertia=MOMENTS, explicitinertial=True
+        )
+        link.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=_axis(k))
+    link.add_site(name="tip", pos=[1.0, 0.0, 0.0])
+    model = spec.compile()
+    data = mujoco.MjData(model)
+
+    def once() -> float:
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = _angles(bodies)
+        begin = time.perf_counter()
+        mujoco.mj_step(model, data, steps)
+        return time.perf_counter() - begin
+
+    seconds = _median(once, repeats) / steps
+    mujoco.mj_forward(model, data)
+    return seconds, np.array(data.site("tip").xpos)
+
+
+def exudyn_tree_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:
+    """Seconds a step of Exudyn's tree of minimal coordinates, and the tip at the end."""
+    exu, items = library(), importlib.import_module("exudyn.itemInterface")
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    node = mbs.AddNode(
+        items.NodeGenericODE2(
+            referenceCoordinates=[0.0] * bodies,
+            initialCoordinates=_angles(bodies),
+            initialCoordinates_t=[0.0] * bodies,
+            numberOfODE2Coordinates=bodies,
+        )
+    )
+    kinds = exu.JointType
+    tree = mbs.AddObject(
+        items.ObjectKinematicTree(
+            nodeNumber=node,
+            gravity=list(GRAVITY),
+            jointTypes=[kinds.RevoluteZ if k % 2 else kinds.RevoluteY for k in range(bodies)],
+            linkParents=list(range(-1, bodies - 1)),
+            jointTransformations=exu.Matrix3DList([np.eye(3)] * bodies),
+            jointOffsets=exu.Vector3DList([[1.0 if k else 0.0, 0.0, 0.0] for k in range(bodies)]),
+            linkInertiasCOM=exu.Matrix3DList([np.diag(MOMENTS)] * bodies),
+            linkCOMs=exu.Vector3DList([[0.5, 0.0, 0.0]] * bodies),
+            linkMasses=[1.0] * bodies,
+        )
+    )
+    tip = mbs.AddMarker(
+        items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=bodies - 1, localPosition=[1, 0, 0])
+    )
+    mbs.Assemble()
+    settings = _settings(exu, steps, exu.DynamicSolverType.RK44)
+    settings.timeIntegration.explicit.computeEndOfStepAccelerations = False
+    seconds = _median(lambda: _solve(exu, mbs, settings), repeats) / steps
+    return seconds, np.array(mbs.GetMarkerOutput(tip, exu.OutputVariableType.Position))
+
+
+def exudyn_bodies_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:
+    """Seconds a step of Exudyn's bodies with joints as constraints, and the tip at the end."""
+    exu, inertias = library(), importlib.import_module("exudyn.rigidBodyUtilities")
+    start = simulate(chain(bodies), [0.0], step=STEP)
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    before, place = mbs.CreateGround(), np.zeros(3)
+    for k in range(bodies):
+        turn = start.rotation(f"B{k}")[0]
+        body = mbs.CreateRigidBody(
+            inertia=inertias.RigidBodyInertia(mass=1.0, inertiaTensor=np.diag(MOMENTS), com=[0.0, 0.0, 0.0]),
+            referencePosition=place + 0.5 * turn[:, 0],
+            referenceRotationMatrix=turn,
+            gravity=list(GRAVITY),
+            nodeType=exu.NodeType.RotationRxyz,
+        )
+        mbs.CreateRevoluteJoint(itemNumbers=[before, body], position=place, axis=turn @ _axis(k), useGlobalFrame=True)
+        before, place = body, place + turn[:, 0]
+    mbs.Assemble()
+    settings = _settings(exu, steps, exu.DynamicSolverType.GeneralizedAlpha)
+    settings.timeIntegration.newton.useModifiedNewton = True
+    seconds = _median(lambda: _solve(exu, mbs, settings), repeats) / steps
+    return seconds, np.array(mbs.GetObjectOutputBody(before, exu.OutputVariableType.Position, [0.5, 0.0, 0.0]))
+
+
+def _settings(exu: Any, steps: int, solver: Any) -> Any:
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.solution.sensors.active = False
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
+    integration = settings.timeIntegration
+    integration.numberOfSteps, integration.endTime = steps, steps * STEP
+    integration.adaptiveStep = integration.automaticStepSize = False
+    integration.verboseMode = 0
+    integration.solverType = solver
+    return settings
+
+
+def _solve(exu: Any, mbs: Any, settings: Any) -> float:
+    # The solver keeps its result apart from the initial values, so that every call starts anew.
+    begin = time.perf_counter()
+    if not mbs.SolveDynamic(settings, showHints=False):
+        raise RuntimeError("exudyn: the solver gave up")
+    return time.perf_counter() - begin
+
+
+def _median(once: Callable[[], float], repeats: int) -> float:
+    once()
+    return statistics.median(once() for _ in range(repeats))
+
+
+def main() -> None:
+    """Measure and print."""
+    for row in measure():
+        print(  # noqa: T201 - a command
+            f"{row.bodies:4d} bodies  {row.name:26s} {row.seconds * 1e6:10.1f} us {row.ratio:7.1f} times ours, "
+            f"gap {row.gap:.1e} m",
+            flush=True,
+        )
+
+
+def _axis(k: int) -> tuple[float, float, float]:
+    return (0.0, 0.0, 1.0) if k % 2 else (0.0, 1.0, 0.0)
+
+
+def _angles(bodies: int) -> list[float]:
+    return [0.1 * float(np.sin(k)) for k in range(bodies)]
+
+
+if __name__ == "__main__":
+    main()
