@@ -152,3 +152,17 @@ def test_cubics_are_one_piece(powers: list[float], horizon: float) -> None:
     expected = np.polynomial.polynomial.polyval(times, scaled)
     assert len(fitted.coefficients) == 1
     np.testing.assert_allclose(along([fitted], 0, times), expected, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("function", "derivative"),
+    [
+        (lambda t: 1 - np.cos(9 * t), lambda t: 9 * np.sin(9 * t)),
+        (lambda t: np.exp(t) - 1 - t, lambda t: np.exp(t) - 1),
+    ],
+)
+def test_terms_that_cancel_are_no_reason_to_refuse(function: Any, derivative: Any) -> None:
+    fitted = functions.fit(function, 0.01)
+    for t in (0.0013, 0.005, 0.0099):
+        assert functions.value(fitted, t) == pytest.approx(float(function(np.longdouble(t))), rel=1e-9)
+        assert functions.value(fitted, t, 1) == pytest.approx(float(derivative(np.longdouble(t))), rel=1e-6)

@@ -12,8 +12,8 @@ from scipy.special import ellipj, ellipk
 from shoal.engines.casadi import CasadiEngine
 from shoal.errors import InputError
 from shoal.mechanics import stability
-from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.mechanics.build import build
+from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.mechanics.simulate import simulate
 from shoal.mechanics.warm import WIDE
 from shoal.scene import Scene, load_scene

@@ -29,6 +29,9 @@ _PROBES = 4096
 """Pieces wider than this fraction of the range are also held against so many even samples of the whole range, so
 that a pulse of a thousandth of the range is not overlooked."""
 
+_CANCELLED, _SHORT = 1e-14, 1 / 16
+"""What is as good as this, relative to the function's size, is good enough for pieces as short as that."""
+
 _MOST_PIECES = 2**17
 """Pieces looked at in all, of which about half are kept: a bound on time and memory."""
 
@@ -99,6 +102,9 @@ def fit(
         steepest = np.abs(np.diff(values) / np.diff(_CHECKS)).max(axis=1) / half
         noise = digits * np.maximum(np.abs(lower), np.abs(upper)) * steepest
         tolerance = 16.0 * digits * scale + 2.0 * noise
+        # Terms that cancel leave their own round-off, which shorter pieces cannot lessen.
+        cancelled = (error > tolerance) & (error <= _CANCELLED * scale) & (upper - lower <= _SHORT * (horizon - begin))
+        tolerance, noise = np.where(cancelled, error, tolerance), np.where(cancelled, error, noise)
         good = error <= tolerance
         for k in np.flatnonzero(good & (upper - lower > _WIDE * (horizon - begin))):
             inside = slice(*np.searchsorted(probes, [lower[k], upper[k]]))

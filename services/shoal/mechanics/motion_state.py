@@ -49,7 +49,7 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
     n = model.unknowns
     none = np.zeros(0, dtype=np.int64)
     found = []
-    for time in times:
+    for time in map(float, times):
         arrays = model.tile(SINGLE, _LANE)
         room = work_space(SINGLE, arrays)
         arrays = ready(SINGLE, arrays, room)
@@ -66,5 +66,5 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
         if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))):
             raise ComputationError(f"{scene.name}: the motion is not finite at {time:g} s; use a smaller step")
         evaluator.turns = room.memory
-        found.append(State(float(time), q, v, evaluator.acceleration(q, v, time), room.memory.copy()))
+        found.append(State(time, q, v, evaluator.acceleration(q, v, time), room.memory.copy()))
     return evaluator, found

@@ -171,6 +171,8 @@ def _pose(scene: Scene, name: str, mine: list[JointPoint], turning: Orientations
     root, relative = turning.root(name)
     stated = [body for body in scene.bodies if turning.root(body)[0] == root and body in scene.initial]
     leader = stated[0] if stated and name not in scene.initial else name
+    if root == GROUND and np.any(start.rate):
+        raise InputError(f"initial.{name}.rate: joints keep {name} from turning, found {np.max(np.abs(start.rate)):g} rad/s")
     rate = 0.0 if root == GROUND else scene.start(leader).rate
     if root == GROUND:
         direction = relative
@@ -267,6 +269,8 @@ def _place_beam(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose:
         joint = shared.get(node)
         position = result.new_pair(r, v) if joint is None else joint.where or _make(joint, r, v, result)
         clamp = _clamp(scene, name, rod, node)
+        if clamp is not None and np.any(pose.rate):
+            raise InputError(f"initial.{name}.rate: a rod welded to the ground does not turn there; leave the rate out")
         slopes = []
         for number, (value, rate) in enumerate(vectors):
             if clamp is not None and number == element.clamped:

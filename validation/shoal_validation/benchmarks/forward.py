@@ -13,10 +13,10 @@ from shoal.engines.exudyn import ExudynEngine
 from shoal.engines.exudyn_build import build as build_exudyn
 from shoal.engines.exudyn_build import library
 from shoal.engines.exudyn_record import choose_steps
+from shoal.mechanics.build import build
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import choose
 from shoal.mechanics.march import march
-from shoal.mechanics.build import build
 from shoal.mechanics.tile import Tile, pack, tiles
 from shoal.scene import Scene, load_scene
 
