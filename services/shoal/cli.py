@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -128,6 +128,65 @@ def simulate(
         terminal.write_trajectory(trajectory, wanted, out)
     terminal.show(trajectory.to_json(), as_json, lambda: terminal.trajectory_table(trajectory, wanted))
     _finish(trajectory.ok, trajectory.message)
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--time", default=0.0, show_default=True, metavar="T", help="Drives stand as they are at T [s].")
+@option_set
+@option_json
+def statics(scene: str, time: float, values: dict[str, str], as_json: bool) -> None:
+    """Find where SCENE comes to rest, and whether it is stable there."""
+    from shoal import terminal
+    from shoal.mechanics.statics import statics
+    from shoal.scene import load_scene
+
+    wanted = load_scene(scene).with_values(values)
+    with terminal.working(f"balancing {wanted.name}"):
+        equilibrium = statics(wanted, time)
+    terminal.show(equilibrium.to_json(), as_json, lambda: terminal.equilibrium_table(equilibrium))
+    _finish(equilibrium.ok, equilibrium.message)
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--count", default=10, show_default=True, type=click.IntRange(min=1), help="How many, lowest first.")
+@click.option(
+    "--about", default="equilibrium", show_default=True, type=click.Choice(["equilibrium", "start"]), help="Which state."
+)
+@option_set
+@option_json
+def modes(scene: str, count: int, about: Literal["equilibrium", "start"], values: dict[str, str], as_json: bool) -> None:
+    """Eigenfrequencies and shapes of SCENE about its equilibrium or its start."""
+    from shoal import terminal
+    from shoal.mechanics.modes import modes
+    from shoal.scene import load_scene
+
+    wanted = load_scene(scene).with_values(values)
+    with terminal.working(f"modes of {wanted.name}"):
+        found = modes(wanted, about=about, count=count)
+    terminal.show(found.to_json(), as_json, lambda: terminal.modes_table(found))
+    _finish(found.ok, "it does not stay there: a motion grows")
+
+
+@main.command()
+@click.argument("scene")
+@click.option("--at", "times", required=True, metavar="T,T,...", callback=times_list, help="Times of the motion [s].")
+@option_set
+@option_json
+def reactions(scene: str, times: list[float], values: dict[str, str], as_json: bool) -> None:
+    """Forces and torques in the joints of SCENE while it moves."""
+    from shoal import terminal
+    from shoal.mechanics.reactions import reactions
+    from shoal.scene import load_scene
+
+    wanted = load_scene(scene).with_values(values)
+    with terminal.working(f"reactions of {wanted.name}"):
+        found = reactions(wanted, times)
+    ok = all(one.ok for one in found)
+    report = {"status": "ok" if ok else "unbalanced", "reactions": [one.to_json() for one in found]}
+    terminal.show(report, as_json, lambda: terminal.reactions_table(found))
+    _finish(ok, "the bodies are not in balance")
 
 
 @main.command()

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from shoal.engines.compare import Comparison
     from shoal.engines.sweep import Sweep
     from shoal.identification import Estimate
+    from shoal.mechanics.modes import Modes
+    from shoal.mechanics.reactions import Reactions
+    from shoal.mechanics.statics import Equilibrium
     from shoal.scene import Scene
     from shoal.trajectory import Trajectory
 
@@ -94,6 +97,52 @@ def trajectory_table(trajectory: Trajectory, scene: Scene) -> None:
         f"status {trajectory.status[0]}; energy off by {trajectory.energy_drift[0]:.1e}, constraints by "
         f"{trajectory.constraint_drift[0]:.1e}; {trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms"
     )
+
+
+def equilibrium_table(equilibrium: Equilibrium) -> None:
+    """Where the markers rest, what the joints bear, and the evidence."""
+    table = _table(f"{equilibrium.scene.name} at rest", "marker", "x [m]", "y [m]", "angle [rad]")
+    for name in equilibrium.markers:
+        x, y = equilibrium.marker(name)
+        table.add_row(name, f"{x:.9f}", f"{y:.9f}", f"{equilibrium.angle(name):.9f}")
+    out.print(table)
+    if equilibrium.reactions is not None:
+        reactions_table([equilibrium.reactions])
+    lowest = equilibrium.eigenvalues[:1].real
+    out.print(
+        f"status {equilibrium.status}{f' ({equilibrium.message})' if equilibrium.message else ''}; "
+        f"unbalanced {equilibrium.residual:.1e} of all forces, joints gape by {equilibrium.gap:.1e}"
+        + "".join(f"; lowest eigenvalue {value:.4g} rad^2/s^2" for value in lowest)
+        + f"; {equilibrium.iterations} iterations"
+    )
+
+
+def reactions_table(found: list[Reactions]) -> None:
+    """What every joint exerts on its second body."""
+    for reactions in found:
+        title = f"joint forces on the second body at t = {reactions.time:g} s"
+        table = _table(title, "joint", "kind", "fx [N]", "fy [N]", "torque [N m]", "unique")
+        for name, joint in reactions.joints.items():
+            numbers = (f"{value:.6g}" for value in (*joint.force, joint.torque))
+            table.add_row(name, joint.kind, *numbers, "yes" if joint.unique else "no")
+        out.print(table)
+        if reactions.redundancy:
+            out.print(
+                f"{reactions.redundancy} more than needed: least forces are shown; "
+                f"redundant: {', '.join(reactions.constraints) or 'none away from this position'}"
+            )
+
+
+def modes_table(modes: Modes) -> None:
+    """Frequencies, slowest first."""
+    headings = ("mode", "frequency [Hz]", "[rad/s]", "damping ratio", "growth [1/s]", "kind")
+    table = _table(f"{modes.scene.name}: small motions about the {modes.about}", *headings)
+    for number, mode in enumerate(modes.modes, 1):
+        numbers = (mode.frequency, mode.angular_frequency, mode.damping_ratio, mode.eigenvalue.real)
+        table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind)
+    out.print(table)
+    if not modes.balanced:
+        out.print("the forces do not balance there; these are motions relative to its fall")
 
 
 def estimate_table(estimate: Estimate) -> None:

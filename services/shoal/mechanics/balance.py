@@ -26,6 +26,8 @@ LONGEST = 0.2
 """Longest step of the descent, as a fraction of the machine's size."""
 FAR = 30.0
 """A machine that has moved by so many times its own size falls for ever."""
+STRAINED = 1e-9
+"""Forces that strain the machine by less than this count for nothing."""
 SEEN = 1e-9
 """Unbalanced forces below this fraction of all forces are round-off."""
 
@@ -56,6 +58,9 @@ class Balance:
         self.evaluator, self.t = evaluator, t
         self.metric = Metric(evaluator.mass)
         self.size, self.unit = size, size * np.sqrt(mass)
+        q = evaluator.model.q0[:, 0]
+        stiff = abs(evaluator.stiffness(q, t, load=0.0)) @ np.abs(q)
+        self._least = STRAINED * self.metric.size(stiff)
 
     def look(self, q: Array, load: float = 1.0) -> View:
         """Forces, free directions and multipliers at q."""
@@ -71,10 +76,13 @@ class Balance:
         return np.asarray(basis.T @ (full @ basis))
 
     def residual(self, view: View) -> float:
-        """Unbalanced force over the elastic and the applied force, all in the metric of M^-1."""
+        """Unbalanced force over the elastic and the applied force, all in the metric of M^-1.
+
+        Where neither acts, over the force that a strain of 1e-9 would take.
+        """
         evaluation = view.evaluation
         parts = (evaluation.elastic, evaluation.force - evaluation.elastic)
-        scale = max(self.metric.size(part) for part in parts)
+        scale = max(self._least, *(self.metric.size(part) for part in parts))
         return float(np.linalg.norm(view.unbalanced)) / scale if scale > 0 else 0.0
 
     def restore(self, q: Array) -> tuple[Array, float]:

@@ -67,7 +67,7 @@ def raw(w: Work) -> Work:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def derive(tile: Tile, m: Arrays, z: Array, last: int, moving: bool) -> None:
     """Fill the derived rows of z up to row `last`; for rates (moving) the constants do not count."""
     gauss.derive(tile, m, z, m.unknowns, last, moving)
@@ -90,7 +90,7 @@ def _fold(tile: Tile, m: Arrays, f: Array) -> None:
             add_product(tile, f, m.derived.source[t], m.derived.coefficient, t, f, row)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def loaded(m: Arrays) -> bool:
     """Whether forces depend on rates or on time."""
     e = m.elements
@@ -104,7 +104,7 @@ def enter(m: Arrays, w: Work) -> None:
     gate.store(w.home, w)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Array) -> None:
     """Applied and elastic generalised forces Q on the unknowns; z, zdot, f: (rows, lanes).
 
@@ -113,7 +113,7 @@ def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Ar
     gate.call(m.gates.force, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, f, ALL))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def elastic_force(tile: Tile, m: Arrays, w: Work, z: Array, f: Array, exact: bool) -> None:
     """The elastic part of Q; exact: without the elements of `add_mean_force`. Fills the derived rows of z."""
     part = SIMPLE if exact else ELASTIC
@@ -132,7 +132,7 @@ def _force_gate(tile, m, w, t, z, zdot, f, part):  # type: ignore[no-untyped-def
     _force(tile, gate.load(m), gate.load(w), t, z, zdot, f, part)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Array, part: int) -> None:
     derive(tile, m, z, m.force_rows, False)
     for row in range(m.force_rows):
@@ -151,15 +151,16 @@ def _force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: A
         forces.add_force(tile, m.forces, m.functions, t, z, zdot, w.memory, f, w.element, w.power, moving)
     ancf_cable.add_force_full(tile, e.cables_full, z, f, w.element)
     ancf_cable.add_force_reduced(tile, e.cables_reduced, z, f, w.element)
-    beam.add_force(tile, e.cubics, z, zdot, f, w.element, w.power, moving)
-    beam.add_force(tile, e.quintics, z, zdot, f, w.element, w.power, moving)
-    if part != SIMPLE:
+    if e.cubics.size + e.quintics.size > 0:
+        beam.add_force(tile, e.cubics, z, zdot, f, w.element, w.power, moving)
+        beam.add_force(tile, e.quintics, z, zdot, f, w.element, w.power, moving)
+    if part != SIMPLE and e.solids.size + e.two_point_solids.size > 0:
         ancf_full.add_force(tile, e.solids, z, f, w.element)
         ancf_full.add_force(tile, e.two_point_solids, z, f, w.element)
     _fold(tile, m, f)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def acceleration(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """The acceleration by Gauss's principle; z, zdot, a: (rows, lanes), a valid on the unknowns."""
     gate.call(m.gates.acceleration, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, tolerance, a))
@@ -177,7 +178,7 @@ def _acceleration_gate(tile, pm, pw, t, z, zdot, tolerance, a):  # type: ignore[
         sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def settle(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, iterations: int = 3) -> None:
     """Remove the drift of a constrained model (nothing to do where sharing expressed every joint)."""
     if m.constraints.size > 0 and m.projects:
@@ -190,7 +191,7 @@ def _settle_gate(tile, pm, pw, t, tolerance, iterations):  # type: ignore[no-unt
     gauss.project(tile, m, w.gauss, t, w.z, w.zdot, tolerance, iterations)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def remember(tile: Tile, m: Arrays, w: Work) -> None:
     """Count the turns of angle forces after a step."""
     if m.forces.size > 0:
@@ -198,7 +199,7 @@ def remember(tile: Tile, m: Arrays, w: Work) -> None:
         forces.remember(tile, m.forces, w.z, w.memory)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def energies(tile: Tile, m: Arrays, w: Work) -> None:
     """Kinetic, elastic and gravitational energy [J] of the state, into w.energy; uses w.stage."""
     gate.call(m.gates.energies, (tile, gate.typed(m.home, m), gate.typed(w.home, w)))

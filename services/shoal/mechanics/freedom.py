@@ -41,6 +41,9 @@ class Metric:
 
     def __init__(self, mass: Any) -> None:
         self._lower = np.linalg.cholesky(np.asarray(mass.toarray()))
+        n = len(self._lower)
+        basis = scipy.linalg.solve_triangular(self._lower, np.eye(n), lower=True, trans="T")
+        self._whole = Freedom(basis, 0, np.zeros((0, 0)), np.zeros((n, 0)), np.zeros((0, 0)))
 
     def size(self, force: Array) -> float:
         """The norm of a generalised force in the metric of M^-1 [kg^1/2 m/s^2]."""
@@ -48,11 +51,9 @@ class Metric:
 
     def freedom(self, jacobian: Any) -> Freedom:
         """The tangent space of the constraints with the Jacobian C_q (sparse)."""
-        lower, n = self._lower, len(self._lower)
-        count = jacobian.shape[0]
+        lower, count = self._lower, jacobian.shape[0]
         if count == 0:
-            basis = scipy.linalg.solve_triangular(lower, np.eye(n), lower=True, trans="T")
-            return Freedom(basis, 0, np.zeros((0, 0)), np.zeros((n, 0)), np.zeros((0, 0)))
+            return self._whole
         rows = scipy.linalg.solve_triangular(lower, jacobian.toarray().T, lower=True)
         lengths = np.linalg.norm(rows, axis=0)
         scale = np.divide(1.0, lengths, out=np.ones_like(lengths), where=lengths > 0)

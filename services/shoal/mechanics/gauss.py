@@ -25,7 +25,7 @@ SETTLING = 100.0
 """Drift is removed along fewer directions than accelerations are held: those this much farther from singular."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def derive(tile: Tile, m: Arrays, z: Array, begin: int, end: int, moving: bool) -> None:
     """Fill the derived rows of z from row `begin` up to row `end`; for rates (moving) the constants do not count."""
     for row in range(begin, end):

@@ -166,7 +166,7 @@ def march(
     return record
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _count_turns(tile: Tile, m: Arrays, w: Work, marker_rows: Index, turns: Array, above: Array) -> None:
     """Add 2 pi to `turns` (markers, lanes) where a marker's direction has passed the negative x axis."""
     width = len(tile)

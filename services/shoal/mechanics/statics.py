@@ -161,7 +161,7 @@ class _Search:
                 break
             eigenvalues, lowest = self._eigen(found.q)
             zero = zero_level(eigenvalues)
-            if not (leave_unstable and has_potential) or np.real(eigenvalues[0]) > -zero:
+            if not (leave_unstable and has_potential) or not np.any(np.real(eigenvalues) < -zero):
                 break
             message = "left an unstable equilibrium; "
             kick = 1e-3 * self.balance.size / np.max(np.abs(lowest)) * (1 + attempt)

@@ -14,7 +14,8 @@ What the paper leaves open:
 - what is returned: the best fish ever seen, or (`keep_best` off) the P_g of step 3-7, which the printed steps forget.
 
 A swarm that compares values of G cannot tell places apart whose G differs by less than its round-off: the acceleration
-is known to about the square root of that, 1e-8 of |y_f|, however long it swims.
+is known to about the square root of that, 1e-8 of |y_f|, however long it swims. And what it finds is the minimiser,
+which at a singular position is in general not the acceleration of the motion (see `projection`).
 """
 
 from __future__ import annotations
@@ -261,13 +262,15 @@ def march(
         v += step * solve_triangular(lower, y, lower=True, trans=1)  # step 4
         q += step * v
         _arrive(SINGLE, arrays, room, now + step, solver.rank_tolerance, 3, gap, record.drift)
+    named = "named by the scene" if solver.integrator == INTEGRATOR else "auto: the time step of the swarm's paper"
     return record, {
         "acceleration": solver.acceleration,
+        "integrator_reason": named,
         "swarm": {
             "size": solver.swarm_size,
             "iterations": solver.swarm_iterations,
             "seed": solver.swarm_seed,
-            **asdict(search.switches),
+            **({} if solver.acceleration == "afsa" else asdict(search.switches)),
             **tally.facts(),
         },
     }

@@ -72,7 +72,7 @@ def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quint
     def ours(scheme: Any) -> bool:
         return isinstance(scheme, types.BaseNamedTuple) and scheme.instance_class is settings
 
-    @overload(advance, jit_options={"error_model": "numpy"})
+    @overload(advance, jit_options={"error_model": "numpy", "forceinline": True})
     def choose_step(tile, scheme, m, w, t, h):  # type: ignore[no-untyped-def]
         return _body(step) if ours(scheme) else None
 
