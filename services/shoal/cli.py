@@ -151,12 +151,12 @@ def statics(scene: str, time: float, values: dict[str, str], as_json: bool) -> N
 @main.command()
 @click.argument("scene")
 @click.option("--count", default=10, show_default=True, type=click.IntRange(min=1), help="How many, lowest first.")
-@click.option(
-    "--about", default="equilibrium", show_default=True, type=click.Choice(["equilibrium", "start"]), help="Which state."
-)
+@click.option("--about", default="equilibrium", show_default=True, type=click.Choice(["equilibrium", "start"]))
 @option_set
 @option_json
-def modes(scene: str, count: int, about: Literal["equilibrium", "start"], values: dict[str, str], as_json: bool) -> None:
+def modes(
+    scene: str, count: int, about: Literal["equilibrium", "start"], values: dict[str, str], as_json: bool
+) -> None:
     """Eigenfrequencies and shapes of SCENE about its equilibrium or its start."""
     from shoal import terminal
     from shoal.mechanics.modes import modes

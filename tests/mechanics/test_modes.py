@@ -38,7 +38,7 @@ def _beam(element: str, elements: int, *, pinned: bool, **more: Any) -> Scene:
 
 
 @pytest.mark.parametrize("pinned", [False, True], ids=["cantilever", "pinned"])
-@pytest.mark.parametrize(("element", "meshes", "order"), [("ancf-cable", (4, 8), 4), ("ancf-quintic", (2, 4), 8)])
+@pytest.mark.parametrize(("element", "meshes", "order"), [("ancf-cable", (8, 16), 4), ("ancf-quintic", (4, 8), 8)])
 def test_bernoulli_euler_frequencies_and_their_order(
     element: str, meshes: tuple[int, int], order: int, pinned: bool
 ) -> None:
@@ -49,9 +49,9 @@ def test_bernoulli_euler_frequencies_and_their_order(
         found = modes(_beam(element, elements, pinned=pinned), count=3)
         assert found.ok
         errors.append(found.frequencies / exact - 1)
-    assert np.all(np.abs(errors[1]) < {4: 2e-4, 8: 2e-5}[order])
+    assert np.all(np.abs(errors[1]) < {4: 1e-4, 8: 1e-7}[order])
     slopes = np.log2(np.abs(errors[0]) / np.abs(errors[1]))
-    assert slopes[1:] == pytest.approx([order, order], abs=1.0)
+    assert slopes[1:] == pytest.approx([order, order], abs=0.4)
 
 
 def test_ancf_full_vibrates_like_a_beam() -> None:

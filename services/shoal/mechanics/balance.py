@@ -80,10 +80,12 @@ class Balance:
 
         Where neither acts, over the force that a strain of 1e-9 would take.
         """
-        evaluation = view.evaluation
-        parts = (evaluation.elastic, evaluation.force - evaluation.elastic)
-        scale = max(self._least, *(self.metric.size(part) for part in parts))
+        scale = self._scale(view)
         return float(np.linalg.norm(view.unbalanced)) / scale if scale > 0 else 0.0
+
+    def _scale(self, view: View) -> float:
+        parts = (view.evaluation.elastic, view.evaluation.force - view.evaluation.elastic)
+        return max(self._least, *(self.metric.size(part) for part in parts))
 
     def restore(self, q: Array) -> tuple[Array, float]:
         """The nearest place (metric of M) where the joints close, and how far they still gape."""
@@ -132,6 +134,9 @@ class Balance:
             curvature, modes = scipy.linalg.eigh(self.hessian(q, view, load))
             pull = modes.T @ view.unbalanced
             zero = zero_level(curvature)
+            # What nothing pulls and nothing holds stays where it is.
+            idle = (np.abs(curvature) <= zero) & (np.abs(pull) <= SEEN * self._scale(view))
+            pull[idle] = 0.0
             if self.residual(view) < SEEN**1.3:
                 return Found(q, True, iteration, correction)
             potential = view.evaluation.potential
@@ -143,23 +148,41 @@ class Balance:
                     y *= LONGEST * self.unit / length
                 trial, gap = self.restore(q + view.freedom.basis @ (modes @ y))
                 correction = float(np.linalg.norm(y)) / self.unit
-                self.evaluator.remember(trial)
                 ahead = self.look(trial, load)
                 change = ahead.evaluation.potential - potential
+                if gap < 1e-10 and not change <= noise:
+                    # Turning along straight lines stretches: take the stiff directions back before judging.
+                    active = np.abs(y) > 0.03 * np.max(np.abs(y))
+                    trial, gap = self._relax(trial, 10.0 * float(np.max(np.abs(curvature[active]))), load)
+                    ahead = self.look(trial, load)
+                    change = ahead.evaluation.potential - potential
                 if gap < 1e-10 and change <= noise:
                     break
                 if correction < CLOSE:
                     good = self.residual(view) < np.sqrt(SEEN)
-                    self.evaluator.remember(q)
                     return Found(q, good, iteration, correction, "" if good else "the descent of the potential stalls")
                 shift = max(4.0 * shift, float(np.linalg.norm(pull)) / max(float(np.linalg.norm(y)), 1e-300))
-            held = bool(np.all(curvature > zero))
+            held = bool(np.all((curvature > zero) | idle))
+            self.evaluator.remember(trial)
             q, view, shift = trial, ahead, shift / 8.0 if correction > 1e-6 else 0.0
             if held and correction < CLOSE:
                 return Found(q, True, iteration, correction)
             if float(np.max(np.abs(q - begin))) > FAR * self.size:
                 return Found(q, False, iteration, correction, "falls without end")
         return Found(q, False, most, correction, f"not at rest after {most} steps downhill")
+
+    def _relax(self, q: Array, stiff: float, load: float) -> tuple[Array, float]:
+        """Newton's method in the directions stiffer than `stiff` [rad^2/s^2] alone."""
+        gap = 0.0
+        for _ in range(4):
+            view = self.look(q, load)
+            curvature, modes = scipy.linalg.eigh(self.hessian(q, view, load))
+            pull = modes.T @ view.unbalanced
+            y = np.where(curvature > stiff, pull / np.where(curvature > stiff, curvature, 1.0), 0.0)
+            q, gap = self.restore(q + view.freedom.basis @ (modes @ y))
+            if float(np.linalg.norm(y)) < 1e-6 * self.unit:
+                break
+        return q, gap
 
 
 def zero_level(curvature: Array) -> float:

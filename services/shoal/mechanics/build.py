@@ -100,7 +100,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
         constraints=held,
         constraint_names=tuple(one.name for one in terms.held),
         marker_rows=_index(marker_rows),
-        method=gauss.METHODS[scene.solver.acceleration],
+        method=gauss.METHODS.get(scene.solver.acceleration, gauss.PROJECTION),
         baumgarte=scene.solver.baumgarte,
     )
 

@@ -14,8 +14,9 @@ from shoal.mechanics.tile import Array, Tile
 from shoal.mechanics.vector import add_product, clear, copy, pointer
 
 ELEMENT_ROWS = 64
-ALL, ELASTIC, SIMPLE = 0, 1, 2
-"""Parts of the force: everything, the elastic part, the elastic part but for elements that know their mean force."""
+ALL, ELASTIC, SIMPLE, ACCELERATION = 0, 1, 2, 3
+"""Parts of the force: everything, the elastic part, the elastic part but for elements that know their mean
+force; or the acceleration that follows from everything."""
 
 
 class Work(NamedTuple):
@@ -110,14 +111,14 @@ def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Ar
 
     Fills the derived rows of z and zdot that forces act on, and the dissipated minus supplied power.
     """
-    gate.call(m.gates.force, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, f, ALL))
+    gate.call(m.gates.motion, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, 0.0, f, ALL))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def elastic_force(tile: Tile, m: Arrays, w: Work, z: Array, f: Array, exact: bool) -> None:
     """The elastic part of Q; exact: without the elements of `add_mean_force`. Fills the derived rows of z."""
     part = SIMPLE if exact else ELASTIC
-    gate.call(m.gates.force, (tile, gate.typed(m.home, m), gate.typed(w.home, w), 0.0, z, z, f, part))
+    gate.call(m.gates.motion, (tile, gate.typed(m.home, m), gate.typed(w.home, w), 0.0, z, z, 0.0, f, part))
 
 
 @njit(cache=True, error_model="numpy")
@@ -127,18 +128,13 @@ def add_mean_force(tile: Tile, m: Arrays, w: Work, before: Array, after: Array, 
     ancf_full.add_mean_force(tile, m.elements.two_point_solids, before, after, f, w.element)
 
 
-@njit(cache=True, error_model="numpy")
-def _force_gate(tile, m, w, t, z, zdot, f, part):  # type: ignore[no-untyped-def]
-    _force(tile, gate.load(m), gate.load(w), t, z, zdot, f, part)
-
-
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Array, part: int) -> None:
     derive(tile, m, z, m.force_rows, False)
     for row in range(m.force_rows):
         clear(tile, f, row)
     e = m.elements
-    moving = part == ALL
+    moving = part in (ALL, ACCELERATION)
     if moving:
         for row in range(m.unknowns):
             copy(tile, f, row, m.weight, row)
@@ -163,19 +159,22 @@ def _force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: A
 @njit(cache=True, error_model="numpy", forceinline=True)
 def acceleration(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """The acceleration by Gauss's principle; z, zdot, a: (rows, lanes), a valid on the unknowns."""
-    gate.call(m.gates.acceleration, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, tolerance, a))
+    arguments = (gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, tolerance, a, ACCELERATION)
+    gate.call(m.gates.motion, (tile, *arguments))
 
 
 @njit(cache=True, error_model="numpy")
-def _acceleration_gate(tile, pm, pw, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def]
+def _motion_gate(tile, pm, pw, t, z, zdot, tolerance, a, part):  # type: ignore[no-untyped-def]
+    """A part of the force, or the acceleration."""
     m, w = gate.load(pm), gate.load(pw)
-    _force(tile, m, w, t, z, zdot, a, ALL)
-    if m.constraints.size > 0:
-        gauss.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
-        if m.driven:
-            constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)
-    else:
-        sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
+    _force(tile, m, w, t, z, zdot, a, part)
+    if part == ACCELERATION:
+        if m.constraints.size > 0:
+            gauss.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
+            if m.driven:
+                constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)
+        else:
+            sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -243,8 +242,7 @@ def gates(tile: Tile, arrays: Arrays, room: Work, assemble: Any) -> Gates:
     w = types.CPointer(gate.returned(raw, room))
     width, number, rows = typeof(tile), types.float64, types.CPointer(types.float64)
     return Gates(
-        gate.address(_force_gate, (width, m, w, number, rows, rows, rows, types.int64)),
-        gate.address(_acceleration_gate, (width, m, w, number, rows, rows, number, rows)),
+        gate.address(_motion_gate, (width, m, w, number, rows, rows, number, rows, types.int64)),
         gate.address(_settle_gate, (width, m, w, number, number, types.int64)),
         gate.address(_energies_gate, (width, m, w)),
         assemble(width, m, w),

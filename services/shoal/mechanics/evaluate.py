@@ -1,13 +1,14 @@
 """A door to the compiled kernels for one state of a model: forces, constraints, energies and tangents, as arrays.
 
-The equations of motion are M a = Q - C_q' lambda with C(q, t) = 0; at rest, Q(q, 0, t) = C_q' lambda.
+The equations of motion are M a = Q - C_q' lambda with C(q, t) = 0; at rest, Q(q, 0, t) = C_q' lambda. For checks,
+statics and small motions; the time loop does not come this way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,7 @@ from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.sparse import Pattern
 from shoal.mechanics.tangent import ready, stiffness_at, tangent_tile
-from shoal.mechanics.tile import SINGLE, Array, Tile
+from shoal.mechanics.tile import SINGLE, Array, Index, Tile
 from shoal.mechanics.vector import pointer
 from shoal.scene import Scene
 
@@ -214,16 +215,12 @@ class Evaluator:
     def strain_energies(self, q: Array) -> dict[str, float]:
         """Strain energy [J] of every flexible body."""
         bodies = dict.fromkeys(name for owners in self.model.owners for name in owners)
-        return {body: self._energy(q, self._only(lambda owner, _: owner == body)) for body in bodies}
+        return {body: self._energy(q, self._only(body)) for body in bodies}
 
     def element_forces(self, q: Array, v: Array, body: str) -> list[Array]:
         """Elastic and viscous generalised force of each element of a flexible body by itself, (unknowns,) each."""
         count = sum(owners.count(body) for owners in self.model.owners)
-        found = []
-        for wanted in range(count):
-            chosen = self._only(lambda owner, number, wanted=wanted: owner == body and number == wanted)
-            found.append(self._force(q, v, chosen))
-        return found
+        return [self._force(q, v, self._only(body, number)) for number in range(count)]
 
     @property
     def follows(self) -> bool:
@@ -251,15 +248,15 @@ class Evaluator:
             drives=drives._replace(coefficient=drives.coefficient * load, factor=drives.factor * load),
         )
 
-    def _only(self, wanted: Any) -> Arrays:
-        """The arrays with the stiffness of some elements (owner, number in its body) and no springs."""
+    def _only(self, body: str, number: int | None = None) -> Arrays:
+        """The arrays with the stiffness of one element of a body (or of all of them), and with no loads."""
         arrays = self._arrays
         families = {}
         for (name, (size, first)), owners in zip(_STIFF.items(), self.model.owners, strict=True):
             family = getattr(arrays.elements, name)
             values = family.coefficients.reshape(-1, size).copy()
             for row, owner in enumerate(owners):
-                if not wanted(owner, row - owners.index(owner)):
+                if owner != body or number not in (None, row - owners.index(owner)):
                     values[row, first:] = 0.0
             families[name] = family._replace(coefficients=values.ravel())
         law = np.zeros_like(arrays.forces.law)
@@ -285,7 +282,7 @@ class Evaluator:
         self._force(q, None, arrays)
         return float(self._room.energy[1])
 
-    def _strengths(self, arrays: Arrays, numbers: Array, t: float) -> Array:
+    def _strengths(self, arrays: Arrays, numbers: Index, t: float) -> Array:
         """Functions of time by number, -1 for the constant 1."""
         found = [1.0 if k < 0 else functions.evaluate(arrays.functions, int(k), t, 0) for k in numbers]
         return np.array(found)
@@ -317,7 +314,7 @@ class Evaluator:
     def _load_stiffness(self, arrays: Arrays, t: float) -> scipy.sparse.csc_array:
         """-dQ/dq of motors and of forces that turn with a body."""
         drives, z, n = arrays.drives, self._room.z, self.model.unknowns
-        parts: list[tuple[Array, Array, Array]] = []
+        parts: list[tuple[Index, Index, Array]] = []
         strength = self._strengths(arrays, drives.following_function, t)
         for k in range(drives.following):
             rows = drives.rows[4 * k : 4 * k + 4]

@@ -149,8 +149,8 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
     in C_q v leaves the rate of the weakest direction uncertain by eps/d, and its acceleration by that over d. So the
     best tolerance is about the cube root of eps.
     """
-    derive(tile, m, q, m.force_rows, m.held_rows, False)
-    derive(tile, m, v, m.force_rows, m.held_rows, True)
+    derive(tile, m, q, m.unknowns, m.held_rows, False)
+    derive(tile, m, v, m.unknowns, m.held_rows, True)
     if m.saddle.size > 0 and m.method == PROJECTION:
         _constrain_many(tile, m, w, t, q, v, a)
         return
@@ -352,7 +352,7 @@ def project(
 ) -> None:
     """Move q and v back onto C = 0 and C_q v = -C_t by the smallest change in the mass metric."""
     for _ in range(iterations):
-        derive(tile, m, q, m.force_rows, m.held_rows, False)
+        derive(tile, m, q, m.unknowns, m.held_rows, False)
         constraints.residual(tile, m.constraints, m.functions, t, q, w.gap)
         largest = 0.0
         for k in range(m.constraints.size * len(tile)):
@@ -366,7 +366,7 @@ def project(
 @njit(cache=True, error_model="numpy")
 def project_rates(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, tolerance: float) -> None:
     """Move v back onto C_q v = -C_t by the smallest change in the mass metric."""
-    derive(tile, m, q, m.force_rows, m.held_rows, False)
+    derive(tile, m, q, m.unknowns, m.held_rows, False)
     constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
     constraints.rates(tile, m.constraints, m.functions, t, w.gap)
     constraints.add_product(tile, m.constraints, w.jacobian, v, w.gap)
@@ -411,7 +411,7 @@ def _correct(tile: Tile, m: Arrays, w: GaussWork, q: Array, x: Array, tolerance:
 @njit(cache=True, error_model="numpy")
 def prepare(tile: Tile, m: Arrays, factor: Array, pattern: sparse.Pattern, q: Array, w: GaussWork) -> None:
     """Evaluate C_q, H^-1 C_q' and C_q H^-1 C_q' at q for the factored matrix H."""
-    derive(tile, m, q, m.force_rows, m.held_rows, False)
+    derive(tile, m, q, m.unknowns, m.held_rows, False)
     n = m.unknowns
     c = m.constraints
     constraints.jacobian(tile, c, q, 1.0, w.jacobian)

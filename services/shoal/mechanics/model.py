@@ -54,8 +54,7 @@ class Elements(NamedTuple):
 class Gates(NamedTuple):
     """Addresses of the kernels of dynamics.py and tangent.py for one width."""
 
-    force: int
-    acceleration: int
+    motion: int
     settle: int
     energies: int
     assemble: int
@@ -250,7 +249,7 @@ class Model:
         e = self.elements
         return Arrays(
             gate.home(),
-            Gates(0, 0, 0, 0, 0),
+            Gates(0, 0, 0, 0),
             self.unknowns,
             self.force_rows,
             self.held_rows,

@@ -60,7 +60,7 @@ class Mode:
     @property
     def damping_ratio(self) -> float:
         """Damping over critical damping; 1 for motions that creep back, negative for those that grow."""
-        return -self.eigenvalue.real / abs(self.eigenvalue) if self.eigenvalue else 0.0
+        return 0.0 - self.eigenvalue.real / abs(self.eigenvalue) if self.eigenvalue else 0.0
 
     @property
     def kind(self) -> str:
@@ -131,7 +131,7 @@ def modes(
     count: int = 10,
     leave_unstable: bool = True,
 ) -> Modes:
-    """The `count` lowest modes about the static equilibrium, or about the start of the scene, with drives at `time` [s].
+    """The lowest modes about the static equilibrium, or about the start of the scene, with drives at time [s].
 
     Raises InputError if the scene cannot be modelled, ComputationError if there is no equilibrium.
     """

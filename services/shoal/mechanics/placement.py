@@ -172,7 +172,9 @@ def _pose(scene: Scene, name: str, mine: list[JointPoint], turning: Orientations
     stated = [body for body in scene.bodies if turning.root(body)[0] == root and body in scene.initial]
     leader = stated[0] if stated and name not in scene.initial else name
     if root == GROUND and np.any(start.rate):
-        raise InputError(f"initial.{name}.rate: joints keep {name} from turning, found {np.max(np.abs(start.rate)):g} rad/s")
+        raise InputError(
+            f"initial.{name}.rate: joints keep {name} from turning, found {np.max(np.abs(start.rate)):g} rad/s"
+        )
     rate = 0.0 if root == GROUND else scene.start(leader).rate
     if root == GROUND:
         direction = relative

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from shoal.mechanics.affine import Affine
 from shoal.mechanics.evaluate import Evaluator
 from shoal.mechanics.frames import BeamFrame, PointFrame
 from shoal.mechanics.free_bodies import FreeBodies, vectors
@@ -24,6 +26,7 @@ from shoal.mechanics.tile import Array
 from shoal.scene import Attachment, Coupling, Distance, Revolute, Scene, Slider, Weld
 from shoal.trajectory import plain
 
+Complex = npt.NDArray[np.complex128]
 RANK = 1e-9
 SHARE = 1e-6
 """A component that takes part in a self-stress (of unit size) by less than this is unique."""
@@ -50,8 +53,11 @@ class JointReaction:
 
 @dataclass(frozen=True)
 class Reactions:
-    """Reactions at one state. redundancy: how many self-stresses are possible; constraints: of the model that depend on
-    others at a neighbouring state as well; unbalanced: what no joint can balance, relative to all forces."""  # noqa: D205, D209
+    """Reactions at one state.
+
+    redundancy: how many self-stresses are possible. constraints: those of the model that depend on others, at a
+    neighbouring state as well. unbalanced: what no joint can balance, relative to all forces.
+    """
 
     time: float
     joints: dict[str, JointReaction]
@@ -176,21 +182,21 @@ def _second(joint: Any) -> Attachment:
     return joint.terms[0].at if isinstance(joint, Coupling) else joint.second
 
 
-def _rows(bodies: FreeBodies, vector: Any) -> Array:
+def _rows(bodies: FreeBodies, vector: Affine) -> Complex:
     row = np.zeros(bodies.unknowns, dtype=complex)
     for unknown, coefficient in vector.terms.items():
         row[unknown] = complex(coefficient)
     return row
 
 
-def _value(bodies: FreeBodies, side: Attachment, at: Array) -> tuple[complex, Array]:
+def _value(bodies: FreeBodies, side: Attachment, at: Array) -> tuple[complex, Complex]:
     """Place [m] of an attachment and its derivative."""
     vector = bodies.placement.point(bodies.scene, side)
     row = _rows(bodies, vector)
     return complex(row @ at + vector.constant), row
 
 
-def _direction(bodies: FreeBodies, side: Attachment, at: Array) -> tuple[complex, Array]:
+def _direction(bodies: FreeBodies, side: Attachment, at: Array) -> tuple[complex, Complex]:
     """Direction vector at an attachment and its derivative."""
     vector = bodies.placement.direction(bodies.scene, side)
     row = _rows(bodies, vector)

@@ -56,7 +56,7 @@ def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: 
     rows: list[tuple[float, float, float, float]] = []
     for number, elastic in enumerate(bodies.evaluator.element_forces(at, rate, rod)):
         height, width = body.section((number + 0.5) / body.elements)
-        pairs = [vector.pair for vector in frame.vectors(number)]
+        pairs = [pair for vector in frame.vectors(number) if (pair := vector.pair)]
         vectors = np.array([complex(at[x], at[y]) for x, y in pairs])
         changes = np.array([complex(change[x], change[y]) for x, y in pairs])
         inertia = np.array(element.mass(body.density, height, width, length)) @ changes

@@ -1,4 +1,4 @@
-"""Static equilibrium of a scene, with large deflections: a stable place where all forces balance, or the reason why not.
+"""Static equilibrium of a scene, with large deflections: a stable place of rest, or the reason why there is none.
 
 A machine that its own stiffness holds is loaded step by step by Newton's method; steps are halved where a step does
 not converge, turns a body by too much or ends in an unstable place. A machine without stiffness of its own (a
@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg
 
 from shoal.mechanics.balance import Balance, Found, zero_level
-from shoal.mechanics.evaluate import Evaluator, Points, points
+from shoal.mechanics.evaluate import Evaluator, points
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.groups import start_angle
 from shoal.mechanics.placement import Placement, place
@@ -27,6 +27,8 @@ from shoal.trajectory import plain
 
 TURN = 0.8
 """Largest turn [rad] of any body or section in one load step."""
+WAY = 0.3
+"""Longest way (rms) of the bodies in one load step, relative to the machine's size."""
 SMALLEST = 1.0 / 1024
 """Smallest load step."""
 GAPE = 1e-9
@@ -46,11 +48,12 @@ class Held(StrEnum):
 class Equilibrium:
     """A state of rest, and the evidence for it.
 
-    balanced: whether the forces balance, stably or not. q: coordinates; multipliers: lambda of the constraints, Q = C_q' lambda. markers: names; points [m], (markers, 2);
-    angles [rad], counted over full turns from the start, (markers,). energy: strain, gravity, applied [J], and the
-    strain energy of every flexible body. residual: unbalanced force relative to all forces; gap: worst violation of a
-    joint; correction: the last one, relative to the machine's size. eigenvalues: of the reduced stiffness in the
-    metric of the mass [rad^2/s^2], lowest first; all positive means stable. steps: load steps. reactions: in joints.
+    balanced: whether the forces balance, stably or not. q: coordinates; multipliers: lambda, Q = C_q' lambda.
+    markers: names; points [m], (markers, 2); angles [rad], counted over full turns from the start, (markers,).
+    energy: strain, gravity, applied [J]; strain_energy: of every flexible body [J]. residual: unbalanced force
+    relative to all forces; gap: worst violation of a joint; correction: the last one, relative to the machine's size.
+    eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
+    stable. steps: load steps. reactions: in the joints. turns: what angle forces have counted [rad].
     """
 
     scene: Scene
@@ -116,7 +119,7 @@ class Equilibrium:
 
 
 def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True) -> Equilibrium:
-    """The equilibrium that a machine at rest reaches from the start of its scene, with drives as they are at `time` [s].
+    """The equilibrium that a machine reaches from the start of its scene, with drives as they are at `time` [s].
 
     leave_unstable: go on from an unstable equilibrium (a column beyond its buckling load) to a stable one, where the
     loads have a potential. Raises InputError if the scene cannot be modelled.
@@ -148,6 +151,11 @@ class _Search:
         has_potential = not self.evaluator.follows
         message = ""
         found = self._loaded(q)
+        if (found is None or not found.converged) and not leave_unstable:
+            start = q if found is None else found.q
+            straight = self._count(self.balance.newton(start))
+            if straight.converged and self._turn(start, straight.q) < TURN:
+                found = straight
         if found is None or not found.converged:
             if has_potential:
                 if found is not None:
@@ -252,7 +260,8 @@ class _Search:
             ahead = min(1.0, load + step)
             guess = q + (q - before) * ((ahead - load) / (load - before_load)) if load > before_load else q
             found = self._count(self.balance.newton(guess, ahead))
-            if found.converged and self._turn(q, found.q) < TURN and self._firm(found.q, ahead):
+            near = self._turn(q, found.q) < TURN and self._way(q, found.q) < WAY
+            if found.converged and near and self._firm(found.q, ahead):
                 before, before_load = q, load
                 q, load = found.q, ahead
                 correction = found.correction
@@ -272,7 +281,7 @@ class _Search:
         matrix = self.balance.hessian(q, view, load)
         if self.evaluator.follows and load > 0:
             return True
-        values = scipy.linalg.eigvalsh(matrix)
+        values = np.asarray(scipy.linalg.eigvalsh(matrix), dtype=float)
         return bool(np.all(values > zero_level(values)))
 
     def _eigen(self, q: Array) -> tuple[Array, Array]:
@@ -297,6 +306,12 @@ class _Search:
         """Largest turn [rad] of a body or section between two states."""
         change = np.angle(self.directions.at(other) * np.conj(self.directions.at(one)))
         return float(np.max(np.abs(change), initial=0.0))
+
+    def _way(self, one: Array, other: Array) -> float:
+        """How far the bodies lie apart in two states (rms), relative to the machine's size."""
+        change = other - one
+        square = float(change @ (self.evaluator.mass @ change))
+        return float(np.sqrt(max(0.0, square))) / float(self.balance.unit)
 
     def _follow(self, q: Array) -> None:
         """Count the turns of springs and markers."""
@@ -346,6 +361,3 @@ def _vectors(frame: Any, size: float) -> list[Any]:
     if isinstance(frame, RigidFrame):
         return [frame.origin, frame.origin + frame.axis * size]
     return [node[0] for node in frame.nodes]
-
-
-__all__ = ["Equilibrium", "Held", "Points", "machine_size", "statics"]
