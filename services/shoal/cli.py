@@ -92,10 +92,16 @@ def scenes(name: str | None) -> None:
     from shoal import terminal
     from shoal.identification.problem import load_problem, problem_library, problem_names
     from shoal.scene.load import load_scene, scene_library, scene_names
+    from shoal.scene.parametric import parametric
 
     if name is None:
         terminal.listing("scenes", {n: load_scene(n).description for n in scene_names()})
         terminal.listing("problems", {n: load_problem(n).description for n in problem_names()})
+        return
+    if (data := parametric(name)) is not None:
+        import yaml
+
+        click.echo(yaml.safe_dump(data, sort_keys=False), nl=False)
         return
     for folder, known in ((scene_library(), scene_names()), (problem_library(), problem_names())):
         if name in known:

@@ -298,6 +298,7 @@ def _clamp(scene: Scene, name: str, rod: Rod, node: int) -> Number | None:
         side = joint.second if joint.second.body == name else joint.first
         if np.all(np.abs(scene.location(side)[0] - rod.length * node / rod.elements) < 1e-9 * rod.length):
             turn = kept_turn(scene, joint)
+            assert turn is not None
             return turn if joint.second.body == name else np.conj(turn)
     return None
 

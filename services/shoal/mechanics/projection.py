@@ -25,7 +25,8 @@ def orthonormalise(rows: Array, triangle: Array, norms: Array, order: Index, tol
     rows: (constraints, unknowns); row order[k] of the input = norms[order[k]] * sum_j triangle[j, k] * (basis row j).
     Rows beyond the rank depend on the basis up to the tolerance; a row of zeros depends on anything.
     """
-    count, n = rows.shape
+    count: int = rows.shape[0]
+    n = rows.shape[1]
     for k in range(count):
         order[k] = k
         norms[k] = np.sqrt(np.dot(rows[k], rows[k]))

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from shoal.errors import InputError
-from shoal.scene.parametric import parametric
+from shoal.scene.parametric import EXAMPLES, parametric
 from shoal.scene.scene import Scene
 
 
@@ -66,8 +66,8 @@ def scene_library() -> Traversable:
 
 
 def scene_names() -> list[str]:
-    """Names of the built-in scenes, sorted."""
-    return names(scene_library())
+    """Names of the built-in scenes, sorted; of parametric ones the examples."""
+    return sorted([*names(scene_library()), *EXAMPLES])
 
 
 def load_scene(name: str) -> Scene:

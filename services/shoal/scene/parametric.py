@@ -10,6 +10,7 @@ from shoal.errors import InputError
 
 FOUR_BARS = re.compile(r"^n-four-bar-([0-9]+)$")
 _MOST_LOOPS = 1000
+EXAMPLES = ("n-four-bar-2", "n-four-bar-40")
 
 
 def parametric(name: str) -> dict[str, Any] | None:
@@ -30,15 +31,13 @@ def n_four_bar(loops: int) -> dict[str, Any]:
     one line twice a turn, where the constraints lose N ranks (Gonzalez, Dopico, Luaces and Cuadrado, A benchmarking
     system for MBS simulation software, 2011: 1 m/s and N loops).
     """
-    bar = {"kind": "rigid-body", "mass": 1.0, "inertia": 1 / 12, "centre_of_mass": [0.5, 0.0],
-           "named_points": {"end": [1.0, 0.0]}}  # fmt: skip
     bodies, joints, initial = {}, {}, {}
     for k in range(loops + 1):
-        bodies[f"crank{k}"] = bar
+        bodies[f"crank{k}"] = _bar()
         initial[f"crank{k}"] = {"angle": math.pi / 2, "rate": -1.0}
         joints[f"A{k}"] = _revolute("ground", [float(k), 0.0], f"crank{k}", "start")
         if k:
-            bodies[f"coupler{k}"] = bar
+            bodies[f"coupler{k}"] = _bar()
             joints[f"B{k - 1}"] = _revolute(f"crank{k - 1}", "end", f"coupler{k}", "start")
             joints[f"C{k}"] = _revolute(f"crank{k}", "end", f"coupler{k}", "end")
     return {
@@ -49,6 +48,16 @@ def n_four_bar(loops: int) -> dict[str, Any]:
         "markers": {"B0": {"body": "crank0", "point": "end"}},
         "initial": initial,
         "solver": {"duration": 10.0, "samples": 200, "step": 1e-3},
+    }
+
+
+def _bar() -> dict[str, Any]:
+    return {
+        "kind": "rigid-body",
+        "mass": 1.0,
+        "inertia": 1 / 12,
+        "centre_of_mass": [0.5, 0.0],
+        "named_points": {"end": [1.0, 0.0]},
     }
 
 
