@@ -144,7 +144,7 @@ def simulate(
 def statics(scene: str, time: float, values: dict[str, str], as_json: bool) -> None:
     """Find where SCENE comes to rest, and whether it is stable there."""
     from shoal import terminal
-    from shoal.mechanics.statics import statics
+    from shoal.mechanics.analysis.statics import statics
     from shoal.scene import load_scene
 
     wanted = load_scene(scene).with_values(values)
@@ -165,7 +165,7 @@ def modes(
 ) -> None:
     """Eigenfrequencies and shapes of SCENE about its equilibrium or its start."""
     from shoal import terminal
-    from shoal.mechanics.modes import modes
+    from shoal.mechanics.analysis.modes import modes
     from shoal.scene import load_scene
 
     wanted = load_scene(scene).with_values(values)
@@ -183,7 +183,7 @@ def modes(
 def reactions(scene: str, times: list[float], values: dict[str, str], as_json: bool) -> None:
     """Forces and torques in the joints of SCENE while it moves."""
     from shoal import terminal
-    from shoal.mechanics.reactions import reactions
+    from shoal.mechanics.analysis.reactions import reactions
     from shoal.scene import load_scene
 
     wanted = load_scene(scene).with_values(values)

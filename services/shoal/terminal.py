@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from shoal.engines.compare import Comparison
     from shoal.engines.sweep import Sweep
     from shoal.identification import Estimate
-    from shoal.mechanics.modes import Modes
-    from shoal.mechanics.reactions import Reactions
-    from shoal.mechanics.statics import Equilibrium
+    from shoal.mechanics.analysis.modes import Modes
+    from shoal.mechanics.analysis.reactions import Reactions
+    from shoal.mechanics.analysis.statics import Equilibrium
     from shoal.scene import Scene
     from shoal.trajectory import Trajectory
 

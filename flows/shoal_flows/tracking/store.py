@@ -132,6 +132,8 @@ def _unreachable(error: Exception) -> ComputationError:
 @cache
 def _experiment(name: str) -> str:
     """The experiment of that name, made with its description when it is first used."""
+    from mlflow.exceptions import MlflowException
+
     client = connect()
     found = client.get_experiment_by_name(name)
     if found is not None:
@@ -140,7 +142,14 @@ def _experiment(name: str) -> str:
         return str(found.experiment_id)
     location = None if settings.tracking_server() else (settings.artifact_folder() / name.lower()).as_uri()
     tags = {"mlflow.note.content": _EXPERIMENTS[name], "project": "shoal", "mlflow.experimentKind": _KIND}
-    return str(client.create_experiment(name, artifact_location=location, tags=tags))
+    try:
+        return str(client.create_experiment(name, artifact_location=location, tags=tags))
+    except MlflowException:
+        # Another worker may have made it in the meantime.
+        made = client.get_experiment_by_name(name)
+        if made is None:
+            raise
+        return str(made.experiment_id)
 
 
 def _common_tags() -> dict[str, str]:

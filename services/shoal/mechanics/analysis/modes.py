@@ -15,10 +15,10 @@ import numpy.typing as npt
 import scipy.linalg
 
 from shoal.errors import ComputationError
-from shoal.mechanics.balance import Balance, zero_level
-from shoal.mechanics.evaluate import Evaluator, points
+from shoal.mechanics.analysis.balance import Balance, zero_level
+from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.statics import Equilibrium, machine_size, statics
 from shoal.mechanics.placement import place
-from shoal.mechanics.statics import Equilibrium, machine_size, statics
 from shoal.mechanics.tile import Array
 from shoal.scene import Scene
 from shoal.trajectory import plain

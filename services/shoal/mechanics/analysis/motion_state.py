@@ -9,9 +9,9 @@ import numpy as np
 
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import forces, stability
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.build import build
 from shoal.mechanics.dynamics import derived_rows, work_space
-from shoal.mechanics.evaluate import Evaluator
 from shoal.mechanics.integrators import choose, facts, pick
 from shoal.mechanics.march import march
 from shoal.mechanics.tangent import ready

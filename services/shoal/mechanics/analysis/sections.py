@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.elements import ELEMENTS
-from shoal.mechanics.evaluate import Evaluator
 from shoal.mechanics.frames import BeamFrame
-from shoal.mechanics.free_bodies import FreeBodies
 from shoal.mechanics.pose import as_complex
 from shoal.mechanics.tile import Array
 from shoal.scene import Attachment, DistributedForce, Rod, Scene

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.errors import InputError
-from shoal.mechanics.evaluate import Evaluator
-from shoal.mechanics.motion_state import states
-from shoal.mechanics.reactions import reactions, reactions_of
-from shoal.mechanics.sections import sections
-from shoal.mechanics.statics import statics
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.motion_state import states
+from shoal.mechanics.analysis.reactions import reactions, reactions_of
+from shoal.mechanics.analysis.sections import sections
+from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene
 
 GROUND = {"body": "ground", "point": [0.0, 0.0]}

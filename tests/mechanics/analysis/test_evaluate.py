@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shoal.mechanics.evaluate import Evaluator
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.scene import Scene, load_scene
 
 GROUND = {"body": "ground", "point": [0.0, 0.0]}

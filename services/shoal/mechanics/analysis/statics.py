@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from shoal.mechanics.balance import Balance, Found, zero_level
-from shoal.mechanics.evaluate import Evaluator, points
+from shoal.mechanics.analysis.balance import Balance, Found, zero_level
+from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.reactions import Reactions, reactions_of
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.groups import start_angle
 from shoal.mechanics.placement import Placement, place
-from shoal.mechanics.reactions import Reactions, reactions_of
 from shoal.mechanics.tile import Array
 from shoal.scene import Scene
 from shoal.trajectory import plain

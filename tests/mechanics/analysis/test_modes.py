@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 from shoal.errors import ComputationError
-from shoal.mechanics.modes import modes
+from shoal.mechanics.analysis.modes import modes
 from shoal.scene import Scene, load_scene
 
 GROUND = {"body": "ground", "point": [0.0, 0.0]}

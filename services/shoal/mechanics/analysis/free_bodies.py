@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse
 
 from shoal.mechanics.affine import Affine
+from shoal.mechanics.analysis.evaluate import Evaluator, Points, points
 from shoal.mechanics.build import build
-from shoal.mechanics.evaluate import Evaluator, Points, points
 from shoal.mechanics.forces import LAW
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame
 from shoal.mechanics.placement import Placement, place

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 
-from shoal.mechanics.evaluate import Evaluation, Evaluator
-from shoal.mechanics.freedom import Freedom, Metric
+from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
+from shoal.mechanics.analysis.freedom import Freedom, Metric
 from shoal.mechanics.tile import Array
 
 CLOSE = 1e-11

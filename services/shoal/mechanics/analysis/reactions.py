@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.evaluate import Evaluator
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.free_bodies import FreeBodies, vectors
+from shoal.mechanics.analysis.freedom import Metric
+from shoal.mechanics.analysis.motion_state import states
 from shoal.mechanics.frames import BeamFrame, PointFrame
-from shoal.mechanics.free_bodies import FreeBodies, vectors
-from shoal.mechanics.freedom import Metric
-from shoal.mechanics.motion_state import states
 from shoal.mechanics.pose import unit
 from shoal.mechanics.tile import Array
 from shoal.scene import Attachment, Coupling, Distance, Revolute, Scene, Slider, Weld
