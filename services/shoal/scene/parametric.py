@@ -42,7 +42,7 @@ def n_four_bar(loops: int) -> dict[str, Any]:
             joints[f"C{k}"] = _revolute(f"crank{k}", "end", f"coupler{k}", "end")
     return {
         "name": f"n-four-bar-{loops}",
-        "description": f"Four-bar linkage of {loops} loops, upright, 1 m/s: singular twice a turn (n-four-bar-N, any N).",
+        "description": f"Four-bar linkage of {loops} loops, upright, 1 m/s: singular twice a turn (any N).",
         "bodies": bodies,
         "joints": joints,
         "markers": {"B0": {"body": "crank0", "point": "end"}},
