@@ -173,6 +173,8 @@ def _motion_gate(tile, pm, pw, t, z, zdot, tolerance, a, part):  # type: ignore[
             gauss.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
             if m.driven:
                 constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)
+        elif m.alike:
+            sparse.solve_alike(tile, m.pattern, m.alike_factor, a, 0)
         else:
             sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
 

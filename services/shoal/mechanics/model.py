@@ -61,7 +61,10 @@ class Gates(NamedTuple):
 
 
 class Arrays(NamedTuple):
-    """All a kernel needs of one tile of lanes. method, baumgarte: how accelerations are found."""
+    """All a kernel needs of one tile of lanes. method, baumgarte: how accelerations are found.
+
+    alike: whether all lanes have one mass matrix, whose factor is then alike_factor, (slots,).
+    """
 
     home: Array
     gates: Gates
@@ -79,6 +82,8 @@ class Arrays(NamedTuple):
     mass: Array
     mass_factor: Array
     mass_root: Array
+    alike: bool
+    alike_factor: Array
     weight: Array
     elements: Elements
     forces: Forces
@@ -108,6 +113,8 @@ def raw(m: Arrays) -> Arrays:
         pointer(m.mass),
         pointer(m.mass_factor),
         pointer(m.mass_root),
+        m.alike,
+        pointer(m.alike_factor),
         pointer(m.weight),
         Elements(
             ancf_cable.raw(e.cables_full),
@@ -263,6 +270,8 @@ class Model:
             mass,
             factor,
             np.sqrt(inverse),
+            self.mass_values.shape[1] == 1,
+            np.ascontiguousarray(factor[:: len(tile)]),
             packed(self.weight),
             Elements(
                 e.cables_full._replace(coefficients=packed(e.cables_full.coefficients)),

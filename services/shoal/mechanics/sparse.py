@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics.tile import Array, Index, Tile
-from shoal.mechanics.vector import add_product, copy, pointer, scale, subtract_dot
+from shoal.mechanics.vector import add_product, copy, pointer, scale, scale_alike, subtract_dot, subtract_dot_alike
 
 
 class Pattern(NamedTuple):
@@ -76,7 +76,9 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
     slots, others = [p for _, _, p in by_row], [k for _, k, _ in by_row]
     by_column = np.arange(size, size + len(row))
     parts = (column, row, update, target, left, right, across, slots, others, by_column)
-    arrays = (np.array(part, dtype=np.int64) for part in parts)
+    # Short integers: long chains are limited by memory traffic.
+    narrow = (row, slots, others, by_column)
+    arrays = (np.array(part, dtype=np.int32 if any(part is one for one in narrow) else np.int64) for part in parts)
     return Pattern(size, *arrays), slot
 
 
@@ -128,6 +130,19 @@ def solve(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) ->
         scale(tile, x, first + k, factors, k)
         begin, end = pattern.column[k], pattern.column[k + 1]
         subtract_dot(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def solve_alike(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) -> None:
+    """As `solve` with one factor (slots,) for all lanes, which spares most of the memory traffic. Pointers."""
+    size = pattern.size
+    for i in range(size):
+        begin, end = pattern.across[i], pattern.across[i + 1]
+        subtract_dot_alike(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
+    for k in range(size - 1, -1, -1):
+        scale_alike(tile, x, first + k, factors, k)
+        begin, end = pattern.column[k], pattern.column[k + 1]
+        subtract_dot_alike(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
