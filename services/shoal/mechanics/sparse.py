@@ -75,11 +75,17 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
     across = np.searchsorted([i for i, _, _ in by_row], np.arange(size + 1))
     slots, others = [p for _, _, p in by_row], [k for _, k, _ in by_row]
     by_column = np.arange(size, size + len(row))
-    parts = (column, row, update, target, left, right, across, slots, others, by_column)
-    # Short integers: long chains are limited by memory traffic.
-    narrow = (row, slots, others, by_column)
-    arrays = (np.array(part, dtype=np.int32 if any(part is one for one in narrow) else np.int64) for part in parts)
-    return Pattern(size, *arrays), slot
+
+    def wide(values: list[int]) -> Index:
+        return np.array(values, dtype=np.int64)
+
+    def short(values: Iterable[int]) -> Index:
+        """Long chains are limited by memory traffic."""
+        return np.array(list(values), dtype=np.int32)  # type: ignore[return-value]
+
+    eliminations = (wide(update), wide(target), wide(left), wide(right))
+    by_rows = (np.asarray(across, dtype=np.int64), short(slots), short(others), short(by_column))
+    return Pattern(size, wide(column), short(row), *eliminations, *by_rows), slot
 
 
 @njit(cache=True, error_model="numpy")
