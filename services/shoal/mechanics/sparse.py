@@ -81,7 +81,7 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
 
     def short(values: Iterable[int]) -> Index:
         """Long chains are limited by memory traffic."""
-        return np.array(list(values), dtype=np.int32)  # type: ignore[return-value]
+        return np.array(list(values), dtype=np.int32)
 
     eliminations = (wide(update), wide(target), wide(left), wide(right))
     by_rows = (np.asarray(across, dtype=np.int64), short(slots), short(others), short(by_column))
