@@ -17,6 +17,7 @@ from shoal.mechanics.build import build
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import choose
 from shoal.mechanics.march import march
+from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import Tile, pack, tiles
 from shoal.scene import Scene, load_scene
 
@@ -93,4 +94,5 @@ def prepare(what: Scene, lanes: int) -> Any:
 def _room(model: Any, tile: Tile, part: slice) -> tuple[Any, ...]:
     arrays = model.tile(tile, part)
     scheme = choose(model.scene.solver, model, tile, part)
-    return arrays, work_space(tile, arrays), scheme, pack(model.q0, part, tile), pack(model.v0, part, tile)
+    room = work_space(tile, arrays)
+    return ready(tile, arrays, room), room, scheme, pack(model.q0, part, tile), pack(model.v0, part, tile)
