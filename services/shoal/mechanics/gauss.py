@@ -156,7 +156,8 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
         return
     width = len(tile)
     s = _lane_work(m, w)
-    _rows(tile, m, w, q)
+    constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
+    _rows(tile, m, w)
     sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, a, 0)
     constraints.bias(tile, m.constraints, m.functions, t, v, w.gap)
     if m.method == BAUMGARTE:
@@ -186,11 +187,10 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
 
 
 @njit(cache=True, error_model="numpy")
-def _rows(tile: Tile, m: Arrays, w: GaussWork, q: Array) -> None:
-    """The rows D^-1/2 L^-1 C_q' at q, into w.response."""
+def _rows(tile: Tile, m: Arrays, w: GaussWork) -> None:
+    """The rows D^-1/2 L^-1 C_q' of the Jacobian in w.jacobian, into w.response."""
     n = m.unknowns
     c = m.constraints
-    constraints.jacobian(tile, c, q, 1.0, w.jacobian)
     for row in range(c.size * n):
         clear(tile, w.response, row)
     for k in range(c.size):
@@ -251,7 +251,7 @@ def _solve_many(tile: Tile, m: Arrays, w: GaussWork, load: Array, gap: Array, ou
     for k in range(m.constraints.size):
         clear(tile, room.x, s.place[n + k])
         subtract(tile, room.x, s.place[n + k], gap, k)
-    saddle.solve(tile, s, room)
+    sparse.solve(tile, s.pattern, room.values, room.x, 0)
     for i in range(n):
         copy(tile, out, i, room.x, s.place[i])
     for k in range(m.constraints.size):
@@ -359,7 +359,8 @@ def project(
             largest = max(largest, abs(w.gap[k]))
         if largest < 1e-15:
             break
-        _correct(tile, m, w, q, q, tolerance)
+        constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
+        _correct(tile, m, w, q, tolerance)
     project_rates(tile, m, w, t, q, v, tolerance)
 
 
@@ -370,16 +371,15 @@ def project_rates(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Ar
     constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
     constraints.rates(tile, m.constraints, m.functions, t, w.gap)
     constraints.add_product(tile, m.constraints, w.jacobian, v, w.gap)
-    _correct(tile, m, w, q, v, tolerance)
+    _correct(tile, m, w, v, tolerance)
 
 
 @njit(cache=True, error_model="numpy")
-def _correct(tile: Tile, m: Arrays, w: GaussWork, q: Array, x: Array, tolerance: float) -> None:
-    """Change x by the smallest d in the mass metric with C_q d = -gap."""
+def _correct(tile: Tile, m: Arrays, w: GaussWork, x: Array, tolerance: float) -> None:
+    """Change x by the smallest d in the mass metric with C_q d = -gap; C_q is in w.jacobian."""
     width = len(tile)
     if m.saddle.size > 0:
         c = m.constraints
-        constraints.jacobian(tile, c, q, 1.0, w.jacobian)
         saddle.factor(tile, m.saddle, c.entry[c.size], w.jacobian, w.saddle, saddle.SETTLED)
         for row in range(m.unknowns):
             clear(tile, w.extra, row)
@@ -388,7 +388,7 @@ def _correct(tile: Tile, m: Arrays, w: GaussWork, q: Array, x: Array, tolerance:
             x[i] += w.extra[i]
         return
     s = _lane_work(m, w)
-    _rows(tile, m, w, q)
+    _rows(tile, m, w)
     for lane in range(width):
         for i in range(m.unknowns):
             w.extra[i * width + lane] = 0.0

@@ -19,7 +19,7 @@ from numba import njit
 from shoal.mechanics import sparse
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.tile import Array, Index, Tile
-from shoal.mechanics.vector import copy, pointer, scale, subtract_dot
+from shoal.mechanics.vector import copy, pointer, scale
 
 SMALL = 16
 """Up to so many constraints the orthogonal projection is used, which is more accurate and about as fast."""
@@ -132,7 +132,10 @@ def raw(s: Saddle) -> Saddle:
 
 @njit(cache=True, error_model="numpy")
 def factor(tile: Tile, s: Saddle, entries: int, jacobian: Array, w: SaddleWork, tolerance: float) -> int:
-    """Factor the problem for a Jacobian (entries, lanes); returns how many rows were left out in some lane."""
+    """Factor the problem for a Jacobian (entries, lanes); returns how many rows were left out in some lane.
+
+    The factors are solved with by `sparse.solve`, the right-hand side ordered by place.
+    """
     width = len(tile)
     size = s.size
     p = s.pattern
@@ -167,17 +170,6 @@ def factor(tile: Tile, s: Saddle, entries: int, jacobian: Array, w: SaddleWork, 
         for q in range(size + p.column[k], size + p.column[k + 1]):
             scale(tile, w.values, q, w.values, k)
     return dropped
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def solve(tile: Tile, s: Saddle, w: SaddleWork) -> None:
-    """Replace the right-hand side w.x, by place, by the solution."""
-    p = s.pattern
-    for i in range(s.size):
-        subtract_dot(tile, w.x, i, w.values, p.slot, p.other, p.across[i], p.across[i + 1], 0)
-    for k in range(s.size - 1, -1, -1):
-        scale(tile, w.x, k, w.values, k)
-        subtract_dot(tile, w.x, k, w.values, p.by_column, p.row, p.column[k], p.column[k + 1], 0)
 
 
 def room(size: int, slots: int, width: int) -> SaddleWork:
