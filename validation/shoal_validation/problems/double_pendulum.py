@@ -1,0 +1,36 @@
+"""The rigid double pendulum of two uniform rods, by its textbook equations."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from shoal.scene import Rod, load_scene
+from shoal.trajectory import Array
+
+from shoal_validation.problems.contract import Reference
+from shoal_validation.problems.one_angle import TOLERANCE, G
+
+
+def settle(times: Array) -> Reference:
+    """Tip of the scene `rigid-double-pendulum` from Lagrange's equations in two absolute angles."""
+    scene = load_scene("rigid-double-pendulum")
+    rods = [body for body in scene.bodies.values() if isinstance(body, Rod)]
+    (m1, l1), (m2, l2) = ((rod.mass, rod.length) for rod in rods)
+    start = [scene.initial[name].angle for name in scene.bodies]
+
+    def rate(_: float, y: Array) -> Array:
+        a, b, u, w = y
+        c, s = np.cos(a - b), np.sin(a - b)
+        mass = np.array([[(m1 / 3 + m2) * l1**2, m2 * l1 * l2 / 2 * c], [m2 * l1 * l2 / 2 * c, m2 * l2**2 / 3]])
+        load = np.array(
+            [
+                -m2 * l1 * l2 / 2 * s * w * w - (m1 / 2 + m2) * G * l1 * np.cos(a),
+                m2 * l1 * l2 / 2 * s * u * u - m2 * G * l2 / 2 * np.cos(b),
+            ]
+        )
+        return np.concatenate([[u, w], np.linalg.solve(mass, load)])
+
+    run = solve_ivp(rate, (0.0, times[-1]), [*start, 0.0, 0.0], "DOP853", t_eval=times, rtol=TOLERANCE, atol=TOLERANCE)
+    a, b = run.y[:2]
+    points = np.stack([l1 * np.cos(a) + l2 * np.cos(b), l1 * np.sin(a) + l2 * np.sin(b)], axis=1)
+    return Reference(points, "Lagrange's equations in two angles, scipy DOP853", 1e-9)
