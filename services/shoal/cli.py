@@ -115,24 +115,50 @@ def scenes(name: str | None) -> None:
 @option_engine
 @option_set
 @click.option("--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s].")
+@click.option(
+    "--tolerance",
+    type=float,
+    metavar="METRES",
+    help="Find the cheapest model whose error at the markers stays below; overrides elements, integrator and step.",
+)
+@click.option("--verify/--no-verify", default=True, show_default=True, help="Estimate the error by a second run.")
 @option_json
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .csv, .json or .png.")
 def simulate(
-    scene: str, engine: str, values: dict[str, str], times: list[float] | None, as_json: bool, out: Path | None
+    scene: str,
+    engine: str,
+    values: dict[str, str],
+    times: list[float] | None,
+    tolerance: float | None,
+    verify: bool,
+    as_json: bool,
+    out: Path | None,
 ) -> None:
-    """Simulate SCENE and report where its markers go."""
+    """Simulate SCENE and report where its markers go, and how far that can be trusted."""
     from shoal import terminal
     from shoal.engines import get_engine
+    from shoal.engines.verification import verified
     from shoal.scene import load_scene
 
     terminal.check_output(out, (".csv", ".json", ".png"))
-    chosen = get_engine(engine)
     wanted = load_scene(scene).with_values(values)
-    with terminal.working(f"simulating {wanted.name} with {engine}"):
-        trajectory = chosen.simulate(wanted, times)
+    selection = None
+    if tolerance is not None:
+        from shoal.selection import select
+
+        if engine != "gauss":
+            raise InputError(f"--tolerance: models are chosen for engine gauss only, found --engine {engine}")
+        with terminal.rungs_progress(wanted.name) as progress:
+            selection = select(wanted, tolerance, times, progress)
+        trajectory, wanted = selection.trajectory, selection.chosen.scene
+    else:
+        chosen = get_engine(engine)
+        with terminal.working(f"simulating {wanted.name} with {engine}"):
+            trajectory = verified(chosen, wanted, times) if verify else chosen.simulate(wanted, times)
     if out is not None:
         terminal.write_trajectory(trajectory, wanted, out)
-    terminal.show(trajectory.to_json(), as_json, lambda: terminal.trajectory_table(trajectory, wanted))
+    report = trajectory.to_json() | ({} if selection is None else {"selection": selection.to_json()})
+    terminal.show(report, as_json, lambda: terminal.trajectory_table(trajectory, wanted, selection))
     _finish(trajectory.ok, trajectory.message)
 
 

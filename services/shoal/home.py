@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import re
 import tempfile
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -12,6 +13,7 @@ from pathlib import Path
 from shoal.errors import InputError
 
 _KERNELS = Path(__file__).parent / "mechanics"
+_IMPORT = re.compile(r"^\s*from shoal\.(mechanics[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 
 
 def home() -> Path:
@@ -46,12 +48,28 @@ def prepare_kernel_cache() -> None:
 def _fingerprint() -> str:
     """Short hash over the kernel sources, the versions of the compiler and the processor."""
     digest = hashlib.sha256()
-    for source in sorted(_KERNELS.rglob("*.py")):
-        digest.update(source.relative_to(_KERNELS).as_posix().encode() + b"\0")
-        digest.update(source.read_bytes() + b"\0")
+    for name, text in sorted(_kernel_sources().items()):
+        digest.update(name.encode() + b"\0" + text.encode() + b"\0")
     for part in (_version("numba"), _version("numpy"), platform.python_version(), _processor()):
         digest.update(part.encode() + b"\0")
     return digest.hexdigest()[:16]
+
+
+def _kernel_sources() -> dict[str, str]:
+    """Text by module of every file below `mechanics` that holds a kernel, or that such a file imports."""
+    texts = {}
+    for source in _KERNELS.rglob("*.py"):
+        module = ".".join(("mechanics", *source.relative_to(_KERNELS).with_suffix("").parts))
+        texts[module.removesuffix(".__init__")] = source.read_text(encoding="utf-8")
+    found: dict[str, str] = {}
+    pending = [module for module, text in texts.items() if "njit" in text]
+    while pending:
+        module = pending.pop()
+        if module in texts and module not in found:
+            found[module] = texts[module]
+            for package, names in _IMPORT.findall(texts[module]):
+                pending += [package, *(f"{package}.{name}" for name in re.findall(r"\w+", names))]
+    return found
 
 
 def _version(package: str) -> str:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from shoal.mechanics.analysis.reactions import Reactions
     from shoal.mechanics.analysis.statics import Equilibrium
     from shoal.scene import Scene
+    from shoal.selection import Selection
     from shoal.trajectory import Trajectory
 
 out = Console(highlight=False)
@@ -62,6 +63,14 @@ def fitness_progress(what: str) -> Iterator[Callable[[int, float, float], None]]
         yield note
 
 
+@contextmanager
+def rungs_progress(what: str) -> Iterator[Callable[[str], None]]:
+    """A line that names the model just run."""
+    with _progress() as progress:
+        task = progress.add_task(f"{what}: looking for the cheapest model", total=None)
+        yield lambda model: progress.update(task, description=f"{what}: ran {model}")
+
+
 def _progress() -> Progress:
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     return Progress(*columns, console=err, transient=True, disable=not err.is_terminal)
@@ -87,8 +96,10 @@ def listing(title: str, items: Mapping[str, str]) -> None:
     out.print()
 
 
-def trajectory_table(trajectory: Trajectory, scene: Scene) -> None:
+def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection | None = None) -> None:
     """Where the markers end, and the evidence."""
+    if selection is not None:
+        selection_table(selection)
     table = _table(f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s", "marker", "x [m]", "y [m]")
     for name in trajectory.markers:
         x, y = trajectory.marker(name)[-1]
@@ -98,6 +109,35 @@ def trajectory_table(trajectory: Trajectory, scene: Scene) -> None:
         f"status {trajectory.status[0]}; energy off by {trajectory.energy_drift[0]:.1e}, constraints by "
         f"{trajectory.constraint_drift[0]:.1e}; {trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms"
     )
+    if (verification := trajectory.model.get("verification")) is not None:
+        errors = {"time": verification["time_error"], "mesh": verification["mesh_error"]}
+        known = ", ".join(f"{name} {error:.1e} m" for name, error in errors.items() if error is not None)
+        notes = (f"estimated error at the markers: {known}" if known else "", verification["note"])
+        out.print("; ".join(note for note in notes if note))
+
+
+def selection_table(selection: Selection) -> None:
+    """The ladder: what was tried, at what cost, how far off, and why it stopped."""
+    chosen = selection.chosen
+    title = (
+        f"models for {selection.tolerance:g} m at the markers: {len(selection.rungs)} runs, {selection.wall_s:.2f} s"
+    )
+    table = _table(title, "model", "unknowns", "steps", "ms", "error [m]", "")
+    for rung in selection.rungs:
+        facts = rung.trajectory.model
+        verdict = "chosen" if rung is chosen else "" if rung.ok else str(rung.trajectory.status[0])
+        error = f"{rung.error:.1e}" if np.isfinite(rung.error) else "-"
+        name = rung.name if rung.flexible else f"{rung.name}, tolerance {rung.tolerance:g}"
+        cost = f"{rung.trajectory.wall_s * 1e3:.1f}"
+        table.add_row(name, str(facts["unknowns"]), str(rung.trajectory.steps), cost, error, verdict)
+    out.print(table)
+    for rod, reason in selection.rigid.items():
+        out.print(f"{rod} stays rigid: {reason}")
+    verdict = "met" if selection.met else "not met"
+    out.print(f"{verdict}: {chosen.name}, estimated error {chosen.error:.1e} m; {selection.reason}")
+    if selection.shear > selection.tolerance:
+        out.print(f"beyond the beams' theory: shear and rotary inertia, about {selection.shear:.0e} m")
+    out.print()
 
 
 def equilibrium_table(equilibrium: Equilibrium) -> None:

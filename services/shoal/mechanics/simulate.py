@@ -17,11 +17,12 @@ from shoal.mechanics.build import build, with_start
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.groups import start_angle
 from shoal.mechanics.integrators import Choice, choose, facts, pick
+from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.march import Record, march
 from shoal.mechanics.model import Model
 from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import Array, pack, tiles, unpack
-from shoal.scene import GROUND, Attachment, Revolute, Scene, Weld
+from shoal.scene import GROUND, Attachment, Revolute, Scene, Solver, Weld
 from shoal.scene.joints import places
 from shoal.trajectory import Status, Trajectory
 
@@ -105,21 +106,55 @@ def _pool(workers: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(workers, thread_name_prefix="shoal-tiles")
 
 
+def stable_step(scene: Scene, integrator: str) -> float:
+    """Largest stable step [s] of an integrator at the start of a scene; infinite if nothing limits it.
+
+    Raises InputError if the scene cannot be modelled.
+    """
+    return _limit(*_key(scene, scene.solver.duration), facts(integrator))
+
+
+_PACE = (
+    "step",
+    "integrator",
+    "samples",
+    "relative_tolerance",
+    "absolute_tolerance",
+    "max_step",
+    "max_steps",
+    "spectral_radius",
+    "newton_tolerance",
+    "energy_tolerance",
+)
+"""Settings of the solver that leave the model as it is."""
+
+
+def _key(scene: Scene, end: float) -> tuple[str, float]:
+    """What a model is built from: the scene, and up to where its functions of time are wanted [s]."""
+    usual = {name: Solver.model_fields[name].default for name in _PACE}
+    neutral = scene.model_copy(update={"solver": scene.solver.model_copy(update=usual)})
+    return neutral.model_dump_json(), max(end, scene.solver.duration) + max(0.0, scene.solver.step - usual["step"])
+
+
 @lru_cache(maxsize=64)
-def _prepared(scene_json: str, horizon: float) -> tuple[Model, Choice]:
-    """Model and integrator of a scene; repeated runs, and lanes that only start differently, share them."""
-    scene = Scene.model_validate_json(scene_json)
-    model = build(scene, horizon=horizon)
-    return model, pick(scene.solver, model, stability.step_limit)
+def _model(scene_json: str, horizon: float) -> Model:
+    """Repeated runs, runs by other integrators, and lanes that only start differently share the model."""
+    return build(Scene.model_validate_json(scene_json), horizon=horizon)
+
+
+@lru_cache(maxsize=512)
+def _limit(scene_json: str, horizon: float, integrator: Facts) -> float:
+    return stability.step_limit(_model(scene_json, horizon), integrator)
 
 
 def _model_and_choice(scene: Scene, values: Mapping[str, Array], lanes: int, end: float) -> tuple[Model, Choice]:
     """The model of all lanes, and the integrator, whose stability limit is the smallest at the scene's own start."""
-    horizon = max(end, scene.solver.duration)
     if all(path.startswith("initial.") for path in values):
-        model, choice = _prepared(scene.model_dump_json(), horizon)
+        key = _key(scene, end)
+        model = _model(*key)
+        choice = pick(scene.solver, model, lambda _, integrator: _limit(*key, integrator))
         return (with_start(model, scene.with_lanes(values), lanes) if values else model), choice
-    model = build(scene.with_lanes(values), lanes, horizon)
+    model = build(scene.with_lanes(values), lanes, max(end, scene.solver.duration))
     return model, pick(scene.solver, model, stability.step_limit)
 
 

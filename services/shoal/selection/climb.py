@@ -1,0 +1,113 @@
+"""Up the ladder: refine every rod that needs it until two neighbours agree, which makes the finer one a yardstick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.scene import Scene
+from shoal.selection.levels import REFINEMENTS, RIGID, Level, Levels, quintic
+from shoal.selection.run import MARGIN, Rung, distance, flexible_scene, run
+from shoal.selection.work import Forecast
+from shoal.trajectory import Array
+
+WORK_LIMIT = 1e8
+"""Work of one run beyond which the climb gives up, in steps of one cable element: about five seconds."""
+REJECTED = 3
+"""So many refinements in a row whose run is rejected end the climb."""
+AGREE = 0.5
+"""Two neighbours agree when they are closer than this fraction of the tolerance."""
+HALF = 0.5 * MARGIN
+"""A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
+UNKNOWN_FALL = 4.0
+"""By which factor an error is taken to fall from one refinement to the next before two falls were seen."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass
+class Yardstick:
+    """The finest model that was run and the coarser one that agrees with it.
+
+    rung, error: the finest and its own estimated error [m]; base: levels of the coarser; gap: their distance [m]
+    """
+
+    rung: Rung
+    error: float
+    base: dict[str, Level]
+    gap: float
+
+
+class Runs:
+    """Runs of one scene on different levels, each made once. rungs: all of them, in the order they were made."""
+
+    def __init__(self, scene: Scene, times: Array, forecast: Forecast, progress: Progress) -> None:
+        self.scene, self.times, self.forecast, self.progress = scene, times, forecast, progress
+        self.rungs: list[Rung] = []
+        self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
+
+    def __call__(self, levels: Levels, fraction: float = MARGIN, role: str = "") -> Rung:
+        """The run on these levels with a fraction of the stable step."""
+        key = tuple(levels.items()), fraction
+        if key not in self._done:
+            scene = flexible_scene(self.scene, levels, fraction)
+            rung = Rung(dict(levels), scene, run(scene, self.times), self.forecast.work(levels), role=role)
+            self.add(rung)
+            self._done[key] = rung
+        return self._done[key]
+
+    def add(self, rung: Rung) -> None:
+        """Note a run."""
+        self.rungs.append(rung)
+        self.progress(rung.name)
+
+
+def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) -> Yardstick | str:
+    """Refine the rods until two neighbours agree; else say why that was not to be had."""
+    count = dict.fromkeys(rods, REFINEMENTS[0])
+    growing, gap, last_gap, rejected = rods, np.inf, np.nan, 0
+    fine = runs(_levels(count, fixed), HALF, "yardstick")
+    while True:
+        coarse, base = fine, dict(count)
+        if any(count[rod] == REFINEMENTS[-1] for rod in growing):
+            return f"{REFINEMENTS[-1]} elements for {', '.join(growing)} do not settle it"
+        count |= {rod: REFINEMENTS[REFINEMENTS.index(count[rod]) + 1] for rod in growing}
+        levels = _levels(count, fixed)
+        if (work := 2 * runs.forecast.work(levels)) > WORK_LIMIT:
+            return f"the next refinement ({_words(levels)}) takes {work:.1g} element steps, more than {WORK_LIMIT:.0e}"
+        fine = runs(levels, HALF, "yardstick")
+        rejected = 0 if fine.ok else rejected + 1
+        if rejected == REJECTED:
+            return f"the runs are rejected: {fine.trajectory.message}"
+        last_gap, gap = gap, distance(coarse.trajectory, fine.trajectory)
+        coarse.error = gap
+        if gap <= AGREE * tolerance:
+            fall = np.clip(last_gap / gap, 3.0, 16.0) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
+            fine.error = gap / (fall - 1.0)
+            return Yardstick(fine, float(fine.error), _levels(base, fixed), gap)
+        count, growing = _next(runs, fine, count, base, growing, tolerance)
+
+
+def _next(
+    runs: Runs, fine: Rung, count: dict[str, int], base: dict[str, int], growing: tuple[str, ...], tolerance: float
+) -> tuple[dict[str, int], tuple[str, ...]]:
+    """Element counts to go on with, and the rods that the gap comes from: each set back alone shows its part."""
+    if len(growing) == 1 or not fine.ok:
+        return count, growing
+    parts = {}
+    for rod in growing:
+        levels = fine.levels | {rod: quintic(base[rod])}
+        parts[rod] = distance(runs(levels, MARGIN, f"part of {rod}").trajectory, fine.trajectory)
+    guilty = tuple(rod for rod, part in parts.items() if part > AGREE * tolerance / (4 * len(growing)))
+    settled = {rod: base[rod] for rod, part in parts.items() if part < tolerance / 50}
+    return count | settled, guilty or growing
+
+
+def _levels(count: dict[str, int], fixed: Levels) -> dict[str, Level]:
+    return {**fixed, **{rod: quintic(n) for rod, n in count.items()}}
+
+
+def _words(levels: Levels) -> str:
+    return ", ".join(f"{rod} {level}" for rod, level in levels.items() if level != RIGID)

@@ -1,0 +1,88 @@
+"""How richly one rod may be modelled: a ladder from rigid to ever more elements.
+
+The accuracy of n quintic elements needs about 2 n cubic cables of reduced quadrature, whose work is about the same for
+small n and more beyond. So cables are the coarse end of the ladder and quintic elements the fine one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from shoal.scene import Rod, Scene
+
+
+@dataclass(frozen=True)
+class Level:
+    """One rung for one rod: its element and how many of them."""
+
+    element: str
+    elements: int = 1
+
+    def __str__(self) -> str:
+        return "rigid" if self.element == "rigid" else f"{self.elements} {self.element.removeprefix('ancf-')}"
+
+    def fields(self, rod: str) -> dict[str, Any]:
+        """The fields of the scene that say so."""
+        values: dict[str, Any] = {f"bodies.{rod}.element": self.element}
+        if self.element != "rigid":
+            values[f"bodies.{rod}.elements"] = self.elements
+        if self.element == "ancf-cable":
+            values[f"bodies.{rod}.quadrature"] = "reduced"
+        return values
+
+
+RIGID = Level("rigid")
+
+
+def cable(n: int) -> Level:
+    """n cubic cables."""
+    return Level("ancf-cable", n)
+
+
+def quintic(n: int) -> Level:
+    """n quintic elements."""
+    return Level("ancf-quintic", n)
+
+
+LADDER = (
+    RIGID,
+    *(cable(1), cable(2), quintic(1), cable(3), cable(4)),
+    *(quintic(n) for n in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)),
+)
+"""From coarse to fine."""
+
+REFINEMENTS = (1, 2, 4, 8, 16, 32, 64)
+"""Quintic elements of the models by which errors are estimated."""
+
+Levels = Mapping[str, Level]
+"""Of every rod whose model is open; the other bodies stay as the scene states them."""
+
+
+def below(level: Level) -> tuple[Level, ...]:
+    """Coarser levels, the finest first."""
+    return tuple(reversed(LADDER[: LADDER.index(level)]))
+
+
+def open_rods(scene: Scene) -> dict[str, str | None]:
+    """The rods of a scene, and why the model of one is not open: it has no modulus, or its element states a theory."""
+    reasons: dict[str, str | None] = {}
+    for name, body in scene.bodies.items():
+        if not isinstance(body, Rod):
+            continue
+        if body.youngs_modulus is None:
+            reasons[name] = "no youngs_modulus"
+        elif body.element == "ancf-full":
+            reasons[name] = "ancf-full states a theory with shear"
+        else:
+            reasons[name] = None
+    return reasons
+
+
+def apply(scene: Scene, levels: Levels) -> Scene:
+    """The scene with its rods modelled so. Raises InputError where a joint does not suit a flexible rod."""
+    values: dict[str, Any] = {}
+    for rod, level in levels.items():
+        values |= level.fields(rod)
+    return scene.with_values(values)

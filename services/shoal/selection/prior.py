@@ -1,0 +1,145 @@
+"""What rigid rods leave out, estimated before anything flexible is run: quasi-static deflection, amplified.
+
+The machine moves with rigid rods. Along the way each rod bears its weight less its inertia and the loads on it, and
+would bend and stretch by the deflection of a beam under them. Released at once, an elastic rod swings to twice its
+deflection; the motion carries that on with the factor by which it carries on small changes of the initial angles.
+This is an order of magnitude. It prunes only where it is far from the tolerance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.engines.gauss import GaussEngine
+from shoal.errors import InputError
+from shoal.scene import (
+    Attachment,
+    DistributedForce,
+    Force,
+    Function,
+    Rod,
+    Scene,
+    Spring,
+    Torque,
+    TorsionSpring,
+    Weld,
+)
+from shoal.scene.joints import places
+from shoal.scene.loads import sides
+from shoal.selection.levels import RIGID, apply
+from shoal.trajectory import Array, Trajectory
+
+SAMPLES = 400
+OVERSHOOT = 2.0
+NUDGE = 1e-4
+"""Change of an initial angle [rad] by which the growth of small changes is measured."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of a rod a priori.
+
+    deflection: quasi-static, largest along the motion [m], nan if the loads cannot be told beforehand
+    growth: by which factor the motion carries small changes on
+    error: what modelling the rod as rigid costs at the markers, by order of magnitude [m]
+    frequency: lowest bending frequency of the rod, pinned at both ends [rad/s]
+    """
+
+    deflection: float
+    growth: float
+    error: float
+    frequency: float
+
+
+def estimate(scene: Scene, rods: tuple[str, ...]) -> dict[str, Prior]:
+    """The estimate for every rod whose model is open; nan where the rigid motion cannot be had."""
+    probed = _probed(apply(scene, dict.fromkeys(rods, RIGID)), rods)
+    times = np.linspace(0.0, scene.solver.duration, SAMPLES + 1)
+    motion = _run(probed, times)
+    growth = _growth(probed, times, motion) if motion is not None else np.nan
+    found = {}
+    for name in rods:
+        rod = scene.bodies[name]
+        assert isinstance(rod, Rod)
+        deflection = np.nan if motion is None else _deflection(scene, name, rod, motion)
+        assert rod.youngs_modulus is not None
+        speed = np.sqrt(rod.youngs_modulus / rod.density) * rod.height / np.sqrt(12.0)
+        error = OVERSHOOT * deflection * (1.0 + growth)
+        found[name] = Prior(deflection, growth, error, float(np.pi**2 * speed / rod.length**2))
+    return found
+
+
+def _probed(scene: Scene, rods: tuple[str, ...]) -> Scene:
+    """The scene with markers at both ends of its rods beside its own."""
+    markers = {name: place.model_dump(mode="json") for name, place in scene.markers.items()}
+    for name in rods:
+        for end in ("start", "end"):
+            markers[f"at-{name}-{end}"] = Attachment(body=name, point=end).model_dump(mode="json")
+    settings = {"solver.relative_tolerance": 1e-8, "solver.absolute_tolerance": 1e-10, "solver.integrator": "auto"}
+    return scene.with_values({"markers": markers, **settings})
+
+
+def _run(scene: Scene, times: Array) -> Trajectory | None:
+    try:
+        motion = GaussEngine().simulate(scene, times[1:])
+    except InputError:
+        return None
+    return motion if motion.ok else None
+
+
+def _growth(scene: Scene, times: Array, motion: Trajectory) -> float:
+    """Largest displacement of the scene's own markers per displacement at the start."""
+    largest = 0.0
+    for name, body in scene.bodies.items():
+        start = scene.start(name)
+        near = _run(scene.with_values({f"initial.{name}.angle": start.angle + NUDGE}), times)
+        if near is None:
+            continue
+        length = body.length if isinstance(body, Rod) else 1.0
+        away = np.linalg.norm(near.points - motion.points, axis=2)
+        largest = max(largest, float(np.max(away)) / (NUDGE * length))
+    return largest
+
+
+def _deflection(scene: Scene, name: str, rod: Rod, motion: Trajectory) -> float:
+    """Beam formulas under the largest load: half a sine between pins, or a cantilever where a weld holds the rod."""
+    force, moment = _applied(scene, name, rod)
+    interval = float(motion.times[1] - motion.times[0])
+    ends = [motion.marker(f"at-{name}-{end}") for end in ("start", "end")]
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0], axis=1)[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)[1:-1]
+    pulls = [np.array(scene.gravity) - np.diff(path, 2, axis=0) / interval**2 for path in ends]
+    transverse = max(float(np.max(np.abs(np.sum(pull * across, axis=1)))) for pull in pulls)
+    largest = max(float(np.max(np.linalg.norm(pull, axis=1))) for pull in pulls)
+    masses = {other: float(body.mass) for other, body in scene.bodies.items()}
+    line, length = rod.mass / rod.length * transverse, rod.length
+    if any(
+        isinstance(joint, Weld) and name in {side.body for side in places(joint)} for joint in scene.joints.values()
+    ):
+        tip = force + (sum(masses.values()) - rod.mass) * largest
+        sag = line * length**4 / 8 + tip * length**3 / 3 + moment * length**2 / 2
+    else:
+        sag = line * length**4 / np.pi**4 + force * length**3 / 48 + moment * length**2 / 16
+    tension = sum(masses.values()) * largest + force
+    return float(sag / rod.bending_stiffness + tension * length / rod.axial_stiffness)
+
+
+def _applied(scene: Scene, name: str, rod: Rod) -> tuple[float, float]:
+    """Sum of the forces [N] and torques [N m] on a rod; nan where they depend on time or on the motion."""
+    force, moment = 0.0, 0.0
+    for load in scene.loads.values():
+        if isinstance(load, DistributedForce) and load.body == name:
+            force += float(np.hypot(*load.force)) * rod.length * _constant(load.scale)
+        elif isinstance(load, Force) and load.at.body == name:
+            force += float(np.hypot(*load.force)) * _constant(load.scale)
+        elif isinstance(load, Torque) and name in {side.body for side in sides(load).values()}:
+            moment += _constant(load.torque)
+        elif isinstance(load, Spring | TorsionSpring) and name in {side.body for side in sides(load).values()}:
+            force = np.nan
+    return force, moment
+
+
+def _constant(function: Function) -> float:
+    return np.nan if function.number is None else abs(function.number)

@@ -1,0 +1,82 @@
+"""One rung: a model of the scene, run once, with the time step or tolerance that goes with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shoal.engines.gauss import GaussEngine
+from shoal.errors import InputError
+from shoal.mechanics.simulate import stable_step
+from shoal.scene import Scene
+from shoal.selection.levels import RIGID, Level, Levels, apply
+from shoal.selection.work import INTEGRATOR
+from shoal.trajectory import Array, Trajectory
+
+MARGIN = 0.95
+"""Of the stable step, which is that of the start and varies by a few percent along the motion."""
+
+
+@dataclass
+class Rung:
+    """A model that was run. error: estimated distance from the truth at the markers [m], nan if unknown."""
+
+    levels: dict[str, Level]
+    scene: Scene
+    trajectory: Trajectory
+    work: float
+    error: float = np.nan
+    role: str = ""
+    tolerance: float = field(default=np.nan)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run may be believed."""
+        return self.trajectory.ok
+
+    @property
+    def name(self) -> str:
+        """Levels in words."""
+        return ", ".join(f"{rod} {level}" for rod, level in self.levels.items()) or "as stated"
+
+    @property
+    def flexible(self) -> bool:
+        """Whether any rod is."""
+        return any(level.element != "rigid" for level in self.levels.values())
+
+
+def flexible_scene(scene: Scene, levels: Levels, fraction: float) -> Scene:
+    """The scene on these levels, by leapfrog with a fraction of its longest stable step. Raises InputError."""
+    duration, modelled = scene.solver.duration, apply(scene, levels)
+    steps = max(int(np.ceil(duration / (fraction * stable_step(modelled, INTEGRATOR)))), scene.solver.samples)
+    return modelled.with_values({"solver.integrator": INTEGRATOR, "solver.step": duration / steps})
+
+
+def rigid_scene(scene: Scene, levels: Levels, tolerance: float) -> Scene:
+    """The scene on rigid levels, by an adaptive integrator that keeps the error of each step below a tolerance."""
+    values = {"solver.relative_tolerance": tolerance, "solver.absolute_tolerance": 0.1 * tolerance}
+    return apply(scene, levels).with_values({"solver.integrator": "auto", **values})
+
+
+def run(scene: Scene, times: Array) -> Trajectory:
+    """The motion. Raises InputError."""
+    return GaussEngine().simulate(scene, times)
+
+
+def distance(one: Trajectory, other: Trajectory) -> float:
+    """Largest distance of a marker between two runs over all times [m]; infinite unless both may be believed."""
+    if not (one.ok and other.ok):
+        return np.inf
+    away = np.linalg.norm(one.points - other.points, axis=2)
+    return float(np.max(away))
+
+
+def can_be_flexible(scene: Scene, rod: str, others: tuple[str, ...]) -> str | None:
+    """None, or why this rod has to stay rigid."""
+    levels = dict.fromkeys(others, RIGID) | {rod: Level("ancf-quintic", 1)}
+    try:
+        stable_step(apply(scene, levels), INTEGRATOR)
+    except InputError as error:
+        return str(error)
+    return None

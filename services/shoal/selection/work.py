@@ -1,0 +1,61 @@
+"""What a model costs before it is run: its stable step, and its work in steps of one cable element.
+
+The highest frequency of a machine is about the highest of its rods, each taken with the others rigid. It is computed
+on two elements and carried over to n: an axial mode goes as c / l, a bending mode as c r / l^2 (c^2 = E / rho, r the
+radius of gyration of the section, l the element's length).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shoal.mechanics.simulate import stable_step
+from shoal.scene import Rod, Scene
+from shoal.selection.levels import RIGID, Level, Levels, apply
+
+INTEGRATOR = "leapfrog"
+"""One force evaluation a step, and the longest stable step per evaluation of all explicit integrators."""
+WEIGHT = {"rigid": 0.0, "ancf-cable": 1.0, "ancf-quintic": 2.5}
+"""Work of one element in one step, in terms of a cable's; measured on meshes of 16 elements."""
+STEP_WORK = 3.0
+"""Work of a step beside its elements."""
+_BENDING = {"ancf-cable": 4.7, "ancf-quintic": 16.8}
+"""A bending mode is the fastest one of an element whose length is below so many radii of gyration."""
+
+
+class Forecast:
+    """Work of the models of one scene. open: its rods whose model is open."""
+
+    def __init__(self, scene: Scene, rods: tuple[str, ...]) -> None:
+        self.scene, self.rods = scene, rods
+        self._steps: dict[tuple[str, str], float] = {}
+
+    def step(self, levels: Levels) -> float:
+        """The stable step [s] as foreseen; infinite if nothing is elastic."""
+        return float(min((self._rod_step(name, level) for name, level in levels.items()), default=np.inf))
+
+    def work(self, levels: Levels) -> float:
+        """Work of a run with leapfrog at its longest step, in steps of one cable element; 0 for rigid rods."""
+        elements = sum(WEIGHT[level.element] * level.elements for level in levels.values())
+        return float(self.scene.solver.duration / self.step(levels) * (elements + STEP_WORK)) if elements else 0.0
+
+    def _rod_step(self, name: str, level: Level) -> float:
+        if level.element == "rigid":
+            return np.inf
+        key = (name, level.element)
+        if key not in self._steps:
+            alone = dict.fromkeys(self.rods, RIGID) | {name: Level(level.element, 2)}
+            self._steps[key] = stable_step(apply(self.scene, alone), INTEGRATOR)
+        rod = self.scene.bodies[name]
+        assert isinstance(rod, Rod)
+        gyration = max(rod.height, rod.end_height or 0.0) / np.sqrt(12.0)
+        turn = rod.length / (_BENDING[level.element] * gyration)
+
+        def growth(n: int) -> float:
+            return float(n * max(1.0, n / turn))
+
+        return float(self._steps[key] * growth(2) / growth(level.elements))
+
+    def own(self, name: str, level: Level) -> float:
+        """Work of one rod by itself, as if the others were rigid."""
+        return float(WEIGHT[level.element] * level.elements / self._rod_step(name, level))

@@ -1,0 +1,72 @@
+"""What energy and drift cannot see: long steps, chaos, coarse meshes, a wrong branch. A second run sees it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from shoal.engines import get_engine
+from shoal.engines.verification import verified
+from shoal.scene import load_scene
+from shoal.trajectory import Status
+from shoal_validation.problems import PROBLEMS, get_problem
+
+THIN = {"bodies.OA.elements": 1, "bodies.AB.elements": 2, "bodies.OA.height": 0.004, "bodies.AB.height": 0.004}
+PULLED = {
+    "initial.left.angle": 0.0,
+    "initial.left.rate": -4.0,
+    "initial.right.angle": 0.0,
+    "initial.right.rate": -4.0,
+    "loads": {"pull": {"kind": "force", "at": {"body": "left", "point": "end"}, "force": [20.0, 0.0]}},
+}
+WRONG: dict[str, tuple[str, dict[str, Any]]] = {
+    "energy-momentum, long step": (
+        "rigid-double-pendulum",
+        {"solver.integrator": "energy-momentum", "solver.step": 0.1},
+    ),
+    "leapfrog, long step": ("parallelogram", {"solver.integrator": "leapfrog", "solver.step": 0.02}),
+    "chaos, rk4": (
+        "rigid-double-pendulum",
+        {"solver.integrator": "rk4", "solver.step": 0.005, "solver.duration": 10.0},
+    ),
+    "chaos, auto": ("rigid-double-pendulum", {"solver.duration": 30.0}),
+    "locked thin rods": ("flexible-double-pendulum", THIN),
+    "wrong branch": ("parallelogram", {**PULLED, "solver.rank_tolerance": 1e-14, "solver.duration": 3.0}),
+}
+
+
+@pytest.mark.parametrize("name", list(WRONG))
+def test_wrong_runs_that_conserve_energy_are_not_believed(name: str) -> None:
+    scene_name, values = WRONG[name]
+    run = verified(get_engine("gauss"), load_scene(scene_name).with_values(values))
+    assert run.status[0] is not Status.OK, run.model["verification"]
+
+
+@pytest.mark.parametrize("name", [name for name in PROBLEMS if name != "squeezer"])
+def test_estimated_error_covers_the_true_one(name: str) -> None:
+    """References: closed forms, scipy, Exudyn (see the problem library)."""
+    problem = get_problem(name)
+    run = verified(get_engine("gauss"), problem.scene(), problem.times)
+    stated = run.model["verification"]
+    estimate = (stated["time_error"] or 0.0) + (stated["mesh_error"] or 0.0)
+    assert run.ok, run.message
+    assert problem.error(run) <= 2 * estimate + problem.reference.error
+
+
+def test_other_engines_are_held_against_the_native_one() -> None:
+    run = verified(get_engine("exudyn"), load_scene("flexible-double-pendulum"))
+    assert run.ok, run.message
+    assert 1e-6 < run.model["verification"]["time_error"] < 1e-3
+
+
+def test_no_second_run_that_takes_too_long() -> None:
+    scene = load_scene("flexible-double-pendulum").with_values({"solver.step": 1e-5})
+    run = get_engine("gauss").simulate(scene)
+    from dataclasses import replace
+
+    from shoal.engines.verification import verify
+
+    long = replace(run, model={**run.model, "evaluations": 10**9})
+    stated = verify(long, scene)
+    assert stated.time_error is None
+    assert "would take" in stated.note

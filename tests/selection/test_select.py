@@ -1,0 +1,143 @@
+"""The cheapest model whose error meets a tolerance: kept word, pruning, refusals."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from shoal.cli import main
+from shoal.engines.gauss import GaussEngine
+from shoal.errors import InputError
+from shoal.scene import Scene, load_scene
+from shoal.selection import select
+from shoal.selection.levels import LADDER, RIGID, below, cable, quintic
+from shoal.selection.prior import estimate
+from shoal.selection.run import distance
+from shoal.selection.work import INTEGRATOR, Forecast
+from shoal_validation.problems import get_problem
+
+HEADLINE = load_scene("flexible-double-pendulum")
+
+
+def _with_modulus(value: float) -> Scene:
+    return HEADLINE.with_values({f"bodies.{rod}.youngs_modulus": value for rod in ("OA", "AB")})
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_headline_keeps_its_word_against_exudyn(tolerance: float) -> None:
+    problem = get_problem("flexible-case-1")
+    selection = select(problem.scene(), tolerance, problem.times)
+    assert selection.met
+    assert selection.trajectory.ok
+    assert problem.error(selection.trajectory) <= tolerance
+    assert all(level != RIGID for level in selection.chosen.levels.values())
+
+
+def test_chosen_scene_reproduces_the_run() -> None:
+    selection = select(HEADLINE, 1e-2)
+    again = GaussEngine().simulate(selection.chosen.scene)
+    np.testing.assert_allclose(again.points, selection.trajectory.points, atol=1e-9)
+
+
+@pytest.mark.parametrize(("modulus", "rigid"), [(2e16, True), (2e14, True), (2e7, False)])
+def test_stiff_rods_come_out_rigid_and_soft_ones_do_not(modulus: float, rigid: bool) -> None:
+    selection = select(_with_modulus(modulus), 1e-2)
+    assert selection.met
+    assert all((level == RIGID) == rigid for level in selection.chosen.levels.values())
+
+
+def test_a_stiff_rod_and_a_soft_one_are_told_apart() -> None:
+    scene = HEADLINE.with_values({"bodies.OA.youngs_modulus": 1e14})
+    levels = select(scene, 3e-3).chosen.levels
+    assert levels["OA"] == RIGID
+    assert levels["AB"] != RIGID
+
+
+def test_very_stiff_rods_are_judged_without_a_flexible_run() -> None:
+    selection = select(_with_modulus(2e16), 1e-2)
+    assert set(selection.rigid) == {"OA", "AB"}
+    assert not any(rung.flexible for rung in selection.rungs)
+
+
+def test_ladder_says_what_was_tried_and_why_it_stopped() -> None:
+    data = select(HEADLINE, 1e-2).to_json()
+    assert data["status"] == "met"
+    assert sum(rung["chosen"] for rung in data["rungs"]) == 1
+    assert all(rung["wall_s"] > 0 and rung["steps"] > 0 for rung in data["rungs"])
+    assert "yardstick" in data["reason"]
+    assert data["estimated_error"] <= 1e-2
+
+
+def test_rigid_machine_gets_the_loosest_tolerance_that_does() -> None:
+    problem = get_problem("double-pendulum")
+    coarse, fine = (select(problem.scene(), tolerance, problem.times) for tolerance in (1e-2, 1e-7))
+    assert problem.error(coarse.trajectory) <= 1e-2
+    assert problem.error(fine.trajectory) <= 1e-7
+    assert coarse.chosen.work < fine.chosen.work
+
+
+def test_chaos_is_owned_up_to() -> None:
+    selection = select(load_scene("rigid-double-pendulum").with_values({"solver.duration": 60.0}), 1e-3)
+    assert not selection.met
+    assert not selection.trajectory.ok
+    assert "sensitive" in selection.trajectory.message
+
+
+def test_rods_that_cannot_bend_say_why() -> None:
+    offset = {"kind": "torsion-spring", "first": {"body": "OA", "point": [0.5, 0.1]}, "second": {"body": "AB"}}
+    scene = _with_modulus(2e9).with_values(
+        {"bodies.OA.element": "rigid", "bodies.AB.element": "rigid", "loads": {"spring": offset}}
+    )
+    selection = select(scene, 1e-3)
+    assert "not on the axis" in selection.rigid["OA"]
+    assert selection.chosen.levels["AB"] != RIGID
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf])
+def test_tolerance_is_a_length_above_zero(tolerance: float) -> None:
+    with pytest.raises(InputError, match="tolerance: needs a length above 0 m"):
+        select(HEADLINE, tolerance)
+
+
+def test_shear_that_the_theory_leaves_out_is_reported() -> None:
+    """Exudyn's geometrically exact beam, which has shear, ends 0.36 mm from the cable's (16/32 elements, mechanics)."""
+    assert 0.36e-3 / 3 < select(HEADLINE, 1e-2).shear < 0.36e-3 * 3
+
+
+def test_command_line_prints_the_ladder() -> None:
+    arguments = ["simulate", "flexible-double-pendulum", "--tolerance", "1e-2", "--at", "0.25,0.5", "--json"]
+    run = CliRunner().invoke(main, arguments, standalone_mode=False)
+    data: dict[str, Any] = json.loads(run.stdout)
+    assert data["status"] == "ok"
+    assert data["markers"]["B"]["t"] == [0.25, 0.5]
+    assert data["selection"]["levels"]["AB"]["element"] != "rigid"
+
+
+def test_levels_below_are_coarser() -> None:
+    for level in LADDER:
+        assert all(LADDER.index(coarser) < LADDER.index(level) for coarser in below(level))
+
+
+@pytest.mark.parametrize("levels", [(cable(2), cable(4)), (quintic(1), quintic(8)), (quintic(4), quintic(2))])
+def test_forecast_of_the_stable_step(levels: tuple[Any, Any]) -> None:
+    from shoal.mechanics.simulate import stable_step
+    from shoal.selection.levels import apply
+
+    chosen = dict(zip(("OA", "AB"), levels, strict=True))
+    true = stable_step(apply(HEADLINE, chosen), INTEGRATOR)
+    assert 0.6 < Forecast(HEADLINE, ("OA", "AB")).step(chosen) / true < 1.6
+
+
+@pytest.mark.parametrize("modulus", [2e9, 2e10, 2e11, 2e12])
+def test_prior_is_right_to_two_orders_of_magnitude(modulus: float) -> None:
+    scene = _with_modulus(modulus)
+    prior = sum(one.error for one in estimate(scene, ("OA", "AB")).values())
+    engine = GaussEngine()
+    rigid = engine.simulate(scene.with_values({f"bodies.{rod}.element": "rigid" for rod in ("OA", "AB")}))
+    values = {f"bodies.{rod}.{key}": value for rod in ("OA", "AB")
+              for key, value in (("element", "ancf-quintic"), ("elements", 2))}  # fmt: skip
+    bent = engine.simulate(scene.with_values({**values, "solver.step": 3e-6}))
+    assert 0.01 < distance(rigid, bent) / prior < 100

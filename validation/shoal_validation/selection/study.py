@@ -1,0 +1,82 @@
+"""One machine through the selection: true error, and work beside the cheapest model that would have done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from shoal.selection import Selection, select
+from shoal.selection.climb import Runs
+from shoal.selection.levels import LADDER, RIGID, Level
+from shoal.selection.run import Rung, distance
+from shoal.selection.work import Forecast
+
+from shoal_validation.selection.machines import Draw
+
+FINER = 10.0
+"""The truth is the yardstick of a selection whose tolerance is smaller by this factor."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What one machine showed.
+
+    error: true distance from the yardstick of the finer selection [m], nan if there is none; work: of the chosen model;
+    least: the least work of all models within the tolerance, nan if not searched for
+    """
+
+    seed: int
+    rods: int
+    tolerance: float
+    met: bool
+    reason: str
+    model: str
+    estimate: float
+    error: float
+    reference_error: float
+    work: float
+    least: float
+    cheapest: str
+    seconds: float
+
+
+def study(machine: Draw, exhaustive: bool = False) -> Case:
+    """Select, then judge by a finer selection."""
+    chosen = select(machine.scene, machine.tolerance)
+    finer = select(machine.scene, machine.tolerance / FINER)
+    yardstick = min((r for r in finer.rungs if np.isfinite(r.error)), key=lambda r: r.error, default=None)
+    error = distance(chosen.chosen.trajectory, yardstick.trajectory) if yardstick is not None else np.nan
+    least, cheapest = (np.nan, "") if not exhaustive or yardstick is None else _cheapest(machine, chosen, yardstick)
+    return Case(
+        machine.seed,
+        len(machine.scene.bodies),
+        machine.tolerance,
+        chosen.met,
+        chosen.reason,
+        chosen.chosen.name,
+        chosen.chosen.error,
+        error,
+        yardstick.error if yardstick is not None else np.nan,
+        chosen.chosen.work,
+        least,
+        cheapest,
+        chosen.wall_s,
+    )
+
+
+def _cheapest(machine: Draw, chosen: Selection, yardstick: Rung) -> tuple[float, str]:
+    """The least work within the tolerance among all combinations of levels that cost less than the chosen model."""
+    rods = tuple(chosen.chosen.levels)
+    forecast = Forecast(chosen.chosen.scene, rods)
+    runs = Runs(chosen.chosen.scene, yardstick.trajectory.times, forecast, lambda _: None)
+    cheaper: list[tuple[float, dict[str, Level]]] = []
+    for levels in product(LADDER, repeat=len(rods)):
+        combination = dict(zip(rods, levels, strict=True))
+        work = forecast.work(combination)
+        if 0 < work < chosen.chosen.work and any(level != RIGID for level in levels):
+            cheaper.append((work, combination))
+    for work, combination in sorted(cheaper, key=lambda pair: pair[0]):
+        if distance(runs(combination).trajectory, yardstick.trajectory) <= machine.tolerance:
+            return work, runs.rungs[-1].name
+    return chosen.chosen.work, chosen.chosen.name
