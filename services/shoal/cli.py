@@ -345,6 +345,16 @@ def demo() -> None:
 
 
 @main.command()
+@click.option("--only", metavar="NAME", help="One problem of the library or of the paper.")
+@click.option("--quick", is_flag=True, help="A part that takes less than three minutes.")
+@option_json
+def validate(only: str | None, quick: bool, as_json: bool) -> None:
+    """Run the problem library over all engines, against its references and the nights before; write one page."""
+    good = _pipeline("shoal_validation.nightly.main").main(only, quick, as_json)
+    _finish(bool(good), "not every line is as it should be; the page and the lines above name them")
+
+
+@main.command()
 @option_json
 def doctor(as_json: bool) -> None:
     """Check the installation: engines, compiled kernels, pipeline, folders; say what is wrong."""
@@ -361,7 +371,7 @@ def _pipeline(module: str) -> Any:
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] in ("prefect", "mlflow", "shoal_flows"):
+        if (error.name or "").split(".")[0] in ("prefect", "mlflow", "jinja2", "shoal_flows"):
             raise InputError(f"{error.name} is not installed; install shoal with its extra 'pipeline'") from None
         raise
 

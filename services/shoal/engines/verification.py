@@ -2,8 +2,8 @@
 
 Energy and drift cannot see everything: an energy-conserving step may be far too long, a chaotic motion loses every
 digit in time, a coarse mesh of a thin rod locks. So the run is held against the native solver with half the step (or
-a hundred times the tolerance, if its integrator is adaptive), the usual treatment of constraints and singular
-positions, and then against twice as many elements.
+another tolerance, if its integrator is adaptive), the usual treatment of constraints and singular positions, and then
+against twice as many elements.
 """
 
 from __future__ import annotations
@@ -26,8 +26,15 @@ WRONG = 0.1
 """A run whose estimated error is beyond this fraction of the machine's scale is rejected."""
 MARGIN = 0.95
 """Of the stable step, which is that of the start."""
-LOOSER = 100.0
-"""Factor on the tolerance of an adaptive integrator; its error falls at least tenfold with it."""
+SPAN = 100.0
+"""Factor between the tolerances of two adaptive runs; the error falls at least tenfold with it."""
+LOOSE = 1e-8
+"""A tolerance above this is held against a tighter one, a tolerance below against a looser one, which costs less."""
+HALVING = 4.0 / 3.0
+"""The error of a method of second order in terms of its distance from the run with half the step."""
+COARSE = 0.03
+"""A mesh error beyond this fraction of the scale is looked at with four times the elements, which locks less."""
+UNTRUSTED = (Status.DIVERGED, Status.ENERGY, Status.DRIFTED, Status.OUT_OF_REACH)
 PATIENCE = 10.0
 """No second run is made that would take longer than so many seconds."""
 COST = 2e-8
@@ -41,17 +48,20 @@ class Verification:
     """Estimated errors of a run at its markers [m], None where they were not estimated and `note` says why.
 
     time_error: against a more careful run of the same mesh; mesh_error: against twice as many elements;
-    scale: how far the markers get from the ground [m]
+    scale: how far the markers get from the ground [m]; rejected: why the more careful run is itself not to be trusted
     """
 
     time_error: float | None
     mesh_error: float | None
     scale: float
     note: str = ""
+    rejected: str = ""
 
     @property
     def complaint(self) -> str:
         """Why the run is not to be trusted; empty if nothing speaks against it."""
+        if self.rejected:
+            return f"a more careful run is rejected ({self.rejected}); use a smaller solver.step or tolerance"
         if self.time_error is not None and self.time_error > WRONG * self.scale:
             return (
                 f"the time error is about {self.time_error:.2g} m: use a smaller solver.step or tolerance, "
@@ -76,42 +86,62 @@ def verified(engine: Engine, scene: Scene, times: Sequence[float] | Array | None
 
 def verify(trajectory: Trajectory, scene: Scene) -> Verification:
     """Estimate the errors of a run of a scene by more careful ones."""
-    notes: list[str] = []
-    expected = 2 * COST * trajectory.model["unknowns"] * trajectory.model.get("evaluations", trajectory.steps)
-    careful = _run("time error", lambda: _careful(scene, trajectory), expected, trajectory, notes)
-    time_error = None if careful is None else _distance(trajectory, careful)
     scale = _scale(trajectory, scene)
-    if time_error is not None and _adaptive(trajectory) and time_error < WRONG * scale:
-        time_error /= np.sqrt(LOOSER)
-    finer, mesh_error = None, None
-    if any(isinstance(body, Rod) and body.element != "rigid" for body in scene.bodies.values()):
-        expected = MESH_COST * (expected if careful is None else careful.wall_s)
-        finer = _run("mesh error", lambda: _finer(scene), expected, trajectory, notes)
-    if finer is not None:
-        mesh_error = _distance(trajectory, finer)
+    expected = 2 * COST * trajectory.model["unknowns"] * trajectory.model.get("evaluations", trajectory.steps)
+    careful, note = _second("time", lambda: _careful(scene, trajectory), expected, trajectory)
+    if careful is None:
+        notes, time_error, rejected = [note], None, ""
+    elif careful.status[0] in UNTRUSTED:
+        return Verification(None, None, scale, rejected=careful.message)
+    else:
+        notes, time_error, rejected = [], _time_error(trajectory, careful, scene, scale), ""
+        expected = careful.wall_s
+    if not any(_flexible(scene)):
+        return Verification(time_error, None, scale, "; ".join(notes), rejected)
+    finer, note = _second("mesh", lambda: _finer(scene, 2), MESH_COST * expected, trajectory)
+    if finer is None or not finer.ok:
+        note = note or "mesh error not estimated: the run on twice as many elements is rejected"
+        return Verification(time_error, None, scale, "; ".join([*notes, note]))
+    mesh_error = _distance(trajectory, finer)
+    if COARSE * scale < mesh_error:
+        finest, _ = _second("mesh", lambda: _finer(scene, 4), MESH_COST**2 * expected, trajectory)
+        if finest is not None and finest.ok:
+            mesh_error = max(mesh_error, _distance(trajectory, finest))
     return Verification(time_error, mesh_error, scale, "; ".join(notes))
 
 
-def _run(
-    what: str, make: Callable[[], Scene], expected: float, trajectory: Trajectory, notes: list[str]
-) -> Trajectory | None:
-    """The second run, or None and a note why it could not be had."""
+def _second(
+    what: str, make: Callable[[], Scene], expected: float, trajectory: Trajectory
+) -> tuple[Trajectory | None, str]:
+    """A second run, or None and why it could not be had. expected: how long it will take [s]."""
     if expected > PATIENCE:
-        notes.append(f"{what} not estimated: that would take about {expected:.0f} s")
-        return None
+        return None, f"{what} error not estimated: that would take about {expected:.0f} s"
     try:
         second = GaussEngine().simulate(make(), trajectory.times)
     except InputError as error:
-        notes.append(f"{what} not estimated: {error}")
-        return None
-    if not second.ok:
-        notes.append(f"{what} not estimated: the second run ended {second.status[0]}, {second.message}")
-        return None
-    return second
+        return None, f"{what} error not estimated: {error}"
+    if second.status[0] is Status.FAILED:
+        return None, f"{what} error not estimated: {second.message}"
+    return second, ""
+
+
+def _time_error(trajectory: Trajectory, careful: Trajectory, scene: Scene, scale: float) -> float:
+    """The distance of the two runs as an error of the first."""
+    away = _distance(trajectory, careful)
+    if not _adaptive(trajectory):
+        return HALVING * away
+    if scene.solver.relative_tolerance > LOOSE or away > WRONG * scale:
+        return away
+    return float(away / np.sqrt(SPAN))
 
 
 def _adaptive(trajectory: Trajectory) -> bool:
     return trajectory.engine == "gauss" and facts(trajectory.model["integrator"]).adaptive
+
+
+def _flexible(scene: Scene) -> dict[str, Rod]:
+    """The flexible rods of a scene."""
+    return {n: body for n, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
 
 
 def _careful(scene: Scene, trajectory: Trajectory) -> Scene:
@@ -120,21 +150,19 @@ def _careful(scene: Scene, trajectory: Trajectory) -> Scene:
     settings = {f"solver.{name}": value for name, value in usual.items()}
     if _adaptive(trajectory):
         solver = scene.solver
-        tolerances = (min(LOOSER * t, 0.1) for t in (solver.relative_tolerance, solver.absolute_tolerance))
-        relative, absolute = tolerances
-        return scene.with_values(
-            {**settings, "solver.relative_tolerance": relative, "solver.absolute_tolerance": absolute}
-        )
-    if not any(isinstance(body, Rod) and body.element != "rigid" for body in scene.bodies.values()):
+        factor = 1 / SPAN if solver.relative_tolerance > LOOSE else SPAN
+        settings["solver.relative_tolerance"] = solver.relative_tolerance * factor
+        settings["solver.absolute_tolerance"] = solver.absolute_tolerance * factor
+        return scene.with_values(settings)
+    if not any(_flexible(scene)):
         return scene.with_values({**settings, "solver.integrator": "auto"})
     return _leapfrog(scene.with_values(settings), 0.5 * scene.solver.step)
 
 
-def _finer(scene: Scene) -> Scene:
-    """Twice as many elements."""
-    flexible = {n: b for n, b in scene.bodies.items() if isinstance(b, Rod) and b.element != "rigid"}
-    finer = scene.with_values({f"bodies.{name}.elements": 2 * rod.elements for name, rod in flexible.items()})
-    return _leapfrog(finer, scene.solver.step)
+def _finer(scene: Scene, times: int) -> Scene:
+    """So many times as many elements."""
+    finer = {f"bodies.{name}.elements": times * rod.elements for name, rod in _flexible(scene).items()}
+    return _leapfrog(scene.with_values(finer), scene.solver.step)
 
 
 def _leapfrog(scene: Scene, step: float) -> Scene:
@@ -148,12 +176,11 @@ def _distance(one: Trajectory, other: Trajectory) -> float:
 
 
 def _scale(trajectory: Trajectory, scene: Scene) -> float:
-    """How far the markers get from the nearest ground joint, or along their own paths [m]."""
+    """How far the markers get from the nearest ground joint [m]; without one, the extent of their paths."""
     points = trajectory.points[..., 0]
-    extent = float(np.max(np.ptp(points, axis=0)))
     sides = (side for joint in scene.joints.values() for side in places(joint))
     anchors = [scene.location(side) for side in sides if side.body == GROUND]
     if not anchors:
-        return extent
+        return float(np.max(np.ptp(points, axis=0)))
     away = np.min([np.linalg.norm(points - np.array(anchor), axis=2) for anchor in anchors], axis=0)
-    return max(extent, float(np.max(away)))
+    return float(np.max(away))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, lru_cache
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -264,9 +266,9 @@ def _size(scene: Scene) -> float:
     attached = [*sides, *scene.markers.values()]
     total = 0.0
     for name, body in scene.bodies.items():
-        used = [*(scene.location(place) for place in attached if place.body == name), *body.points.values()]
-        total += max(np.hypot(a[0] - b[0], a[1] - b[1]) for a in used for b in used)
-    return float(total)
+        used = {*(scene.location(place) for place in attached if place.body == name), *body.points.values()}
+        total += max((math.dist(a, b) for a, b in combinations(used, 2)), default=0.0)
+    return total
 
 
 def _facts(scene: Scene, model: Model, choice: Choice, record: Record) -> dict[str, Any]:
