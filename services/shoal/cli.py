@@ -228,6 +228,12 @@ def reactions(scene: str, times: list[float], values: dict[str, str], as_json: b
 @click.option("--seed", default=0, show_default=True, help="Seed of the random numbers.")
 @option_engine
 @option_set
+@click.option(
+    "--tolerance",
+    type=float,
+    metavar="METRES",
+    help="Error the model may have at the markers: coarse models for the search, the cheapest good one at the end.",
+)
 @option_json
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .json or .png.")
 def identify(
@@ -237,6 +243,7 @@ def identify(
     seed: int,
     engine: str,
     values: dict[str, str],
+    tolerance: float | None,
     as_json: bool,
     out: Path | None,
 ) -> None:
@@ -248,7 +255,14 @@ def identify(
     wanted = load_problem(problem)
     with terminal.fitness_progress(wanted.name) as progress:
         estimate = identify(
-            wanted, method=method, data=data, engine=engine, values=values, seed=seed, progress=progress
+            wanted,
+            method=method,
+            data=data,
+            engine=engine,
+            values=values,
+            seed=seed,
+            tolerance=tolerance,
+            progress=progress,
         )
     if out is not None:
         terminal.write_estimate(estimate, out)

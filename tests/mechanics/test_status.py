@@ -9,6 +9,7 @@ import pytest
 from shoal.errors import InputError
 from shoal.mechanics import march, simulate
 from shoal.mechanics.integrators import INTEGRATORS
+from shoal.mechanics.simulate import stable_step
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Status
 
@@ -232,3 +233,15 @@ def test_a_loop_that_starts_apart_is_assembled_or_refused() -> None:
     assert np.hypot(*(run.marker("B")[1] - [2.0, 0.0])) == pytest.approx(1.5, abs=1e-12)
     apart = _machine(bodies, joints | {"C": ("ground", [9.0, 0.0], "T", "start")}, {"B": ("S", "end")})
     assert not simulate.simulate(_with(apart, integrator="rk4"), np.array([0.1])).ok
+
+
+def test_torque_on_a_fine_mesh_has_a_stability_limit() -> None:
+    """A load without stiffness and damping leaves the damping matrix of a large model empty."""
+    scene = load_scene("flexible-double-pendulum").with_values(
+        {
+            "bodies.OA.elements": 60,
+            "bodies.AB.elements": 60,
+            "loads": {"torque": {"kind": "torque", "at": {"body": "OA"}, "torque": 1.0}},
+        }
+    )
+    assert 0 < stable_step(scene, "leapfrog") < 1e-4

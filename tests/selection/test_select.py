@@ -141,3 +141,9 @@ def test_prior_is_right_to_two_orders_of_magnitude(modulus: float) -> None:
               for key, value in (("element", "ancf-quintic"), ("elements", 2))}  # fmt: skip
     bent = engine.simulate(scene.with_values({**values, "solver.step": 3e-6}))
     assert 0.01 < distance(rigid, bent) / prior < 100
+
+
+def test_machine_without_freedom() -> None:
+    weld = {"kind": "weld", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "OA"}}
+    scene = load_scene("single-pendulum").with_values({"joints": {"O": weld}})
+    np.testing.assert_allclose(GaussEngine().simulate(scene, [0.5]).marker("A"), [[1.0, 0.0]], atol=1e-12)

@@ -10,6 +10,7 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import InputError
+from shoal.identification.adapt import Stage, coarse_to_fine
 from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.measurement import Measurement, measure
@@ -33,12 +34,15 @@ def identify(
     values: Mapping[str, Any] | None = None,
     seed: int = 0,
     measurement: Measurement | None = None,
+    tolerance: float | None = None,
     progress: Progress = lambda *_: None,
 ) -> Estimate:
     """Find the parameters of a problem.
 
     method: one of METHODS, else the problem's; data: a recording instead of the problem's own;
     values: fields of the scene to set; measurement: one made earlier, to share it between methods;
+    tolerance: error [m] that the model may have at the markers, for which elements, integrator and step are chosen
+    instead of taken from the scene (coarse while searching);
     progress: called with (iteration, best fitness, mean fitness). Raises InputError, ComputationError.
     """
     name = method or problem.method
@@ -48,10 +52,16 @@ def identify(
         measurement = measure(problem, load_truth(problem), data)
     model = ForwardModel(problem, scene, get_engine(engine), measurement)
     begin = time.perf_counter()
-    outcome = search(model, np.random.default_rng(seed), progress)
+    rng, stages = np.random.default_rng(seed), list[Stage]()
+    if tolerance is None:
+        outcome = search(model, rng, progress)
+    elif engine != "gauss":
+        raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
+    else:
+        model, outcome, stages = coarse_to_fine(model, search, tolerance, rng, progress)
     wall = time.perf_counter() - begin
     evaluations = model.counter.evaluations
-    return _estimate(model, outcome, name, engine, seed, wall, evaluations)
+    return _estimate(model, outcome, name, engine, seed, wall, evaluations, stages)
 
 
 def load_truth(problem: Problem) -> Scene:
@@ -60,7 +70,14 @@ def load_truth(problem: Problem) -> Scene:
 
 
 def _estimate(
-    model: ForwardModel, outcome: Outcome, method: str, engine: str, seed: int, wall: float, evaluations: int
+    model: ForwardModel,
+    outcome: Outcome,
+    method: str,
+    engine: str,
+    seed: int,
+    wall: float,
+    evaluations: int,
+    stages: list[Stage],
 ) -> Estimate:
     point = outcome.point
     measurement = model.measurement
@@ -87,7 +104,7 @@ def _estimate(
         engine=engine,
         seed=seed,
         verdict=verdict,
-        message=message or outcome.message,
+        message="; ".join(note for note in (message or outcome.message, _coarse(model, model_error)) if note),
         parameters=parameters,
         quantities=quantities,
         combinations=unknown,
@@ -105,7 +122,7 @@ def _estimate(
         else float(np.sqrt(np.sum(model_error**2) / len(measurement.times) / measurement.things)),
         truth=measurement.truth,
         data=measurement.origin,
-        model={"scene": model.scene.name, **model.problem.values},
+        model={"scene": model.scene.name, **model.problem.values, **_chosen(stages)},
         scene=model.scene.with_values(
             {p.path: float(v) for p, v in zip(model.problem.parameters.values(), point, strict=True)}
         ),
@@ -134,6 +151,18 @@ def _model_error(model: ForwardModel, point: Array) -> Array | None:
         return None
     error = fine - coarse
     return error if np.all(np.isfinite(error)) else None
+
+
+def _chosen(stages: list[Stage]) -> dict[str, Any]:
+    return {"selection": [stage.to_json() for stage in stages]} if stages else {}
+
+
+def _coarse(model: ForwardModel, model_error: Array | None) -> str:
+    """A word where the error of the model is larger than that of the measurement; empty if it is not."""
+    noise = model.problem.noise
+    if model_error is None or noise is None or (size := float(np.sqrt(np.mean(model_error**2)))) <= noise:
+        return ""
+    return f"the mesh error of {size:.1g} exceeds the noise of {noise:.1g}; --tolerance {noise / 3:.1g} chooses a mesh"
 
 
 def _parameters(model: ForwardModel, point: Array, at: Linearisation, bias: Array | None) -> dict[str, Value]:
@@ -173,7 +202,7 @@ def _judge(
     size = float(np.sqrt(np.mean(residual**2)))
     spread_of_data = float(np.sqrt(np.mean((values - values.mean(axis=0)) ** 2)))
     noise = model.problem.noise
-    if size > _BAD_FIT * spread_of_data:
+    if size > _BAD_FIT * spread_of_data and (noise is None or size > 3 * noise):
         return Verdict.REJECTED, f"the best fit is off by {size:.3g}, the data vary by {spread_of_data:.3g}"
     if noise is not None and size > 3 * noise:
         return Verdict.REJECTED, f"residuals of {size:.3g} are {size / noise:.0f} times the noise of {noise:.3g}"

@@ -187,7 +187,7 @@ def _relative(error: Array, scale: Array, scene: Scene, model: Model) -> Array:
     rods set the scale, as far as round-off goes.
     """
     stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
-    floor = 1e-9 * float(np.max(np.abs(model.weight))) * _size(scene) + 1e-12 * float(stiff)
+    floor = 1e-9 * float(np.max(np.abs(model.weight), initial=0.0)) * _size(scene) + 1e-12 * float(stiff)
     relative: Array = error / np.maximum(scale, floor + 1e-300)
     return relative
 

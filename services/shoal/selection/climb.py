@@ -13,8 +13,8 @@ from shoal.selection.run import MARGIN, Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
 
-WORK_LIMIT = 1e8
-"""Work of one run beyond which the climb gives up, in steps of one cable element: about five seconds."""
+WORK_LIMIT = 4e8
+"""Work of one run beyond which the climb gives up, in steps of one cable element: about twenty seconds."""
 REJECTED = 3
 """So many refinements in a row whose run is rejected end the climb."""
 AGREE = 0.5
@@ -23,6 +23,9 @@ HALF = 0.5 * MARGIN
 """A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
 UNKNOWN_FALL = 4.0
 """By which factor an error is taken to fall from one refinement to the next before two falls were seen."""
+
+YARDSTICK = "yardstick"
+"""Role of the refinements in the list of rungs."""
 
 Progress = Callable[[str], None]
 
@@ -68,7 +71,7 @@ def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) ->
     """Refine the rods until two neighbours agree; else say why that was not to be had."""
     count = dict.fromkeys(rods, REFINEMENTS[0])
     growing, gap, last_gap, rejected = rods, np.inf, np.nan, 0
-    fine = runs(_levels(count, fixed), HALF, "yardstick")
+    fine = runs(_levels(count, fixed), HALF, YARDSTICK)
     while True:
         coarse, base = fine, dict(count)
         if any(count[rod] == REFINEMENTS[-1] for rod in growing):
@@ -77,7 +80,7 @@ def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) ->
         levels = _levels(count, fixed)
         if (work := 2 * runs.forecast.work(levels)) > WORK_LIMIT:
             return f"the next refinement ({_words(levels)}) takes {work:.1g} element steps, more than {WORK_LIMIT:.0e}"
-        fine = runs(levels, HALF, "yardstick")
+        fine = runs(levels, HALF, YARDSTICK)
         rejected = 0 if fine.ok else rejected + 1
         if rejected == REJECTED:
             return f"the runs are rejected: {fine.trajectory.message}"

@@ -12,7 +12,7 @@ import numpy as np
 from shoal.engines.contract import sampling_times
 from shoal.errors import InputError
 from shoal.scene import Scene
-from shoal.selection.climb import Progress, Runs, climb
+from shoal.selection.climb import YARDSTICK, Progress, Runs, climb
 from shoal.selection.levels import RIGID, Level, Levels, open_rods
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
@@ -163,8 +163,8 @@ def _flexible(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float
     """Climb to a yardstick, then trim."""
     yardstick = climb(runs, rods, fixed, tolerance - known)
     if isinstance(yardstick, str):
-        finest = max(runs.rungs, key=lambda rung: rung.work)
-        finest.error = max((r.error for r in runs.rungs if np.isfinite(r.error)), default=np.inf)
+        *_, last, finest = [rung for rung in runs.rungs if rung.role == YARDSTICK]
+        finest.error = distance(last.trajectory, finest.trajectory) + known
         return finest, yardstick
     yardstick.error += known
     chosen = trim(runs, yardstick, rods, tolerance)

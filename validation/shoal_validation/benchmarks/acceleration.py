@@ -1,11 +1,12 @@
 """Ways to solve Gauss's principle side by side: the compiled ones, and the paper's swarms at every time step.
 
 Two tables. The first, on the double pendulum, has no singular position: cost and accuracy of every solver with the
-same time step of semi-implicit Euler, and an ablation of the swarms. The second drives a linkage of two four-bars
-through its singular positions, with and without removal of drift, against the closed form: coupled cranks are one
-pendulum whose angle from the upright obeys phi'' = kappa sin phi, phi = 2 am(t/2 | -4 kappa). The compiled solvers go
-by rk4 for 10 s, ten passages. The swarms go by the paper's time step, whose own error grows to a metre within 3 s at
-any step that a swarm can afford; so they go for 1.5 s, two passages, and are held against projection by the same step.
+same time step of semi-implicit Euler (`python -m shoal_validation.ablation` takes the swarms apart). The second drives
+a linkage of two four-bars through its singular positions, with and without removal of drift, against the closed form:
+coupled cranks are one pendulum whose angle from the upright obeys phi'' = kappa sin phi, phi = 2 am(t/2 | -4 kappa).
+The compiled solvers go by rk4 for 10 s, ten passages. The swarms go by the paper's time step, whose own error grows to
+a metre within 3 s at any step that a swarm can afford; so they go for 1.5 s, two passages, and are held against
+projection by the same step.
 """
 
 from __future__ import annotations
@@ -28,16 +29,7 @@ COMPILED = ("projection", "kkt", "augmented-lagrangian", "proximal", "baumgarte"
 SWARMS = ("afsa", "iafsa", "iafsa-printed")
 EULER = "semi-implicit-euler"
 UNSEEDED = {"seed_traditional": False, "seed_previous": False}
-ABLATIONS: dict[str, dict[str, bool]] = {
-    "": {},
-    "no mutation": {"mutation": False},
-    "no velocity": {"velocity": False},
-    "previous seed only": {"seed_traditional": False},
-    "previous seed only, no mutation": {"seed_traditional": False, "mutation": False},
-    "no seeds": UNSEEDED,
-    "no seeds, no mutation": {**UNSEEDED, "mutation": False},
-    "no seeds, no velocity": {**UNSEEDED, "velocity": False},
-}
+ABLATIONS: dict[str, dict[str, bool]] = {"": {}, "no seeds": UNSEEDED}
 FORGETFUL = {"iafsa-printed": {"P_g of step 3-7": {"keep_best": False}}}
 
 LOOPS = 2
@@ -96,7 +88,7 @@ class PassageRow:
 
 
 def measure_cost(scene_name: str, step: float, steps: int, solvers: tuple[str, ...] = COMPILED) -> Iterator[CostRow]:
-    """Compiled solvers, swarms and ablations on one scene; a row as soon as it is known."""
+    """Compiled solvers and swarms, seeded and not, on one scene; a row as soon as it is known."""
     # Released from rest: semi-implicit Euler is off by percents of the little energy that the first steps bring.
     settings = {"solver.integrator": EULER, "solver.step": step, "solver.duration": steps * step}
     settings |= {"solver.energy_tolerance": 0.1}

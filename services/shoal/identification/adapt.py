@@ -1,0 +1,84 @@
+"""No more model than the data need: search on a coarse model, finish on the one that meets a tolerance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from shoal.identification.forward import ForwardModel, Progress
+from shoal.identification.methods import Method, Outcome
+from shoal.identification.methods.least_squares import descend
+from shoal.identification.starts import starting_points
+from shoal.scene import Scene
+from shoal.selection import Selection, select
+from shoal.trajectory import Array
+
+COARSER = 30.0
+"""The search goes by a model whose error may be larger by this factor than that of the final one."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One model on the way: what it is, its estimated error at the markers [m], and the evaluations spent on it."""
+
+    model: str
+    tolerance: float
+    error: float
+    evaluations: int
+    selection_s: float
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain data."""
+        return vars(self)
+
+
+def coarse_to_fine(
+    model: ForwardModel, search: Method, tolerance: float, rng: np.random.Generator, progress: Progress
+) -> tuple[ForwardModel, Outcome, list[Stage]]:
+    """Search with a method on a coarse model, then least squares from there on the model that meets `tolerance` [m].
+
+    The models are chosen at the first pose that the data allow, and again where the search ended. Returns the final
+    model, whose counter has counted both stages, with the outcome and the models on the way. Raises InputError.
+    """
+    stages: list[Stage] = []
+    start = starting_points(model)[0]
+    coarse, chosen = _chosen(model, start, COARSER * tolerance)
+    outcome = search(coarse, rng, progress)
+    stages.append(_stage(chosen, coarse.counter.evaluations))
+    fine, chosen = _chosen(coarse, outcome.point, tolerance)
+    descent = descend(fine, outcome.point, progress)
+    stages.append(_stage(chosen, fine.counter.evaluations))
+    # Values of different models cannot be compared, so the search on the coarse one counts without a best value.
+    fine.counter.charge(coarse.counter.evaluations, outcome.point, np.inf)
+    rows = outcome.iterations + [(len(outcome.iterations) + i, best, mean) for i, best, mean in descent.rows]
+    message = "" if chosen.met else f"the model is off by about {chosen.chosen.error:.1g} m: {chosen.reason}"
+    return (
+        fine,
+        replace(outcome, point=descent.point, fitness=descent.fitness, iterations=rows, message=message),
+        stages,
+    )
+
+
+def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[ForwardModel, Selection]:
+    """The forward model on the scene that is chosen at a point."""
+    selection = select(at(model, point), tolerance, model.measurement.times)
+    fields = {
+        path: value for rod, level in selection.chosen.levels.items() for path, value in level.fields(rod).items()
+    }
+    solver = selection.chosen.scene.solver.model_dump(mode="json")
+    kept = {name: solver[name] for name in ("integrator", "step", "relative_tolerance", "absolute_tolerance")}
+    scene = model.scene.with_values({**fields, **{f"solver.{name}": value for name, value in kept.items()}})
+    return ForwardModel(model.problem, scene, model.engine, model.measurement), selection
+
+
+def at(model: ForwardModel, point: Array) -> Scene:
+    """The scene of a point."""
+    paths = (parameter.path for parameter in model.problem.parameters.values())
+    return model.scene.with_values({path: float(x) for path, x in zip(paths, point, strict=True)})
+
+
+def _stage(selection: Selection, evaluations: int) -> Stage:
+    chosen = selection.chosen
+    return Stage(chosen.name, selection.tolerance, chosen.error, evaluations, selection.wall_s)

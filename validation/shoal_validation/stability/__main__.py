@@ -1,0 +1,68 @@
+"""`python -m shoal_validation.stability`: run the maps, draw them, and write their section of docs/stability.md."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from shoal_validation.judge import Outcome
+from shoal_validation.stability import MAPS
+from shoal_validation.stability.charts import draw
+from shoal_validation.stability.page import rewrite
+from shoal_validation.stability.survey import Result, survey
+
+DOCS = Path(__file__).parents[3] / "docs"
+
+
+def main() -> None:
+    """Run what was asked for; the page is written after a complete run only."""
+    parser = argparse.ArgumentParser(prog="python -m shoal_validation.stability", description=__doc__)
+    parser.add_argument("--only", choices=MAPS, action="append", help="run this map only; may be repeated")
+    parser.add_argument("--quick", action="store_true", help="three values of each axis; needs --out")
+    parser.add_argument("--out", type=Path, default=DOCS / "charts", help="folder of charts and stability.json")
+    asked = parser.parse_args()
+    if asked.quick and asked.out == DOCS / "charts":
+        parser.error("--quick: name a folder by --out; the charts of docs/ come from complete maps")
+    began = time.perf_counter()
+    maps = [MAPS[name] for name in asked.only or MAPS]
+    results = [survey(one.reduced() if asked.quick else one, _note) for one in maps]
+    for result in results:
+        draw(result, asked.out / f"stability-{result.name}.png")
+    if not asked.only:
+        data = {result.name: result.to_json() for result in results}
+        (asked.out / "stability.json").write_text(json.dumps(data, separators=(",", ":")) + "\n", encoding="utf-8")
+        if asked.out == DOCS / "charts":
+            rewrite(DOCS / "stability.md", results)
+    _note(f"{time.perf_counter() - began:.0f} s")
+    Console(highlight=False, width=150).print(table(results))
+
+
+def table(results: Sequence[Result]) -> Table:
+    """How many cells of each class every method has over all maps, silently wrong first."""
+    counts: dict[str, Counter[Outcome]] = {}
+    for result in results:
+        for panel in result.panels:
+            name = f"ours: {panel.method}" if panel.ours else panel.method
+            counts[name] = counts.get(name, Counter()) + panel.count
+    kinds = [Outcome.SILENT, *(kind for kind in Outcome if kind is not Outcome.SILENT)]
+    shown = Table("method", *map(str, kinds), box=box.SIMPLE_HEAD)
+    for name, count in sorted(counts.items(), key=lambda item: -item[1][Outcome.SILENT]):
+        shown.add_row(name, *(str(count[kind] or "") for kind in kinds))
+    return shown
+
+
+def _note(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()
