@@ -73,7 +73,8 @@ class Scene(Record):
         for name in self.initial:
             if name not in self.bodies:
                 raise ValueError(f"initial.{name}: no such body; the bodies are {', '.join(self.bodies)}")
-        loose = [name for name in self.bodies if name not in self._placed()]
+        placed = self._placed()
+        loose = [name for name in self.bodies if name not in placed]
         if loose:
             raise ValueError(
                 f"bodies.{loose[0]}: no chain of joints connects it to the ground; a body that flies free needs "

@@ -1,0 +1,133 @@
+"""Work and precision: fronts are fronts, references agree, measured errors fall as the method's order says."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from shoal.engines import get_engine
+from shoal_validation.problems import PROBLEMS, get_problem
+from shoal_validation.work_precision.contract import OURS, Method, Point, Run, counted
+from shoal_validation.work_precision.front import GAIN, cheapest, front
+from shoal_validation.work_precision.gauss import _method as own
+from shoal_validation.work_precision.measure import FAMILIES, Study, curve
+from shoal_validation.work_precision.mesh import with_mesh
+from shoal_validation.work_precision.page import BEGIN, END, failures, renew
+from shoal_validation.work_precision.table import costs
+
+FLEXIBLE = [name for name, problem in PROBLEMS.items() if problem.flexible]
+POINT = Point(OURS, "leapfrog", "2C/4C", "step 0.001 s", 1.0, 1.0)
+sizes = st.floats(1e-9, 1e3)
+points = st.lists(st.tuples(sizes, sizes, st.sampled_from(["ok", "ok", "refused"])), max_size=30).map(
+    lambda rows: [replace(POINT, seconds=t, error=e, status=s) for t, e, s in rows]
+)
+
+
+@given(points, st.floats(1e-9, 1e-1))
+def test_a_front_is_a_front(cloud: list[Point], floor: float) -> None:
+    """Each point of it is clearly nearer than all faster ones, all else is not, and only believed runs are on it."""
+    best = front(cloud, floor)
+    known = [(p.seconds, max(p.error, floor)) for p in best]
+    assert all(a[0] <= b[0] and a[1] * (1 - GAIN) > b[1] for a, b in pairwise(known))
+    assert all(p.ok for p in best)
+    for p in (p for p in cloud if p.ok):
+        assert any(seconds <= p.seconds and error * (1 - GAIN) <= max(p.error, floor) for seconds, error in known)
+
+
+@given(points, sizes)
+def test_the_cheapest_is_the_cheapest(cloud: list[Point], reach: float) -> None:
+    """No believed run within the error takes less time."""
+    found = cheapest(cloud, reach)
+    there = [p.seconds for p in cloud if p.ok and p.error <= reach]
+    assert (found.seconds if found else None) == min(there, default=None)
+
+
+@pytest.mark.parametrize("name", FLEXIBLE)
+def test_stored_references_are_exact_enough(name: str) -> None:
+    """The file states an error of at most 3e-6 m, and its own refinements bear it out."""
+    data = json.loads((files("shoal_validation.problems") / "computed" / f"{name}.json").read_text(encoding="utf-8"))
+    changes = [data["settings"][key]["largest"] for key in ("change_from_mesh", "change_from_step")]
+    assert data["error"] == pytest.approx(sum(changes))
+    assert data["error"] <= 3e-6
+    assert data["agreement"] <= 2 * data["error"]
+
+
+@pytest.mark.parametrize("name", FLEXIBLE)
+def test_our_beam_agrees_with_the_reference(name: str) -> None:
+    """Exudyn's converged cables and our quintic beam, which share no shape function, are the same beam: 4/20 elements
+    are 1.3e-5 m off at most, a tenth of what 2/12 elements are."""
+    problem = get_problem(name)
+    scene = with_mesh(problem.scene(), "4Q/20Q").with_values({"solver.integrator": "leapfrog", "solver.step": 1e-4})
+    assert problem.error(get_engine("gauss").simulate(scene, problem.times)) < 2e-5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FLEXIBLE)
+def test_our_finest_beam_agrees_with_the_reference(name: str) -> None:
+    """On 16/32 elements only the reference's own error is left; two thirds of it are that of our step."""
+    problem = get_problem(name)
+    scene = with_mesh(problem.scene(), "16Q/32Q").with_values({"solver.integrator": "leapfrog", "solver.step": 1e-5})
+    assert problem.error(get_engine("gauss").simulate(scene, problem.times)) < 2 * problem.reference.error
+
+
+def test_leapfrog_is_of_second_order_on_its_mesh() -> None:
+    """The measured error against the time-converged mesh falls with the step's square; the continuum's does not."""
+    problem = get_problem("flexible-case-1")
+    method = own("leapfrog", "2C/4C", counted(problem, (2000, 4000, 8000)))
+    measured = list(curve(problem, method, repeats=1))
+    errors = np.array([p.mesh_error for p in measured], dtype=float)
+    assert np.log2(errors[:-1] / errors[1:]) == pytest.approx(2.0, abs=0.15)
+    assert measured[-1].error == pytest.approx(measured[0].error, rel=1e-2)
+    assert measured[-1].error > 1e3 * errors[-1]
+
+
+def test_runs_that_fail_have_a_status_and_no_place() -> None:
+    """A step beyond the stability limit is refused; a run that is off by a tenth of the machine is silently wrong."""
+    problem = get_problem("flexible-case-1")
+    refused = next(curve(problem, own("leapfrog", "2C/4C", (1e-3,))))
+    assert refused.status == "refused"
+    assert "stability limit" in refused.message
+
+    path = problem.reference.points + np.array([0.0, 1.0])
+    wrong = next(curve(problem, Method("x", "y", "", "step", (1.0,), lambda *_: lambda: Run(path)), repeats=1))
+    assert wrong.status == "silently wrong"
+
+    study = Study(problem, [refused, wrong])
+    assert front(study.points, 0.0) == []
+    assert all(line.ours is None for line in costs(study))
+    assert "leapfrog: 1 refused" in failures([study])
+    assert "y: 1 silently wrong" in failures([study])
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_family_comes_near_the_rigid_double_pendulum(family: str) -> None:
+    """Its finest setting is within a millimetre of Lagrange's equations: the scene was understood."""
+    if family == "MuJoCo":
+        pytest.importorskip("mujoco")
+    problem = get_problem("double-pendulum")
+    method = FAMILIES[family](problem, True)[1 if family == "ours" else 0]
+    middle = method.settings[len(method.settings) // 2]
+    found = next(curve(problem, replace(method, settings=(middle,)), repeats=1))
+    assert found.ok
+    assert found.error < 1e-3
+
+
+def test_tables_replace_what_is_between_the_marks(tmp_path: Path) -> None:
+    """A second run leaves one set of tables; text around the marks stays."""
+    page = tmp_path / "page.md"
+    page.write_text(f"above\n{BEGIN}\nold\n{END}\nbelow\n", encoding="utf-8")
+    study = Study(get_problem("flexible-case-1"), [replace(POINT, seconds=2e-3, error=1e-3 / 2)])
+    for _ in range(2):
+        renew(page, [study], {"processor": "x"})
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("above\n")
+    assert text.endswith("below\n")
+    assert "old" not in text
+    assert text.count("2 ms: leapfrog, 2C/4C") == 2  # 1e-2 and 1e-3 m

@@ -1,0 +1,101 @@
+"""What one line of the plan computes, in the worker process: an error against the reference, and a time."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from shoal.engines import get_engine
+from shoal.engines.capabilities import require
+from shoal.errors import ComputationError, InputError
+from shoal.trajectory import Status, Trajectory
+
+from shoal_validation.problems import get_problem
+
+T = TypeVar("T")
+REPEATS, ENOUGH = 9, 0.3
+"""Repeats of a call, and the time [s] after which there are no more."""
+LONG = 60.0
+"""A call that takes longer [s] is not repeated."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """error: [m] or [rad], nan where there is no motion; seconds: median of whole calls; message: why it is not ok."""
+
+    status: str
+    error: float
+    seconds: float
+    message: str = ""
+
+
+def motion(problem: str, engine: str, values: Mapping[str, object], verify: bool = False) -> Measured:
+    """A problem on an engine with fields of its scene set; verify: as `shoal simulate` does it. Raises InputError."""
+    from shoal.engines.verification import verified
+
+    wanted, chosen = get_problem(problem), get_engine(engine)
+    scene = wanted.scene().with_values(dict(values))
+    require(engine, scene)
+    if verify:
+        return _motion(problem, lambda: verified(chosen, scene, wanted.times))
+    return _motion(problem, lambda: chosen.simulate(scene, wanted.times))
+
+
+def selection(problem: str, tolerance: float) -> Measured:
+    """The cheapest model for a tolerance [m], as `shoal simulate --tolerance` finds it; all its runs are timed."""
+    from shoal.selection import select
+
+    wanted = get_problem(problem)
+    scene = wanted.scene()
+    return _motion(problem, lambda: select(scene, tolerance, wanted.times).trajectory)
+
+
+def angles(problem: str, method: str) -> Measured:
+    """A problem of identification: largest error of a parameter [rad]; the making of the data is not timed."""
+    from shoal.identification import identify, load_problem
+    from shoal.identification.identify import load_truth
+    from shoal.identification.measurement import measure
+
+    wanted = load_problem(problem)
+    data = measure(wanted, load_truth(wanted))
+    seconds, estimate = _timed(lambda: identify(wanted, method=method, measurement=data))
+    error = max(abs(estimate.parameters[name].value - true) for name, true in estimate.truth.items())
+    status = str(Status.OK) if estimate.verdict.trusted else str(estimate.verdict)
+    return Measured(status, float(error), seconds, estimate.message)
+
+
+def _motion(problem: str, call: Callable[[], Trajectory]) -> Measured:
+    """A motion against the problem's reference."""
+    seconds, trajectory = _timed(call)
+    error = get_problem(problem).error(trajectory) if trajectory.ok else np.nan
+    return Measured(str(trajectory.status[0]), float(error), seconds, trajectory.message)
+
+
+def _timed(call: Callable[[], T]) -> tuple[float, T]:
+    """Median time of a call [s]; the first, which loads kernels and builds the model, counts only if it is long."""
+    first, answer = _once(call)
+    taken = [first] if first > LONG else [_once(call)[0]]
+    while len(taken) < REPEATS and sum(taken) < ENOUGH:
+        taken.append(_once(call)[0])
+    return statistics.median(taken), answer
+
+
+def _once(call: Callable[[], T]) -> tuple[float, T]:
+    """Time of a call [s] less what it waited for others on the machine: never more than its processor time."""
+    begin, busy = time.perf_counter(), time.process_time()
+    answer = call()
+    return min(time.perf_counter() - begin, time.process_time() - busy), answer
+
+
+def attempt(run: Callable[[], Measured]) -> Measured:
+    """A run whose refusal is a result like any other."""
+    try:
+        return run()
+    except InputError as error:
+        return Measured(str(Status.REFUSED), np.nan, np.nan, str(error))
+    except ComputationError as error:
+        return Measured(str(Status.FAILED), np.nan, np.nan, str(error))

@@ -1,0 +1,114 @@
+"""Carries out a plan: every line in the worker process, then against its limit and against the nights before."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+from shoal.trajectory import Status
+
+from shoal_validation.nightly.history import compare
+from shoal_validation.nightly.measure import Measured
+from shoal_validation.nightly.plan import Line
+from shoal_validation.nightly.result import Night, Result, Verdict
+from shoal_validation.nightly.worker import Worker
+
+TIMEOUT = 300.0
+"""A line that takes longer [s] is stopped; where no kernel is compiled yet, the first one of a kind takes a minute."""
+PACKAGES = ("shoal", "numpy", "scipy", "numba", "exudyn", "casadi")
+
+Progress = Callable[[int, Line], None]
+"""Called with the number of lines done and the line that is next."""
+
+
+def run(
+    lines: Sequence[Line],
+    before: Sequence[Night] = (),
+    *,
+    quick: bool = False,
+    only: str | None = None,
+    progress: Progress = lambda *_: None,
+    timeout: float = TIMEOUT,
+) -> Night:
+    """Measure all lines. `before`: earlier nights of this machine."""
+    started, begin = datetime.now(UTC), time.perf_counter()
+    found = []
+    with Worker() as worker:
+        for done, line in enumerate(lines):
+            progress(done, line)
+            result = compare(judged(line, worker.measure(line.run, timeout)), before)
+            if result.verdict is Verdict.SLOWER:
+                # Others on the machine slow a run down, nothing speeds it up: the better of two tries counts.
+                again = compare(judged(line, worker.measure(line.run, timeout)), before)
+                result = min(result, again, key=_seconds)
+            found.append(result)
+    wall = time.perf_counter() - begin
+    when = started.strftime("%Y-%m-%dT%H:%M:%S")
+    return Night(when, machine(), versions(), quick, only, wall, tuple(found))
+
+
+def judged(line: Line, measured: Measured) -> Result:
+    """A line against its own limit."""
+    answered = measured.status == Status.OK
+    if line.limit is None:
+        verdict = Verdict.FAILED if answered else Verdict.NOT_POSSIBLE
+        if measured.status in ("crashed", "timeout"):
+            verdict = Verdict.FAILED
+        expected = f"no answer: {line.reason}"
+    else:
+        verdict = Verdict.PASSED if answered and measured.error <= line.limit else Verdict.FAILED
+        expected = f"at most {line.limit:.1e} {line.unit} from {line.reference()}"
+    return Result(
+        problem=line.problem,
+        engine=line.engine,
+        method=line.method,
+        expected=expected,
+        found=_words(line, measured),
+        error=_number(measured.error),
+        limit=line.limit,
+        unit=line.unit,
+        seconds=_number(measured.seconds),
+        status=measured.status,
+        verdict=verdict,
+        reason=line.reason,
+    )
+
+
+def machine() -> str:
+    """Processor and cores: what times depend on."""
+    cpuinfo = Path("/proc/cpuinfo")
+    text = cpuinfo.read_text(encoding="utf-8", errors="replace") if cpuinfo.exists() else ""
+    names = (line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("model name"))
+    processor = next(names, "") or platform.processor() or platform.machine()
+    return f"{processor}, {os.cpu_count()} cores"
+
+
+def versions() -> dict[str, str]:
+    """Of Python and of the packages that shape the numbers."""
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def _words(line: Line, measured: Measured) -> str:
+    if measured.status != Status.OK:
+        return f"{measured.status}: {measured.message}" if measured.message else measured.status
+    return f"{measured.error:.1e} {line.unit} in {measured.seconds * 1e3:.3g} ms"
+
+
+def _seconds(result: Result) -> float:
+    return np.inf if result.seconds is None else result.seconds
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None
