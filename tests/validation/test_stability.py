@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 from shoal.trajectory import Status
 from shoal_validation.judge import Outcome
-from shoal_validation.stability import MAPS, page
+from shoal_validation.stability import MAPS
 from shoal_validation.stability.charts import draw
 from shoal_validation.stability.contract import StabilityMap
 from shoal_validation.stability.methods import EXUDYN, unchecked
+from shoal_validation.stability.page import section
 from shoal_validation.stability.survey import Result, survey
 
 FEW: dict[str, tuple[tuple[str, ...], tuple[Any, ...], tuple[Any, ...]]] = {
@@ -91,23 +92,10 @@ def test_a_turned_coupler_is_the_wrong_branch() -> None:
     assert any(where.cell(method, 1e-2, ratio).branch for ratio in where.y.values)
 
 
-def test_charts_and_page_are_written(tmp_path: Path) -> None:
+def test_chart_and_section_are_written(tmp_path: Path) -> None:
     result = survey(_few("step-machine"))
     draw(result, tmp_path / "chart.png")
     assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
-    text = tmp_path / "page.md"
-    text.write_text(f"before\n{page.BEGIN}\nfrom before\n{page.END}\nafter\n", encoding="utf-8")
-    page.rewrite(text, [result])
-    written = text.read_text(encoding="utf-8")
-    assert "from before" not in written
-    assert result.question in written
-    assert written.startswith("before\n")
-    assert written.endswith("after\n")
-
-
-def test_a_page_without_marks_is_left_alone(tmp_path: Path) -> None:
-    text = tmp_path / "page.md"
-    text.write_text("nothing here", encoding="utf-8")
-    with pytest.raises(ValueError, match="lacks"):
-        page.rewrite(text, [])
-    assert text.read_text(encoding="utf-8") == "nothing here"
+    text = section([result])
+    assert result.question in text
+    assert "| ours | 0 |" in text

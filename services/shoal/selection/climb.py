@@ -13,8 +13,8 @@ from shoal.selection.run import MARGIN, Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
 
-WORK_LIMIT = 4e8
-"""Work of one run beyond which the climb gives up, in steps of one cable element: about twenty seconds."""
+WORK_LIMIT = 1.5e8
+"""Work of one run beyond which the climb gives up, in steps of one cable element: about ten seconds."""
 REJECTED = 3
 """So many refinements in a row whose run is rejected end the climb."""
 AGREE = 0.5

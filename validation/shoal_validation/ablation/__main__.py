@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from shoal_validation.ablation import dynamics, inverse, report
-from shoal_validation.inverse_precision.document import rewrite
+from shoal_validation.document import rewrite
 
 
 def main(arguments: list[str]) -> None:

@@ -10,7 +10,7 @@ from shoal_validation.ablation.charts import MARKS, Panel, draw
 from shoal_validation.ablation.dynamics import ROUND_OFF, Steps
 from shoal_validation.ablation.factorial import Effect, combinations, effects, label
 from shoal_validation.ablation.inverse import BUDGET, CLOSE, TARGET, Searches
-from shoal_validation.inverse_precision.document import table
+from shoal_validation.document import table
 
 
 def draw_dynamics(results: list[Steps], file: Path) -> None:

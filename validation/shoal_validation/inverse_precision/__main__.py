@@ -19,10 +19,10 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
+from shoal_validation.document import rewrite
 from shoal_validation.inverse_precision import charts, horizon_noise, report
 from shoal_validation.inverse_precision.cases import BUDGET, CASES, Case
 from shoal_validation.inverse_precision.contenders import contenders
-from shoal_validation.inverse_precision.document import rewrite
 from shoal_validation.inverse_precision.measure import Run, run
 
 MAP = "horizon-noise"

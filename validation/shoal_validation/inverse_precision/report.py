@@ -6,8 +6,8 @@ from collections import Counter
 
 import numpy as np
 
+from shoal_validation.document import table
 from shoal_validation.inverse_precision.charts import floor, reach, worst_cells
-from shoal_validation.inverse_precision.document import table
 from shoal_validation.inverse_precision.horizon_noise import Cell, Panel
 from shoal_validation.inverse_precision.measure import CLOSE, Run
 from shoal_validation.judge import Outcome

@@ -34,7 +34,7 @@ def draw(seed: int) -> Draw:
         "markers": {name: {"body": name, "point": "end"} for name in (names[-1], names[0])},
         "initial": {name: {"angle": float(rng.uniform(-np.pi, np.pi))} for name in names},
         "loads": _loads(rng, bodies),
-        "solver": {"duration": float(rng.uniform(0.3, 1.0)), "samples": 50},
+        "solver": {"duration": float(rng.uniform(0.2, 0.6)), "samples": 50},
     }
     return Draw(seed, Scene.parse(scene), float(length * _log(rng, 1e-4, 1e-2)))
 

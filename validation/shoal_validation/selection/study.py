@@ -22,16 +22,19 @@ FINER = 10.0
 class Case:
     """What one machine showed.
 
+    stiffness: geometric mean of the rods' moduli [Pa]; rigid: whether all rods came out rigid;
     error: true distance from the yardstick of the finer selection [m], nan if there is none; work: of the chosen model;
     least: the least work of all models within the tolerance, nan if not searched for
     """
 
     seed: int
     rods: int
+    stiffness: float
     tolerance: float
     met: bool
     reason: str
     model: str
+    rigid: bool
     estimate: float
     error: float
     reference_error: float
@@ -51,10 +54,12 @@ def study(machine: Draw, exhaustive: bool = False) -> Case:
     return Case(
         machine.seed,
         len(machine.scene.bodies),
+        _stiffness(machine),
         machine.tolerance,
         chosen.met,
         chosen.reason,
         chosen.chosen.name,
+        not chosen.chosen.flexible,
         chosen.chosen.error,
         error,
         yardstick.error if yardstick is not None else np.nan,
@@ -63,6 +68,11 @@ def study(machine: Draw, exhaustive: bool = False) -> Case:
         cheapest,
         chosen.wall_s,
     )
+
+
+def _stiffness(machine: Draw) -> float:
+    moduli = [getattr(body, "youngs_modulus", None) for body in machine.scene.bodies.values()]
+    return float(np.exp(np.mean([np.log(modulus) for modulus in moduli if modulus])))
 
 
 def _cheapest(machine: Draw, chosen: Selection, yardstick: Rung) -> tuple[float, str]:

@@ -14,10 +14,11 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from shoal_validation.document import rewrite
 from shoal_validation.judge import Outcome
 from shoal_validation.stability import MAPS
 from shoal_validation.stability.charts import draw
-from shoal_validation.stability.page import rewrite
+from shoal_validation.stability.page import section
 from shoal_validation.stability.survey import Result, survey
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -41,7 +42,7 @@ def main() -> None:
         data = {result.name: result.to_json() for result in results}
         (asked.out / "stability.json").write_text(json.dumps(data, separators=(",", ":")) + "\n", encoding="utf-8")
         if asked.out == DOCS / "charts":
-            rewrite(DOCS / "stability.md", results)
+            rewrite(DOCS / "stability.md", "stability", section(results))
     _note(f"{time.perf_counter() - began:.0f} s")
     Console(highlight=False, width=150).print(table(results))
 

@@ -4,22 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 
+from shoal_validation.document import table
 from shoal_validation.judge import Outcome
 from shoal_validation.stability.survey import Result
-
-BEGIN, END = "<!-- begin stability -->", "<!-- end stability -->"
-
-
-def rewrite(page: Path, results: Sequence[Result]) -> None:
-    """Replace what stands between the two marks. Raises ValueError if the page has none."""
-    text = page.read_text(encoding="utf-8")
-    before, _, rest = text.partition(BEGIN)
-    _, mark, after = rest.partition(END)
-    if not mark:
-        raise ValueError(f"{page}: lacks {BEGIN} or {END}")
-    page.write_text(f"{before}{BEGIN}\n{section(results)}\n{END}{after}", encoding="utf-8")
 
 
 def section(results: Sequence[Result]) -> str:
@@ -46,6 +34,5 @@ def _totals(results: Sequence[Result]) -> str:
         for panel in result.panels:
             name = "ours" if panel.ours else "other engines, checked" if panel.checked else "other engines, unchecked"
             groups[name] = groups.get(name, Counter()) + panel.count
-    lines = [f"| cells | {' | '.join(kinds)} |", f"|---|{'---|' * len(kinds)}"]
-    lines += [f"| {name} | {' | '.join(str(count[kind]) for kind in kinds)} |" for name, count in groups.items()]
-    return "\n".join(lines)
+    rows = [(name, *(str(count[kind]) for kind in kinds)) for name, count in groups.items()]
+    return table(("cells", *kinds), rows)

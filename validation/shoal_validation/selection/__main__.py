@@ -1,0 +1,60 @@
+"""`python -m shoal_validation.selection`: is the chosen model within its tolerance, and what did it cost too much.
+
+Draws random machines, lets Shoal choose a model for each, and judges by a finer one; for one and two rods all cheaper
+models are run, too. Writes docs/charts/selection.json and .png and the section of docs/model-choice.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from shoal.trajectory import plain
+
+from shoal_validation.document import rewrite
+from shoal_validation.selection.chart import draw_chart
+from shoal_validation.selection.machines import draw
+from shoal_validation.selection.report import section
+from shoal_validation.selection.study import Case, study
+
+DOCS = Path(__file__).parents[3] / "docs"
+EXHAUSTIVE = 2
+"""Rods up to which every cheaper combination of levels is run."""
+
+
+def main() -> None:
+    """Run the study."""
+    parser = argparse.ArgumentParser(prog="python -m shoal_validation.selection", description=__doc__)
+    parser.add_argument("--machines", type=int, default=200, help="how many random machines (default: 200)")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first (default: 0)")
+    parser.add_argument("--out", type=Path, default=DOCS / "charts", help="folder of chart and data")
+    asked = parser.parse_args()
+    if asked.machines < 1:
+        parser.error(f"--machines: needs one or more, found {asked.machines}")
+    cases = list(cases_of(range(asked.first, asked.first + asked.machines)))
+    asked.out.mkdir(parents=True, exist_ok=True)
+    data = plain([asdict(case) for case in cases])
+    (asked.out / "selection.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    draw_chart(cases, asked.out / "selection.png")
+    text = section(cases)
+    if asked.out == DOCS / "charts":
+        rewrite(DOCS / "model-choice.md", "selection", text)
+    Console(highlight=False).print(text)
+
+
+def cases_of(seeds: range) -> Iterator[Case]:
+    """What the machines of these seeds show, with progress on standard error."""
+    for seed in track(seeds, "machines", console=Console(stderr=True)):
+        machine = draw(seed)
+        with np.errstate(invalid="ignore"):
+            yield study(machine, exhaustive=len(machine.scene.bodies) <= EXHAUSTIVE)
+
+
+if __name__ == "__main__":
+    main()

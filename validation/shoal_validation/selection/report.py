@@ -1,0 +1,59 @@
+"""The figures of the study in words and one table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shoal_validation.document import table
+from shoal_validation.selection.study import Case
+
+
+def section(cases: Sequence[Case]) -> str:
+    """What became of all machines, by number of rods."""
+    rows = [_row(f"{rods}", [case for case in cases if case.rods == rods]) for rods in (1, 2, 3, 4)]
+    head = ("rods", "machines", "met, and true", "met, not true", "beyond 3 times", "not met, and said so", "all rigid")
+    parts = [
+        f"{len(cases)} machines, seeds {cases[0].seed} to {cases[-1].seed}.",
+        table((*head, "search, median"), [row for row in [*rows, _row("all", list(cases))] if row[1] != "0"]),
+        _costs([case for case in cases if np.isfinite(case.least) and case.least > 0 and case.met]),
+        _owned([case for case in cases if not case.met]),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _row(name: str, cases: list[Case]) -> tuple[str, ...]:
+    met = [case for case in cases if case.met]
+    # A machine counts against the tolerance only where its finer model is known better than the tolerance itself.
+    over = [case for case in met if case.error > case.tolerance]
+    counts = (
+        len(cases),
+        len(met) - len(over),
+        len(over),
+        sum(case.error > 3 * case.tolerance for case in met),
+        len(cases) - len(met),
+        sum(case.rigid for case in met),
+    )
+    median = f"{np.median([case.seconds for case in cases]):.2f} s" if cases else ""
+    return (name, *map(str, counts), median)
+
+
+def _costs(cases: list[Case]) -> str:
+    if not cases:
+        return ""
+    ratios = np.array([case.work / case.least for case in cases])
+    return (
+        f"Work over that of the cheapest model that would have met the tolerance, for the {len(cases)} machines of "
+        f"one or two rods that are not all rigid: median {np.median(ratios):.2f}, 95 % below {np.quantile(ratios, 0.95):.2f}, "
+        f"largest {ratios.max():.2f}; above 2 for {np.mean(ratios > 2):.0%}."
+    )
+
+
+def _owned(cases: list[Case]) -> str:
+    if not cases:
+        return ""
+    reasons = {"too much work": "element steps", "runs rejected": "rejected", "does not settle": "settle"}
+    counts = {name: sum(word in case.reason for case in cases) for name, word in reasons.items()}
+    known = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
+    return f"Not met: {known}."
