@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from shoal.identification import METHODS
 from shoal.swarm import BudgetExhausted
+from shoal_validation.document import rewrite, table
 from shoal_validation.inverse_precision.cases import CASES, rigid_problem, textbook
 from shoal_validation.inverse_precision.charts import best_so_far, reach, worst_cells
 from shoal_validation.inverse_precision.contenders import Contender, contenders
-from shoal_validation.inverse_precision.document import rewrite, table
 from shoal_validation.inverse_precision.horizon_noise import (
     DEVIATIONS,
     EXACT,

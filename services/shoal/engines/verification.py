@@ -38,9 +38,7 @@ UNTRUSTED = (Status.DIVERGED, Status.ENERGY, Status.DRIFTED, Status.OUT_OF_REACH
 PATIENCE = 10.0
 """No second run is made that would take longer than so many seconds."""
 COST = 2e-8
-"""Seconds per unknown and evaluation, roughly."""
-MESH_COST = 4.0
-"""Twice the elements with the step they need take about so many times longer than the run with half the step."""
+"""Seconds per unknown and evaluation, roughly; a measured time would make the answer depend on the machine's load."""
 
 
 @dataclass(frozen=True)
@@ -87,37 +85,37 @@ def verified(engine: Engine, scene: Scene, times: Sequence[float] | Array | None
 def verify(trajectory: Trajectory, scene: Scene) -> Verification:
     """Estimate the errors of a run of a scene by more careful ones."""
     scale = _scale(trajectory, scene)
-    expected = 2 * COST * trajectory.model["unknowns"] * trajectory.model.get("evaluations", trajectory.steps)
-    careful, note = _second("time", lambda: _careful(scene, trajectory), expected, trajectory)
+    careful, note = _second("time", lambda: _careful(scene, trajectory), 1, trajectory)
     if careful is None:
         notes, time_error, rejected = [note], None, ""
     elif careful.status[0] in UNTRUSTED:
         return Verification(None, None, scale, rejected=careful.message)
     else:
         notes, time_error, rejected = [], _time_error(trajectory, careful, scene, scale), ""
-        expected = careful.wall_s
     if not any(_flexible(scene)):
         return Verification(time_error, None, scale, "; ".join(notes), rejected)
-    finer, note = _second("mesh", lambda: _finer(scene, 2), MESH_COST * expected, trajectory)
+    finer, note = _second("mesh", lambda: _finer(scene, 2), 2, trajectory)
     if finer is None or not finer.ok:
         note = note or "mesh error not estimated: the run on twice as many elements is rejected"
         return Verification(time_error, None, scale, "; ".join([*notes, note]))
     mesh_error = _distance(trajectory, finer)
     if COARSE * scale < mesh_error:
-        finest, _ = _second("mesh", lambda: _finer(scene, 4), MESH_COST**2 * expected, trajectory)
+        finest, _ = _second("mesh", lambda: _finer(scene, 4), 4, trajectory)
         if finest is not None and finest.ok:
             mesh_error = max(mesh_error, _distance(trajectory, finest))
     return Verification(time_error, mesh_error, scale, "; ".join(notes))
 
 
-def _second(
-    what: str, make: Callable[[], Scene], expected: float, trajectory: Trajectory
-) -> tuple[Trajectory | None, str]:
-    """A second run, or None and why it could not be had. expected: how long it will take [s]."""
-    if expected > PATIENCE:
-        return None, f"{what} error not estimated: that would take about {expected:.0f} s"
+def _second(what: str, make: Callable[[], Scene], times: int, trajectory: Trajectory) -> tuple[Trajectory | None, str]:
+    """A second run on so many times the unknowns, or None and why it could not be had."""
     try:
-        second = GaussEngine().simulate(make(), trajectory.times)
+        scene = make()
+        fixed = scene.solver.integrator == "leapfrog"
+        evaluations = trajectory.times[-1] / scene.solver.step if fixed else trajectory.model.get("evaluations", 0)
+        expected = COST * times * trajectory.model["unknowns"] * evaluations
+        if expected > PATIENCE:
+            return None, f"{what} error not estimated: that would take about {expected:.0f} s"
+        second = GaussEngine().simulate(scene, trajectory.times)
     except InputError as error:
         return None, f"{what} error not estimated: {error}"
     if second.status[0] is Status.FAILED:

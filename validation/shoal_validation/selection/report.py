@@ -45,8 +45,8 @@ def _costs(cases: list[Case]) -> str:
     ratios = np.array([case.work / case.least for case in cases])
     return (
         f"Work over that of the cheapest model that would have met the tolerance, for the {len(cases)} machines of "
-        f"one or two rods that are not all rigid: median {np.median(ratios):.2f}, 95 % below {np.quantile(ratios, 0.95):.2f}, "
-        f"largest {ratios.max():.2f}; above 2 for {np.mean(ratios > 2):.0%}."
+        f"one or two rods that are not all rigid: median {np.median(ratios):.2f}, 95 % below "
+        f"{np.quantile(ratios, 0.95):.2f}, largest {ratios.max():.2f}; above 2 for {np.mean(ratios > 2):.0%}."
     )
 
 
