@@ -13,7 +13,7 @@ SUITABLE := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_inf
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export DO_NOT_TRACK := true
 
-.PHONY: help setup demo test lint types imports bench up lock clean
+.PHONY: help setup demo test lint types imports bench charts up lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
@@ -61,6 +61,11 @@ imports: setup  ## imports go one way
 
 bench: setup  ## speed and accuracy against the other engines
 	@$(BIN)/python -m shoal_validation.benchmarks
+
+charts: setup  ## every chart and table of docs/ anew (an hour)
+	@for part in work_precision stability ablation inverse_precision selection; do \
+	  echo "== $$part"; $(BIN)/python -m shoal_validation.$$part; \
+	done
 
 up: setup  ## browse the runs
 	@$(BIN)/shoal ui

@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 from shoal.engines import get_engine
 from shoal_validation.problems import PROBLEMS, get_problem
 from shoal_validation.work_precision.contract import OURS, Method, Point, Run, counted
+from shoal_validation.work_precision.data import load, save
 from shoal_validation.work_precision.front import GAIN, cheapest, front
 from shoal_validation.work_precision.gauss import _method as own
 from shoal_validation.work_precision.measure import FAMILIES, Study, curve
 from shoal_validation.work_precision.mesh import with_mesh
-from shoal_validation.work_precision.page import BEGIN, END, failures, renew
+from shoal_validation.work_precision.page import failures, tables
 from shoal_validation.work_precision.table import costs
 
 FLEXIBLE = [name for name, problem in PROBLEMS.items() if problem.flexible]
@@ -119,15 +120,25 @@ def test_every_family_comes_near_the_rigid_double_pendulum(family: str) -> None:
     assert found.error < 1e-3
 
 
-def test_tables_replace_what_is_between_the_marks(tmp_path: Path) -> None:
-    """A second run leaves one set of tables; text around the marks stays."""
-    page = tmp_path / "page.md"
-    page.write_text(f"above\n{BEGIN}\nold\n{END}\nbelow\n", encoding="utf-8")
-    study = Study(get_problem("flexible-case-1"), [replace(POINT, seconds=2e-3, error=1e-3 / 2)])
-    for _ in range(2):
-        renew(page, [study], {"processor": "x"})
-    text = page.read_text(encoding="utf-8")
-    assert text.startswith("above\n")
-    assert text.endswith("below\n")
-    assert "old" not in text
-    assert text.count("2 ms: leapfrog, 2C/4C") == 2  # 1e-2 and 1e-3 m
+def test_data_can_be_drawn_again(tmp_path: Path) -> None:
+    """What was saved comes back: four digits of every number, and every status."""
+    wrong = replace(POINT, error=float("nan"), status="silently wrong", message="why")
+    study = Study(
+        get_problem("flexible-case-1"), [replace(POINT, error=1.23456e-3, mesh_error=2e-5), wrong], {"x": "y"}
+    )
+    save(tmp_path, [study], {"processor": "x"})
+    (found,), machine = load(tmp_path)
+    assert machine == {"processor": "x"}
+    assert found.left_out == study.left_out
+    assert found.points[0] == replace(study.points[0], error=1.235e-3)
+    assert not found.points[1].ok
+    assert found.points[1].message == "why"
+
+
+def test_tables_tell_what_an_error_costs() -> None:
+    """Each error that is reached has a line with the run that reaches it; one that is not says so."""
+    problem = get_problem("flexible-case-1")
+    text = tables([Study(problem, [replace(POINT, seconds=2e-3, error=5e-4)])], {"processor": "x"})
+    assert "| flexible-case-1 | 1e-03 | 2 ms: leapfrog, 2C/4C, step 0.001 s | not reached |" in text
+    assert "| flexible-case-1 | 1e-04 | not reached |" in text
+    assert problem.reference.source in text
