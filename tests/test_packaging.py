@@ -73,10 +73,14 @@ def test_kernel_cache_follows_the_sources_and_the_compiler(tmp_path: Path, monke
     before = home.kernel_cache().name
     monkeypatch.setattr(home, "_KERNELS", tmp_path / "mechanics")
     assert home.kernel_cache().name == before
-    (tmp_path / "mechanics" / "elements" / "new.py").write_text("x = 1\n")
+    (tmp_path / "mechanics" / "analysis" / "new.py").write_text("x = 1\n")
+    assert home.kernel_cache().name == before, "no kernel imports this file"
+    (tmp_path / "mechanics" / "elements" / "new.py").write_text("from numba import njit\n")
     with_new_file = home.kernel_cache().name
+    (tmp_path / "mechanics" / "affine.py").write_text("x = 1\n")
+    with_imported_file = home.kernel_cache().name
     monkeypatch.setattr(home, "_version", lambda package: "0")
-    assert len({before, with_new_file, home.kernel_cache().name}) == 3
+    assert len({before, with_new_file, with_imported_file, home.kernel_cache().name}) == 4
 
 
 def test_the_choice_of_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -83,11 +83,12 @@ class Record:
 
     def at_wanted(self) -> tuple[Array, Array]:
         """Coordinates and velocities at the wanted times, (samples, unknowns) each; cubic Hermite between steps."""
-        size = self.steps.size
-        row = np.searchsorted(self.times, self.steps.wanted + 1e-9 * size, side="right") - 1
+        row = np.searchsorted(self.times, self.steps.wanted + 1e-9 * self.steps.size, side="right") - 1
         row = np.clip(row, 0, max(len(self.times) - 2, 0))
         after = np.minimum(row + 1, len(self.times) - 1)
-        s = ((self.steps.wanted - self.times[row]) / size)[:, None]
+        # Of a thinned record the last two kept steps need not be neighbours.
+        size = np.where(after > row, self.times[after] - self.times[row], self.steps.size)[:, None]
+        s = (self.steps.wanted - self.times[row])[:, None] / size
         s = np.where(np.abs(s - np.round(s)) < 1e-6, np.round(s), s)
         q0, q1, v0, v1 = self.q[row], self.q[after], self.v[row] * size, self.v[after] * size
         q = (1 + 2 * s) * (1 - s) ** 2 * q0 + s * (1 - s) ** 2 * v0 + s**2 * (3 - 2 * s) * q1 + s**2 * (s - 1) * v1
