@@ -7,43 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.special import ellipj, ellipk
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
+from shoal_validation.problems import one_angle
 
-G = 9.81
-
-
-def _motion(acceleration: Callable[[float, float], float], angle: float, rate: float, end: float) -> float:
-    """The angle at the end of a motion with one degree of freedom, by scipy."""
-    run = solve_ivp(lambda _, y: [y[1], acceleration(*y)], (0.0, end), [angle, rate], "DOP853", rtol=1e-13, atol=1e-13)
-    assert run.success
-    return float(run.y[0, -1])
+Reference = Callable[[Any], Any]
 
 
-def _four_bar(loops: int, end: float) -> Any:
-    """Tip of the first crank; the angle from upright obeys phi'' = kappa sin phi."""
-    kappa = G * ((loops + 1) / 2 + loops) / ((loops + 1) / 3 + loops)
-    phi = _motion(lambda angle, _: kappa * np.sin(angle), 0.0, 1.0, end)
-    return np.array([np.sin(phi), np.cos(phi)])
-
-
-def _parallelogram(angle: float, rate: float, end: float, side: float = 0.0) -> Any:
-    """Cranks of 1 and 3 kg and a coupler of 2 kg, which translates, are one pendulum; `side` [N] pulls along x."""
-    inertia = (1.0 + 3.0) / 3 + 2.0
-    phi = _motion(lambda a, _: (-4.0 * G * np.cos(a) - side * np.sin(a)) / inertia, angle, rate, end)
-    return np.array([np.cos(phi), np.sin(phi)])
-
-
-def _slider_crank(angle: float, rate: float, end: float) -> Any:
-    """T = (1/3 + sin^2 a) a'^2, V = g sin a for two uniform rods of 1 m and 1 kg; place of the slider."""
-
-    def acceleration(a: float, w: float) -> float:
-        inertia = 2 / 3 + 2 * np.sin(a) ** 2
-        return float(-(G * np.cos(a) + 2 * np.sin(a) * np.cos(a) * w * w) / inertia)
-
-    return np.array([2 * np.cos(_motion(acceleration, angle, rate, end)), 0.0])
+def _end(reference: Reference, end: float) -> Any:
+    """The marker at the end of a motion that is known in one angle (see the problem library)."""
+    return reference(np.array([end])).points[-1]
 
 
 def _at(scene: Scene, marker: str, end: float) -> Any:
@@ -57,7 +30,7 @@ def _at(scene: Scene, marker: str, end: float) -> Any:
 )
 def test_n_four_bar_turns_through_its_singular_positions(loops: int, end: float, tolerance: float) -> None:
     scene = load_scene(f"n-four-bar-{loops}")
-    np.testing.assert_allclose(_at(scene, "B0", end), _four_bar(loops, end), atol=tolerance)
+    np.testing.assert_allclose(_at(scene, "B0", end), _end(one_angle.four_bar(loops), end), atol=tolerance)
 
 
 def test_n_four_bar_ends_where_its_elliptic_function_says() -> None:
@@ -69,12 +42,14 @@ def test_n_four_bar_ends_where_its_elliptic_function_says() -> None:
 def test_parallelogram_with_unequal_cranks(side: float) -> None:
     load = {"pull": {"kind": "force", "at": {"body": "left", "point": "end"}, "force": [side, 0.0]}}
     scene = load_scene("parallelogram").with_values({"loads": load})
-    np.testing.assert_allclose(_at(scene, "A", 10.0), _parallelogram(np.pi / 2, -1.0, 10.0, side), atol=1e-8)
+    np.testing.assert_allclose(
+        _at(scene, "A", 10.0), _end(one_angle.parallelogram(np.pi / 2, -1.0, side), 10.0), atol=1e-8
+    )
 
 
 def test_slider_crank_of_equal_rods_passes_the_bearing() -> None:
     scene = load_scene("equal-slider-crank")
-    np.testing.assert_allclose(_at(scene, "B", 5.0), _slider_crank(np.pi / 4, 6.0, 5.0), atol=1e-8)
+    np.testing.assert_allclose(_at(scene, "B", 5.0), _end(one_angle.slider_crank(np.pi / 4, 6.0), 5.0), atol=1e-8)
 
 
 def _flat(side: float, offset: float = 0.0) -> Scene:
@@ -86,8 +61,8 @@ def _flat(side: float, offset: float = 0.0) -> Scene:
 
 
 STARTS = {
-    "parallelogram": (_flat(0.0), "A", lambda end: _parallelogram(0.0, -4.0, end)),
-    "parallelogram-pulled": (_flat(20.0), "A", lambda end: _parallelogram(0.0, -4.0, end, 20.0)),
+    "parallelogram": (_flat(0.0), "A", one_angle.parallelogram(0.0, -4.0)),
+    "parallelogram-pulled": (_flat(20.0), "A", one_angle.parallelogram(0.0, -4.0, 20.0)),
     "slider-crank": (
         load_scene("equal-slider-crank").with_values(
             {
@@ -98,7 +73,7 @@ STARTS = {
             }
         ),
         "B",
-        lambda end: _slider_crank(np.pi / 2, 6.0, end),
+        one_angle.slider_crank(np.pi / 2, 6.0),
     ),
 }
 
@@ -112,7 +87,7 @@ def test_an_integrator_keeps_its_order_when_started_at_the_singular_position(
     end, errors = 0.4, []
     for step in (0.02, 0.01, 0.005):
         run = scene.with_values({"solver.integrator": integrator, "solver.step": step, "solver.energy_tolerance": 0.1})
-        errors.append(np.abs(_at(run, marker, end) - reference(end)).max())
+        errors.append(np.abs(_at(run, marker, end) - _end(reference, end)).max())
     slopes = np.diff(np.log(errors)) / np.log(0.5)
     assert slopes[-1] > order - 0.35, f"errors {errors}"
 
@@ -120,7 +95,7 @@ def test_an_integrator_keeps_its_order_when_started_at_the_singular_position(
 @pytest.mark.parametrize("offset", [0.0, 1e-12, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-2])
 def test_started_at_any_distance_from_the_singular_position(offset: float) -> None:
     scene = _flat(20.0, offset)
-    np.testing.assert_allclose(_at(scene, "A", 1.0), _parallelogram(offset, -4.0, 1.0, 20.0), atol=1e-7)
+    np.testing.assert_allclose(_at(scene, "A", 1.0), _end(one_angle.parallelogram(offset, -4.0, 20.0), 1.0), atol=1e-7)
 
 
 @pytest.mark.parametrize("acceleration", ["kkt", "augmented-lagrangian", "proximal"])
@@ -128,7 +103,7 @@ def test_other_solvers_agree_while_drift_is_removed(acceleration: str) -> None:
     scene = load_scene("n-four-bar-2").with_values(
         {"solver.acceleration": acceleration, "solver.integrator": "rk4", "solver.step": 1e-3}
     )
-    np.testing.assert_allclose(_at(scene, "B0", 10.0), _four_bar(2, 10.0), atol=1e-6)
+    np.testing.assert_allclose(_at(scene, "B0", 10.0), _end(one_angle.four_bar(2), 10.0), atol=1e-6)
 
 
 def test_andrews_squeezing_mechanism_ends_at_its_published_angles() -> None:
@@ -146,8 +121,4 @@ def test_andrews_squeezing_mechanism_ends_at_its_published_angles() -> None:
 def test_two_thousand_seconds_of_a_pendulum() -> None:
     """A mass point on 1 m, released horizontally: sin((angle + pi/2)/2) = k sn(K - omega t | k^2), k^2 = 1/2."""
     scene = load_scene("single-pendulum").with_values({"solver.duration": 2000.0, "initial.OA.angle": 0.0})
-    omega, m = np.sqrt(G), 0.5
-    sn = ellipj(ellipk(m) - omega * 2000.0, m)[0]
-    swing = 2 * np.arcsin(np.sqrt(m) * sn)
-    expected = np.array([np.sin(swing), -np.cos(swing)])
-    np.testing.assert_allclose(_at(scene, "A", 2000.0), expected, atol=1e-6)
+    np.testing.assert_allclose(_at(scene, "A", 2000.0), _end(one_angle.pendulum, 2000.0), atol=1e-6)
