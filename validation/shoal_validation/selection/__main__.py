@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -33,14 +33,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.selection", description=__doc__)
     parser.add_argument("--machines", type=int, default=200, help="how many random machines (default: 200)")
     parser.add_argument("--first", type=int, default=0, help="seed of the first (default: 0)")
+    parser.add_argument("--resume", action="store_true", help="keep the machines that selection.json holds already")
     parser.add_argument("--out", type=Path, default=DOCS / "charts", help="folder of chart and data")
     asked = parser.parse_args()
     if asked.machines < 1:
         parser.error(f"--machines: needs one or more, found {asked.machines}")
-    cases = list(cases_of(range(asked.first, asked.first + asked.machines)))
     asked.out.mkdir(parents=True, exist_ok=True)
-    data = plain([asdict(case) for case in cases])
-    (asked.out / "selection.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    record = asked.out / "selection.json"
+    seeds = range(asked.first, asked.first + asked.machines)
+    cases = [case for case in load(record) if case.seed in seeds] if asked.resume else []
+    for case in cases_of([seed for seed in seeds if seed not in {case.seed for case in cases}]):
+        cases.append(case)
+        save(cases, record)
     draw_chart(cases, asked.out / "selection.png")
     text = section(cases)
     if asked.out == DOCS / "charts":
@@ -48,7 +52,19 @@ def main() -> None:
     Console(highlight=False).print(text)
 
 
-def cases_of(seeds: range) -> Iterator[Case]:
+def save(cases: Sequence[Case], record: Path) -> None:
+    """All cases so far, so that a study that was stopped can go on."""
+    data = plain([asdict(case) for case in sorted(cases, key=lambda case: case.seed)])
+    record.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+
+
+def load(record: Path) -> list[Case]:
+    """The cases that `save` wrote, where null stands for what is not known."""
+    rows = json.loads(record.read_text(encoding="utf-8"))
+    return [Case(**{name: np.nan if value is None else value for name, value in row.items()}) for row in rows]
+
+
+def cases_of(seeds: Sequence[int]) -> Iterator[Case]:
     """What the machines of these seeds show, with progress on standard error."""
     for seed in track(seeds, "machines", console=Console(stderr=True)):
         machine = draw(seed)
