@@ -57,14 +57,15 @@ def test_machines_are_what_their_seed_says() -> None:
 
 def test_report_counts_broken_words(tmp_path: Path) -> None:
     cases = [_case(0, error=0.5), _case(1, error=1.5), _case(2, error=4.0), _case(3, error=9.0, met=False)]
+    cases.append(_case(4, error=9.0, reference=8.0))
     text = section(cases)
-    assert "| all | 4 | 1 | 2 | 1 | 1 | 0 |" in text
+    assert "| all | 5 | 1 | 2 | 1 | 1 | 1 | 0 |" in text
     assert "largest 2.00" in text
     draw_chart(cases, tmp_path / "chart.png")
     assert (tmp_path / "chart.png").stat().st_size > 10_000
 
 
-def _case(seed: int, error: float, met: bool = True) -> Case:
+def _case(seed: int, error: float, met: bool = True, reference: float = 0.01) -> Case:
     return Case(
         seed=seed,
         rods=1,
@@ -76,7 +77,7 @@ def _case(seed: int, error: float, met: bool = True) -> Case:
         rigid=False,
         estimate=0.5,
         error=error,
-        reference_error=0.01,
+        reference_error=reference,
         work=2.0,
         least=1.0,
         cheapest="A 1 cable",
@@ -88,7 +89,7 @@ def _case(seed: int, error: float, met: bool = True) -> Case:
 def test_two_hundred_machines() -> None:
     """Exhaustive search for the cheapest model up to two rods; see docs/model-choice.md."""
     cases = [study(machine, exhaustive=len(machine.scene.bodies) <= 2) for machine in map(draw, range(200))]
-    met = [case for case in cases if case.met]
+    met = [case for case in cases if case.met and case.known]
     assert len(met) >= 0.8 * len(cases)
     assert np.mean([case.error <= case.tolerance for case in met]) >= 0.95
     assert all(case.error <= 3 * case.tolerance for case in met)

@@ -11,6 +11,7 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -61,7 +62,8 @@ def save(cases: Sequence[Case], record: Path) -> None:
 def load(record: Path) -> list[Case]:
     """The cases that `save` wrote, where null stands for what is not known."""
     rows = json.loads(record.read_text(encoding="utf-8"))
-    return [Case(**{name: np.nan if value is None else value for name, value in row.items()}) for row in rows]
+    known: list[dict[str, Any]] = [{k: np.nan if value is None else value for k, value in row.items()} for row in rows]
+    return [Case(**row) for row in known]
 
 
 def cases_of(seeds: Sequence[int]) -> Iterator[Case]:

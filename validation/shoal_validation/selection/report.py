@@ -13,7 +13,16 @@ from shoal_validation.selection.study import Case
 def section(cases: Sequence[Case]) -> str:
     """What became of all machines, by number of rods."""
     rows = [_row(f"{rods}", [case for case in cases if case.rods == rods]) for rods in (1, 2, 3, 4)]
-    head = ("rods", "machines", "met, and true", "met, not true", "beyond 3 times", "not met, and said so", "all rigid")
+    head = (
+        "rods",
+        "machines",
+        "met, and true",
+        "met, not true",
+        "beyond 3 times",
+        "met, truth unknown",
+        "not met, and said so",
+        "all rigid",
+    )
     parts = [
         f"{len(cases)} machines, seeds {cases[0].seed} to {cases[-1].seed}.",
         table((*head, "search, median"), [row for row in [*rows, _row("all", list(cases))] if row[1] != "0"]),
@@ -25,13 +34,14 @@ def section(cases: Sequence[Case]) -> str:
 
 def _row(name: str, cases: list[Case]) -> tuple[str, ...]:
     met = [case for case in cases if case.met]
-    # A machine counts against the tolerance only where its finer model is known better than the tolerance itself.
-    over = [case for case in met if case.error > case.tolerance]
+    judged = [case for case in met if case.known]
+    over = [case for case in judged if case.error > case.tolerance]
     counts = (
         len(cases),
-        len(met) - len(over),
+        len(judged) - len(over),
         len(over),
-        sum(case.error > 3 * case.tolerance for case in met),
+        sum(case.error > 3 * case.tolerance for case in judged),
+        len(met) - len(judged),
         len(cases) - len(met),
         sum(case.rigid for case in met),
     )

@@ -43,6 +43,11 @@ class Case:
     cheapest: str
     seconds: float
 
+    @property
+    def known(self) -> bool:
+        """Whether the finer model is known well enough to judge by."""
+        return bool(self.reference_error < 0.5 * self.tolerance)
+
 
 def study(machine: Draw, exhaustive: bool = False) -> Case:
     """Select, then judge by a finer selection."""
