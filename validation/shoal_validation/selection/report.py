@@ -14,18 +14,12 @@ def section(cases: Sequence[Case]) -> str:
     """What became of all machines, by number of rods."""
     rows = [_row(f"{rods}", [case for case in cases if case.rods == rods]) for rods in (1, 2, 3, 4)]
     head = (
-        "rods",
-        "machines",
-        "met, and true",
-        "met, not true",
-        "beyond 3 times",
-        "met, truth unknown",
-        "not met, and said so",
-        "all rigid",
+        *("rods", "machines", "met, and true", "met, not true", "beyond 3 times", "met, truth unknown"),
+        *("not met, and said so", "all rigid", "search, median"),
     )
     parts = [
         f"{len(cases)} machines, seeds {cases[0].seed} to {cases[-1].seed}.",
-        table((*head, "search, median"), [row for row in [*rows, _row("all", list(cases))] if row[1] != "0"]),
+        table(head, [row for row in [*rows, _row("all", list(cases))] if row[1] != "0"]),
         _costs([case for case in cases if np.isfinite(case.least) and case.least > 0 and case.met]),
         _owned([case for case in cases if not case.met]),
     ]
