@@ -50,7 +50,7 @@ def _fingerprint() -> str:
     digest = hashlib.sha256()
     for name, text in sorted(_kernel_sources().items()):
         digest.update(name.encode() + b"\0" + text.encode() + b"\0")
-    for part in (_version("numba"), _version("numpy"), platform.python_version(), _processor()):
+    for part in (_version("numba"), _version("numpy"), platform.python_version(), processor()):
         digest.update(part.encode() + b"\0")
     return digest.hexdigest()[:16]
 
@@ -79,7 +79,8 @@ def _version(package: str) -> str:
         return ""
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Name of the processor, on which machine code and times depend."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
-from shoal.home import home
+from shoal.home import home, processor
 
-from shoal_validation.benchmarks import forward, inverse
-
-PROBLEMS = ("paper-case-1", "paper-case-1-same-mesh")
+from shoal_validation.benchmarks import forward
 
 
 def main() -> None:
@@ -25,16 +22,9 @@ def main() -> None:
         table.add_row(row.name, f"{row.seconds * 1e3:.4f}", f"{row.ratio:.1f}")
     console.print(table)
 
-    methods = [row for problem in PROBLEMS for row in inverse.measure_methods(problem)]
-    table = Table("identification", "evaluations", "s", "fitness", "error [rad]", box=box.SIMPLE_HEAD)
-    for line in methods:
-        numbers = (f"{line.evaluations}", f"{line.seconds:.3f}", f"{line.fitness:.2e}", f"{line.error:.1e}")
-        table.add_row(line.name, *numbers)
-    console.print(table)
-
     out = home() / "benchmarks.json"
-    machine = {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count()}
-    data = {"machine": machine, "forward": [vars(row) for row in rows], "inverse": [vars(row) for row in methods]}
+    machine = {"processor": processor(), "cores": os.cpu_count()}
+    data = {"machine": machine, "forward": [vars(row) for row in rows]}
     out.write_text(json.dumps(data, indent=1), encoding="utf-8")
     console.print(f"written to {out}")
 

@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 import numpy as np
+from shoal.home import processor
 from shoal.trajectory import Status
 
 from shoal_validation.nightly.history import compare
@@ -82,11 +82,7 @@ def judged(line: Line, measured: Measured) -> Result:
 
 def machine() -> str:
     """Processor and cores: what times depend on."""
-    cpuinfo = Path("/proc/cpuinfo")
-    text = cpuinfo.read_text(encoding="utf-8", errors="replace") if cpuinfo.exists() else ""
-    names = (line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("model name"))
-    processor = next(names, "") or platform.processor() or platform.machine()
-    return f"{processor}, {os.cpu_count()} cores"
+    return f"{processor()}, {os.cpu_count()} cores"
 
 
 def versions() -> dict[str, str]:

@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from shoal.home import processor
 from shoal.trajectory import plain
 
 from shoal_validation.problems import get_problem
@@ -22,9 +23,7 @@ FILE = "work-precision.json"
 
 def machine_facts() -> dict[str, str]:
     """What the times depend on."""
-    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines() if Path("/proc/cpuinfo").exists() else []
-    processor = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
-    facts = {"processor": processor or platform.processor() or platform.machine(), "cores": str(os.cpu_count())}
+    facts = {"processor": processor(), "cores": str(os.cpu_count())}
     facts["python"] = platform.python_version()
     for package in PACKAGES:
         try:
