@@ -13,7 +13,7 @@ from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.selection import select
-from shoal.selection.levels import LADDER, RIGID, below, cable, quintic
+from shoal.selection.levels import LADDERS, RIGID, below, cable, quintic
 from shoal.selection.prior import estimate
 from shoal.selection.run import distance
 from shoal.selection.work import INTEGRATOR, Forecast
@@ -116,9 +116,22 @@ def test_command_line_prints_the_ladder() -> None:
     assert data["selection"]["levels"]["AB"]["element"] != "rigid"
 
 
-def test_levels_below_are_coarser() -> None:
-    for level in LADDER:
-        assert all(LADDER.index(coarser) < LADDER.index(level) for coarser in below(level))
+@pytest.mark.parametrize("limit", list(LADDERS))
+def test_levels_below_are_coarser(limit: str) -> None:
+    ladder = LADDERS[limit]
+    for level in ladder:
+        assert all(ladder.index(coarser) < ladder.index(level) for coarser in below(level, limit))
+
+
+def test_ancf_full_is_a_theory_of_its_own() -> None:
+    """Its limit has shear, so that no rod becomes a cable."""
+    thick = {f"bodies.{rod}.{key}": value for rod in ("OA", "AB")
+             for key, value in (("element", "ancf-full"), ("law", "enhanced"), ("height", 0.05))}  # fmt: skip
+    selection = select(HEADLINE.with_values(thick), 2e-2)
+    assert selection.met
+    assert {level.element for level in selection.chosen.levels.values()} == {"ancf-full"}
+    yardstick = [rung for rung in selection.rungs if rung.role == "yardstick"][-1]
+    assert distance(selection.chosen.trajectory, yardstick.trajectory) <= 2e-2
 
 
 @pytest.mark.parametrize("levels", [(cable(2), cable(4)), (quintic(1), quintic(8)), (quintic(4), quintic(2))])

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from shoal.scene import Scene
-from shoal.selection.levels import REFINEMENTS, RIGID, Level, Levels, quintic
+from shoal.selection.levels import REFINEMENTS, RIGID, Level, Levels
 from shoal.selection.run import MARGIN, Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
@@ -44,10 +44,14 @@ class Yardstick:
 
 
 class Runs:
-    """Runs of one scene on different levels, each made once. rungs: all of them, in the order they were made."""
+    """Runs of one scene on different levels, each made once.
 
-    def __init__(self, scene: Scene, times: Array, forecast: Forecast, progress: Progress) -> None:
-        self.scene, self.times, self.forecast, self.progress = scene, times, forecast, progress
+    limits: the open rods with the element whose limit is their truth; rungs: all runs, in the order they were made
+    """
+
+    def __init__(self, scene: Scene, times: Array, limits: Mapping[str, str], progress: Progress) -> None:
+        self.scene, self.times, self.limits, self.progress = scene, times, limits, progress
+        self.forecast = Forecast(scene, tuple(limits))
         self.rungs: list[Rung] = []
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
 
@@ -61,6 +65,10 @@ class Runs:
             self._done[key] = rung
         return self._done[key]
 
+    def refined(self, count: Mapping[str, int]) -> dict[str, Level]:
+        """Rods of so many elements of the kind whose limit is their truth."""
+        return {rod: Level(self.limits[rod], n) for rod, n in count.items()}
+
     def add(self, rung: Rung) -> None:
         """Note a run."""
         self.rungs.append(rung)
@@ -71,13 +79,13 @@ def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) ->
     """Refine the rods until two neighbours agree; else say why that was not to be had."""
     count = dict.fromkeys(rods, REFINEMENTS[0])
     growing, gap, last_gap, rejected = rods, np.inf, np.nan, 0
-    fine = runs(_levels(count, fixed), HALF, YARDSTICK)
+    fine = runs({**fixed, **runs.refined(count)}, HALF, YARDSTICK)
     while True:
         coarse, base = fine, dict(count)
         if any(count[rod] == REFINEMENTS[-1] for rod in growing):
             return f"{REFINEMENTS[-1]} elements for {', '.join(growing)} do not settle it"
         count |= {rod: REFINEMENTS[REFINEMENTS.index(count[rod]) + 1] for rod in growing}
-        levels = _levels(count, fixed)
+        levels = {**fixed, **runs.refined(count)}
         if (work := 2 * runs.forecast.work(levels)) > WORK_LIMIT:
             return f"the next refinement ({_words(levels)}) takes {work:.1g} element steps, more than {WORK_LIMIT:.0e}"
         fine = runs(levels, HALF, YARDSTICK)
@@ -89,7 +97,7 @@ def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) ->
         if gap <= AGREE * tolerance:
             fall = np.clip(last_gap / gap, 3.0, 16.0) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
             fine.error = gap / (fall - 1.0)
-            return Yardstick(fine, float(fine.error), _levels(base, fixed), gap)
+            return Yardstick(fine, float(fine.error), {**fixed, **runs.refined(base)}, gap)
         count, growing = _next(runs, fine, count, base, growing, tolerance)
 
 
@@ -101,15 +109,11 @@ def _next(
         return count, growing
     parts = {}
     for rod in growing:
-        levels = fine.levels | {rod: quintic(base[rod])}
+        levels = fine.levels | runs.refined({rod: base[rod]})
         parts[rod] = distance(runs(levels, MARGIN, f"part of {rod}").trajectory, fine.trajectory)
     guilty = tuple(rod for rod, part in parts.items() if part > AGREE * tolerance / (4 * len(growing)))
     settled = {rod: base[rod] for rod, part in parts.items() if part < tolerance / 50}
     return count | settled, guilty or growing
-
-
-def _levels(count: dict[str, int], fixed: Levels) -> dict[str, Level]:
-    return {**fixed, **{rod: quintic(n) for rod, n in count.items()}}
 
 
 def _words(levels: Levels) -> str:

@@ -46,38 +46,39 @@ def quintic(n: int) -> Level:
     return Level("ancf-quintic", n)
 
 
-LADDER = (
-    RIGID,
-    *(cable(1), cable(2), quintic(1), cable(3), cable(4)),
-    *(quintic(n) for n in (2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)),
-)
-"""From coarse to fine."""
+COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
+LADDERS = {
+    "ancf-quintic": (
+        *(RIGID, cable(1), cable(2), quintic(1), cable(3), cable(4)),
+        *(quintic(n) for n in COUNTS if n > 1),
+    ),
+    "ancf-full": (RIGID, *(Level("ancf-full", n) for n in COUNTS)),
+}
+"""From coarse to fine, by the element whose limit is the truth."""
 
 REFINEMENTS = (1, 2, 4, 8, 16, 32, 64)
-"""Quintic elements of the models by which errors are estimated."""
+"""Numbers of these elements in the models by which errors are estimated."""
 
 Levels = Mapping[str, Level]
 """Of every rod whose model is open; the other bodies stay as the scene states them."""
 
 
-def below(level: Level) -> tuple[Level, ...]:
-    """Coarser levels, the finest first."""
-    return tuple(reversed(LADDER[: LADDER.index(level)]))
+def below(level: Level, limit: str) -> tuple[Level, ...]:
+    """Coarser levels, the finest first, of a rod whose truth is the limit of that element."""
+    ladder = LADDERS[limit]
+    return tuple(reversed(ladder[: ladder.index(level)]))
 
 
-def open_rods(scene: Scene) -> dict[str, str | None]:
-    """The rods of a scene, and why the model of one is not open: it has no modulus, or its element states a theory."""
-    reasons: dict[str, str | None] = {}
-    for name, body in scene.bodies.items():
-        if not isinstance(body, Rod):
-            continue
-        if body.youngs_modulus is None:
-            reasons[name] = "no youngs_modulus"
-        elif body.element == "ancf-full":
-            reasons[name] = "ancf-full states a theory with shear"
-        else:
-            reasons[name] = None
-    return reasons
+def open_rods(scene: Scene) -> dict[str, str]:
+    """The rods whose model is open, and the element whose limit is their truth: of the scene's theory the finest.
+
+    Bernoulli-Euler's beam, unless the scene names ancf-full, which has shear and stretch of the section.
+    """
+    return {
+        name: "ancf-full" if body.element == "ancf-full" else "ancf-quintic"
+        for name, body in scene.bodies.items()
+        if isinstance(body, Rod) and body.youngs_modulus is not None
+    }
 
 
 def apply(scene: Scene, levels: Levels) -> Scene:

@@ -10,7 +10,7 @@ from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Scene
-from shoal.selection.levels import RIGID, Level, Levels, apply
+from shoal.selection.levels import RIGID, Level, Levels, apply, open_rods
 from shoal.selection.work import INTEGRATOR
 from shoal.trajectory import Array, Trajectory
 
@@ -72,9 +72,9 @@ def distance(one: Trajectory, other: Trajectory) -> float:
     return float(np.max(away))
 
 
-def can_be_flexible(scene: Scene, rod: str, others: tuple[str, ...]) -> str | None:
-    """None, or why this rod has to stay rigid."""
-    levels = dict.fromkeys(others, RIGID) | {rod: Level("ancf-quintic", 1)}
+def can_be_flexible(scene: Scene, rod: str, limit: str) -> str | None:
+    """None, or why this rod has to stay rigid. limit: the element it would be made of."""
+    levels = dict.fromkeys(open_rods(scene), RIGID) | {rod: Level(limit, 1)}
     try:
         stable_step(apply(scene, levels), INTEGRATOR)
     except InputError as error:

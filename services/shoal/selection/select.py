@@ -11,14 +11,13 @@ import numpy as np
 
 from shoal.engines.contract import sampling_times
 from shoal.errors import InputError
-from shoal.scene import Scene
+from shoal.scene import Rod, Scene
 from shoal.selection.climb import YARDSTICK, Progress, Runs, climb
 from shoal.selection.levels import RIGID, Level, Levels, open_rods
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
 from shoal.selection.theory import neglected
 from shoal.selection.trim import WITHIN, trim
-from shoal.selection.work import Forecast
 from shoal.trajectory import Array, Status, Trajectory, plain
 
 GRID = 50
@@ -93,8 +92,8 @@ def select(
     """The cheapest model of a scene whose estimated error at the markers is within `tolerance` [m].
 
     The truth is the converged theory: Bernoulli-Euler's beam for rods with a modulus, whatever element the scene
-    names for them. Integrator, step, element and number of elements are chosen; progress is told every model
-    that is run. Raises InputError.
+    names for them, but for ancf-full, which is a theory of its own. Integrator, step, element and number of elements
+    are chosen; progress is told every model that is run. Raises InputError.
     """
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
@@ -102,12 +101,13 @@ def select(
     asked = sampling_times(scene, times)
     scene = scene.with_values({"solver.duration": float(asked[-1])}) if asked[-1] > 0 else scene
     grid = _grid(asked)
-    rods, rigid = _open(scene)
+    limits, rigid = _open(scene)
+    rods = tuple(limits)
     priors = estimate(scene, rods) if rods else {}
     surely = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(rods) < tolerance]
     rigid |= {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
     fixed: Levels = dict.fromkeys(rods, RIGID)
-    runs = Runs(scene, grid, Forecast(scene, rods), progress)
+    runs = Runs(scene, grid, limits, progress)
     flexible = tuple(rod for rod in rods if rod not in surely)
     known = sum(priors[rod].error for rod in surely)
     if flexible:
@@ -129,15 +129,18 @@ def select(
     )
 
 
-def _open(scene: Scene) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Rods whose model is open, and the others with the reason."""
-    found = open_rods(scene)
-    closed = {rod: reason for rod, reason in found.items() if reason}
-    rods = tuple(rod for rod, reason in found.items() if not reason)
-    for rod in rods:
-        if reason := can_be_flexible(scene, rod, rods):
+def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
+    """Rods whose model is open with the element of their limit, and the other rods with the reason."""
+    limits = open_rods(scene)
+    closed = {
+        name: "no youngs_modulus"
+        for name, body in scene.bodies.items()
+        if isinstance(body, Rod) and body.youngs_modulus is None
+    }
+    for rod, limit in limits.items():
+        if reason := can_be_flexible(scene, rod, limit):
             closed[rod] = reason
-    return tuple(rod for rod in rods if rod not in closed), closed
+    return {rod: limit for rod, limit in limits.items() if rod not in closed}, closed
 
 
 def _rigid(runs: Runs, levels: Levels, tolerance: float, known: float) -> tuple[Rung, str]:

@@ -20,7 +20,7 @@ def neglected(chosen: Rung, runs: Runs) -> float:
     share = 0.0
     for name, level in chosen.levels.items():
         rod = runs.scene.bodies[name]
-        if level == RIGID or not isinstance(rod, Rod):
+        if level.element in ("rigid", "ancf-full") or not isinstance(rod, Rod):
             continue
         nu = rod.poisson_ratio
         kappa = 10 * (1 + nu) / (12 + 11 * nu)

@@ -49,7 +49,7 @@ def run(
                 result = min(result, again, key=_seconds)
             found.append(result)
     wall = time.perf_counter() - begin
-    when = started.strftime("%Y-%m-%dT%H:%M:%S")
+    when = started.replace(tzinfo=None).isoformat(timespec="milliseconds")
     return Night(when, machine(), versions(), quick, only, wall, tuple(found))
 
 

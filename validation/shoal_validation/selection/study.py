@@ -8,9 +8,8 @@ from itertools import product
 import numpy as np
 from shoal.selection import Selection, select
 from shoal.selection.climb import Runs
-from shoal.selection.levels import LADDER, RIGID, Level
+from shoal.selection.levels import LADDERS, RIGID, Level
 from shoal.selection.run import Rung, distance
-from shoal.selection.work import Forecast
 
 from shoal_validation.selection.machines import Draw
 
@@ -83,12 +82,12 @@ def _stiffness(machine: Draw) -> float:
 def _cheapest(machine: Draw, chosen: Selection, yardstick: Rung) -> tuple[float, str]:
     """The least work within the tolerance among all combinations of levels that cost less than the chosen model."""
     rods = tuple(chosen.chosen.levels)
-    forecast = Forecast(chosen.chosen.scene, rods)
-    runs = Runs(chosen.chosen.scene, yardstick.trajectory.times, forecast, lambda _: None)
+    limits = dict.fromkeys(rods, "ancf-quintic")
+    runs = Runs(chosen.chosen.scene, yardstick.trajectory.times, limits, lambda _: None)
     cheaper: list[tuple[float, dict[str, Level]]] = []
-    for levels in product(LADDER, repeat=len(rods)):
+    for levels in product(LADDERS["ancf-quintic"], repeat=len(rods)):
         combination = dict(zip(rods, levels, strict=True))
-        work = forecast.work(combination)
+        work = runs.forecast.work(combination)
         if 0 < work < chosen.chosen.work and any(level != RIGID for level in levels):
             cheaper.append((work, combination))
     for work, combination in sorted(cheaper, key=lambda pair: pair[0]):
