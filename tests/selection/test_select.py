@@ -86,6 +86,13 @@ def test_chaos_is_owned_up_to() -> None:
     assert "sensitive" in selection.trajectory.message
 
 
+def test_what_would_take_too_long_is_not_tried_and_not_met() -> None:
+    selection = select(_with_modulus(1e19), 1e-9)
+    assert not selection.met
+    assert not any(rung.flexible for rung in selection.rungs)
+    assert "element steps, more than" in selection.trajectory.message
+
+
 def test_rods_that_cannot_bend_say_why() -> None:
     offset = {"kind": "torsion-spring", "first": {"body": "OA", "point": [0.5, 0.1]}, "second": {"body": "AB"}}
     scene = _with_modulus(2e9).with_values(

@@ -79,7 +79,10 @@ def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) ->
     """Refine the rods until two neighbours agree; else say why that was not to be had."""
     count = dict.fromkeys(rods, REFINEMENTS[0])
     growing, gap, last_gap, rejected = rods, np.inf, np.nan, 0
-    fine = runs({**fixed, **runs.refined(count)}, HALF, YARDSTICK)
+    levels = {**fixed, **runs.refined(count)}
+    if (work := 2 * runs.forecast.work(levels)) > WORK_LIMIT:
+        return _too_much(levels, work)
+    fine = runs(levels, HALF, YARDSTICK)
     while True:
         coarse, base = fine, dict(count)
         if any(count[rod] == REFINEMENTS[-1] for rod in growing):
@@ -87,7 +90,7 @@ def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) ->
         count |= {rod: REFINEMENTS[REFINEMENTS.index(count[rod]) + 1] for rod in growing}
         levels = {**fixed, **runs.refined(count)}
         if (work := 2 * runs.forecast.work(levels)) > WORK_LIMIT:
-            return f"the next refinement ({_words(levels)}) takes {work:.1g} element steps, more than {WORK_LIMIT:.0e}"
+            return _too_much(levels, work)
         fine = runs(levels, HALF, YARDSTICK)
         rejected = 0 if fine.ok else rejected + 1
         if rejected == REJECTED:
@@ -116,5 +119,6 @@ def _next(
     return count | settled, guilty or growing
 
 
-def _words(levels: Levels) -> str:
-    return ", ".join(f"{rod} {level}" for rod, level in levels.items() if level != RIGID)
+def _too_much(levels: Levels, work: float) -> str:
+    words = ", ".join(f"{rod} {level}" for rod, level in levels.items() if level != RIGID)
+    return f"the next refinement ({words}) takes {work:.1g} element steps, more than {WORK_LIMIT:.1e}"

@@ -111,7 +111,8 @@ def select(
     flexible = tuple(rod for rod in rods if rod not in surely)
     known = sum(priors[rod].error for rod in surely)
     if flexible:
-        chosen, reason = _flexible(runs, flexible, fixed, tolerance, known)
+        worst = SURELY_RIGID * sum(prior.error for prior in priors.values())
+        chosen, reason = _flexible(runs, flexible, fixed, tolerance, known, worst)
     else:
         chosen, reason = _rigid(runs, fixed, tolerance, known)
     met = bool(chosen.error <= tolerance)
@@ -152,23 +153,32 @@ def _rigid(runs: Runs, levels: Levels, tolerance: float, known: float) -> tuple[
         rung = Rung(dict(levels), scene, trajectory, float(trajectory.model["evaluations"]), role="candidate")
         rung.tolerance = step_tolerance
         runs.add(rung)
-        if last is not None:
-            last.error = distance(last.trajectory, rung.trajectory) + known
-            if last.error <= WITHIN * tolerance:
-                return last, f"the next tolerance, {step_tolerance:g}, moves the markers by {last.error - known:.1g} m"
+        if last is None:
+            last = rung
+            continue
+        last.error = distance(last.trajectory, rung.trajectory) + known
+        if last.error == known and step_tolerance != TOLERANCES[-1]:
+            continue  # something else limits the steps, or nothing moves: the two runs are one
+        if last.error <= WITHIN * tolerance:
+            return last, f"the tolerance {step_tolerance:g} moves the markers by {last.error - known:.1g} m"
         last = rung
     assert last is not None
     last.error = runs.rungs[-2].error
     return last, "no tolerance of the integrator settles the motion; it is too sensitive for so long a run"
 
 
-def _flexible(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float, known: float) -> tuple[Rung, str]:
-    """Climb to a yardstick, then trim."""
+def _flexible(
+    runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float, known: float, worst: float
+) -> tuple[Rung, str]:
+    """Climb to a yardstick, then trim. worst: what rigid rods may cost a priori, for want of anything better [m]."""
     yardstick = climb(runs, rods, fixed, tolerance - known)
     if isinstance(yardstick, str):
-        *_, last, finest = [rung for rung in runs.rungs if rung.role == YARDSTICK]
-        finest.error = distance(last.trajectory, finest.trajectory) + known
-        return finest, yardstick
+        refined = [rung for rung in runs.rungs if rung.role == YARDSTICK]
+        if len(refined) < 2:
+            rigid, _ = _rigid(runs, dict.fromkeys(runs.limits, RIGID), tolerance, worst)
+            return rigid, yardstick
+        refined[-1].error = distance(refined[-2].trajectory, refined[-1].trajectory) + known
+        return refined[-1], yardstick
     yardstick.error += known
     chosen = trim(runs, yardstick, rods, tolerance)
     if chosen is None:
