@@ -41,8 +41,8 @@ def test_data_from_exudyns_fine_mesh_lie_within_the_intervals(name: str) -> None
         assert found.value == pytest.approx(true, abs=1e-3)
         assert found.lower <= true <= found.upper
         # The finer mesh predicts where the coarser one leads astray.
-        assert found.model_bias is not None
-        assert found.value + found.model_bias == pytest.approx(true, abs=1e-4)
+        assert found.correction is not None
+        assert found.value + found.correction == pytest.approx(true, abs=1e-4)
 
 
 def test_both_elbow_branches_are_looked_at() -> None:

@@ -20,7 +20,7 @@ def mesh_error(fits: Sequence[Fit], title: str) -> Figure:
     for panel, name in zip(axes[:, 0], names, strict=True):
         values = [f.estimate.parameters[name] for f in fits]
         true = [abs(v.value - f.estimate.truth[name]) for v, f in zip(values, fits, strict=True)]
-        predicted = [abs(v.model_bias) if v.model_bias is not None else np.nan for v in values]
+        predicted = [abs(v.correction) if v.correction is not None else np.nan for v in values]
         half = [(v.upper - v.lower) / 2 for v in values]
         dots = {"linestyle": "none", "markersize": 9}
         panel.plot(

@@ -51,7 +51,7 @@ def mesh_rows(study: Study) -> list[list[str]]:
         row = [fit.cell.name]
         for name, error in errors(fit).items():
             value = e.parameters[name]
-            predicted = None if value.model_bias is None else abs(value.model_bias)
+            predicted = None if value.correction is None else abs(value.correction)
             row += [degrees(abs(error), 5), degrees(predicted, 5), degrees((value.upper - value.lower) / 2, 5)]
         rows.append([*row, length(e.model_error_rms), length(e.rms), str(e.evaluations)])
     return rows

@@ -93,7 +93,7 @@ def _log_result(run: Run, fit: Fit) -> None:
         run.metric(f"interval/{name}/lower", value.lower)
         run.metric(f"interval/{name}/upper", value.upper)
         run.metric(f"interval/{name}/std", value.std)
-        if value.model_bias is not None:
-            run.metric(f"model_bias/{name}", value.model_bias)
+        if value.correction is not None:
+            run.metric(f"correction/{name}", value.correction)
     for name, true in estimate.truth.items():
         run.metric(f"error/{name}", estimate.parameters[name].value - true)

@@ -28,7 +28,8 @@ class Verdict(StrEnum):
 class Value:
     """An estimated number: standard deviation from the residuals, 95 % interval with the model's own error in it.
 
-    model_bias: estimated shift by the discretisation error of the model, None if not computed
+    correction: what a mesh twice as fine would add to the value, None if not computed; it is not added, but is in
+    the interval
     """
 
     value: float
@@ -36,7 +37,7 @@ class Value:
     lower: float
     upper: float
     identifiable: bool
-    model_bias: float | None = None
+    correction: float | None = None
     at_bound: bool = False
 
 

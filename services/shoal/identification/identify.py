@@ -92,9 +92,9 @@ def _estimate(
     scale = np.maximum(np.abs(point), 1e-3 * (model.upper - model.lower))
     at = linearise(jacobian, residual, scale, len(measurement.channels))
     model_error = _model_error(model, point)
-    bias = None if model_error is None else -at.pseudo_inverse @ model_error.ravel()
-    parameters = _parameters(model, point, at, bias)
-    quantities = _quantities(model, point, at, bias)
+    correction = None if model_error is None else -at.pseudo_inverse @ model_error.ravel()
+    parameters = _parameters(model, point, at, correction)
+    quantities = _quantities(model, point, at, correction)
     unknown = combinations(at.unknown, model.names)
     if verdict is Verdict.IDENTIFIED:
         verdict, message = _judge(model, outcome, residual, parameters, unknown)
@@ -165,18 +165,18 @@ def _coarse(model: ForwardModel, model_error: Array | None) -> str:
     return f"the mesh error of {size:.1g} exceeds the noise of {noise:.1g}; --tolerance {noise / 3:.1g} chooses a mesh"
 
 
-def _parameters(model: ForwardModel, point: Array, at: Linearisation, bias: Array | None) -> dict[str, Value]:
+def _parameters(model: ForwardModel, point: Array, at: Linearisation, correction: Array | None) -> dict[str, Value]:
     found = {}
     for k, name in enumerate(model.names):
         std, fixed = spread(lambda p, k=k: float(p[k]), point, at)  # type: ignore[misc]
         span = model.upper[k] - model.lower[k]
         at_bound = bool(min(point[k] - model.lower[k], model.upper[k] - point[k]) < 1e-6 * span)
-        shift = None if bias is None else float(bias[k])
+        shift = None if correction is None else float(correction[k])
         found[name] = _value(float(point[k]), std, fixed and not at_bound and std < span, shift, at_bound)
     return found
 
 
-def _quantities(model: ForwardModel, point: Array, at: Linearisation, bias: Array | None) -> dict[str, Value]:
+def _quantities(model: ForwardModel, point: Array, at: Linearisation, correction: Array | None) -> dict[str, Value]:
     constants = {name: float(model.scene.value(path)) for name, path in model.problem.constants.items()}
     found = {}
     for name, text in model.problem.quantities.items():
@@ -185,14 +185,14 @@ def _quantities(model: ForwardModel, point: Array, at: Linearisation, bias: Arra
             return expression.evaluate(text, {**constants, **dict(zip(model.names, p.tolist(), strict=True))})
 
         std, fixed = spread(value_at, point, at)
-        shift = None if bias is None else value_at(point + bias) - value_at(point)
+        shift = None if correction is None else value_at(point + correction) - value_at(point)
         found[name] = _value(value_at(point), std, fixed, shift, False)
     return found
 
 
-def _value(value: float, std: float, identifiable: bool, bias: float | None, at_bound: bool) -> Value:
-    half = 1.96 * std + abs(bias or 0.0)
-    return Value(value, std, value - half, value + half, bool(identifiable), bias, at_bound)
+def _value(value: float, std: float, identifiable: bool, correction: float | None, at_bound: bool) -> Value:
+    half = 1.96 * std + abs(correction or 0.0)
+    return Value(value, std, value - half, value + half, bool(identifiable), correction, at_bound)
 
 
 def _judge(

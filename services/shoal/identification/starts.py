@@ -35,12 +35,25 @@ def starting_points(model: ForwardModel) -> Array:
 
 
 def _first_pose(model: ForwardModel) -> tuple[Array, Array]:
-    """Channels and their rates at time zero, from a parabola through the first samples; both (channels,)."""
+    """Channels and their rates at time zero, from a polynomial through the first samples; both (channels,).
+
+    A machine released from rest moves as a polynomial in t^2 at first, which reaches back to zero from farther away.
+    """
     count = min(_FIRST_SAMPLES, len(model.measurement.times))
-    coefficients = np.polynomial.polynomial.polyfit(
-        model.measurement.times[:count], model.measurement.values[:count], deg=min(2, count - 1)
-    )
+    times, values = model.measurement.times[:count], model.measurement.values[:count]
+    if _at_rest(model):
+        coefficients = np.polynomial.polynomial.polyfit(times**2, values, deg=min(2, count - 1))
+        return coefficients[0], np.zeros_like(coefficients[0])
+    coefficients = np.polynomial.polynomial.polyfit(times, values, deg=min(2, count - 1))
     return coefficients[0], coefficients[1]
+
+
+def _at_rest(model: ForwardModel) -> bool:
+    """Whether the machine starts without any velocity, whatever the parameters are."""
+    moving = any(start.rate or any(start.velocity) for start in model.scene.initial.values())
+    paths = [p.path for p in model.problem.parameters.values()]
+    sought = any(path.startswith("initial.") and not path.endswith(".angle") for path in paths)
+    return not (moving or sought or model.scene.ground_points)
 
 
 def _poses(model: ForwardModel, middle: Array, angles: list[int], pose: Array) -> Array:
