@@ -201,6 +201,11 @@ def estimate_table(estimate: Estimate) -> None:
         f"fitness {estimate.fitness:.4e}, RMS {estimate.rms:.3e}; {estimate.evaluations} evaluations "
         f"in {estimate.wall_s:.2f} s"
     )
+    for stage in estimate.model.get("selection", ()):
+        out.print(
+            f"model for {stage['tolerance']:g} m: {stage['model']}, off by about {stage['error']:.1e} m, "
+            f"{stage['evaluations']} evaluations"
+        )
     if estimate.truth:
         errors = (f"{name} {estimate.parameters[name].value - true:+.2e}" for name, true in estimate.truth.items())
         out.print(f"against the truth of the computed data: {', '.join(errors)}")

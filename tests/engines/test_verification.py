@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 from shoal.engines import get_engine, verification
 from shoal.engines.verification import verified
@@ -51,6 +52,18 @@ def test_estimated_error_covers_the_true_one(name: str) -> None:
     estimate = (stated["time_error"] or 0.0) + (stated["mesh_error"] or 0.0)
     assert run.ok, run.message
     assert problem.error(run) <= 2 * estimate + problem.reference.error
+
+
+def test_chaos_is_believed_as_long_as_it_is_known() -> None:
+    """At 15 s tolerances of 1e-12 and 1e-14 are 0.13 m apart, 1e-10 and 1e-12 as far as the machine is long."""
+    scene = load_scene("rigid-double-pendulum").with_values({"solver.duration": 15.0})
+    run = verified(get_engine("gauss"), scene, [15.0])
+    tight = get_engine("gauss").simulate(
+        scene.with_values({"solver.relative_tolerance": 1e-14, "solver.absolute_tolerance": 1e-14}), [15.0]
+    )
+    true = float(np.linalg.norm(run.marker("B")[-1] - tight.marker("B")[-1]))
+    assert run.ok, run.message
+    assert true / 3 < run.model["verification"]["time_error"] < 3 * true
 
 
 def test_other_engines_are_held_against_the_native_one() -> None:

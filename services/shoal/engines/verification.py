@@ -30,6 +30,8 @@ SPAN = 100.0
 """Factor between the tolerances of two adaptive runs; the error falls at least tenfold with it."""
 LOOSE = 1e-8
 """A tolerance above this is held against a tighter one, a tolerance below against a looser one, which costs less."""
+TIGHTER, TIGHTEST = 0.1, 1e-14
+"""Factor on the tolerance of the run that tells whether a chaotic motion is still known; the smallest tolerance."""
 HALVING = 4.0 / 3.0
 """The error of a method of second order in terms of its distance from the run with half the step."""
 COARSE = 0.03
@@ -128,9 +130,13 @@ def _time_error(trajectory: Trajectory, careful: Trajectory, scene: Scene, scale
     away = _distance(trajectory, careful)
     if not _adaptive(trajectory):
         return HALVING * away
-    if scene.solver.relative_tolerance > LOOSE or away > WRONG * scale:
+    if scene.solver.relative_tolerance > LOOSE:
         return away
-    return float(away / np.sqrt(SPAN))
+    if away <= WRONG * scale:
+        return float(away / np.sqrt(SPAN))
+    # A chaotic motion may be lost to the looser run and not yet to this one, which a tighter one tells.
+    tighter, _ = _second("time", lambda: _careful(scene, trajectory, TIGHTER), 1, trajectory)
+    return away if tighter is None else min(away, _distance(trajectory, tighter))
 
 
 def _adaptive(trajectory: Trajectory) -> bool:
@@ -142,14 +148,14 @@ def _flexible(scene: Scene) -> dict[str, Rod]:
     return {n: body for n, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
 
 
-def _careful(scene: Scene, trajectory: Trajectory) -> Scene:
-    """The same mesh, with the usual treatment of constraints."""
+def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) -> Scene:
+    """The same mesh, with the usual treatment of constraints. factor: on the tolerance of an adaptive integrator."""
     usual = {name: Solver.model_fields[name].default for name in ("acceleration", "project", "rank_tolerance")}
     settings = {f"solver.{name}": value for name, value in usual.items()}
     if _adaptive(trajectory):
         solver = scene.solver
-        factor = 1 / SPAN if solver.relative_tolerance > LOOSE else SPAN
-        settings["solver.relative_tolerance"] = solver.relative_tolerance * factor
+        factor = factor or (1 / SPAN if solver.relative_tolerance > LOOSE else SPAN)
+        settings["solver.relative_tolerance"] = max(solver.relative_tolerance * factor, TIGHTEST)
         settings["solver.absolute_tolerance"] = solver.absolute_tolerance * factor
         return scene.with_values(settings)
     if not any(_flexible(scene)):
