@@ -34,13 +34,12 @@ Progress = Callable[[str], None]
 class Yardstick:
     """The finest model that was run and the coarser one that agrees with it.
 
-    rung, error: the finest and its own estimated error [m]; base: levels of the coarser; gap: their distance [m]
+    rung, error: the finest and its own estimated error [m]; base: levels of the coarser
     """
 
     rung: Rung
     error: float
     base: dict[str, Level]
-    gap: float
 
 
 class Runs:
@@ -100,7 +99,7 @@ def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) ->
         if gap <= AGREE * tolerance:
             fall = np.clip(last_gap / gap, 3.0, 16.0) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
             fine.error = gap / (fall - 1.0)
-            return Yardstick(fine, float(fine.error), {**fixed, **runs.refined(base)}, gap)
+            return Yardstick(fine, float(fine.error), {**fixed, **runs.refined(base)})
         count, growing = _next(runs, fine, count, base, growing, tolerance)
 
 

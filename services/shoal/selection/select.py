@@ -13,7 +13,7 @@ from shoal.engines.contract import sampling_times
 from shoal.errors import InputError
 from shoal.scene import Rod, Scene
 from shoal.selection.climb import YARDSTICK, Progress, Runs, climb
-from shoal.selection.levels import RIGID, Level, Levels, open_rods
+from shoal.selection.levels import RIGID, Levels, open_rods
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
 from shoal.selection.theory import neglected
@@ -56,16 +56,13 @@ class Selection:
             "reason": self.reason,
             "estimated_error": self.chosen.error,
             "neglected_shear": self.shear,
-            "levels": {rod: {"element": level.element, "elements": level.elements} for rod, level in self._levels()},
+            "levels": {rod: vars(level) for rod, level in self.chosen.levels.items()},
             "rigid": self.rigid,
             "priors": {rod: vars(prior) for rod, prior in self.priors.items()},
             "rungs": [_rung_json(rung, rung is self.chosen) for rung in self.rungs],
             "wall_s": self.wall_s,
         }
         return dict(plain(data))
-
-    def _levels(self) -> list[tuple[str, Level]]:
-        return list(self.chosen.levels.items())
 
 
 def _rung_json(rung: Rung, chosen: bool) -> dict[str, Any]:
