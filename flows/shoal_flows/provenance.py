@@ -5,8 +5,9 @@ from __future__ import annotations
 import platform
 import subprocess
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from shoal.versions import versions as of_packages
 
 PACKAGES = ("shoal", "numpy", "scipy", "numba", "exudyn", "casadi", "prefect", "mlflow")
 
@@ -14,13 +15,7 @@ PACKAGES = ("shoal", "numpy", "scipy", "numba", "exudyn", "casadi", "prefect", "
 @cache
 def versions() -> dict[str, str]:
     """Versions of the packages that shape the numbers, and of Python."""
-    found = {"python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+    return of_packages(PACKAGES)
 
 
 @cache

@@ -73,6 +73,10 @@ class Trajectory:
         """Direction at one marker [rad], (samples,)."""
         return self.angles[:, self.markers.index(name), lane]
 
+    def distance(self, other: Trajectory) -> float:
+        """Largest distance of a marker from where it is in another run of the same scene, over all times [m]."""
+        return float(np.max(np.linalg.norm(self.points - other.points, axis=2)))
+
     def to_json(self, lane: int = 0) -> dict[str, Any]:
         """One lane as plain data, which `shoal simulate --json` prints; null where nothing finite is known."""
         times = self.times.tolist()

@@ -17,15 +17,13 @@ from shoal.engines.contract import Engine
 from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.mechanics.integrators import facts
-from shoal.mechanics.simulate import stable_step
+from shoal.mechanics.simulate import STEP_MARGIN, stable_step
 from shoal.scene import GROUND, Rod, Scene, Solver
 from shoal.scene.joints import places
 from shoal.trajectory import Array, Status, Trajectory, plain
 
 WRONG = 0.1
 """A run whose estimated error is beyond this fraction of the machine's scale is rejected."""
-MARGIN = 0.95
-"""Of the stable step, which is that of the start."""
 SPAN = 100.0
 """Factor between the tolerances of two adaptive runs; the error falls at least tenfold with it."""
 LOOSE = 1e-8
@@ -100,11 +98,11 @@ def verify(trajectory: Trajectory, scene: Scene) -> Verification:
     if finer is None or not finer.ok:
         note = note or "mesh error not estimated: the run on twice as many elements is rejected"
         return Verification(time_error, None, scale, "; ".join([*notes, note]))
-    mesh_error = _distance(trajectory, finer)
+    mesh_error = trajectory.distance(finer)
     if COARSE * scale < mesh_error:
         finest, _ = _second("mesh", lambda: _finer(scene, 4), 4, trajectory)
         if finest is not None and finest.ok:
-            mesh_error = max(mesh_error, _distance(trajectory, finest))
+            mesh_error = max(mesh_error, trajectory.distance(finest))
     return Verification(time_error, mesh_error, scale, "; ".join(notes))
 
 
@@ -127,7 +125,7 @@ def _second(what: str, make: Callable[[], Scene], times: int, trajectory: Trajec
 
 def _time_error(trajectory: Trajectory, careful: Trajectory, scene: Scene, scale: float) -> float:
     """The distance of the two runs as an error of the first."""
-    away = _distance(trajectory, careful)
+    away = trajectory.distance(careful)
     if not _adaptive(trajectory):
         return HALVING * away
     if scene.solver.relative_tolerance > LOOSE:
@@ -136,7 +134,7 @@ def _time_error(trajectory: Trajectory, careful: Trajectory, scene: Scene, scale
         return float(away / np.sqrt(SPAN))
     # A chaotic motion may be lost to the looser run and not yet to this one, which a tighter one tells.
     tighter, _ = _second("time", lambda: _careful(scene, trajectory, TIGHTER), 1, trajectory)
-    return away if tighter is None else min(away, _distance(trajectory, tighter))
+    return away if tighter is None else min(away, trajectory.distance(tighter))
 
 
 def _adaptive(trajectory: Trajectory) -> bool:
@@ -170,13 +168,8 @@ def _finer(scene: Scene, times: int) -> Scene:
 
 
 def _leapfrog(scene: Scene, step: float) -> Scene:
-    step = min(step, MARGIN * stable_step(scene, "leapfrog"))
+    step = min(step, STEP_MARGIN * stable_step(scene, "leapfrog"))
     return scene.with_values({"solver.integrator": "leapfrog", "solver.step": step})
-
-
-def _distance(one: Trajectory, other: Trajectory) -> float:
-    away = np.linalg.norm(one.points - other.points, axis=2)
-    return float(np.max(away))
 
 
 def _scale(trajectory: Trajectory, scene: Scene) -> float:

@@ -30,6 +30,8 @@ from shoal.trajectory import Status, Trajectory
 
 REACH_MARGIN = 1.1
 DRIFT_TOLERANCE = 1e-6
+STEP_MARGIN = 0.95
+"""Of the stable step, which is that of the start and varies by a few percent along the motion."""
 
 
 def simulate(

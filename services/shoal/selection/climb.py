@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.scene import Scene
 from shoal.selection.levels import REFINEMENTS, RIGID, Level, Levels
-from shoal.selection.run import MARGIN, Rung, distance, flexible_scene, run
+from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
 
@@ -19,7 +20,7 @@ REJECTED = 3
 """So many refinements in a row whose run is rejected end the climb."""
 AGREE = 0.5
 """Two neighbours agree when they are closer than this fraction of the tolerance."""
-HALF = 0.5 * MARGIN
+HALF = 0.5 * STEP_MARGIN
 """A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
 UNKNOWN_FALL = 4.0
 """By which factor an error is taken to fall from one refinement to the next before two falls were seen."""
@@ -54,7 +55,7 @@ class Runs:
         self.rungs: list[Rung] = []
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
 
-    def __call__(self, levels: Levels, fraction: float = MARGIN, role: str = "") -> Rung:
+    def __call__(self, levels: Levels, fraction: float = STEP_MARGIN, role: str = "") -> Rung:
         """The run on these levels with a fraction of the stable step."""
         key = tuple(levels.items()), fraction
         if key not in self._done:
@@ -112,7 +113,7 @@ def _next(
     parts = {}
     for rod in growing:
         levels = fine.levels | runs.refined({rod: base[rod]})
-        parts[rod] = distance(runs(levels, MARGIN, f"part of {rod}").trajectory, fine.trajectory)
+        parts[rod] = distance(runs(levels, STEP_MARGIN, f"part of {rod}").trajectory, fine.trajectory)
     guilty = tuple(rod for rod, part in parts.items() if part > AGREE * tolerance / (4 * len(growing)))
     settled = {rod: base[rod] for rod, part in parts.items() if part < tolerance / 50}
     return count | settled, guilty or growing

@@ -98,8 +98,7 @@ def _growth(scene: Scene, times: Array, motion: Trajectory) -> float:
         if near is None:
             continue
         length = body.length if isinstance(body, Rod) else 1.0
-        away = np.linalg.norm(near.points - motion.points, axis=2)
-        largest = max(largest, float(np.max(away)) / (NUDGE * length))
+        largest = max(largest, near.distance(motion) / (NUDGE * length))
     return largest
 
 

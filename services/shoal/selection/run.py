@@ -14,9 +14,6 @@ from shoal.selection.levels import RIGID, Level, Levels, apply, open_rods
 from shoal.selection.work import INTEGRATOR
 from shoal.trajectory import Array, Trajectory
 
-MARGIN = 0.95
-"""Of the stable step, which is that of the start and varies by a few percent along the motion."""
-
 
 @dataclass
 class Rung:
@@ -68,8 +65,7 @@ def distance(one: Trajectory, other: Trajectory) -> float:
     """Largest distance of a marker between two runs over all times [m]; infinite unless both may be believed."""
     if not (one.ok and other.ok):
         return np.inf
-    away = np.linalg.norm(one.points - other.points, axis=2)
-    return float(np.max(away))
+    return one.distance(other)
 
 
 def can_be_flexible(scene: Scene, rod: str, limit: str) -> str | None:

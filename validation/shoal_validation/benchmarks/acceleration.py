@@ -112,7 +112,7 @@ def cost(name: str, scene: Scene, times: Array, true: Trajectory, search: Search
         longer = simulate(scene, LONGER * times)
         seconds = longer.wall_s / longer.steps
     swarm = run.model.get("swarm", {"evaluations": run.model["evaluations"], "error": np.nan})
-    path = float(np.max(np.linalg.norm(run.points - true.points, axis=2)))
+    path = run.distance(true)
     return CostRow(name, seconds, swarm["evaluations"] / run.steps, swarm["error"], path, run.status[0])
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import statistics
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
@@ -14,6 +13,7 @@ from shoal.engines.capabilities import require
 from shoal.errors import ComputationError, InputError
 from shoal.trajectory import Status, Trajectory
 
+from shoal_validation.benchmarks.timing import undisturbed
 from shoal_validation.problems import get_problem
 
 T = TypeVar("T")
@@ -77,18 +77,11 @@ def _motion(problem: str, call: Callable[[], Trajectory]) -> Measured:
 
 def _timed(call: Callable[[], T]) -> tuple[float, T]:
     """Median time of a call [s]; the first, which loads kernels and builds the model, counts only if it is long."""
-    first, answer = _once(call)
-    taken = [first] if first > LONG else [_once(call)[0]]
+    first, answer = undisturbed(call)
+    taken = [first] if first > LONG else [undisturbed(call)[0]]
     while len(taken) < REPEATS and sum(taken) < ENOUGH:
-        taken.append(_once(call)[0])
+        taken.append(undisturbed(call)[0])
     return statistics.median(taken), answer
-
-
-def _once(call: Callable[[], T]) -> tuple[float, T]:
-    """Time of a call [s] less what it waited for others on the machine: never more than its processor time."""
-    begin, busy = time.perf_counter(), time.process_time()
-    answer = call()
-    return min(time.perf_counter() - begin, time.process_time() - busy), answer
 
 
 def attempt(run: Callable[[], Measured]) -> Measured:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import platform
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 from shoal.home import processor
 from shoal.trajectory import Status
+from shoal.versions import versions
 
 from shoal_validation.nightly.history import compare
 from shoal_validation.nightly.measure import Measured
@@ -50,7 +49,7 @@ def run(
             found.append(result)
     wall = time.perf_counter() - begin
     when = started.replace(tzinfo=None).isoformat(timespec="milliseconds")
-    return Night(when, machine(), versions(), quick, only, wall, tuple(found))
+    return Night(when, machine(), versions(PACKAGES), quick, only, wall, tuple(found))
 
 
 def judged(line: Line, measured: Measured) -> Result:
@@ -83,17 +82,6 @@ def judged(line: Line, measured: Measured) -> Result:
 def machine() -> str:
     """Processor and cores: what times depend on."""
     return f"{processor()}, {os.cpu_count()} cores"
-
-
-def versions() -> dict[str, str]:
-    """Of Python and of the packages that shape the numbers."""
-    found = {"python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    return found
 
 
 def _words(line: Line, measured: Measured) -> str:

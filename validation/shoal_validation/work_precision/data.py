@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 from dataclasses import asdict
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from shoal.home import processor
 from shoal.trajectory import plain
+from shoal.versions import versions
 
 from shoal_validation.problems import get_problem
 from shoal_validation.work_precision.contract import Point
@@ -23,14 +22,7 @@ FILE = "work-precision.json"
 
 def machine_facts() -> dict[str, str]:
     """What the times depend on."""
-    facts = {"processor": processor(), "cores": str(os.cpu_count())}
-    facts["python"] = platform.python_version()
-    for package in PACKAGES:
-        try:
-            facts[package] = version(package)
-        except PackageNotFoundError:
-            facts[package] = "missing"
-    return facts
+    return {"processor": processor(), "cores": str(os.cpu_count()), **versions(PACKAGES)}
 
 
 def save(folder: Path, studies: list[Study], machine: dict[str, str]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from shoal.errors import ComputationError, InputError
 from shoal.trajectory import Array, Status
 
+from shoal_validation.benchmarks.timing import undisturbed
 from shoal_validation.judge import Outcome, judge
 from shoal_validation.problems import Problem
 from shoal_validation.work_precision import casadi, exudyn, gauss, mujoco, scipy
@@ -93,12 +94,12 @@ def timed(call: Callable[[], Run], repeats: int = REPEATS) -> tuple[float, Run]:
 
     A run that failed, or is very long, is not made again.
     """
-    first, run = _once(call)
+    first, run = undisturbed(lambda: _caught(call))
     if run.status != Status.OK or first > 3 * LONGEST:
         return first, run
     taken: list[float] = []
     while not taken or (len(taken) < repeats and sum(taken) < ENOUGH):
-        taken.append(_once(call)[0])
+        taken.append(undisturbed(lambda: _caught(call))[0])
     return statistics.median(taken), run
 
 
@@ -139,15 +140,13 @@ def _loop(problem: Problem, method: Method, setting: float, repeats: int) -> flo
     return statistics.median(taken)
 
 
-def _once(call: Callable[[], Run]) -> tuple[float, Run]:
-    """Wall-clock time of a call [s], less what it waited for others on the machine: never more than its CPU time."""
-    begin, busy = time.perf_counter(), time.process_time()
+def _caught(call: Callable[[], Run]) -> Run:
+    """A run whose refusal is a result like any other."""
     try:
-        run = call()
+        return call()
     except (InputError, ComputationError) as error:
         status = Status.REFUSED if isinstance(error, InputError) else Status.FAILED
-        run = Run(np.full((1, 2), np.nan), status, str(error))
-    return min(time.perf_counter() - begin, time.process_time() - busy), run
+        return Run(np.full((1, 2), np.nan), status, str(error))
 
 
 def _largest(away: Array) -> float:
