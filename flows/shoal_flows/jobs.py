@@ -13,7 +13,6 @@ from shoal.engines import sweep as sweeping
 from shoal.errors import InputError
 from shoal.identification import Estimate, Measurement, identify, load_problem, measure
 from shoal.identification.identify import load_truth
-from shoal.identification.measurement import observe
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Trajectory
 
@@ -54,7 +53,7 @@ class Fit:
     @property
     def residuals(self) -> Array:
         """Model minus measurement, (samples, channels)."""
-        return np.asarray(self.at_samples - self.estimate.measurement.values)
+        return np.asarray(self.at_samples - self.estimate.measurement.first.values)
 
 
 def measured(problem: str, data: str | None = None) -> Measurement:
@@ -78,11 +77,9 @@ def fit(cell: Cell, measurement: Measurement) -> Fit:
 
 def with_motion(cell: Cell, estimate: Estimate) -> Fit:
     """An estimate with the motion of what it found."""
-    measurement = estimate.measurement
-    engine = get_engine(cell.engine)
-    sampled = engine.simulate(estimate.scene, measurement.times)
-    grid = np.linspace(0.0, float(measurement.times[-1]), _POINTS)
-    return Fit(cell, estimate, observe(sampled, measurement.channels)[0], engine.simulate(estimate.scene, grid))
+    grid = np.linspace(0.0, float(estimate.measurement.first.times[-1]), _POINTS)
+    sampled = next(iter(estimate.predicted.values()))
+    return Fit(cell, estimate, sampled, get_engine(cell.engine).simulate(estimate.scene, grid))
 
 
 def simulated(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene, Trajectory]:

@@ -40,6 +40,8 @@ class Trajectory:
     constraint_drift: largest violation of a position constraint, (lanes,)
     steps: time steps taken by each lane; wall_s: wall-clock time of the whole call [s]
     model: what was computed, for the record (unknowns, elements, integrator, step, ...)
+    velocities: of the markers [m/s], (samples, markers, 2, lanes); rates: of the angles [rad/s],
+        (samples, markers, lanes); None where the engine does not tell them
     """
 
     engine: str
@@ -54,6 +56,8 @@ class Trajectory:
     wall_s: float
     message: str = ""
     model: dict[str, Any] = field(default_factory=dict)
+    velocities: Array | None = None
+    rates: Array | None = None
 
     @property
     def lanes(self) -> int:

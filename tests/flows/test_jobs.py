@@ -13,7 +13,7 @@ def test_fit_carries_the_motion_of_what_it_found(fits: list[Fit]) -> None:
     assert fit.estimate.verdict.trusted
     assert np.mean(np.sum(fit.residuals**2, axis=1)) == pytest.approx(fit.estimate.fitness, rel=1e-9)
     assert fit.motion.times[0] == 0
-    assert fit.motion.times[-1] == fit.estimate.measurement.times[-1]
+    assert fit.motion.times[-1] == fit.estimate.measurement.end
     assert np.allclose(fit.motion.marker("B")[-1], fit.at_samples[-1], atol=1e-12)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from shoal.errors import InputError
-from shoal.identification import Verdict, identify, load_problem, measure
+from shoal.identification import Measurement, Verdict, identify, load_problem, measure
 
 
 def test_search_goes_by_a_coarse_model_and_ends_on_the_needed_one() -> None:
@@ -39,9 +39,9 @@ def test_stated_noise_decides_what_a_fit_is() -> None:
     """Noise as large as the motion itself is no reason to reject a model that explains the rest."""
     problem = load_problem("paper-case-1-same-mesh")
     data = measure(problem, problem.load_scene())
-    noisy = type(data)(
-        **{**vars(data), "values": data.values + np.random.default_rng(0).normal(0, 0.3, data.values.shape)}
-    )
-    loud = identify(problem.model_copy(update={"noise": 0.3}), measurement=noisy)
+    one = data.first
+    shaken = one.values + np.random.default_rng(0).normal(0, 0.3, one.values.shape)
+    noisy, stated = (Measurement.single(one.times, one.channels, shaken, "shaken", noise=size) for size in (None, 0.3))
+    loud = identify(problem, measurement=stated)
     assert loud.verdict is not Verdict.REJECTED
     assert identify(problem, measurement=noisy).verdict is Verdict.REJECTED

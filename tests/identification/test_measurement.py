@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shoal.errors import InputError
-from shoal.identification import Measurement, load_problem, measure
+from shoal.identification import Recording, load_problem, measure
 
 
-def read(path: Path) -> Measurement:
+def read(path: Path) -> Recording:
     problem = load_problem("kaheman-single")
-    return measure(problem, problem.load_scene(), str(path))
+    return measure(problem, problem.load_scene(), str(path)).first
 
 
 def test_angles_lose_whole_turns_and_get_their_offset(tmp_path: Path) -> None:

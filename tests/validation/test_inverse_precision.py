@@ -73,8 +73,8 @@ def test_data_are_not_made_by_the_model_that_is_fitted() -> None:
 
 def test_noise_has_the_size_and_the_seed_that_it_says() -> None:
     clean, noisy, again = (textbook(rigid_problem(), 2.0, noise, 1) for noise in (0.0, 0.1, 0.1))
-    assert np.std(noisy.values - clean.values) == pytest.approx(0.1, rel=0.15)
-    assert np.array_equal(noisy.values, again.values)
+    assert np.std(noisy.first.values - clean.first.values) == pytest.approx(0.1, rel=0.15)
+    assert np.array_equal(noisy.first.values, again.first.values)
 
 
 def made(errors: list[float]) -> Run:

@@ -30,7 +30,7 @@ def convergence(fits: Sequence[Fit], title: str) -> Figure:
         )
     floor = [f.estimate.model_error_rms for f in fits if f.estimate.model_error_rms is not None]
     if floor:
-        things = fits[0].estimate.measurement.things
+        things = fits[0].estimate.measurement.first.things
         level = things * float(np.min(floor)) ** 2
         axes.axhline(level, color=GREY, linewidth=1, linestyle=(0, (1, 2)))
         axes.annotate("mesh error of the model", (1, level), (0, -4), textcoords="offset points", va="top", color=GREY)

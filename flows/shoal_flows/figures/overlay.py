@@ -12,7 +12,7 @@ def overlay(fits: Sequence[Fit]) -> str:
     """HTML of the paths of the observed marker in the plane; hover for the time, click a name to hide it."""
     import plotly.graph_objects as plotly
 
-    measurement = fits[0].estimate.measurement
+    measurement = fits[0].estimate.measurement.first
     marker = measurement.channels[0].marker
     figure = plotly.Figure()
     if [c.quantity for c in measurement.channels] == ["x", "y"]:

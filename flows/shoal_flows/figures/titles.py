@@ -39,7 +39,7 @@ def leaves(name: str, fits: Sequence[Fit]) -> str:
 
 def follows(name: str, fits: Sequence[Fit]) -> str:
     """How closely the best fit follows the data."""
-    unit = "mrad" if all(c.quantity == "angle" for c in fits[0].estimate.measurement.channels) else "mm"
+    unit = "mrad" if all(c.quantity == "angle" for c in fits[0].estimate.measurement.first.channels) else "mm"
     return f"{name}: the fitted model follows the data to {1e3 * best(fits).estimate.rms:.2g} {unit} (RMS)"
 
 

@@ -13,7 +13,7 @@ _UNITS = {"x": "m", "y": "m", "angle": "rad"}
 @styled
 def trajectory(fit: Fit, title: str) -> Figure:
     """Each channel against time: circles are measured, the line is the model."""
-    measurement, estimate = fit.estimate.measurement, fit.estimate
+    measurement, estimate = fit.estimate.measurement.first, fit.estimate
     channels = measurement.channels
     figure, axes = canvas(1.6 + 1.7 * len(channels), nrows=len(channels), sharex=True, squeeze=False)
     colour = METHODS.get(estimate.method, OTHER)["color"]

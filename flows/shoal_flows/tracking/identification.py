@@ -64,7 +64,7 @@ def log_fit(fit: Fit, picture: bytes, study: str) -> str:
         run.params({"mesh": ", ".join(f"{name}: {n}" for name, n in mesh.items()) or "rigid", **cell.values})
         _log_progress(run, fit)
         _log_result(run, fit)
-        log_motion(run, fit.motion, estimate.measurement.channels[0].marker)
+        log_motion(run, fit.motion, estimate.measurement.first.channels[0].marker)
         run.picture(picture, "trajectory.png")
         run.text(as_json_text(estimate.to_json(), indent=1), "estimate.json")
         return run.run_id

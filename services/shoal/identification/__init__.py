@@ -2,7 +2,7 @@
 
 from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.identify import identify
-from shoal.identification.measurement import Measurement, measure
+from shoal.identification.measurement import Measurement, Recording, measure
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import Problem, load_problem, problem_names
 
@@ -11,6 +11,7 @@ __all__ = [
     "Estimate",
     "Measurement",
     "Problem",
+    "Recording",
     "Value",
     "Verdict",
     "identify",

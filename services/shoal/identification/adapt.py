@@ -11,7 +11,6 @@ from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods import Method, Outcome
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.starts import starting_points
-from shoal.scene import Scene
 from shoal.selection import Selection, select
 from shoal.trajectory import Array
 
@@ -62,21 +61,18 @@ def coarse_to_fine(
 
 
 def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[ForwardModel, Selection]:
-    """The forward model on the scene that is chosen at a point."""
-    selection = select(at(model, point), tolerance, model.measurement.times)
+    """The forward model on the scene that is chosen at a point, by the longest recording."""
+    name, recording = max(model.measurement.recordings.items(), key=lambda item: item[1].times[-1])
+    clock = model.parameters.measurement_values(point[None], name, recording.stated)
+    times = clock["clock"][0] * recording.times + clock["delay"][0]
+    selection = select(model.scene_at(point, name), tolerance, times)
     fields = {
         path: value for rod, level in selection.chosen.levels.items() for path, value in level.fields(rod).items()
     }
     solver = selection.chosen.scene.solver.model_dump(mode="json")
     kept = {name: solver[name] for name in ("integrator", "step", "relative_tolerance", "absolute_tolerance")}
     scene = model.scene.with_values({**fields, **{f"solver.{name}": value for name, value in kept.items()}})
-    return ForwardModel(model.problem, scene, model.engine, model.measurement), selection
-
-
-def at(model: ForwardModel, point: Array) -> Scene:
-    """The scene of a point."""
-    paths = (parameter.path for parameter in model.problem.parameters.values())
-    return model.scene.with_values({path: float(x) for path, x in zip(paths, point, strict=True)})
+    return replace(model, scene=scene), selection
 
 
 def _stage(selection: Selection, evaluations: int) -> Stage:

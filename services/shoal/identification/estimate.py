@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
+
+from shoal.identification.measurement import Measurement
+from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
 
@@ -40,12 +44,22 @@ class Value:
     correction: float | None = None
     at_bound: bool = False
 
+    def exponential(self) -> Value:
+        """The value of a parameter that was sought by its logarithm."""
+        value = float(np.exp(self.value))
+        correction = None if self.correction is None else value * self.correction
+        lower, upper = float(np.exp(self.lower)), float(np.exp(self.upper))
+        return Value(value, value * self.std, lower, upper, self.identifiable, correction, self.at_bound)
+
 
 @dataclass(frozen=True)
 class Estimate:
     """Result of an identification. fitness: mean squared deviation; rms: per observed thing (position or angle).
 
     history: evaluations and the best fitness after them; iterations: (iteration, best, mean fitness)
+    evaluations: simulations; work: simulated time over that of one run of all recordings
+    choice: which method was taken, and why; notes: what was found and mended in the recordings
+    scenes: the identified machine, by recording; predicted: its channels at the samples of each recording
     """
 
     problem: str
@@ -54,12 +68,14 @@ class Estimate:
     seed: int
     verdict: Verdict
     message: str
+    choice: str
     parameters: dict[str, Value]
     quantities: dict[str, Value]
     combinations: list[str]
     fitness: float
     rms: float
     evaluations: int
+    work: float
     placements: int
     wall_s: float
     history: tuple[Array, Array]
@@ -69,9 +85,16 @@ class Estimate:
     model_error_rms: float | None
     truth: dict[str, float]
     data: str
+    notes: list[str]
     model: dict[str, Any]
-    scene: Any
-    measurement: Any
+    scenes: dict[str, Scene]
+    predicted: dict[str, Array]
+    measurement: Measurement
+
+    @property
+    def scene(self) -> Scene:
+        """The identified machine, in the first recording."""
+        return next(iter(self.scenes.values()))
 
     @property
     def status(self) -> str:
@@ -96,7 +119,9 @@ class Estimate:
             "combinations": self.combinations,
             "fitness": plain(self.fitness),
             "rms": plain(self.rms),
+            "choice": self.choice,
             "evaluations": self.evaluations,
+            "work": plain(self.work),
             "placements": self.placements,
             "wall_s": self.wall_s,
             "minima": plain(self.minima),
@@ -104,6 +129,7 @@ class Estimate:
             "model_error_rms": plain(self.model_error_rms),
             "truth": self.truth,
             "data": self.data,
+            "notes": self.notes,
             "iterations": plain([list(row) for row in self.iterations]),
             "model": self.model,
         }

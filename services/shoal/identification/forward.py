@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from shoal.engines import Engine, get_engine
 from shoal.errors import InputError
-from shoal.identification.measurement import Measurement, observe
-from shoal.identification.problem import Parameter, Problem
+from shoal.identification.checkpoint import Memory
+from shoal.identification.loss import flatten, noise_of
+from shoal.identification.measurement import Measurement
+from shoal.identification.observation import Camera, observe
+from shoal.identification.parametrization import Parametrization
+from shoal.identification.problem import Problem
 from shoal.scene import Scene
 from shoal.swarm import EvaluationCounter
 from shoal.trajectory import Array, Status
@@ -19,46 +25,120 @@ Progress = Callable[[int, float, float], None]
 """Called with (iteration, best fitness, mean fitness of the iteration)."""
 
 
+class TimeIsUp(Exception):  # noqa: N818 - an end that is expected, not an error
+    """The time allowed for an identification has passed; the best so far stands."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What the rows of a residual vector are, (rows,) each: number of the recording, time by its clock [s], channel.
+
+    weight: what a deviation was multiplied by; priors are not among them
+    """
+
+    recording: Array
+    time: Array
+    channel: Array
+    weight: Array
+
+
 @dataclass
 class ForwardModel:
     """Simulates parameter sets, one per lane, and compares them with the measurement.
 
-    `residuals` is wrapped by one counter, which every method shares. Fitness is the mean over the
-    samples of the sum of squared residuals (for a tip: the mean squared distance [m^2]).
+    Points are vectors as `Parametrization` has them. `residuals` is wrapped by one counter, which every method shares.
+    Fitness is the mean over the samples of the sum of squared residuals (for a tip: the mean squared distance [m^2]).
+    Where channels have different noise they are weighted by it, relative to its geometric mean.
+
+    deadline: time (time.monotonic) after which `residuals` raises TimeIsUp; memory: of evaluations made earlier
+    whole: of a model of a part of the recordings, the model of all, which counts its evaluations too
     """
 
     problem: Problem
     scene: Scene
     engine: Engine
     measurement: Measurement
+    deadline: float | None = None
+    memory: Memory | None = None
+    whole: ForwardModel | None = None
     counter: EvaluationCounter = field(init=False)
     placements: int = field(init=False, default=0)
     """Poses computed without simulating a motion."""
+    work: float = field(init=False, default=0.0)
+    """Simulated time over that of one run of all recordings: full-run equivalents."""
+    refusal: str = field(init=False, default="")
+    """Why a simulation was refused, if one was."""
 
     def __post_init__(self) -> None:
         self.counter = EvaluationCounter(self._residuals, cost=self.cost)
 
-    @property
-    def _parameters(self) -> tuple[Parameter, ...]:
-        return tuple(self.problem.parameters.values())
+    @cached_property
+    def parameters(self) -> Parametrization:
+        """The parameters as a vector."""
+        return Parametrization.of(self.problem, self.scene, tuple(self.measurement.recordings))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Parameters, in the order of the vectors."""
-        return tuple(self.problem.parameters)
+        return self.parameters.names
 
     @property
     def lower(self) -> Array:
         """Lower bounds, (parameters,)."""
-        return np.array([p.lower for p in self.problem.parameters.values()])
+        return self.parameters.lower
 
     @property
     def upper(self) -> Array:
         """Upper bounds, (parameters,)."""
-        return np.array([p.upper for p in self.problem.parameters.values()])
+        return self.parameters.upper
+
+    def sizes(self, point: Array) -> Array:
+        """Size of each parameter at a point, at least a thousandth of its range, (parameters,)."""
+        return np.maximum(np.abs(point), 1e-3 * (self.upper - self.lower))
+
+    @cached_property
+    def rows(self) -> Rows:
+        """What the rows of the residuals are, but for those of priors at their end."""
+        parts = []
+        for number, recording in enumerate(self.measurement.recordings.values()):
+            sample, channel = np.nonzero(np.isfinite(recording.values))
+            parts.append((np.full(len(sample), number), recording.times[sample], channel))
+        numbers, times, channels = (np.concatenate(column) for column in zip(*parts, strict=True))
+        weight = np.ones(len(times)) if self.noise is None else self.noise / self._row_noise
+        return Rows(numbers, times, channels, weight)
+
+    @cached_property
+    def _row_noise(self) -> Array:
+        """Stated standard deviation of each row, (rows,), nan where it is not."""
+        runs = self.measurement.recordings.values()
+        return np.concatenate([np.broadcast_to(r.noise, r.values.shape)[np.isfinite(r.values)] for r in runs])
+
+    @cached_property
+    def noise(self) -> float | None:
+        """Standard deviation of a (weighted) residual if the noise of every channel is stated, else None."""
+        noise = self._row_noise
+        return float(np.exp(np.mean(np.log(noise)))) if np.all(np.isfinite(noise)) else None
+
+    @cached_property
+    def samples(self) -> int:
+        """How many instants were measured, over all recordings."""
+        return sum(int(np.any(np.isfinite(r.values), axis=1).sum()) for r in self.measurement.recordings.values())
+
+    @cached_property
+    def things(self) -> float:
+        """How many positions and angles an instant shows, on average."""
+        runs = self.measurement.recordings.values()
+        return sum(r.things * len(r.times) for r in runs) / sum(len(r.times) for r in runs)
+
+    def until(self, end: float) -> ForwardModel:
+        """The model of the samples up to a time [s]; its evaluations count here too."""
+        return replace(self, measurement=self.measurement.until(end), whole=self.whole or self)
 
     def residuals(self, points: Array) -> Array:
-        """Model minus measurement, (points, samples * channels); inf where a simulation failed. Counted."""
+        """Model minus measurement, (points, rows), and a row for each prior; inf where a simulation failed.
+
+        Counted. Raises TimeIsUp.
+        """
         return np.asarray(self.counter(points))
 
     def fitness(self, points: Array) -> Array:
@@ -66,47 +146,132 @@ class ForwardModel:
         return self.cost(self.residuals(points))
 
     def cost(self, residuals: Array) -> Array:
-        """Fitness of residuals (points, samples * channels)."""
-        return np.asarray(np.sum(residuals**2, axis=1) / len(self.measurement.times))
+        """Fitness of residuals (points, rows)."""
+        return np.asarray(np.sum(residuals**2, axis=1) / self.samples)
 
-    def observe(self, points: Array, times: Array, scene: Scene | None = None) -> Array:
-        """Channels of the model at `times`, (points, samples, channels); nan where a simulation failed. Not counted."""
-        if not np.all(valid := self._valid(points)):
-            seen = np.full((len(points), len(times), len(self.measurement.channels)), np.nan)
-            if np.any(valid):
-                seen[valid] = self.observe(points[valid], times, scene)
-            return seen
-        values = {p.path: points[:, k] for k, p in enumerate(self._parameters)}
-        trajectory = self.engine.simulate_many(scene or self.scene, values, times)
-        seen = observe(trajectory, self.measurement.channels)
-        seen[[status is not Status.OK for status in trajectory.status]] = np.nan
+    def observe(
+        self, points: Array, name: str | None = None, times: Array | None = None, scene: Scene | None = None
+    ) -> Array:
+        """Channels of a recording in the model, (points, samples, channels); nan where a simulation failed.
+
+        name: of the recording, else the first; times: by its clock [s], else those of its samples; scene: instead of
+        the model's. Not counted.
+        """
+        name = name or next(iter(self.measurement.recordings))
+        recording = self.measurement.recordings[name]
+        times = recording.times if times is None else times
+        scene = scene or self.scene
+        scene = scene.with_values(recording.stated.known) if recording.stated.known else scene
+        values = self.parameters.scene_values(points, name)
+        seen_by = self.parameters.measurement_values(points, name, recording.stated)
+        seen = np.full((len(points), len(times), len(recording.channels)), np.nan)
+        pace = np.column_stack([seen_by.pop("clock"), seen_by.pop("delay")])
+        possible = self._possible(points, values, scene)
+        for clock, delay in np.unique(pace[possible], axis=0):
+            lanes = np.flatnonzero(possible & np.all(pace == (clock, delay), axis=1))
+            instants = clock * times + delay
+            if instants[0] < 0:
+                continue
+            inputs = {path: numbers[lanes] for path, numbers in values.items()}
+            view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
+            seen[lanes] = self._simulate(scene, inputs, instants, view, name)
         return seen
 
-    def poses(self, points: Array) -> Array:
+    def _simulate(self, scene: Scene, values: dict[str, Array], times: Array, view: Camera, name: str) -> Array:
+        """One call of the engine; lanes that it refuses are found by halving and stay nan."""
+        lanes = len(next(iter(values.values()))) if values else len(np.atleast_1d(view.x))
+        channels = self.measurement.recordings[name].channels
+        try:
+            trajectory = (
+                self.engine.simulate_many(scene, values, times) if values else self.engine.simulate(scene, times)
+            )
+        except InputError as error:
+            self.refusal = self.refusal or str(error)
+            nothing = np.full((1, len(times), len(channels)), np.nan)
+            if lanes == 1:
+                return nothing
+            halves = (slice(0, lanes // 2), slice(lanes // 2, lanes))
+            whole = [np.broadcast_to(number, lanes) for number in view]
+            parts = [({path: x[half] for path, x in values.items()}, [x[half] for x in whole]) for half in halves]
+            return np.concatenate([self._simulate(scene, v, times, Camera(*x), name) for v, x in parts])
+        seen = observe(trajectory, channels, view)
+        failed = np.array([status is not Status.OK for status in trajectory.status])
+        seen[np.broadcast_to(failed, len(seen))] = np.nan
+        return seen
+
+    def poses(self, points: Array, name: str | None = None) -> Array:
         """Channels at time zero, (points, channels). No motion is simulated, so nothing is counted as an evaluation."""
-        self.placements += len(points)
+        (self.whole or self).placements += len(points)
         # Placing bodies is the same for every engine, and the native one places all points in one call.
         native = replace(self, engine=get_engine("gauss"))
-        return native.observe(points, np.zeros(1))[:, 0]
+        return native.observe(points, name, np.zeros(1))[:, 0]
 
-    def _valid(self, points: Array) -> Array:
+    def scene_at(self, point: Array, name: str | None = None) -> Scene:
+        """The scene of a point, in a recording (else the first). Raises InputError."""
+        name = name or next(iter(self.measurement.recordings))
+        values = self.parameters.scene_values(point[None], name)
+        stated = self.measurement.recordings[name].stated.known
+        return self.scene.with_values({**stated, **{path: float(x[0]) for path, x in values.items()}})
+
+    def _possible(self, points: Array, values: dict[str, Array], scene: Scene) -> Array:
         """Which points are scenes at all, (points,): inside the box all are, outside a mass may be negative."""
-        valid = np.ones(len(points), dtype=bool)
+        possible: Array = np.ones(len(points), dtype=bool)
         outside = np.any((points < self.lower) | (points > self.upper), axis=1)
-        # Limits of fields are intervals: where the extremes are accepted, so is what lies between.
-        extremes = (points[outside].min(axis=0), points[outside].max(axis=0)) if np.any(outside) else ()
-        if not all(self._is_scene(extreme) for extreme in extremes):
-            valid[outside] = [self._is_scene(point) for point in points[outside]]
-        return valid
-
-    def _is_scene(self, point: Array) -> bool:
-        try:
-            self.scene.with_values({p.path: float(x) for p, x in zip(self._parameters, point, strict=True)})
-        except InputError:
-            return False
-        return True
+        doubtful = possible.copy() if self.problem.ties else outside
+        for path, numbers in values.items() if np.any(doubtful) else ():
+            # Limits of fields are intervals: where the extremes are accepted, so is what lies between.
+            extremes = {float(np.min(numbers[doubtful])), float(np.max(numbers[doubtful]))}
+            if not all(_accepts(scene, path, x) for x in extremes):
+                possible[doubtful] &= [_accepts(scene, path, float(x)) for x in numbers[doubtful]]
+        return possible
 
     def _residuals(self, points: Array) -> Array:
-        seen = self.observe(points, self.measurement.times)
-        difference = (seen - self.measurement.values).reshape(len(points), -1)
-        return np.where(np.isfinite(difference), difference, np.inf)
+        if self.deadline is not None and time.monotonic() > self.deadline:
+            raise TimeIsUp
+        key = (self.measurement.end, points)
+        if self.memory is not None and (known := self.memory.recall(*key)) is not None:
+            found = known
+        else:
+            found = self._simulated_residuals(points)
+            if self.memory is not None:
+                self.memory.keep(*key, found)
+        self.work += len(points)
+        if self.whole is not None:
+            whole = self.whole
+            whole.work += len(points) * self.measurement.end / whole.measurement.end
+            # Values of a part cannot be compared with those of the whole, so it counts without a best value.
+            whole.counter.charge(len(points), points[0], np.inf)
+        return found
+
+    def _simulated_residuals(self, points: Array) -> Array:
+        columns = []
+        for name, recording in self.measurement.recordings.items():
+            seen = self.observe(points, name) - recording.values
+            columns.append(seen[:, np.isfinite(recording.values)])
+        rows = np.concatenate(columns, axis=1) * self.rows.weight
+        if self.problem.loss != "squares":
+            rows = flatten(rows, self.problem.loss, self.loss_scale)
+        rows = np.concatenate([rows, self._prior_rows(points)], axis=1)
+        return np.where(np.isfinite(rows), rows, np.inf)
+
+    @cached_property
+    def loss_scale(self) -> Array:
+        """Size of a residual from which on it counts as an outlier, (rows,): by the noise, stated or estimated."""
+        sizes = [noise_of(recording) for recording in self.measurement.recordings.values()]
+        return np.array([sizes[r][c] for r, c in zip(self.rows.recording, self.rows.channel, strict=True)]) * (
+            self.rows.weight
+        )
+
+    def _prior_rows(self, points: Array) -> Array:
+        values = self.parameters.to_values(points)
+        priors = [(k, entry.parameter.prior) for k, entry in enumerate(self.parameters.entries.values())]
+        rows = [(values[:, k] - prior.mean) / prior.std for k, prior in priors if prior is not None]
+        return (self.noise or 1.0) * np.array(rows).reshape(len(rows), len(points)).T
+
+
+def _accepts(scene: Scene, path: str, value: float) -> bool:
+    try:
+        scene.with_values({path: value})
+    except InputError:
+        return False
+    return True

@@ -1,126 +1,179 @@
-"""Measured motion: from a recording, or computed by another engine than the one that is fitted."""
+"""Measured motion: from recordings, or computed by another engine than the one that is fitted."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
-from shoal.identification.problem import Channel, EngineSource, FileSource, Problem
+from shoal.identification.observation import camera, observe
+from shoal.identification.problem import RESERVED, Problem
+from shoal.identification.reading import read
+from shoal.identification.recording import Channel, Clocked, EngineSource, FileSource
 from shoal.scene import Scene
-from shoal.trajectory import Array, Trajectory
+from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class Measurement:
-    """Samples of the channels. times [s]: (samples,), from the start of the motion to fit; values: (samples, channels).
+class Recording:
+    """Samples of one run. times [s]: (samples,), by the recording's clock, from the start of the motion to fit on.
 
-    `origin` says where the data come from; `truth` holds the parameters of computed data, for the report.
+    values: (samples, channels) in SI units, nan where nothing was measured
+    noise: standard deviation of each channel, (channels,), nan where it is not stated
+    stated: clock, position of the camera, fields of the scene of this run
+    origin: where the data come from; notes: what was found and mended in them
     """
 
     times: Array
     channels: tuple[Channel, ...]
     values: Array
     origin: str
-    truth: dict[str, float]
+    noise: Array
+    stated: Clocked = field(default_factory=Clocked)
+    notes: tuple[str, ...] = ()
 
     @property
     def things(self) -> int:
         """How many things are observed: positions (x and y count as one) and angles."""
-        return len({(c.marker, "angle" if c.quantity == "angle" else "position") for c in self.channels})
+        return len({(c.marker, "position" if c.is_position else c.quantity) for c in self.channels})
+
+    def until(self, end: float) -> Recording:
+        """The samples up to a time [s]."""
+        keep = self.times <= end + 1e-12
+        return replace(self, times=self.times[keep], values=self.values[keep])
+
+    def every(self, step: int) -> Recording:
+        """Every `step`-th sample."""
+        return replace(self, times=self.times[::step], values=self.values[::step])
 
 
-def observe(trajectory: Trajectory, channels: tuple[Channel, ...]) -> Array:
-    """The channels of a trajectory, (lanes, samples, channels)."""
-    columns = []
-    for channel in channels:
-        index = trajectory.markers.index(channel.marker)
-        if channel.quantity == "angle":
-            columns.append(trajectory.angles[:, index])
-        else:
-            columns.append(trajectory.points[:, index, 0 if channel.quantity == "x" else 1])
-    return np.moveaxis(np.stack(columns, axis=1), -1, 0)
+@dataclass(frozen=True)
+class Measurement:
+    """The recordings by name, and the parameters of computed data (`truth`), for the report."""
+
+    recordings: Mapping[str, Recording]
+    truth: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def single(
+        cls,
+        times: Array,
+        channels: tuple[Channel, ...],
+        values: Array,
+        origin: str,
+        truth: Mapping[str, float] | None = None,
+        noise: float | None = None,
+    ) -> Measurement:
+        """One recording without a name."""
+        sizes = np.full(len(channels), np.nan if noise is None else noise)
+        return cls({"recording": Recording(times, channels, values, origin, sizes)}, truth or {})
+
+    @property
+    def first(self) -> Recording:
+        """The first of the recordings."""
+        return next(iter(self.recordings.values()))
+
+    @property
+    def origin(self) -> str:
+        """Where the data come from."""
+        many = len(self.recordings) > 1
+        return "; ".join(f"{name}: {r.origin}" if many else r.origin for name, r in self.recordings.items())
+
+    @property
+    def end(self) -> float:
+        """The last time of a sample [s]."""
+        return max(float(recording.times[-1]) for recording in self.recordings.values())
+
+    def until(self, end: float) -> Measurement:
+        """The samples up to a time [s]."""
+        return replace(self, recordings={name: r.until(end) for name, r in self.recordings.items()})
 
 
-def measure(problem: Problem, scene: Scene, data: str | None = None) -> Measurement:
-    """The measurement of a problem; `data` names a file instead of the problem's own. Raises InputError."""
-    if isinstance(problem.source, EngineSource):
-        if data is not None:
-            raise InputError(f"data: {problem.name} computes its data; it takes no file")
-        return _computed(problem, problem.source, scene)
-    path = data or problem.source.path
-    if path is None:
-        raise InputError(f"data: {problem.name} needs a recording; give it with --data FILE.csv")
-    return _recorded(problem, problem.source, Path(path))
+def measure(problem: Problem, scene: Scene, data: str | Mapping[str, str] | None = None) -> Measurement:
+    """The measurement of a problem. Raises InputError, ComputationError.
+
+    data: a file (CSV, Parquet, or a recording's YAML) instead of the problem's own, or one for each recording by name
+    """
+    files = _named(problem, data)
+    recordings, truth = {}, dict[str, float]()
+    for name, source in problem.sources.items():
+        where = name if problem.recordings else problem.name
+        if isinstance(source, EngineSource):
+            if name in files:
+                raise InputError(f"data: {where} computes its data; it takes no file")
+            recordings[name], known = _computed(problem, source, scene, where)
+            prefix = f"{name}." if problem.recordings else ""
+            truth |= {(f"{prefix}{n}" if problem.parameters[n].own else n): x for n, x in known.items()}
+            continue
+        path = files.get(name) or source.path
+        if path is None:
+            raise InputError(f"data: {where} needs a recording; give it with --data FILE.csv")
+        recordings[name] = _recorded(problem, source, Path(path))
+    return Measurement(recordings, truth)
 
 
-def _computed(problem: Problem, source: EngineSource, scene: Scene) -> Measurement:
-    truth = scene.with_values(source.values)
+def _named(problem: Problem, data: str | Mapping[str, str] | None) -> dict[str, str]:
+    if data is None:
+        return {}
+    names = list(problem.sources)
+    if isinstance(data, str):
+        if len(names) > 1:
+            raise InputError(f"data: {problem.name} has several recordings; give NAME=FILE for {', '.join(names)}")
+        return {names[0]: data}
+    for name in data:
+        if name not in names:
+            raise InputError(f"data: no recording {name!r} in {problem.name}; there are {', '.join(names)}")
+    return dict(data)
+
+
+def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) -> tuple[Recording, dict[str, float]]:
+    truth = scene.with_values({**source.known, **source.values})
     times = np.linspace(0.0, source.stop, source.count + 1)[1:]
-    trajectory = get_engine(source.engine).simulate(truth, times)
+    channels = problem.channels_of(source)
+    trajectory = get_engine(source.engine).simulate(truth, source.clock * times + source.delay)
     if not trajectory.ok:
-        raise ComputationError(f"{problem.name}: the data could not be computed: {trajectory.message}")
-    return Measurement(
-        times=times,
-        channels=tuple(problem.channels),
-        values=observe(trajectory, tuple(problem.channels))[0],
-        origin=f"{source.engine}, " + ", ".join(f"{path}={value}" for path, value in source.values.items()),
-        truth={name: float(truth.value(parameter.path)) for name, parameter in problem.parameters.items()},
+        raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
+    values = observe(trajectory, channels, camera(source))[0]
+    values = values + source.noise * np.random.default_rng(source.seed).standard_normal(values.shape)
+    engine = ", ".join([source.engine, *(f"{path}={value}" for path, value in source.values.items())])
+    recording = Recording(
+        times,
+        channels,
+        values,
+        engine if source.noise == 0 else f"{engine}, noise {source.noise:g}",
+        _noise(problem, channels),
+        _stated(source),
+    )
+    paths = {name: parameter.path for name, parameter in problem.parameters.items()}
+    return recording, {name: _true(truth, source, path) for name, path in paths.items() if path}
+
+
+def _true(scene: Scene, source: EngineSource, path: str) -> float:
+    head, _, rest = path.partition(".")
+    return float(getattr(source, rest) if head == RESERVED else scene.value(path))
+
+
+def _recorded(problem: Problem, source: FileSource, path: Path) -> Recording:
+    source, found = read(source, problem.channels_of(source), path)
+    return Recording(
+        found.times,
+        found.channels,
+        found.values,
+        found.origin,
+        _noise(problem, found.channels),
+        _stated(source),
+        found.notes,
     )
 
 
-def _recorded(problem: Problem, source: FileSource, path: Path) -> Measurement:
-    table = _read_csv(path)
-    needed = [source.time, *(channel.column for channel in problem.channels)]
-    for column in needed:
-        if column not in table.columns:
-            raise InputError(f"{path}: no column {column!r}; there are {', '.join(map(str, table.columns))}")
-    columns = {column: _numbers(table[column], column, path) for column in dict.fromkeys(needed)}
-    times = columns[source.time] * source.time_scale
-    if np.any(np.diff(times) <= 0):
-        row = int(np.argmax(np.diff(times) <= 0)) + 3
-        raise InputError(f"{path}: row {row}, column {source.time!r}: times must increase")
-    inside = (times >= source.start - 1e-9) & (times <= source.start + source.duration + 1e-9)
-    if inside.sum() < 3:
-        raise InputError(
-            f"{path}: only {inside.sum()} samples from {source.start:g} s to {source.start + source.duration:g} s; "
-            f"the recording covers {times[0]:g} s to {times[-1]:g} s"
-        )
-    chosen = np.flatnonzero(inside)[:: source.every]
-    values = np.column_stack([c.offset + c.scale * columns[c.column][chosen] for c in problem.channels])
-    for k, channel in enumerate(problem.channels):
-        if channel.quantity == "angle":
-            # Whole turns before the window say nothing about the motion in it.
-            values[:, k] -= 2 * np.pi * np.round(values[0, k] / (2 * np.pi))
-    return Measurement(
-        times=times[chosen] - times[chosen[0]],
-        channels=tuple(problem.channels),
-        values=values,
-        origin=f"{path.name}, {times[chosen[0]]:g} s to {times[chosen[-1]]:g} s, {len(chosen)} samples",
-        truth={},
-    )
+def _stated(source: Clocked) -> Clocked:
+    return Clocked(**{name: getattr(source, name) for name in Clocked.model_fields})
 
 
-def _read_csv(path: Path) -> Any:
-    import pandas
-
-    try:
-        return pandas.read_csv(path)
-    except (OSError, EOFError) as error:
-        raise InputError(f"data: {path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    except (ValueError, UnicodeDecodeError) as error:
-        raise InputError(f"data: {path} is not CSV: {str(error).splitlines()[0]}") from None
-
-
-def _numbers(series: Any, column: str, path: Path) -> Array:
-    import pandas
-
-    numbers: Array = pandas.to_numeric(series, errors="coerce").to_numpy(dtype=float)
-    bad = np.flatnonzero(~np.isfinite(numbers))
-    if bad.size:
-        raise InputError(f"{path}: row {bad[0] + 2}, column {column!r}: {series.iloc[bad[0]]!r} is not a number")
-    return numbers
+def _noise(problem: Problem, channels: tuple[Channel, ...]) -> Array:
+    sizes = [channel.noise if channel.noise is not None else problem.noise for channel in channels]
+    return np.array([np.nan if size is None else size for size in sizes])

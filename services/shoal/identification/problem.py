@@ -11,20 +11,40 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
+from shoal.identification.recording import Channel, EngineSource, FileSource, Source
 from shoal.scene import Scene, expression, load_scene
 from shoal.scene.load import names, read_named
-from shoal.scene.record import NonNegative, Positive, Record, one_line
+from shoal.scene.record import Positive, Record, one_line
+from shoal.scene.scene import Name
 
-Quantity = Literal["x", "y", "angle"]
+MEASUREMENT = ("clock", "delay", "scale", "x", "y", "tilt")
+"""What a parameter can be that is none of the scene's: the path is `measurement.` and one of these."""
+RESERVED = "measurement"
+
+
+class Prior(Record):
+    """What is known of a parameter beforehand: a normal distribution."""
+
+    mean: float
+    std: Positive
 
 
 class Parameter(Record):
-    """A number to be found: its path in the scene, its bounds, and where to start if nothing better is known."""
+    """A number to be found: its path in the scene, its bounds, and where to start if nothing better is known.
 
-    path: str
+    path: a field of the scene, or `measurement.` and clock, delay, scale, x, y or tilt; without one the parameter
+        only stands in `ties`
+    scale: `log` for numbers that are known in order of magnitude only
+    own: every recording has its own (an initial state, for instance), named RECORDING.NAME
+    """
+
+    path: str | None = None
     lower: float
     upper: float
     start: float | None = None
+    scale: Literal["linear", "log"] = "linear"
+    prior: Prior | None = None
+    own: bool = False
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -32,56 +52,40 @@ class Parameter(Record):
             raise ValueError(f"lower {self.lower:g} is not below upper {self.upper:g}")
         if self.start is not None and not self.lower <= self.start <= self.upper:
             raise ValueError(f"start {self.start:g} is not between lower {self.lower:g} and upper {self.upper:g}")
+        if self.scale == "log" and self.lower <= 0:
+            raise ValueError(f"lower {self.lower:g} is not positive, as a logarithmic scale needs")
+        head, _, rest = (self.path or "").partition(".")
+        if head == RESERVED and rest not in MEASUREMENT:
+            raise ValueError(f"path {self.path!r}: a measurement has {', '.join(MEASUREMENT)}")
         return self
 
-
-class Channel(Record):
-    """One measured signal: a marker's x, y [m] or angle [rad] = offset + scale * column."""
-
-    marker: str
-    quantity: Quantity
-    column: str = ""
-    scale: float = 1.0
-    offset: float = 0.0
-
-
-class EngineSource(Record):
-    """Data computed by another engine: the scene with `values` set, sampled `count` times up to `stop` s."""
-
-    kind: Literal["engine"] = "engine"
-    engine: str = "exudyn"
-    values: dict[str, Any] = {}
-    stop: Positive
-    count: Annotated[int, Field(ge=2)]
-
-
-class FileSource(Record):
-    """Data from a CSV file (gzip allowed): `duration` s from `start` s on, times in column `time` * time_scale."""
-
-    kind: Literal["file"] = "file"
-    path: str | None = None
-    time: str = "t"
-    time_scale: Positive = 1.0
-    start: NonNegative = 0.0
-    duration: Positive
-    every: Annotated[int, Field(ge=1)] = 1
+    @property
+    def of_measurement(self) -> bool:
+        """Whether it describes the measurement, not the machine."""
+        return (self.path or "").startswith(RESERVED + ".")
 
 
 class Problem(Record):
     """What to identify. `values` replace fields of the scene; `noise` is the standard deviation of a channel.
 
-    `constants` name fields of the scene for use in `quantities`, which are expressions in parameters
-    and constants that the answer reports with their uncertainty (ratios, for instance).
+    source, or recordings by name: the data; several are fitted at once
+    ties: path -> expression in parameters and constants, for fields that depend on parameters
+    constants: name -> field of the scene, for use in `ties` and `quantities`
+    quantities: expressions in parameters and constants that the answer reports with their uncertainty
+    loss: how a deviation counts; all but `squares` let outliers weigh less
     """
 
     name: str
     description: str = ""
     scene: str
     values: dict[str, Any] = {}
-    parameters: Annotated[dict[str, Parameter], Field(min_length=1)]
-    channels: Annotated[list[Channel], Field(min_length=1)]
-    source: Annotated[EngineSource | FileSource, Field(discriminator="kind")]
+    parameters: Annotated[dict[Name, Parameter], Field(min_length=1)]
+    ties: dict[str, str] = {}
+    channels: list[Channel] = []
+    source: Source | None = None
+    recordings: dict[Name, Source] = {}
     noise: Positive | None = None
+    loss: Literal["squares", "huber", "soft-l1", "cauchy"] = "squares"
     constants: dict[str, str] = {}
     quantities: dict[str, str] = {}
     method: str = "auto"
@@ -89,31 +93,75 @@ class Problem(Record):
     @model_validator(mode="after")
     def _known_names(self) -> Self:
         known = {*self.parameters, *self.constants}
-        for name, text in self.quantities.items():
+        expressions = {f"quantities.{name}": text for name, text in self.quantities.items()}
+        expressions |= {f"ties.{path}": text for path, text in self.ties.items()}
+        for where, text in expressions.items():
             try:
                 unknown = expression.names(text) - known
             except InputError as error:
-                raise ValueError(f"quantities.{name}: {error}") from None
+                raise ValueError(f"{where}: {error}") from None
             if unknown:
-                raise ValueError(f"quantities.{name}: {sorted(unknown)[0]!r} is neither a parameter nor a constant")
-        if isinstance(self.source, FileSource) and not all(channel.column for channel in self.channels):
-            raise ValueError("channels: each needs the `column` of the file it is read from")
+                raise ValueError(f"{where}: {sorted(unknown)[0]!r} is neither a parameter nor a constant")
+        fitted = {parameter.path for parameter in self.parameters.values()} | {*self.ties}
+        for name, path in self.constants.items():
+            if path in fitted:
+                raise ValueError(f"constants.{name}: {path} is not constant; it is sought or tied")
+        used = {name for text in self.ties.values() for name in expression.names(text)}
+        for name, parameter in self.parameters.items():
+            if parameter.path is None and name not in used:
+                raise ValueError(f"parameters.{name}: has no path and stands in none of the ties")
         return self
+
+    @model_validator(mode="after")
+    def _data(self) -> Self:
+        if (self.source is None) == (not self.recordings):
+            raise ValueError("source: give either one source or several recordings")
+        for name, source in self.sources.items():
+            channels = self.channels_of(source)
+            if not channels:
+                raise ValueError("channels: at least one is needed")
+            if isinstance(source, FileSource) and not all(channel.column for channel in channels):
+                raise ValueError(f"channels: each needs the `column` of the file it is read from ({name})")
+        if any(p.prior for p in self.parameters.values()) and not self._noise_is_stated():
+            raise ValueError("noise: a prior weighs against the data by their noise; state it for every channel")
+        return self
+
+    def _noise_is_stated(self) -> bool:
+        return self.noise is not None or all(
+            channel.noise is not None for source in self.sources.values() for channel in self.channels_of(source)
+        )
+
+    @property
+    def sources(self) -> dict[str, EngineSource | FileSource]:
+        """Where the data come from, by the name of the recording."""
+        return self.recordings or ({"recording": self.source} if self.source is not None else {})
+
+    def channels_of(self, source: EngineSource | FileSource) -> tuple[Channel, ...]:
+        """The signals of a recording."""
+        return tuple(source.channels or self.channels)
 
     def load_scene(self, values: Mapping[str, Any] | None = None) -> Scene:
         """The scene to fit, with this problem's and the given values set, and every path checked. Raises InputError."""
         scene = load_scene(self.scene)
         scene = scene.with_values({**self.values, **(values or {})})
         for name, parameter in self.parameters.items():
+            if parameter.path is None or parameter.of_measurement:
+                continue
             for bound in (parameter.lower, parameter.upper):
                 try:
                     scene.with_values({parameter.path: bound})
                 except InputError as error:
                     raise InputError(f"{self.name}: parameters.{name}: {error}") from None
-        for channel in self.channels:
-            if channel.marker not in scene.markers:
-                known = ", ".join(scene.markers)
-                raise InputError(f"{self.name}: channels: no marker {channel.marker!r}; there are {known}")
+        for path in (*self.ties, *self.constants.values()):
+            try:
+                scene.value(path)
+            except InputError as error:
+                raise InputError(f"{self.name}: ties or constants: {error}") from None
+        for source in self.sources.values():
+            for channel in self.channels_of(source):
+                if channel.marker not in scene.markers:
+                    known = ", ".join(scene.markers)
+                    raise InputError(f"{self.name}: channels: no marker {channel.marker!r}; there are {known}")
         return scene
 
     @classmethod

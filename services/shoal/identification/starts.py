@@ -7,12 +7,13 @@ placement alone, from many starts at once; no motion is simulated.
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import qmc
 
 from shoal.identification.forward import ForwardModel
 from shoal.trajectory import Array
 
 _CANDIDATES = 64
+_MOST = 8
+"""Starting points, at most."""
 _ITERATIONS = 30
 _FIRST_SAMPLES = 5
 _SAME = 1e-3
@@ -21,48 +22,67 @@ _SAME = 1e-3
 
 def starting_points(model: ForwardModel) -> Array:
     """Starting points, best first, (points, parameters): bounds' middle or `start`, initial state from the data."""
-    parameters = model.problem.parameters.values()
-    middle = np.array([(p.lower + p.upper) / 2 if p.start is None else p.start for p in parameters])
-    angles = [k for k, p in enumerate(parameters) if p.path.startswith("initial.") and p.path.endswith(".angle")]
-    rates = [k for k, p in enumerate(parameters) if p.path.startswith("initial.") and p.path.endswith(".rate")]
-    pose, slope = _first_pose(model)
-    points = middle[None]
-    if angles:
-        points = _poses(model, middle, angles, pose)
-    if rates:
-        points = np.array([_with_rates(model, point, rates, angles, slope) for point in points])
+    points = model.parameters.start[None]
+    for name in model.measurement.recordings:
+        points = np.concatenate([_of_recording(model, point, name) for point in points])[:_MOST]
     return np.asarray(np.clip(points, model.lower, model.upper))
 
 
-def _first_pose(model: ForwardModel) -> tuple[Array, Array]:
+def _of_recording(model: ForwardModel, point: Array, name: str) -> Array:
+    """The point with every initial state that the first samples of a recording allow, (points, parameters)."""
+    angles = model.parameters.indices(name, ".angle")
+    rates = model.parameters.indices(name, ".rate")
+    if not angles and not rates:
+        return point[None]
+    pose, slope = _first_pose(model, name)
+    points = _poses(model, name, point, list(angles.values()), pose) if angles else point[None]
+    partners = {path: angles.get(path.removesuffix("rate") + "angle") for path in rates}
+    if rates and None not in partners.values():
+        known = [k for k in partners.values() if k is not None]
+        points = np.array([_with_rates(model, name, p, list(rates.values()), known, slope) for p in points])
+    return points
+
+
+def _first_pose(model: ForwardModel, name: str) -> tuple[Array, Array]:
     """Channels and their rates at time zero, from a polynomial through the first samples; both (channels,).
 
     A machine released from rest moves as a polynomial in t^2 at first, which reaches back to zero from farther away.
+    Channels without a sample there are nan.
     """
-    count = min(_FIRST_SAMPLES, len(model.measurement.times))
-    times, values = model.measurement.times[:count], model.measurement.values[:count]
-    if _at_rest(model):
-        coefficients = np.polynomial.polynomial.polyfit(times**2, values, deg=min(2, count - 1))
-        return coefficients[0], np.zeros_like(coefficients[0])
-    coefficients = np.polynomial.polynomial.polyfit(times, values, deg=min(2, count - 1))
-    return coefficients[0], coefficients[1]
+    recording = model.measurement.recordings[name]
+    clock = model.parameters.measurement_values(model.parameters.start[None], name, recording.stated)
+    at_rest = _at_rest(model, name)
+    pose, slope = np.full((2, len(recording.channels)), np.nan)
+    for k, signal in enumerate(recording.values.T):
+        first = np.flatnonzero(np.isfinite(signal))[:_FIRST_SAMPLES]
+        times, values = clock["clock"][0] * recording.times[first] + clock["delay"][0], signal[first]
+        if len(first) == 0:
+            continue
+        variable = times**2 if at_rest else times
+        coefficients = np.polynomial.polynomial.polyfit(variable, values, deg=min(2, len(first) - 1))
+        pose[k] = coefficients[0]
+        slope[k] = 0.0 if at_rest or len(first) == 1 else coefficients[1]
+    return pose, slope
 
 
-def _at_rest(model: ForwardModel) -> bool:
+def _at_rest(model: ForwardModel, name: str) -> bool:
     """Whether the machine starts without any velocity, whatever the parameters are."""
-    moving = any(start.rate or any(start.velocity) for start in model.scene.initial.values())
-    paths = [p.path for p in model.problem.parameters.values()]
+    start = model.scene_at(model.parameters.start, name)
+    moving = any(body.rate or any(body.velocity) for body in start.initial.values())
+    paths = model.parameters.scene_values(model.parameters.start[None], name)
     sought = any(path.startswith("initial.") and not path.endswith(".angle") for path in paths)
     return not (moving or sought or model.scene.ground_points)
 
 
-def _poses(model: ForwardModel, middle: Array, angles: list[int], pose: Array) -> Array:
+def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pose: Array) -> Array:
     """Distinct minimisers of the pose error over the angles, best first, (points, parameters)."""
+    from scipy.stats import qmc  # slow to import
+
     scatter = qmc.Sobol(len(angles), seed=0).random(_CANDIDATES)
     points = np.repeat(middle[None], _CANDIDATES, axis=0)
     points[:, angles] = model.lower[angles] + scatter * (model.upper - model.lower)[angles]
     damping = np.full(_CANDIDATES, 1e-3)
-    error, jacobian = _pose_error(model, points, angles, pose)
+    error, jacobian = _pose_error(model, name, points, angles, pose)
     cost = np.sum(error**2, axis=1)
     for _ in range(_ITERATIONS):
         normal = np.einsum("nck,ncl->nkl", jacobian, jacobian)
@@ -74,7 +94,7 @@ def _poses(model: ForwardModel, middle: Array, angles: list[int], pose: Array) -
         trial = points.copy()
         trial[:, angles] -= step[..., 0]
         trial = np.clip(trial, model.lower, model.upper)
-        trial_error, trial_jacobian = _pose_error(model, trial, angles, pose)
+        trial_error, trial_jacobian = _pose_error(model, name, trial, angles, pose)
         trial_cost = np.sum(trial_error**2, axis=1)
         better = trial_cost < cost
         points[better], error[better], jacobian[better] = trial[better], trial_error[better], trial_jacobian[better]
@@ -97,26 +117,26 @@ def _distinct(model: ForwardModel, points: Array, cost: Array, angles: list[int]
     return np.array(found)
 
 
-def _pose_error(model: ForwardModel, points: Array, angles: list[int], pose: Array) -> tuple[Array, Array]:
-    """Pose minus measured pose, (points, channels), and its derivative in the angles, (points, channels, angles)."""
+def _pose_error(model: ForwardModel, name: str, points: Array, angles: list[int], pose: Array) -> tuple[Array, Array]:
+    """Pose minus measured pose, (points, channels), and its derivative in the angles, (points, channels, angles).
+
+    Channels that are not known, or that are no pose (rates), do not count.
+    """
     h = 1e-6
     shifted = np.concatenate([points, *(points + h * np.eye(points.shape[1])[k] for k in angles)])
-    seen = model.poses(shifted).reshape(1 + len(angles), len(points), -1)
-    return seen[0] - pose, np.moveaxis((seen[1:] - seen[0]) / h, 0, -1)
+    seen = model.poses(shifted, name).reshape(1 + len(angles), len(points), -1)
+    channels = model.measurement.recordings[name].channels
+    counted = np.isfinite(pose) & np.array([channel.quantity != "rate" for channel in channels])
+    error = np.where(counted, seen[0] - np.where(counted, pose, 0.0), 0.0)
+    return error, np.where(counted[:, None], np.moveaxis((seen[1:] - seen[0]) / h, 0, -1), 0.0)
 
 
-def _with_rates(model: ForwardModel, point: Array, rates: list[int], angles: list[int], slope: Array) -> Array:
+def _with_rates(
+    model: ForwardModel, name: str, point: Array, rates: list[int], angles: list[int], slope: Array
+) -> Array:
     """The point with its rates such that the channels start with the measured slope (least squares)."""
-    paths = [p.path for p in model.problem.parameters.values()]
-    partner = [paths.index(paths[k].removesuffix("rate") + "angle") for k in rates if _has_partner(paths, k)]
-    if len(partner) != len(rates):
-        return point
-    _, jacobian = _pose_error(model, point[None], partner, np.zeros(len(slope)))
-    solution, *_ = np.linalg.lstsq(jacobian[0], slope, rcond=None)
+    _, jacobian = _pose_error(model, name, point[None], angles, np.where(np.isfinite(slope), 0.0, np.nan))
+    solution, *_ = np.linalg.lstsq(jacobian[0], np.where(np.isfinite(slope), slope, 0.0), rcond=None)
     point = point.copy()
     point[rates] = solution
     return point
-
-
-def _has_partner(paths: list[str], k: int) -> bool:
-    return paths[k].removesuffix("rate") + "angle" in paths

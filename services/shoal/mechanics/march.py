@@ -20,13 +20,16 @@ CHECKS = 64
 """Energy and drift are looked at about so many times in a run of fixed steps."""
 CHECK_EVERY = 4
 """An adaptive run is looked at every so many steps, each of which is worth a dozen looks."""
+SAMPLED = 8
+"""Numbers in the sample of a marker."""
 LOBATTO = 0.5 - 0.5 / np.sqrt(5.0)
 """Inner node of the four-point Lobatto rule on the unit interval, of order 6; its weights are 1/12 and 5/12."""
 
 
 class Record(NamedTuple):
-    """What a march leaves behind. samples: (times * markers * 5, lanes), of each marker its
-    point, its direction, and the continuous angle [rad] at the end of the step; the rest: (lanes,).
+    """What a march leaves behind. samples: (times * markers * SAMPLED, lanes), of each marker its point, its
+    direction, the continuous angle [rad] at the end of the step, its velocity [m/s] and the rate of its direction
+    [rad/s]; the rest: (lanes,).
 
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest kinetic + elastic energy [J];
     drift: largest violation of a constraint; correction: largest change that made the start consistent.
@@ -65,7 +68,7 @@ def march(
     dynamics.enter(m, w)
     end = m.unknowns * width
     markers = marker_rows.size // 4
-    per_sample = 5 * markers * width
+    per_sample = SAMPLED * markers * width
     record = Record(
         np.full(len(times) * per_sample, np.nan),
         np.zeros(width),
@@ -101,21 +104,27 @@ def march(
         while sample < len(times) and times[sample] <= now + 1e-9 * taken:
             if abs(times[sample] - now) <= 1e-9 * taken:
                 for i in range(end):
-                    inside_q[i] = w.z[i]
+                    inside_q[i], inside_v[i] = w.z[i], w.zdot[i]
             else:
                 x = 1.0 - (now - times[sample]) / taken
                 interpolate(tile, scheme, m, w, pointer(past), x, taken, pointer(inside_q), pointer(inside_v))
             dynamics.derive(tile, m, pointer(inside_q), m.rows, False)
-            first = sample * per_sample
+            dynamics.derive(tile, m, pointer(inside_v), m.rows, True)
             for k in range(markers):
+                first = sample * per_sample + SAMPLED * k * width
                 for row in range(4):
-                    to, source = first + (5 * k + row) * width, marker_rows[4 * k + row] * width
+                    to, source = first + row * width, marker_rows[4 * k + row] * width
                     for lane in range(width):
                         record.samples[to + lane] = inside_q[source + lane]
+                        if row < 2:
+                            record.samples[to + 5 * width + lane] = inside_v[source + lane]
                 for lane in range(width):
-                    x = w.z[marker_rows[4 * k + 2] * width + lane]
-                    y = w.z[marker_rows[4 * k + 3] * width + lane]
-                    record.samples[first + (5 * k + 4) * width + lane] = np.arctan2(y, x) + turns[k * width + lane]
+                    x_row, y_row = marker_rows[4 * k + 2] * width + lane, marker_rows[4 * k + 3] * width + lane
+                    angle = np.arctan2(w.z[y_row], w.z[x_row]) + turns[k * width + lane]
+                    x, y = inside_q[x_row], inside_q[y_row]
+                    record.samples[first + 4 * width + lane] = angle
+                    turning = x * inside_v[y_row] - y * inside_v[x_row]
+                    record.samples[first + 7 * width + lane] = turning / (x * x + y * y)
             sample += 1
         if number == steps or now >= ending:
             break

@@ -20,7 +20,7 @@ from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.groups import start_angle
 from shoal.mechanics.integrators import Choice, choose, facts, pick
 from shoal.mechanics.integrators.scheme import Facts
-from shoal.mechanics.march import Record, march
+from shoal.mechanics.march import SAMPLED, Record, march
 from shoal.mechanics.model import Model
 from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import Array, pack, tiles, unpack
@@ -84,9 +84,9 @@ def simulate(
     workers = min(threads or os.cpu_count() or 1, len(parts))
     results = [run(part) for part in parts] if workers == 1 else list(_pool(workers).map(run, parts))
     record = Record(*(np.concatenate(field, axis=1) for field in zip(*results, strict=True)))
-    samples = record.samples.reshape(len(times), len(scene.markers), 5, lanes)
+    samples = record.samples.reshape(len(times), len(scene.markers), SAMPLED, lanes)
     points = samples[:, :, :2]
-    angles = _angles(scene, model, samples[:, :, 2:])
+    angles = _angles(scene, model, samples[:, :, 2:5])
     energy_drift = _relative(record.energy_error[0], record.energy_scale[0], scene, model)
     status, message = _verdict(scene, model, record, choice, points, energy_drift)
     return Trajectory(
@@ -95,6 +95,8 @@ def simulate(
         markers=tuple(scene.markers),
         points=points,
         angles=angles,
+        velocities=samples[:, :, 5:7],
+        rates=samples[:, :, 7],
         status=status,
         energy_drift=energy_drift,
         constraint_drift=record.drift[0],

@@ -31,7 +31,7 @@ from scipy.linalg import cholesky, solve_triangular
 from shoal.errors import InputError
 from shoal.mechanics import constraints, dynamics, model
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.march import ASSEMBLY, Record
+from shoal.mechanics.march import ASSEMBLY, SAMPLED, Record
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.tile import SINGLE, Array, Index, Tile
 from shoal.mechanics.vector import pointer
@@ -208,8 +208,8 @@ def march(
     """
     n, step, markers = arrays.unknowns, solver.step, len(marker_rows)
     q, v = room.z[:n], room.zdot[:n]
-    record = Record(np.full(len(times) * markers * 5, np.nan), *(np.zeros(1) for _ in Record._fields[1:]))
-    samples = record.samples.reshape(len(times), markers, 5)
+    record = Record(np.full(len(times) * markers * SAMPLED, np.nan), *(np.zeros(1) for _ in Record._fields[1:]))
+    samples = record.samples.reshape(len(times), markers, SAMPLED)
     lower = cholesky(_dense_mass(arrays), lower=True)
     inside = np.zeros(arrays.rows)
     gap = np.empty(arrays.constraints.size)

@@ -12,7 +12,7 @@ half the time. The traditional optimum is that of least squares; its evaluations
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -71,8 +71,8 @@ class Data:
         """Computed once; every run shares it."""
         problem = load_problem(PROBLEM)
         whole = measure(problem, problem.load_scene())
-        middle = len(whole.times) // 2
-        half = replace(whole, times=whole.times[:middle], values=whole.values[:middle])
+        times = whole.first.times
+        half = whole.until(float(times[len(times) // 2 - 1]))
         return cls(problem, problem.load_scene(LEAPFROG), whole, half)
 
     def model(self, record: Measurement) -> ForwardModel:
@@ -108,7 +108,7 @@ def search(swarm: str, data: Data, combination: Combination, seed: int, budget: 
         half = data.model(data.half)
         seed_of_half = _traditional(half, rng) if traditional else None
         last = _swim(swarm, half, combination, seed_of_half, None, rng, 10 * budget, PREVIOUS_ITERATIONS)
-        spent = half.counter.evaluations * len(data.half.times) / len(data.whole.times)
+        spent = half.counter.evaluations * len(data.half.first.times) / len(data.whole.first.times)
     model = data.model(data.whole)
     best = _traditional(model, rng) if traditional else None
     _swim(swarm, model, combination, best, last, rng, budget - int(spent), None)

@@ -53,15 +53,20 @@ def rigid_problem() -> Problem:
     return Problem.parse(data, "rigid-double-pendulum")
 
 
-def textbook(problem: Problem, horizon: float, noise: float = 0.0, seed: int = 0, rate: float = RATE) -> Measurement:
-    """The tip by Lagrange's equations (scipy) up to `horizon` [s], `rate` samples a second, with white noise [m]."""
+def textbook(
+    problem: Problem, horizon: float, noise: float = 0.0, seed: int = 0, rate: float = RATE, stated: bool = False
+) -> Measurement:
+    """The tip by Lagrange's equations (scipy) up to `horizon` [s], `rate` samples a second, with white noise [m].
+
+    stated: whether the measurement says how large the noise is.
+    """
     count = round(horizon * rate)
     times = np.arange(1, count + 1) / rate
     points: Array = settle(times).points + noise * np.random.default_rng(seed).standard_normal((count, 2))
     scene: Scene = load_scene(problem.scene)
-    truth = {name: float(scene.value(parameter.path)) for name, parameter in problem.parameters.items()}
+    truth = {name: float(scene.value(p.path)) for name, p in problem.parameters.items() if p.path}
     origin = f"Lagrange's equations, scipy DOP853, noise {noise:g} m"
-    return Measurement(times, tuple(problem.channels), points, origin, truth)
+    return Measurement.single(times, tuple(problem.channels), points, origin, truth, noise if stated else None)
 
 
 def _library(problem: Problem) -> Measurement:

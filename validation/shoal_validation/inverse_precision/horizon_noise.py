@@ -104,8 +104,7 @@ def measure_panel(
 def measure_cell(panel: Panel, horizon: float, noise: float, seed: int) -> Cell:
     """One identification of one draw of the noise."""
     problem = rigid_problem()
-    data = textbook(problem, horizon, noise, seed, panel.rate)
-    problem = problem.model_copy(update={"noise": noise if panel.stated else None})
+    data = textbook(problem, horizon, noise, seed, panel.rate, panel.stated)
     where = (panel.method, panel.stated, panel.rate, horizon, noise, seed)
     try:
         estimate = identify(problem, method=panel.method, measurement=data, values=SOLVER, seed=seed)

@@ -7,6 +7,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.outcome import Outcome
+from shoal.identification.recording import Clocked
 from shoal.identification.starts import starting_points
 
 
@@ -14,11 +15,17 @@ def casadi(model: ForwardModel, rng: np.random.Generator, progress: Progress) ->
     """IPOPT on CasADi's own model, from the better start; initial angles and rates from one marker's position only."""
     from shoal.engines.casadi_shooting import identify_initial_angles
 
-    paths = [p.path for p in model.problem.parameters.values()]
-    channels = model.measurement.channels
+    entries = model.parameters.entries.values()
+    paths = [entry.parameter.path or "" for entry in entries]
+    recording = model.measurement.first
+    channels = recording.channels
+    if len(model.measurement.recordings) > 1 or model.problem.ties or recording.stated != Clocked():
+        raise InputError("method: casadi takes one recording without ties, clock and camera; use least-squares")
     markers = {c.marker for c in channels}
-    if not all(path.startswith("initial.") for path in paths):
+    if not all(path.startswith("initial.") for path in paths) or np.any(model.parameters.logarithmic):
         raise InputError("method: casadi finds initial angles and rates only; use least-squares for other parameters")
+    if not np.all(np.isfinite(recording.values)):
+        raise InputError("method: casadi takes no gaps; use least-squares")
     if len(markers) != 1 or [c.quantity for c in channels] != ["x", "y"]:
         raise InputError("method: casadi takes x and y of one marker; use least-squares for other channels")
     starts = starting_points(model)
@@ -30,9 +37,9 @@ def casadi(model: ForwardModel, rng: np.random.Generator, progress: Progress) ->
         start,
         model.lower,
         model.upper,
-        model.measurement.times,
+        recording.times,
         channels[0].marker,
-        model.measurement.values,
+        recording.values,
     )
     fitness = float(result.fitness)
     model.counter.charge(result.evaluations, np.asarray(result.values), fitness)

@@ -23,7 +23,6 @@ _SMALL_STEP = 1e-9
 """Relative to the size of a parameter; a smaller step is the end."""
 _SMALL_GAIN = 1e-8
 """A step that promises to lower the fitness by less than this fraction is the end."""
-_STARTS = 8
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ def least_squares(model: ForwardModel, rng: np.random.Generator, progress: Progr
     Later starts are rivals: a rival is given up when after two steps it is still more than a hundred times
     worse than the best answer, and is then listed with the fitness it had.
     """
-    starts = starting_points(model)[:_STARTS]
+    starts = starting_points(model)
     first = [linearise(model, start) for start in starts]
     order = np.argsort([_cost(residual) for residual, _ in first], kind="stable")
     descents: list[Descent] = []
@@ -77,7 +76,7 @@ def _descend(
     first: int,
     hopeless: float,
 ) -> Descent:
-    samples = len(model.measurement.times)
+    samples = model.samples
     cost = _cost(residual)
     scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
     damping, growth = 1e-6, 2.0
@@ -91,7 +90,7 @@ def _descend(
         trial = np.clip(point + _step(jacobian, residual, damping, scale), model.lower, model.upper)
         moved = trial - point
         predicted = cost - _cost(residual + jacobian @ moved)
-        if np.max(np.abs(moved) / _sizes(model, point)) < _SMALL_STEP or predicted < _SMALL_GAIN * cost:
+        if np.max(np.abs(moved) / model.sizes(point)) < _SMALL_STEP or predicted < _SMALL_GAIN * cost:
             converged = True
             break
         trial_residual, trial_jacobian = linearise(model, trial)
@@ -116,16 +115,12 @@ def _cost(residual: Array) -> float:
 
 def linearise(model: ForwardModel, point: Array) -> tuple[Array, Array]:
     """Residuals at a point, (m,), and their forward-difference Jacobian, (m, parameters); 1 + parameters lanes."""
-    steps = DIFFERENCE * _sizes(model, point)
+    steps = DIFFERENCE * model.sizes(point)
     steps = np.where(point + steps > model.upper, -steps, steps)
     residuals = model.residuals(np.concatenate([point[None], point + np.diag(steps)]))
     with np.errstate(invalid="ignore"):
         jacobian = ((residuals[1:] - residuals[0]) / steps[:, None]).T
     return residuals[0], np.where(np.isfinite(jacobian), jacobian, 0.0)
-
-
-def _sizes(model: ForwardModel, point: Array) -> Array:
-    return np.maximum(np.abs(point), 1e-3 * (model.upper - model.lower))
 
 
 def _step(jacobian: Array, residual: Array, damping: float, scale: Array) -> Array:

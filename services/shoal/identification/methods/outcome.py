@@ -17,6 +17,7 @@ class Outcome:
 
     iterations: rows of (iteration, best fitness, mean fitness of the iteration)
     minima: other points where a local search ended, with their fitness
+    choice: which method `auto` has taken, and why
     """
 
     point: Array
@@ -24,6 +25,7 @@ class Outcome:
     iterations: list[tuple[int, float, float]]
     message: str
     minima: list[tuple[Array, float]] = field(default_factory=list)
+    choice: str = ""
 
 
 Method = Callable[[ForwardModel, np.random.Generator, Progress], Outcome]

@@ -1,0 +1,77 @@
+"""Evaluations that outlive a run: a method that starts again with the same seed finds them and goes on."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.trajectory import Array
+
+_MAGIC = b"shoal-checkpoint-1\n"
+_HEAD = struct.Struct("<20sI")
+
+
+class Memory:
+    """Residuals of batches of points, kept in a file that only grows; what a crash cut off at its end is dropped.
+
+    Methods are deterministic, so replaying one from its seed asks for the same batches in the same order; those that
+    are known cost nothing. fingerprint: of everything that residuals depend on.
+    """
+
+    def __init__(self, path: Path, fingerprint: str) -> None:
+        """Open or begin the file. Raises InputError if it belongs to another identification or cannot be written."""
+        self.path = path
+        self.recalled = 0
+        self._known: dict[bytes, Array] = {}
+        begin = _MAGIC + fingerprint.encode() + b"\n"
+        try:
+            kept = self._load(begin) if path.exists() and path.stat().st_size else 0
+            self._file = path.open("r+b" if kept else "wb")
+            if kept:
+                self._file.truncate(kept)
+                self._file.seek(kept)
+            else:
+                self._file.write(begin)
+        except OSError as error:
+            raise InputError(f"checkpoint: {path} cannot be written: {error.strerror}") from None
+
+    def recall(self, end: float, points: Array) -> Array | None:
+        """What was kept for a batch, or None."""
+        found = self._known.get(_key(end, points))
+        self.recalled += 0 if found is None else len(points)
+        return found
+
+    def keep(self, end: float, points: Array, residuals: Array) -> None:
+        """Note the residuals of a batch."""
+        buffer = io.BytesIO()
+        np.save(buffer, residuals, allow_pickle=False)
+        self._file.write(_HEAD.pack(_key(end, points), buffer.tell()) + buffer.getvalue())
+        self._file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _load(self, begin: bytes) -> int:
+        """Read what is whole; returns where it ends."""
+        data = self.path.read_bytes()
+        if not data.startswith(begin):
+            raise InputError(f"checkpoint: {self.path} is that of another identification; name another file")
+        place = len(begin)
+        while place + _HEAD.size <= len(data):
+            key, size = _HEAD.unpack_from(data, place)
+            end = place + _HEAD.size + size
+            if end > len(data):
+                break
+            self._known[key] = np.load(io.BytesIO(data[place + _HEAD.size : end]), allow_pickle=False)
+            place = end
+        return place
+
+
+def _key(end: float, points: Array) -> bytes:
+    return hashlib.sha1(struct.pack("<d", end) + points.tobytes() + repr(points.shape).encode()).digest()

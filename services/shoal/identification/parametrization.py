@@ -1,0 +1,134 @@
+"""From the vector that a method sees to fields of the scene and to what describes the measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from shoal.identification.problem import RESERVED, Parameter, Problem
+from shoal.identification.recording import Clocked
+from shoal.scene import Scene, expression
+from shoal.trajectory import Array
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One component of the vector: the parameter `key` of the problem, of one recording or (None) of all."""
+
+    key: str
+    parameter: Parameter
+    recording: str | None
+
+
+@dataclass(frozen=True)
+class Parametrization:
+    """The parameters of a problem as a vector; those with a logarithmic scale stand there by their logarithm.
+
+    A parameter that every recording has for itself is one component for each recording.
+    """
+
+    problem: Problem
+    recordings: tuple[str, ...]
+    constants: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, problem: Problem, scene: Scene, recordings: tuple[str, ...]) -> Parametrization:
+        """The parameters of a problem whose constants are those of a scene."""
+        return cls(problem, recordings, {name: float(scene.value(path)) for name, path in problem.constants.items()})
+
+    @cached_property
+    def entries(self) -> dict[str, Entry]:
+        """The components by name, in the order of the vector."""
+        found: dict[str, Entry] = {}
+        for key, parameter in self.problem.parameters.items():
+            if parameter.own and self.problem.recordings:
+                found |= {f"{name}.{key}": Entry(key, parameter, name) for name in self.recordings}
+            else:
+                found[key] = Entry(key, parameter, None)
+        return found
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the components."""
+        return tuple(self.entries)
+
+    @cached_property
+    def lower(self) -> Array:
+        """Lower bounds, (components,)."""
+        return self.to_vector(np.array([entry.parameter.lower for entry in self.entries.values()]))
+
+    @cached_property
+    def upper(self) -> Array:
+        """Upper bounds, (components,)."""
+        return self.to_vector(np.array([entry.parameter.upper for entry in self.entries.values()]))
+
+    @cached_property
+    def start(self) -> Array:
+        """The stated starts, else the middle between the bounds, (components,)."""
+        starts = [entry.parameter.start for entry in self.entries.values()]
+        given = np.array([np.nan if start is None else start for start in starts])
+        with np.errstate(invalid="ignore"):
+            vector = self.to_vector(given)
+        return np.where(np.isnan(given), (self.lower + self.upper) / 2, vector)
+
+    @cached_property
+    def logarithmic(self) -> Array:
+        """Which components stand by their logarithm, (components,), bool."""
+        return np.array([entry.parameter.scale == "log" for entry in self.entries.values()])
+
+    def to_vector(self, values: Array) -> Array:
+        """Components of parameters in their own units, (..., components)."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(self.logarithmic, np.log(np.where(self.logarithmic, values, 1.0)), values)
+
+    def to_values(self, points: Array) -> Array:
+        """Parameters in their own units of components, (..., components)."""
+        return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, points, 0.0)), points)
+
+    def named(self, points: Array, recording: str | None) -> dict[str, Array]:
+        """What expressions know at points (n, components): constants, and the parameters of a recording by name."""
+        values = self.to_values(points)
+        found: dict[str, Array] = {name: np.full(len(points), x) for name, x in self.constants.items()}
+        for k, entry in enumerate(self.entries.values()):
+            if entry.recording is None or entry.recording == recording:
+                found[entry.key] = values[:, k]
+        return found
+
+    def scene_values(self, points: Array, recording: str) -> dict[str, Array]:
+        """Path in the scene -> one number per point, for a recording, ties included."""
+        named = self.named(points, recording)
+        found = {
+            entry.parameter.path: named[entry.key]
+            for entry in self.entries.values()
+            if entry.parameter.path is not None
+            and not entry.parameter.of_measurement
+            and entry.recording in (None, recording)
+        }
+        for path, text in self.problem.ties.items():
+            found[path] = np.broadcast_to(expression.evaluate_array(text, named), (len(points),))
+        return found
+
+    def measurement_values(self, points: Array, recording: str, stated: Clocked) -> dict[str, Array]:
+        """clock, delay, scale, x, y, tilt -> one number per point: a parameter's, else what the recording states."""
+        named = self.named(points, recording)
+        found = {
+            name: np.full(len(points), getattr(stated, name)) for name in ("clock", "delay", "scale", "x", "y", "tilt")
+        }
+        for entry in self.entries.values():
+            if entry.parameter.of_measurement and entry.recording in (None, recording):
+                found[(entry.parameter.path or "").removeprefix(f"{RESERVED}.")] = named[entry.key]
+        return found
+
+    def indices(self, recording: str, suffix: str) -> dict[str, int]:
+        """Path -> component, of the initial state's fields `.angle` or `.rate` in a recording."""
+        return {
+            entry.parameter.path: k
+            for k, entry in enumerate(self.entries.values())
+            if (entry.parameter.path or "").startswith("initial.")
+            and (entry.parameter.path or "").endswith(suffix)
+            and entry.recording in (None, recording)
+            and entry.parameter.path is not None
+        }
