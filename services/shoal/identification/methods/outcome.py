@@ -17,7 +17,7 @@ class Outcome:
 
     iterations: rows of (iteration, best fitness, mean fitness of the iteration)
     minima: other points where a local search ended, with their fitness
-    choice: which method `auto` has taken, and why
+    choice: which method `auto` has taken, and why; ended: whether the method came to its end
     """
 
     point: Array
@@ -26,6 +26,7 @@ class Outcome:
     message: str
     minima: list[tuple[Array, float]] = field(default_factory=list)
     choice: str = ""
+    ended: bool = True
 
 
 Method = Callable[[ForwardModel, np.random.Generator, Progress], Outcome]
