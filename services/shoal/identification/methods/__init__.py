@@ -5,12 +5,14 @@ from __future__ import annotations
 from shoal.errors import InputError
 from shoal.identification.methods.casadi_shooting import casadi
 from shoal.identification.methods.least_squares import least_squares
+from shoal.identification.methods.progressive import progressive
 from shoal.identification.methods.outcome import Method, Outcome
 from shoal.identification.methods.swarms import afsa, iafsa, iafsa_printed, iafsa_unseeded
 
 METHODS: dict[str, Method] = {
     "auto": least_squares,
     "least-squares": least_squares,
+    "progressive": progressive,
     "afsa": afsa,
     "iafsa": iafsa,
     "iafsa-unseeded": iafsa_unseeded,
