@@ -12,7 +12,7 @@ from shoal.identification.adapt import Stage
 from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
-from shoal.identification.methods.least_squares import linearise as difference
+from shoal.identification.sensitivity import sensitivity
 from shoal.identification.uncertainty import Linearisation, autocorrelation, combinations, linearise, spread
 from shoal.scene import Rod, expression
 from shoal.trajectory import Array
@@ -48,7 +48,8 @@ def conclude(
     point, measurement = outcome.point, model.measurement
     evaluations, work, history = model.counter.evaluations, model.work, model.counter.history
     # The intervals look at the neighbourhood of the answer.
-    residual, jacobian = difference(model, point)
+    seen = sensitivity(model, point)
+    residual, jacobian = seen.residual, seen.jacobian
     if not np.all(np.isfinite(residual)):
         verdict, message = Verdict.FAILED, "no parameter set could be simulated; look at the bounds and the scene"
         residual, jacobian = np.zeros_like(residual), np.zeros_like(jacobian)

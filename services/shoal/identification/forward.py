@@ -141,6 +141,10 @@ class ForwardModel:
         """
         return np.asarray(self.counter(points))
 
+    def uncounted(self, points: Array) -> Array:
+        """As `residuals`, for what looks at an answer instead of seeking it."""
+        return self._simulated_residuals(points)
+
     def fitness(self, points: Array) -> Array:
         """Mean squared deviation of each point, (points,). Counted."""
         return self.cost(self.residuals(points))

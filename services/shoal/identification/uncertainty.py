@@ -9,8 +9,9 @@ import numpy as np
 
 from shoal.trajectory import Array
 
-RANK_TOLERANCE = 1e-6
-"""Singular values below this fraction of the largest (columns scaled to the parameters' size) carry nothing."""
+RANK_TOLERANCE = 1e-9
+"""Singular values below this fraction of the largest (columns scaled to the parameters' size) carry nothing, and so do
+those along which a parameter could change by its own size within the noise."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,8 @@ def linearise(jacobian: Array, residual: Array, scale: Array, channels: int) -> 
     within a channel (effective sample size of an AR(1) process).
     """
     left, singular, right = np.linalg.svd(jacobian * scale, full_matrices=False)
-    known = singular > RANK_TOLERANCE * singular[0] if singular[0] > 0 else np.zeros(len(singular), dtype=bool)
+    size = float(np.sqrt(residual @ residual / max(1, residual.size - len(singular))))
+    known = singular > max(RANK_TOLERANCE * singular[0], size, 1e-300)
     inverse = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
     pseudo_inverse = scale[:, None] * (right.T * inverse) @ left.T
     freedom = max(1, residual.size - int(known.sum()))

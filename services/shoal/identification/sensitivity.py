@@ -1,0 +1,96 @@
+"""Derivatives of the residuals that can be believed: differences of two step sizes that agree.
+
+A chaotic motion magnifies the step of a difference until the difference says nothing (a step of 1e-6 may be off by five
+orders of magnitude); a step that is too small drowns in round-off. Both show when two steps are compared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.identification.forward import ForwardModel
+from shoal.trajectory import Array
+
+_STEPS = 10.0 ** np.arange(-5.0, -12.0, -1.0)
+"""Relative to the size of a parameter (see ForwardModel.sizes), largest first."""
+AGREED = 1e-2
+"""Relative difference of two derivatives that count as one."""
+
+
+_NOTHING = 1e-6
+_ROUNDS = 4
+_WELL_CONDITIONED = 1e3
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Residuals at a point, (rows,), and their Jacobian, (rows, parameters).
+
+    doubt: relative difference of two step sizes, the worst of all directions
+    growth: largest over smallest singular value, of parameters in units of their size
+    """
+
+    residual: Array
+    jacobian: Array
+    doubt: float
+    growth: float
+
+    @property
+    def reliable(self) -> bool:
+        """Whether two steps agree in every direction."""
+        return self.doubt <= AGREED
+
+
+def sensitivity(model: ForwardModel, point: Array) -> Sensitivity:
+    """Central differences, in each direction with the neighbouring steps that agree best. Not counted.
+
+    Errors along the strongest direction would hide the weakest, so that the differences are repeated along the
+    singular directions found, until these stay. At a bound the difference is taken to the inner side.
+    """
+    sizes = model.sizes(point)
+    basis = np.eye(len(point))
+    for _ in range(_ROUNDS):
+        residual, columns, doubt = _differences(model, point, sizes, basis)
+        _, singular, turned = np.linalg.svd(columns, full_matrices=False)
+        growth = float(singular[0] / max(singular[-1], 1e-300))
+        if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(turned) - np.eye(len(point)))) < AGREED / growth:
+            break
+        basis = basis @ turned.T
+    return Sensitivity(residual, columns @ basis.T / sizes, float(np.max(doubt)), growth)
+
+
+def _differences(model: ForwardModel, point: Array, sizes: Array, basis: Array) -> tuple[Array, Array, Array]:
+    """Residuals, their derivatives along the columns of `basis` (scaled parameters), and the doubt of each."""
+    count = len(point)
+    steps = np.concatenate([step * sizes * basis.T for step in _STEPS])
+    ahead, behind = (_inside(model, point, move) for move in (steps, -steps))
+    seen = model.uncounted(np.concatenate([point[None], point + ahead, point + behind]))
+    width = np.linalg.norm((ahead - behind) / sizes, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slopes = (seen[1 : 1 + len(steps)] - seen[1 + len(steps) :]) / width[:, None]
+    slopes = slopes.reshape(len(_STEPS), count, -1)
+    columns, doubts = np.zeros((slopes.shape[2], count)), np.full(count, np.inf)
+    for k in range(count):
+        table = slopes[:, k]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            size = np.linalg.norm(table, axis=1)
+            doubt = np.linalg.norm(table[:-1] - table[1:], axis=1) / np.minimum(size[:-1], size[1:])
+        # What changes nothing at all is no reason to doubt.
+        doubt[(size[:-1] == 0.0) & (size[1:] == 0.0)] = 0.0
+        best = int(np.argmin(np.where(np.isfinite(doubt), doubt, np.inf)))
+        if np.all(np.isfinite(table[best])):
+            columns[:, k], doubts[k] = table[best], doubt[best]
+    # Where two steps never agree and next to nothing changes, there is nothing but round-off.
+    size = np.linalg.norm(columns, axis=0)
+    nothing = (doubts > AGREED) & (size < _NOTHING * np.max(size))
+    columns[:, nothing], doubts[nothing] = 0.0, 0.0
+    return seen[0], columns, doubts
+
+
+def _inside(model: ForwardModel, point: Array, moves: Array) -> Array:
+    """Moves that stay within the bounds; one that would not is not made."""
+    there = point + moves
+    good = np.all((there >= model.lower) & (there <= model.upper), axis=1)
+    return np.where(good[:, None], moves, 0.0)
