@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
@@ -45,6 +46,19 @@ def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[s
     return found
 
 
+def recordings(
+    context: click.Context, parameter: click.Parameter, given: tuple[str, ...]
+) -> str | dict[str, str] | None:
+    """FILE, or NAME=FILE once or more."""
+    if len(given) == 1 and ("=" not in given[0] or Path(given[0]).exists()):
+        return given[0]
+    if bare := [one for one in given if "=" not in one]:
+        raise click.BadParameter(f"{bare[0]!r} is not NAME=FILE, as several recordings need it")
+    if len(found := key_value(context, parameter, given)) < len(given):
+        raise click.BadParameter("a recording is named twice")
+    return found or None
+
+
 def times_list(context: click.Context, parameter: click.Parameter, text: str | None) -> list[float] | None:
     """T,T,... as numbers."""
     if text is None:
@@ -53,6 +67,17 @@ def times_list(context: click.Context, parameter: click.Parameter, text: str | N
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise click.BadParameter(f"{text!r} is not a list of times in s, such as 0.1,0.2,0.5") from None
+
+
+class MethodOption(click.Option):
+    """An option whose help names the methods there are; their import waits until somebody asks."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """The option and its help."""
+        from shoal.identification.methods import METHODS
+
+        self.help = f"One of {', '.join(METHODS)}; the problem's by default."
+        return super().get_help_record(ctx)
 
 
 Command = Callable[..., Any]
@@ -223,8 +248,14 @@ def reactions(scene: str, times: list[float], values: dict[str, str], as_json: b
 
 @main.command()
 @click.argument("problem")
-@click.option("--data", metavar="CSV", help="A recording, instead of the problem's own data.")
-@click.option("--method", help="auto, least-squares, iafsa, iafsa-printed, iafsa-unseeded, afsa or casadi.")
+@click.option(
+    "--data",
+    multiple=True,
+    metavar="[NAME=]FILE",
+    callback=recordings,
+    help="A recording (CSV, Parquet, or a YAML that describes one) instead of the problem's own, or one of several.",
+)
+@click.option("--method", cls=MethodOption, metavar="NAME")
 @click.option("--seed", default=0, show_default=True, help="Seed of the random numbers.")
 @option_engine
 @option_set
@@ -234,26 +265,39 @@ def reactions(scene: str, times: list[float], values: dict[str, str], as_json: b
     metavar="METRES",
     help="Error the model may have at the markers: coarse models for the search, the cheapest good one at the end.",
 )
+@click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="Of the search.")
+@click.option(
+    "--checkpoint",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Keep the evaluations in this file; where it exists, go on from it.",
+)
+@click.option("--profiles", is_flag=True, help="The profile likelihood of every parameter.")
+@click.option("--bootstrap", type=click.IntRange(min=0), default=0, metavar="N", help="Draws of a bootstrap.")
 @option_json
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .json or .png.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .html, .png, .gif or .json.")
 def identify(
     problem: str,
-    data: str | None,
+    data: str | dict[str, str] | None,
     method: str | None,
     seed: int,
     engine: str,
     values: dict[str, str],
     tolerance: float | None,
+    time_limit: float | None,
+    checkpoint: Path | None,
+    profiles: bool,
+    bootstrap: int,
     as_json: bool,
     out: Path | None,
 ) -> None:
     """Find the parameters of PROBLEM from measured motion, with intervals and a verdict."""
     from shoal import terminal
     from shoal.identification import identify, load_problem
+    from shoal.identification.conclude import Wishes
 
-    terminal.check_output(out, (".json", ".png"))
+    terminal.check_output(out, (".html", ".png", ".gif", ".json"))
     wanted = load_problem(problem)
-    with terminal.fitness_progress(wanted.name) as progress:
+    with _interruptible(checkpoint), terminal.fitness_progress(wanted.name) as progress:
         estimate = identify(
             wanted,
             method=method,
@@ -262,6 +306,9 @@ def identify(
             values=values,
             seed=seed,
             tolerance=tolerance,
+            time_limit=time_limit,
+            checkpoint=checkpoint,
+            wishes=Wishes(profiles=profiles, bootstrap=bootstrap),
             progress=progress,
         )
     if out is not None:
@@ -387,6 +434,19 @@ def _pipeline(module: str) -> Any:
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] in ("prefect", "mlflow", "jinja2", "shoal_flows"):
             raise InputError(f"{error.name} is not installed; install shoal with its extra 'pipeline'") from None
+        raise
+
+
+@contextmanager
+def _interruptible(checkpoint: Path | None) -> Iterator[None]:
+    """Say that a checkpoint is gone on from, and after Ctrl-C how."""
+    if checkpoint is not None and checkpoint.exists():
+        click.echo(f"shoal: going on from {checkpoint}", err=True)
+    try:
+        yield
+    except KeyboardInterrupt:
+        if checkpoint is not None:
+            click.echo(f"shoal: {checkpoint} keeps what was evaluated; the same command goes on from there", err=True)
         raise
 
 

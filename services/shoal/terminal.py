@@ -52,13 +52,13 @@ def working(what: str) -> Iterator[None]:
 
 
 @contextmanager
-def fitness_progress(what: str) -> Iterator[Callable[[int, float, float], None]]:
-    """A line that follows the best fitness of a running search."""
+def fitness_progress(what: str) -> Iterator[Callable[[int, float, float, int], None]]:
+    """A line that follows the best fitness of a running search, and what it has cost."""
     with _progress() as progress:
         task = progress.add_task(f"{what}: preparing the data", total=None)
 
-        def note(iteration: int, best: float, mean: float) -> None:
-            progress.update(task, description=f"{what}: iteration {iteration}, best fitness {best:.3e}")
+        def note(iteration: int, best: float, mean: float, evaluations: int) -> None:
+            progress.update(task, description=f"{what}: best fitness {best:.3e}, {evaluations} evaluations")
 
         yield note
 
@@ -187,36 +187,83 @@ def modes_table(modes: Modes) -> None:
 
 
 def estimate_table(estimate: Estimate) -> None:
-    """Values with intervals, fit, effort and verdict."""
-    table = _table(
-        f"{estimate.problem}, {estimate.method}", "parameter", "value", "std", "95 % interval", "identifiable"
-    )
+    """The verdict, then values with intervals, other minima, what the residuals say, and what to do next."""
+    _say(f"verdict: {estimate.verdict}", style="bold")
+    for reason in filter(None, estimate.message.split("; ")):
+        _say(f"  {reason}")
+    table = _table(f"{estimate.problem}, {estimate.method}", "parameter", "value", "95 % interval", "known")
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
         known = "yes" if value.identifiable else "at bound" if value.at_bound else "no"
-        interval = f"{value.lower:.6g} to {value.upper:.6g}" if value.identifiable else "-"
-        table.add_row(name, f"{value.value:.8g}", f"{value.std:.1e}" if value.identifiable else "-", interval, known)
+        # Two digits of the uncertainty; a value that is not known has none that mean anything.
+        unit = value.std if value.identifiable and value.std > 0 else abs(value.value) * 1e-2
+        interval = f"{_rounded(value.lower, unit)} to {_rounded(value.upper, unit)}" if value.identifiable else "-"
+        table.add_row(name, _rounded(value.value, unit), interval, known)
     out.print(table)
-    out.print(f"data: {estimate.data}")
-    out.print(
+    for sentence in estimate.combinations:
+        _say(sentence)
+    _minima(estimate)
+    for sentence in estimate.residual_tests.sentences():
+        _say(f"residual {sentence}")
+    for name, found in estimate.profiles.items():
+        sides = [side for side, is_open in (("below", found.lower_open), ("above", found.upper_open)) if is_open]
+        _say(
+            f"profile of {name}: {found.lower:.6g} to {found.upper:.6g}"
+            + (f", open {' and '.join(sides)}" * bool(sides))
+        )
+    if estimate.bootstrap is not None:
+        for name in estimate.parameters:
+            low, high = estimate.bootstrap.interval(name)
+            _say(f"bootstrap of {name}, {len(estimate.bootstrap.draws)} draws: {low:.6g} to {high:.6g}")
+    _effort(estimate)
+    for step in estimate.advice:
+        _say(f"next: {step}")
+
+
+def _minima(estimate: Estimate) -> None:
+    """At most five other minima, the best first."""
+    others = sorted(estimate.minima, key=lambda minimum: minimum["fitness"])
+    for other in others[:5]:
+        values = ", ".join(f"{name} {value:.4g}" for name, value in other.items() if name != "fitness")
+        _say(f"another minimum, fitness {other['fitness']:.3g}: {values}")
+    if len(others) > 5:
+        _say(f"and {len(others) - 5} more minima, all worse")
+
+
+def _effort(estimate: Estimate) -> None:
+    """Where the data come from, what the search cost, and how the answer compares with a known truth."""
+    _say(f"data: {estimate.data}")
+    for note in estimate.notes:
+        _say(f"note: {note}")
+    _say(
         f"fitness {estimate.fitness:.4e}, RMS {estimate.rms:.3e}; {estimate.evaluations} evaluations "
         f"in {estimate.wall_s:.2f} s"
     )
     for stage in estimate.model.get("selection", ()):
-        out.print(
+        _say(
             f"model for {stage['tolerance']:g} m: {stage['model']}, off by about {stage['error']:.1e} m, "
             f"{stage['evaluations']} evaluations"
         )
     if estimate.truth:
         errors = (f"{name} {estimate.parameters[name].value - true:+.2e}" for name, true in estimate.truth.items())
-        out.print(f"against the truth of the computed data: {', '.join(errors)}")
+        _say(f"against the truth of the computed data: {', '.join(errors)}")
     if estimate.model_error_rms is not None:
-        out.print(f"the mesh of the model is off by {estimate.model_error_rms:.1e} m (RMS); the intervals include it")
-    for sentence in estimate.combinations:
-        out.print(sentence)
-    for other in estimate.minima:
-        values = ", ".join(f"{name} {value:.4g}" for name, value in other.items())
-        out.print(f"another minimum: {values}")
-    out.print(f"verdict: {estimate.verdict}" + (f" ({estimate.message})" if estimate.message else ""))
+        _say(f"the mesh of the model is off by {estimate.model_error_rms:.1e} m (RMS); the intervals include it")
+
+
+def _rounded(value: float, unit: float) -> str:
+    """A number to two digits of its uncertainty."""
+    if not np.isfinite([value, unit]).all() or unit <= 0:
+        return f"{value:.6g}"
+    decimals = 1 - int(np.floor(np.log10(unit)))
+    if 0 <= decimals <= 9:
+        return f"{value:.{decimals}f}"
+    digits = max(0, int(np.floor(np.log10(max(abs(value), unit)))) + decimals)
+    return f"{value:.{digits}e}"
+
+
+def _say(text: str, style: str = "") -> None:
+    """A line of text, folded at 80 columns; what looks like markup is none."""
+    out.print(escape(text), style=style, width=min(80, out.width), soft_wrap=False)
 
 
 def sweep_table(sweep: Sweep) -> None:

@@ -44,4 +44,4 @@ def test_stated_noise_decides_what_a_fit_is() -> None:
     noisy, stated = (Measurement.single(one.times, one.channels, shaken, "shaken", noise=size) for size in (None, 0.3))
     loud = identify(problem, measurement=stated)
     assert loud.verdict is not Verdict.REJECTED
-    assert identify(problem, measurement=noisy).verdict is Verdict.REJECTED
+    assert not identify(problem, measurement=noisy).verdict.trusted

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
+from shoal.cli import main
 from shoal.errors import InputError
 from shoal.identification import Recording, load_problem, measure
 
@@ -52,3 +54,23 @@ def test_a_problem_that_computes_its_data_takes_no_file() -> None:
     problem = load_problem("paper-case-1")
     with pytest.raises(InputError, match="takes no file"):
         measure(problem, problem.load_scene(), "some.csv")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["a.csv", "b.csv"], "'a.csv' is not NAME=FILE"),
+        (["run=a.csv", "run=b.csv"], "named twice"),
+        (["other=a.csv"], "no recording 'other'"),
+        (["a=b.csv"], "no column 't'"),
+    ],
+)
+def test_the_option_data_takes_a_file_or_named_files(
+    given: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file whose name has an equals sign is a file."""
+    monkeypatch.chdir(tmp_path)
+    Path("a=b.csv").write_text("time,theta\n0,1\n")
+    found = CliRunner().invoke(main, ["identify", "kaheman-single", *(x for one in given for x in ("--data", one))])
+    assert found.exit_code == 2
+    assert words in " ".join(found.output.split())

@@ -18,7 +18,7 @@ from shoal.errors import InputError
 from shoal.scene import Scene, Spring, TorsionSpring
 from shoal.trajectory import Array, Status
 
-_OPTIONS: dict[str, dict[str, Any]] = {
+OPTIONS: dict[str, dict[str, Any]] = {
     "ipopt": {
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
@@ -82,24 +82,19 @@ def identify_initial_angles(
 
     Minimises the fitness with the Gauss-Newton Hessian. Raises InputError.
     """
-    instants = sampling_times(scene, times)
-    target = np.asarray(measured, dtype=float)
-    if target.shape != (instants.size, 2) or not np.all(np.isfinite(target)):
-        raise InputError(f"measured: needs ({instants.size}, 2) finite positions in m, found shape {target.shape}")
-    if marker not in scene.markers:
-        raise InputError(f"marker: no marker {marker!r}; there are {', '.join(scene.markers)}")
-    first, low, high = _box(paths, start, lower, upper)
+    instants, target = record(scene, times, marker, measured)
+    first, low, high = box(paths, start, lower, upper)
     began = time.perf_counter()
     longest = scene.solver.step if step is None else step
-    plain, linearised = (_shot(scene, paths, instants, marker, longest, count) for count in (0, len(paths)))
+    plain, linearised = (shot(scene, paths, instants, marker, longest, count) for count in (0, len(paths)))
     optimise, fitness_at = _least_squares(plain, linearised, target, solver)
     built = time.perf_counter()
     values = optimise(x0=first, lbx=low, ubx=high)["x"].full().ravel()
     wall = time.perf_counter() - built
     stats = optimise.stats()
     fitness = float(fitness_at(values))
-    forward = 1 + _calls(stats, "nlp_f", "nlp_fg")
-    gradient = _calls(stats, "nlp_grad_f", "nlp_jac_fg", "nlp_hess_l")
+    forward = 1 + calls(stats, "nlp_f", "nlp_fg")
+    gradient = calls(stats, "nlp_grad_f", "nlp_jac_fg", "nlp_hess_l")
     trusted = bool(stats["success"]) and np.isfinite(fitness)
     return ShootingResult(
         values=values,
@@ -115,12 +110,23 @@ def identify_initial_angles(
     )
 
 
-def _calls(stats: dict[str, Any], *names: str) -> int:
+def calls(stats: dict[str, Any], *names: str) -> int:
     """How often the optimiser called its functions of these names; IPOPT and SQP name theirs differently."""
     return sum(int(stats.get(f"n_call_{name}", 0)) for name in names)
 
 
-def _box(paths: Sequence[str], *sides: Sequence[float] | Array) -> tuple[Array, Array, Array]:
+def record(scene: Scene, times: Sequence[float] | Array, marker: str, measured: npt.ArrayLike) -> tuple[Array, Array]:
+    """Instants [s], (samples,), and the marker's measured positions [m], (samples, 2). Raises InputError."""
+    instants = sampling_times(scene, times)
+    target = np.asarray(measured, dtype=float)
+    if target.shape != (instants.size, 2) or not np.all(np.isfinite(target)):
+        raise InputError(f"measured: needs ({instants.size}, 2) finite positions in m, found shape {target.shape}")
+    if marker not in scene.markers:
+        raise InputError(f"marker: no marker {marker!r}; there are {', '.join(scene.markers)}")
+    return instants, target
+
+
+def box(paths: Sequence[str], *sides: Sequence[float] | Array) -> tuple[Array, Array, Array]:
     """Start, lower and upper bound as arrays, (parameters,). Raises InputError."""
     if not paths or len(set(paths)) != len(paths):
         raise InputError(f"paths: needs one or more different paths, found {list(paths)}")
@@ -133,16 +139,11 @@ def _box(paths: Sequence[str], *sides: Sequence[float] | Array) -> tuple[Array, 
     return first, low, high
 
 
-def _shot(scene: Scene, paths: Sequence[str], times: Array, marker: str, step: float, directions: int) -> Any:
+def shot(scene: Scene, paths: Sequence[str], times: Array, marker: str, step: float, directions: int) -> Any:
     """Function parameters -> path of the marker [m] with its derivatives below, (2 + 2 directions, samples)."""
-    for name, load in scene.loads.items():
-        if isinstance(load, Spring | TorsionSpring):
-            field = "length" if isinstance(load, Spring) else "angle"
-            if getattr(load, field) is None:
-                raise InputError(f"loads.{name}.{field}: shooting moves the start, so say where the spring rests")
     model = casadi_model(scene)
     p, size = ca.SX.sym("p", len(paths)), 2 * model.unknowns + 1
-    initial = _initial_state(model, scene, paths, p)
+    initial = initial_state(model, scene, paths, p)
     first = ca.Function("first", [p], [ca.veccat(initial, ca.jacobian(initial, p)[:, :directions])])
     x, carried = ca.SX.sym("x", size), ca.SX.sym("carried", size, directions)
     point = model.places(x)[0][:, model.markers.index(marker)]
@@ -154,7 +155,13 @@ def _shot(scene: Scene, paths: Sequence[str], times: Array, marker: str, step: f
     return ca.Function("shot", [parameters], [path])
 
 
-def _initial_state(model: CasadiModel, scene: Scene, paths: Sequence[str], p: Any) -> Any:
+def initial_state(model: CasadiModel, scene: Scene, paths: Sequence[str], p: Any) -> Any:
+    """The state x at the start as an expression in the parameters p. Raises InputError."""
+    for name, load in scene.loads.items():
+        if isinstance(load, Spring | TorsionSpring):
+            field = "length" if isinstance(load, Spring) else "angle"
+            if getattr(load, field) is None:
+                raise InputError(f"loads.{name}.{field}: shooting moves the start, so say where the spring rests")
     angles: list[Any] = [scene.start(body).angle for body in model.bodies]
     rates: list[Any] = [scene.start(body).rate for body in model.bodies]
     for i, path in enumerate(paths):
@@ -182,7 +189,7 @@ def _least_squares(plain: Any, linearised: Any, measured: Array, solver: str) ->
     hessian = 2 / samples * lam_f * ca.mtimes(jacobian.T, jacobian)
     value = ca.sumsqr(residual) / samples
     none = ca.MX(0, 1)
-    options = _OPTIONS[solver] | {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
+    options = OPTIONS[solver] | {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
     if solver == "ipopt":
         options["grad_f"] = ca.Function("nlp_grad_f", [x, p], [value, gradient])
         options["hess_lag"] = ca.Function("nlp_hess_l", [x, p, lam_f, lam_g], [ca.triu(hessian)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,9 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.trajectory import Array
 
-_MAGIC = b"shoal-checkpoint-1\n"
-_HEAD = struct.Struct("<20sI")
+_MAGIC = b"shoal-checkpoint-2\n"
+_HEAD = struct.Struct("<20sII")
+"""Key of a batch, bytes that follow, and their checksum."""
 
 
 class Memory:
@@ -24,7 +26,10 @@ class Memory:
     """
 
     def __init__(self, path: Path, fingerprint: str) -> None:
-        """Open or begin the file. Raises InputError if it belongs to another identification or cannot be written."""
+        """Open or begin the file.
+
+        Raises InputError if it is damaged, belongs to another identification or cannot be written.
+        """
         self.path = path
         self.recalled = 0
         self._known: dict[bytes, Array] = {}
@@ -37,6 +42,7 @@ class Memory:
                 self._file.seek(kept)
             else:
                 self._file.write(begin)
+                self._file.flush()
         except OSError as error:
             raise InputError(f"checkpoint: {path} cannot be written: {error.strerror}") from None
 
@@ -50,7 +56,8 @@ class Memory:
         """Note the residuals of a batch."""
         buffer = io.BytesIO()
         np.save(buffer, residuals, allow_pickle=False)
-        self._file.write(_HEAD.pack(_key(end, points), buffer.tell()) + buffer.getvalue())
+        body = buffer.getvalue()
+        self._file.write(_HEAD.pack(_key(end, points), len(body), zlib.crc32(body)) + body)
         self._file.flush()
 
     def close(self) -> None:
@@ -60,15 +67,20 @@ class Memory:
     def _load(self, begin: bytes) -> int:
         """Read what is whole; returns where it ends."""
         data = self.path.read_bytes()
+        if begin.startswith(data):
+            return 0
         if not data.startswith(begin):
             raise InputError(f"checkpoint: {self.path} is that of another identification; name another file")
         place = len(begin)
         while place + _HEAD.size <= len(data):
-            key, size = _HEAD.unpack_from(data, place)
+            key, size, checksum = _HEAD.unpack_from(data, place)
             end = place + _HEAD.size + size
             if end > len(data):
                 break
-            self._known[key] = np.load(io.BytesIO(data[place + _HEAD.size : end]), allow_pickle=False)
+            body = data[place + _HEAD.size : end]
+            if zlib.crc32(body) != checksum:
+                raise InputError(f"checkpoint: {self.path} is damaged at byte {place}; name another file or delete it")
+            self._known[key] = np.load(io.BytesIO(body), allow_pickle=False)
             place = end
         return place
 

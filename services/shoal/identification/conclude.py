@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from shoal.errors import InputError
 from shoal.identification.adapt import Stage
+from shoal.identification.bootstrap import bootstrap
+from shoal.identification.covariance import blocks_of
 from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge import Judgement, judge
 from shoal.identification.methods import Outcome
+from shoal.identification.profiles import Profile, profiles
+from shoal.identification.rank import combinations
+from shoal.identification.residual_tests import residual_tests
 from shoal.identification.sensitivity import sensitivity
-from shoal.identification.uncertainty import Linearisation, autocorrelation, combinations, linearise, spread
+from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
 from shoal.scene import Rod, expression
 from shoal.trajectory import Array
-
-_BAD_FIT = 0.2
-"""An RMS above this fraction of the signal's own spread is no fit at all."""
 
 
 @dataclass(frozen=True)
@@ -45,47 +48,60 @@ def conclude(
     wishes: Wishes,
 ) -> Estimate:
     """The estimate of an outcome. The runs it takes are not counted: no method is charged for them."""
-    point, measurement = outcome.point, model.measurement
-    evaluations, work, history = model.counter.evaluations, model.work, model.counter.history
+    searched, point, measurement = model, outcome.point, model.measurement
+    model = replace(model, memory=None, whole=None, deadline=None)
     # The intervals look at the neighbourhood of the answer.
     seen = sensitivity(model, point)
-    residual, jacobian = seen.residual, seen.jacobian
-    if not np.all(np.isfinite(residual)):
-        verdict, message = Verdict.FAILED, "no parameter set could be simulated; look at the bounds and the scene"
-        residual, jacobian = np.zeros_like(residual), np.zeros_like(jacobian)
-    else:
-        verdict, message = Verdict.IDENTIFIED, ""
-    channels = len(measurement.first.channels)
-    at = linearise(jacobian, residual, model.sizes(point), channels)
+    possible = bool(np.all(np.isfinite(seen.residual)))
+    if not possible:
+        seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
+    blocks = blocks_of(model, len(seen.residual))
+    at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks)
     predicted = {name: model.observe(point[None], name)[0] for name in measurement.recordings}
-    model_error = _model_error(model, point, predicted)
+    model_error = _model_error(model, point, predicted) if possible else None
     correction = None if model_error is None else -at.pseudo_inverse @ model_error
+    mesh = None if model_error is None else float(np.sqrt(np.mean(model_error[: len(model.rows.time)] ** 2)))
     parameters = _parameters(model, point, at, correction)
-    quantities = _quantities(model, point, at, correction)
-    unknown = combinations(at.unknown, model.names)
-    if verdict is Verdict.IDENTIFIED:
-        verdict, message = _judge(model, outcome, residual, parameters, unknown)
+    profiled = profiles(model, point, at) if wishes.profiles and possible else {}
+    parameters |= {n: replace(parameters[n], identifiable=False) for n, p in profiled.items() if p.open}
+    unknown = combinations(model, point, at)
+    tests = residual_tests(model, seen.residual, blocks, at.noise, mesh or 0.0)
+    if possible:
+        judgement = judge(model, outcome, seen, at, tests, parameters, unknown)
+    else:
+        message = "no parameter set could be simulated; look at the bounds and the scene"
+        judgement = Judgement(Verdict.FAILED, message)
+    correlation = autocorrelation(seen.residual, blocks)
+    draws = wishes.bootstrap if possible else 0
+    rng = np.random.default_rng(seed)
+    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, mesh))
     return Estimate(
         problem=model.problem.name,
         method=method,
         engine=model.engine.name,
         seed=seed,
-        verdict=verdict,
-        message="; ".join(note for note in (message or outcome.message, _coarse(model, model_error)) if note),
+        verdict=judgement.verdict,
+        message="; ".join(note for note in notes if note),
+        advice=judgement.advice,
         choice=outcome.choice,
         parameters=parameters,
-        quantities=quantities,
+        quantities=_quantities(model, point, at, correction),
         combinations=unknown,
         fitness=outcome.fitness,
         rms=float(np.sqrt(outcome.fitness / model.things)),
-        evaluations=evaluations,
-        work=work,
-        placements=model.placements,
+        evaluations=searched.counter.evaluations,
+        work=searched.work,
+        placements=searched.placements,
         wall_s=wall,
-        history=history,
+        history=searched.counter.history,
         iterations=outcome.iterations,
         minima=[{**_values_of(model, p), "fitness": f} for p, f in outcome.minima],
-        residual_autocorrelation=autocorrelation(residual, channels),
+        residual_autocorrelation=correlation,
+        residual_tests=tests,
+        suspects=judgement.suspects,
+        profiles=profiled,
+        bootstrap=bootstrap(model, point, predicted, correlation, draws, rng) if draws else None,
+        sensitivity_doubt=seen.doubt,
         model_error_rms=None
         if model_error is None
         else float(np.sqrt(np.sum(model_error**2) / model.samples / model.things)),
@@ -133,22 +149,27 @@ def _chosen(stages: list[Stage]) -> dict[str, Any]:
     return {"selection": [stage.to_json() for stage in stages]} if stages else {}
 
 
-def _coarse(model: ForwardModel, model_error: Array | None) -> str:
+def _coarse(model: ForwardModel, mesh: float | None) -> str:
     """A word where the error of the model is larger than that of the measurement; empty if it is not."""
     noise = model.noise
-    if model_error is None or noise is None or (size := float(np.sqrt(np.mean(model_error**2)))) <= noise:
+    if mesh is None or noise is None or mesh <= noise:
         return ""
-    return f"the mesh error of {size:.1g} exceeds the noise of {noise:.1g}; --tolerance {noise / 3:.1g} chooses a mesh"
+    return f"the mesh error of {mesh:.1g} exceeds the noise of {noise:.1g}; --tolerance {noise / 3:.1g} chooses a mesh"
+
+
+def _better(profiled: dict[str, Profile]) -> str:
+    names = ", ".join(name for name, found in profiled.items() if found.better)
+    return f"a better fit than the answer was found on the profile of {names}" if names else ""
 
 
 def _parameters(model: ForwardModel, point: Array, at: Linearisation, correction: Array | None) -> dict[str, Value]:
     found = {}
     for k, name in enumerate(model.names):
-        std, fixed = spread(lambda p, k=k: float(p[k]), point, at)  # type: ignore[misc]
+        about = spread(lambda p, k=k: float(p[k]), point, at)  # type: ignore[misc]
         span = model.upper[k] - model.lower[k]
         at_bound = bool(min(point[k] - model.lower[k], model.upper[k] - point[k]) < 1e-6 * span)
         shift = None if correction is None else float(correction[k])
-        known = _value(float(point[k]), std, fixed and not at_bound and std < span, shift, at_bound)
+        known = _value(float(point[k]), about, about.fixed and not at_bound and about.std < span, shift, at_bound)
         found[name] = known.exponential() if model.parameters.logarithmic[k] else known
     return found
 
@@ -162,9 +183,11 @@ def _quantities(model: ForwardModel, point: Array, at: Linearisation, correction
                 named = model.parameters.named(p[None], recording)
                 return expression.evaluate(text, {key: float(x[0]) for key, x in named.items()})
 
-            std, fixed = spread(value_at, point, at)
+            about = spread(value_at, point, at)
             shift = None if correction is None else value_at(point + correction) - value_at(point)
-            found[f"{recording}.{name}" if recording else name] = _value(value_at(point), std, fixed, shift, False)
+            found[f"{recording}.{name}" if recording else name] = _value(
+                value_at(point), about, about.fixed, shift, False
+            )
     return found
 
 
@@ -174,43 +197,6 @@ def _own(model: ForwardModel, text: str) -> bool:
     return bool(expression.names(text) & keys)
 
 
-def _value(value: float, std: float, identifiable: bool, correction: float | None, at_bound: bool) -> Value:
-    half = 1.96 * std + abs(correction or 0.0)
-    return Value(value, std, value - half, value + half, bool(identifiable), correction, at_bound)
-
-
-def _judge(
-    model: ForwardModel, outcome: Outcome, residual: Array, parameters: dict[str, Value], unknown: list[str]
-) -> tuple[Verdict, str]:
-    size = float(np.sqrt(np.mean(residual**2)))
-    spread_of_data = _spread_of_data(model)
-    noise = model.noise
-    if size > _BAD_FIT * spread_of_data and (noise is None or size > 3 * noise):
-        return Verdict.REJECTED, f"the best fit is off by {size:.3g}, the data vary by {spread_of_data:.3g}"
-    if noise is not None and size > 3 * noise:
-        return Verdict.REJECTED, f"residuals of {size:.3g} are {size / noise:.0f} times the noise of {noise:.3g}"
-    rivals = [f for p, f in outcome.minima if f < 1.5 * outcome.fitness + 1e-18 and _apart(model, p, outcome.point)]
-    if rivals:
-        return Verdict.AMBIGUOUS, f"{1 + len(rivals)} different parameter sets fit equally well"
-    at_bound = [name for name, value in parameters.items() if value.at_bound]
-    if at_bound:
-        return Verdict.COMBINATION, f"{', '.join(at_bound)} ended at a bound and is not identified"
-    if unknown:
-        return (
-            Verdict.COMBINATION,
-            f"only combinations are known: {len(unknown)} direction(s) leave the motion unchanged",
-        )
-    return Verdict.IDENTIFIED, ""
-
-
-def _spread_of_data(model: ForwardModel) -> float:
-    """Standard deviation of the (weighted) data about the mean of each channel."""
-    parts = []
-    for recording in model.measurement.recordings.values():
-        deviation = recording.values - np.nanmean(recording.values, axis=0)
-        parts.append(deviation[np.isfinite(recording.values)])
-    return float(np.sqrt(np.mean((np.concatenate(parts) * model.rows.weight) ** 2)))
-
-
-def _apart(model: ForwardModel, one: Array, other: Array) -> bool:
-    return bool(np.max(np.abs(one - other) / (model.upper - model.lower)) > 1e-3)
+def _value(value: float, about: Spread, identifiable: bool, correction: float | None, at_bound: bool) -> Value:
+    half = about.half + abs(correction or 0.0)
+    return Value(value, about.std, value - half, value + half, bool(identifiable), correction, at_bound)

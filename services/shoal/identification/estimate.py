@@ -8,7 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from shoal.identification.bootstrap import Bootstrap
 from shoal.identification.measurement import Measurement
+from shoal.identification.profiles import Profile
+from shoal.identification.residual_tests import ResidualTests
+from shoal.identification.suspects import Suspect
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
@@ -30,7 +34,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Value:
-    """An estimated number: standard deviation from the residuals, 95 % interval with the model's own error in it.
+    """An estimated number: its standard deviation, and a 95 % interval (Student's t) with the model's own error in it.
 
     correction: what a mesh twice as fine would add to the value, None if not computed; it is not added, but is in
     the interval
@@ -59,6 +63,8 @@ class Estimate:
     history: evaluations and the best fitness after them; iterations: (iteration, best, mean fitness)
     evaluations: simulations; work: simulated time over that of one run of all recordings
     choice: which method was taken, and why; notes: what was found and mended in the recordings
+    advice: what to do next; suspects: properties of the measurement that would explain the misfit
+    sensitivity_doubt: relative difference of derivatives by two step sizes; profiles, bootstrap: where wished for
     scenes: the identified machine, by recording; predicted: its channels at the samples of each recording
     """
 
@@ -68,6 +74,7 @@ class Estimate:
     seed: int
     verdict: Verdict
     message: str
+    advice: list[str]
     choice: str
     parameters: dict[str, Value]
     quantities: dict[str, Value]
@@ -82,6 +89,11 @@ class Estimate:
     iterations: list[tuple[int, float, float]]
     minima: list[dict[str, float]]
     residual_autocorrelation: float
+    residual_tests: ResidualTests
+    suspects: list[Suspect]
+    profiles: dict[str, Profile]
+    bootstrap: Bootstrap | None
+    sensitivity_doubt: float
     model_error_rms: float | None
     truth: dict[str, float]
     data: str
@@ -111,6 +123,7 @@ class Estimate:
             "status": self.status,
             "verdict": str(self.verdict),
             "message": self.message,
+            "advice": self.advice,
             "problem": self.problem,
             "method": self.method,
             "engine": self.engine,
@@ -126,6 +139,11 @@ class Estimate:
             "wall_s": self.wall_s,
             "minima": plain(self.minima),
             "residual_autocorrelation": plain(self.residual_autocorrelation),
+            "residual_tests": self.residual_tests.to_json(),
+            "suspects": [plain(vars(suspect)) for suspect in self.suspects],
+            "profiles": {name: found.to_json() for name, found in self.profiles.items()},
+            "bootstrap": None if self.bootstrap is None else self.bootstrap.to_json(),
+            "sensitivity_doubt": plain(self.sensitivity_doubt),
             "model_error_rms": plain(self.model_error_rms),
             "truth": self.truth,
             "data": self.data,

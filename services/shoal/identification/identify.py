@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,15 @@ from shoal.identification.adapt import Stage, coarse_to_fine
 from shoal.identification.checkpoint import Memory
 from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.estimate import Estimate
-from shoal.identification.forward import ForwardModel, Progress, TimeIsUp
+from shoal.identification.forward import ForwardModel, TimeIsUp
 from shoal.identification.measurement import Measurement, measure
 from shoal.identification.methods import Outcome, get_method
 from shoal.identification.problem import Problem
 from shoal.scene import Scene
 from shoal.versions import versions
+
+Watch = Callable[[int, float, float, int], None]
+"""Called with (iteration, best fitness, mean fitness of the iteration, evaluations so far)."""
 
 
 def identify(
@@ -37,7 +41,7 @@ def identify(
     time_limit: float | None = None,
     checkpoint: Path | None = None,
     wishes: Wishes = NOTHING,
-    progress: Progress = lambda *_: None,
+    progress: Watch = lambda *_: None,
 ) -> Estimate:
     """Find the parameters of a problem.
 
@@ -47,10 +51,10 @@ def identify(
     instead of taken from the scene (coarse while searching);
     time_limit: of the search [s]; then the best so far is the answer; checkpoint: file of evaluations, which a run
     that was broken off finds when it is started again; wishes: what is to be known beyond the answer;
-    progress: called with (iteration, best fitness, mean fitness). Raises InputError, ComputationError.
+    progress: is told how the search goes. Raises InputError, ComputationError.
     """
     name = method or problem.method
-    search = get_method(name)
+    get_method(name)
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
     scene = problem.load_scene(values)
@@ -59,9 +63,28 @@ def identify(
     model = ForwardModel(problem, scene, get_engine(engine), measurement)
     if checkpoint is not None:
         model.memory = Memory(checkpoint, _fingerprint(model, name, seed, tolerance))
-    begin = time.perf_counter()
+    with nullcontext() if model.memory is None else closing(model.memory):
+        begin = time.perf_counter()
+        model, outcome, stages = _search(model, name, np.random.default_rng(seed), tolerance, time_limit, progress)
+        wall = time.perf_counter() - begin
+        return conclude(model, outcome, name, seed, wall, stages, wishes)
+
+
+def _search(
+    model: ForwardModel,
+    method: str,
+    rng: np.random.Generator,
+    tolerance: float | None,
+    time_limit: float | None,
+    watch: Watch,
+) -> tuple[ForwardModel, Outcome, list[Stage]]:
+    """Run a method as long as it may; returns the model it ended with, where, and the models on the way."""
+
+    def progress(iteration: int, best: float, mean: float) -> None:
+        watch(iteration, best, mean, asked.counter.evaluations)
+
+    search, asked, stages = get_method(method), model, list[Stage]()
     model.deadline = None if time_limit is None else time.monotonic() + time_limit
-    rng, stages = np.random.default_rng(seed), list[Stage]()
     try:
         if tolerance is None:
             outcome = search(model, rng, progress)
@@ -69,14 +92,10 @@ def identify(
             model, outcome, stages = coarse_to_fine(model, search, tolerance, rng, progress)
     except TimeIsUp:
         outcome = _best_so_far(model, time_limit or 0.0)
-    wall = time.perf_counter() - begin
     model.deadline = None
     if model.refusal and model.counter.failures == model.counter.evaluations:
         raise InputError(model.refusal)
-    estimate = conclude(model, outcome, name, seed, wall, stages, wishes)
-    if model.memory is not None:
-        model.memory.close()
-    return estimate
+    return model, outcome, stages
 
 
 def load_truth(problem: Problem) -> Scene:
@@ -89,7 +108,8 @@ def _best_so_far(model: ForwardModel, limit: float) -> Outcome:
     if not np.isfinite(counter.best_value):
         raise InputError(f"time_limit: nothing was found in {limit:g} s; allow more")
     rows = [(k, float(best), float(best)) for k, best in enumerate(counter.history[1])]
-    return Outcome(counter.best, counter.best_value, rows, f"stopped after {limit:g} s, before the method had ended")
+    message = f"stopped after {limit:g} s, before the method had ended"
+    return Outcome(counter.best, counter.best_value, rows, message, ended=False)
 
 
 def _fingerprint(model: ForwardModel, method: str, seed: int, tolerance: float | None) -> str:

@@ -12,7 +12,7 @@ from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.identification.observation import camera, observe
 from shoal.identification.problem import RESERVED, Problem
-from shoal.identification.reading import read
+from shoal.identification.reading import described, read
 from shoal.identification.recording import Channel, Clocked, EngineSource, FileSource
 from shoal.scene import Scene
 from shoal.trajectory import Array
@@ -112,7 +112,7 @@ def measure(problem: Problem, scene: Scene, data: str | Mapping[str, str] | None
         path = files.get(name) or source.path
         if path is None:
             raise InputError(f"data: {where} needs a recording; give it with --data FILE.csv")
-        recordings[name] = _recorded(problem, source, Path(path))
+        recordings[name] = _recorded(problem, scene, source, Path(path))
     return Measurement(recordings, truth)
 
 
@@ -157,8 +157,11 @@ def _true(scene: Scene, source: EngineSource, path: str) -> float:
     return float(getattr(source, rest) if head == RESERVED else scene.value(path))
 
 
-def _recorded(problem: Problem, source: FileSource, path: Path) -> Recording:
-    source, found = read(source, problem.channels_of(source), path)
+def _recorded(problem: Problem, scene: Scene, source: FileSource, path: Path) -> Recording:
+    source = FileSource.model_validate(described(source.model_dump(exclude_unset=True), path))
+    channels = problem.channels_of(source)
+    problem.check_channels(channels, scene, path.name)
+    found = read(source, channels)
     return Recording(
         found.times,
         found.channels,
@@ -166,8 +169,16 @@ def _recorded(problem: Problem, source: FileSource, path: Path) -> Recording:
         found.origin,
         _noise(problem, found.channels),
         _stated(source),
-        found.notes,
+        (*found.notes, *_without_scale(problem, source, channels)),
     )
+
+
+def _without_scale(problem: Problem, source: FileSource, channels: tuple[Channel, ...]) -> tuple[str, ...]:
+    """A note where nothing says how large a picture element is."""
+    sized = source.scale != 1.0 or any(p.path == f"{RESERVED}.scale" for p in problem.parameters.values())
+    if sized or not any(channel.unit == "px" and channel.scale == 1.0 for channel in channels):
+        return ()
+    return (f"positions in px count as metres; state `scale`, or seek it by a parameter {RESERVED}.scale",)
 
 
 def _stated(source: Clocked) -> Clocked:

@@ -118,18 +118,11 @@ class Problem(Record):
             raise ValueError("source: give either one source or several recordings")
         for name, source in self.sources.items():
             channels = self.channels_of(source)
-            if not channels:
+            if not channels and isinstance(source, EngineSource):
                 raise ValueError("channels: at least one is needed")
             if isinstance(source, FileSource) and not all(channel.column for channel in channels):
                 raise ValueError(f"channels: each needs the `column` of the file it is read from ({name})")
-        if any(p.prior for p in self.parameters.values()) and not self._noise_is_stated():
-            raise ValueError("noise: a prior weighs against the data by their noise; state it for every channel")
         return self
-
-    def _noise_is_stated(self) -> bool:
-        return self.noise is not None or all(
-            channel.noise is not None for source in self.sources.values() for channel in self.channels_of(source)
-        )
 
     @property
     def sources(self) -> dict[str, EngineSource | FileSource]:
@@ -158,11 +151,22 @@ class Problem(Record):
             except InputError as error:
                 raise InputError(f"{self.name}: ties or constants: {error}") from None
         for source in self.sources.values():
-            for channel in self.channels_of(source):
-                if channel.marker not in scene.markers:
-                    known = ", ".join(scene.markers)
-                    raise InputError(f"{self.name}: channels: no marker {channel.marker!r}; there are {known}")
+            if channels := self.channels_of(source):
+                self.check_channels(channels, scene, self.name)
         return scene
+
+    def check_channels(self, channels: tuple[Channel, ...], scene: Scene, where: str) -> None:
+        """Whether a recording can be compared with the scene. Raises InputError."""
+        if not channels:
+            raise InputError(f"{where}: channels: none are stated, neither by the problem nor by the recording")
+        for channel in channels:
+            if channel.marker not in scene.markers:
+                known = ", ".join(scene.markers)
+                raise InputError(f"{where}: channels: no marker {channel.marker!r}; there are {known}")
+            if channel.noise is None and self.noise is None and any(p.prior for p in self.parameters.values()):
+                raise InputError(
+                    f"{where}: noise: a prior weighs against the data by their noise; state it for {channel.marker}"
+                )
 
     @classmethod
     def parse(cls, data: Any, source: str) -> Problem:
@@ -186,7 +190,19 @@ def problem_names() -> list[str]:
 def load_problem(name: str) -> Problem:
     """The built-in problem of that name, or the one in that YAML file. Raises InputError."""
     problem = Problem.parse(read_named(name, problem_library(), "problem"), name)
-    beside = Path(name).parent / problem.scene
-    if Path(name).suffix and Path(problem.scene).suffix and beside.exists():
-        problem = problem.model_copy(update={"scene": str(beside)})
-    return problem
+    if not Path(name).suffix:
+        return problem
+    folder = Path(name).parent
+    changes: dict[str, Any] = {"recordings": {key: _beside(folder, one) for key, one in problem.recordings.items()}}
+    if problem.source is not None:
+        changes["source"] = _beside(folder, problem.source)
+    if Path(problem.scene).suffix and (folder / problem.scene).exists():
+        changes["scene"] = str(folder / problem.scene)
+    return problem.model_copy(update=changes)
+
+
+def _beside(folder: Path, source: EngineSource | FileSource) -> EngineSource | FileSource:
+    """The source with a path that starts from the folder of the YAML file that names it."""
+    if isinstance(source, EngineSource) or source.path is None:
+        return source
+    return source.model_copy(update={"path": str(folder / source.path)})

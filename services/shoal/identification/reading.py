@@ -2,15 +2,43 @@
 
 from __future__ import annotations
 
+import csv
+import gzip
+import io
+import warnings
+import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from shoal.errors import InputError
 from shoal.identification.recording import SI, Channel, FileSource
+from shoal.identification.swaps import mend
+from shoal.scene.load import read_yaml
+from shoal.scene.record import one_line
 from shoal.trajectory import Array
+
+Mask = NDArray[np.bool_]
+
+LARGEST = 200_000_000
+"""Bytes of a table, unpacked; more are refused."""
+YAML = (".yaml", ".yml")
+_FEWEST = 3
+"""Samples, without which there is no motion."""
+_OUTLIER = 8.0
+"""Times the noise; an isolated sample farther off is counted as an outlier."""
+_PAUSE = 1.5
+"""Times the usual interval; a longer one is a gap."""
+_NEARLY = 0.8
+"""Of half a turn; an angle that turns farther from one sample to the next may as well have turned the other way."""
+
+_EMPTY = ("", "nan", "na", "n/a", "null", "none", "<na>", "nat")
+"""Cells that are gaps, in small letters."""
 
 
 @dataclass(frozen=True)
@@ -24,55 +52,298 @@ class Samples:
     notes: tuple[str, ...] = ()
 
 
-def read(source: FileSource, channels: tuple[Channel, ...], path: Path) -> tuple[FileSource, Samples]:
-    """The samples of a recording, and the source that tells how they were read. Raises InputError."""
-    table = _read_csv(path)
-    needed = [source.time, *(channel.column for channel in channels)]
-    for column in needed:
-        if column not in table.columns:
-            raise InputError(f"{path}: no column {column!r}; there are {', '.join(map(str, table.columns))}")
-    columns = {column: _numbers(table[column], column, path) for column in dict.fromkeys(needed)}
-    times = columns[source.time] * source.time_scale
-    if np.any(np.diff(times) <= 0):
-        row = int(np.argmax(np.diff(times) <= 0)) + 3
-        raise InputError(f"{path}: row {row}, column {source.time!r}: times must increase")
-    duration = np.inf if source.duration is None else source.duration
-    inside = (times >= source.start - 1e-9) & (times <= source.start + duration + 1e-9)
-    if inside.sum() < 3:
-        raise InputError(
-            f"{path}: only {inside.sum()} samples from {source.start:g} s to {source.start + duration:g} s; "
-            f"the recording covers {times[0]:g} s to {times[-1]:g} s"
-        )
+@dataclass(frozen=True)
+class Table:
+    """Columns as a file has them, by name.
+
+    rows: the line of the file that each row stands on, (rows,); decimal: how its text writes the decimal mark
+    """
+
+    path: Path
+    frame: Any
+    rows: NDArray[np.intp]
+    decimal: str = "."
+
+    def numbers(self, column: str) -> Array:
+        """A column, (rows,), nan where a cell is empty. Raises InputError for what is no finite number."""
+        self.require(column)
+        series = self.frame[column]
+        if series.dtype.kind in "iuf":
+            numbers = series.to_numpy(dtype=float, na_value=np.nan)
+        else:
+            words = [None if x is None or x is np.nan or str(x).strip().lower() in _EMPTY else str(x) for x in series]
+            numbers = np.array([np.nan if word is None else _float(word, self.decimal) for word in words])
+            self._refuse_first(np.array([w is not None for w in words]) & np.isnan(numbers), column, "is not a number")
+        self._refuse_first(np.isinf(numbers), column, "is not finite")
+        return np.asarray(numbers, dtype=float)
+
+    def require(self, column: str) -> None:
+        """Refuse a column that is not there."""
+        if column not in self.frame.columns:
+            raise InputError(f"{self.path}: no column {column!r}; there are {_named(self.frame.columns)}")
+
+    def _refuse_first(self, bad: Mask, column: str, why: str) -> None:
+        if np.any(bad):
+            k = int(np.argmax(bad))
+            found = str(self.frame[column].iloc[k])
+            raise InputError(f"{self.path}: row {self.rows[k]}, column {column!r}: {_short(found)} {why}")
+
+
+def described(fields: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Fields of a FileSource that name a table: where `path` is a recording's YAML, what it states goes first.
+
+    The YAML's own `path` is beside it. Raises InputError.
+    """
+    if path.suffix not in YAML:
+        return {**fields, "path": str(path)}
+    try:
+        own = read_yaml(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or 'not UTF-8 text'}") from None
+    if not isinstance(own, dict):
+        raise InputError(f"{path}: a recording is a mapping of fields, found {type(own).__name__}")
+    try:
+        source = FileSource.model_validate(own)
+    except ValidationError as error:
+        raise one_line(error, str(path)) from None
+    if source.path is None or Path(source.path).suffix in YAML:
+        raise InputError(f"{path}: path: the table of the recording (CSV or Parquet), found {source.path!r}")
+    return {**fields, **own, "path": str(path.parent / source.path)}
+
+
+def read(source: FileSource, channels: tuple[Channel, ...]) -> Samples:
+    """The samples of the recording that a source describes. Raises InputError."""
+    path = Path(source.path or "")
+    table = load_table(path, source.columns)
+    for column in (source.time, *(c.column for c in channels))[bool(source.rate) :]:
+        table.require(column)
+    times = _times(source, table)
+    inside = _window(source, times, path)
+    columns = {name: table.numbers(name) for c in channels for name in (c.column, c.origin) if name is not None}
+    notes = _mend(times, columns, channels) if source.swaps else []
+    signals = []
+    for channel in channels:
+        signal, note = _signal(source, channel, columns, times, inside)
+        signals.append(_without_turns(signal, inside) if channel.quantity == "angle" else signal)
+        notes += note
+    values = np.column_stack(signals)
+    for channel, signal in zip(channels, values[inside].T, strict=True):
+        if not np.any(np.isfinite(signal[:: source.every])):
+            raise InputError(f"{path}: column {channel.column!r} has no sample from {_span(times[inside])}")
+    notes += _findings(times[inside], values[inside], channels)
     chosen = np.flatnonzero(inside)[:: source.every]
-    values = np.column_stack([c.offset + c.scale * SI[c.unit or "m"] * columns[c.column][chosen] for c in channels])
-    for k, channel in enumerate(channels):
-        if channel.quantity == "angle":
-            # Whole turns before the window say nothing about the motion in it.
-            values[:, k] -= 2 * np.pi * np.round(values[0, k] / (2 * np.pi))
-    return source, Samples(
-        times[chosen] - times[chosen[0]],
-        channels,
-        values,
-        f"{path.name}, {times[chosen[0]]:g} s to {times[chosen[-1]]:g} s, {len(chosen)} samples",
-    )
+    origin = f"{path.name}, {_span(times[chosen])}, {len(chosen)} samples"
+    return Samples(times[chosen] - times[chosen[0]], channels, values[chosen], origin, tuple(notes))
 
 
-def _read_csv(path: Path) -> Any:
+def load_table(path: Path, columns: list[str] | None = None) -> Table:
+    """A table of CSV or Parquet; columns: names, where it has no header line. Raises InputError."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(LARGEST + 1)
+        if data.startswith(b"\x1f\x8b"):
+            with gzip.open(io.BytesIO(data)) as packed:
+                data = packed.read(LARGEST + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(f"data: {path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > LARGEST:
+        raise InputError(f"data: {path} holds more than {LARGEST / 1e6:.0f} MB; cut the part to fit on out of it")
+    if data.startswith(b"PAR1"):
+        return _parquet(path, data)
+    if b"\0" in data[:65536]:
+        raise InputError(f"data: {path} is not CSV: it is binary")
+    return _csv(path, data, columns)
+
+
+def _parquet(path: Path, data: bytes) -> Table:
     import pandas
 
     try:
-        return pandas.read_csv(path)
-    except (OSError, EOFError) as error:
-        raise InputError(f"data: {path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    except (ValueError, UnicodeDecodeError) as error:
-        raise InputError(f"data: {path} is not CSV: {str(error).splitlines()[0]}") from None
+        frame = pandas.read_parquet(io.BytesIO(data))
+    except ImportError:
+        raise InputError(f"data: {path} is Parquet, which needs the package pyarrow; install it, or give CSV") from None
+    except (OSError, ValueError, KeyError, NotImplementedError, MemoryError) as error:
+        raise InputError(f"data: {path} is not Parquet: {_short(str(error))}") from None
+    return Table(path, frame, np.arange(1, len(frame) + 1))
 
 
-def _numbers(series: Any, column: str, path: Path) -> Array:
+def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     import pandas
 
-    numbers: Array = pandas.to_numeric(series, errors="coerce").to_numpy(dtype=float)
-    bad = np.flatnonzero(~np.isfinite(numbers))
-    if bad.size:
-        raise InputError(f"{path}: row {bad[0] + 2}, column {column!r}: {series.iloc[bad[0]]!r} is not a number")
-    return numbers
+    try:
+        data = data.removeprefix(b"\xef\xbb\xbf")
+        first = data.split(b"\n", 1)[0].decode("utf-8").strip("\r")
+        separator = next((mark for mark in (";", "\t") if mark in first), ",")
+        decimal = "," if separator == ";" else "."
+        header = [name.strip() for name in next(csv.reader([first], delimiter=separator), [])]
+        names = columns or header
+        if not header:
+            raise InputError(f"data: {path} is not CSV: its first line is empty")
+        twice = [name for name in names if names.count(name) > 1]
+        if columns is None and all(np.isfinite(_float(name, decimal)) for name in header):
+            raise InputError(f"{path}: no header line; name its columns with `columns`")
+        if twice:
+            raise InputError(f"{path}: row 1: column {twice[0]!r} stands twice")
+        with warnings.catch_warnings():
+            # A row with more cells than the header would else be cut off with a mere warning.
+            warnings.simplefilter("error", pandas.errors.ParserWarning)
+            frame = pandas.read_csv(
+                io.BytesIO(data),
+                sep=separator,
+                decimal=decimal,
+                header=None,
+                names=names,
+                skiprows=0 if columns else 1,
+                index_col=False,
+                skip_blank_lines=False,
+                skipinitialspace=True,
+                low_memory=False,
+            )
+    except (ValueError, csv.Error, pandas.errors.ParserWarning, OverflowError, MemoryError) as error:
+        raise InputError(f"data: {path} is not CSV: {_short(str(error))}") from None
+    rows = np.arange(len(frame)) + (1 if columns else 2)
+    filled = frame.notna().any(axis=1).to_numpy()
+    return Table(path, frame[filled], rows[filled], decimal)
+
+
+def _times(source: FileSource, table: Table) -> Array:
+    """Times [s], (rows,), as recorded or counted. Raises InputError."""
+    if len(table.rows) == 0:
+        raise InputError(f"{table.path}: only 0 samples in the file; at least {_FEWEST} are needed")
+    if source.rate:
+        # A line that is blank is a frame without any marker.
+        return np.asarray((table.rows - table.rows[0]) / source.rate)
+    times = table.numbers(source.time) * source.time_scale
+    where = f"{table.path}: row {{}}, column {source.time!r}: "
+    for k in np.flatnonzero(np.isnan(times))[:1]:
+        raise InputError(f"{where.format(table.rows[k])}a sample needs its time")
+    for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
+        found = f"found {times[k + 1]:g} s after {times[k]:g} s"
+        raise InputError(f"{where.format(table.rows[k + 1])}times must increase, {found}")
+    return times
+
+
+def _window(source: FileSource, times: Array, path: Path) -> Mask:
+    """Which rows are in the window, (rows,), bool. Raises InputError."""
+    stop = np.inf if source.duration is None else source.start + source.duration
+    inside: Mask = (times >= source.start - 1e-9) & (times <= stop + 1e-9)
+    count = len(np.flatnonzero(inside)[:: source.every])
+    if count < _FEWEST:
+        raise InputError(
+            f"{path}: only {count} samples from {source.start:g} s to {stop:g} s (every {source.every}); at least "
+            f"{_FEWEST} are needed; the recording covers {_span(times)}"
+        )
+    return inside
+
+
+def _mend(times: Array, columns: dict[str, Array], channels: tuple[Channel, ...]) -> list[str]:
+    """Put exchanged markers right in the columns, in place; what was found, by rows of samples from 0."""
+    places = {(c.marker, c.quantity): c.column for c in channels if c.is_position}
+    pairs = {m: (places[m, "x"], places[m, "y"]) for m, q in places if q == "x" and (m, "y") in places}
+    if len(pairs) < 2 or len({name for pair in pairs.values() for name in pair}) < 2 * len(pairs):
+        return []
+    mended, notes = mend(times, {m: np.column_stack([columns[x], columns[y]]) for m, (x, y) in pairs.items()})
+    for marker, (x, y) in pairs.items() if notes else ():
+        columns[x], columns[y] = mended[marker].T
+    return notes
+
+
+def _signal(
+    source: FileSource, channel: Channel, columns: dict[str, Array], times: Array, inside: Mask
+) -> tuple[Array, list[str]]:
+    """A channel in SI units, (rows,), and notes. Where y grows down, y and the sense of angles are turned round."""
+    column = columns[channel.column]
+    notes: list[str] = []
+    unit = SI[channel.unit or ("m" if channel.is_position else "rad")]
+    if channel.quantity == "angle":
+        column, notes = _unwrapped(column, times, 2 * np.pi / unit, channel.marker, inside)
+    if channel.origin:
+        column = column - columns[channel.origin]
+    sense = -1.0 if source.y_axis == "down" and channel.quantity != "x" else 1.0
+    return np.asarray(channel.offset + sense * channel.scale * unit * column), notes
+
+
+def _unwrapped(angle: Array, times: Array, turn: float, marker: str, inside: Mask) -> tuple[Array, list[str]]:
+    """An angle that jumps by whole turns made continuous; one that leaves the range of a turn is not wrapped."""
+    known = np.flatnonzero(np.isfinite(angle))
+    turns = np.round(np.diff(angle[known]) / turn)
+    if not turns.any() or np.ptp(angle[known]) > 1.01 * turn:
+        return angle, []
+    smooth = angle.copy()
+    smooth[known[1:]] -= turn * np.cumsum(turns)
+    interval = np.diff(times[known])
+    usual = interval <= _PAUSE * np.median(interval)
+    steps = np.abs(np.diff(smooth[known]))
+    fastest = float((steps / interval)[usual].max())
+    doubtful = np.where(usual, steps > _NEARLY * turn / 2, fastest * interval > turn / 2)
+    notes = [f"angle of {marker} jumps by whole turns: made continuous"] if turns[inside[known[1:]]].any() else []
+    for k in np.flatnonzero(inside[known[1:]] & doubtful)[:1]:
+        gap = f"{interval[k]:.3g} s from {times[known[k]]:g} s on"
+        notes.append(f"angle of {marker}: its count of turns is a guess; no sample for {gap} is long for its motion")
+    return smooth, notes
+
+
+def _without_turns(angle: Array, inside: Mask) -> Array:
+    """An angle less its whole turns at the start of the window, which say nothing about the motion in it."""
+    known = angle[inside & np.isfinite(angle)][:1]
+    return angle - 2 * np.pi * np.round(known / (2 * np.pi)) if known.size else angle
+
+
+def _findings(times: Array, values: Array, channels: tuple[Channel, ...]) -> list[str]:
+    """Gaps of the channels, dropped frames, uneven times, and outliers."""
+    notes = []
+    interval = np.diff(times)
+    usual = float(np.median(interval))
+    longer = interval > _PAUSE * usual
+    if np.mean(np.abs(interval - usual) > 0.1 * usual) > 0.2:
+        notes.append(f"uneven times: intervals of {interval.min():.3g} s to {interval.max():.3g} s")
+    elif longer.any():
+        frames = int(np.sum(np.round(interval[longer] / usual) - 1))
+        notes.append(f"about {frames} dropped frames; intervals of {usual:.3g} s, the longest {interval.max():.3g} s")
+    for channel, signal in zip(channels, values.T, strict=True):
+        if missing := int(np.isnan(signal).sum()):
+            notes.append(f"{channel.marker} {channel.quantity}: {missing} of {len(times)} samples are gaps")
+        if count := _outliers(times, signal):
+            notes.append(
+                f"{channel.marker} {channel.quantity}: outliers, {count} samples beyond {_OUTLIER:g} standard "
+                "deviations of the noise; `loss: huber` lets them weigh less"
+            )
+    return notes
+
+
+def _outliers(times: Array, signal: Array) -> int:
+    """How many samples stand alone, by the cubic through their four neighbours; none where times are uneven."""
+    from shoal.identification.loss import differences  # slow to import
+
+    known = np.isfinite(signal)
+    x, steps = signal[known], np.diff(times[known])
+    if len(x) < 20 or np.ptp(steps) > 0.1 * np.median(steps):
+        return 0
+    off = np.abs(x[2:-2] - (4 * (x[1:-3] + x[3:-1]) - x[:-4] - x[4:]) / 6) / np.sqrt(70 / 36)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(off, 3), 7)
+    # A spike spoils the prediction of the two samples on either side, and of no other; fast motion spoils them all.
+    alone = (off == around.max(axis=1)) & (off > _OUTLIER * np.maximum(around[:, 0], around[:, 6]))
+    # Of a signal in whole units (pixels) that hardly moves, the differences tell nothing below the unit.
+    resolution = float(np.diff(np.unique(x)).min(initial=np.inf)) if np.ptp(x) else 0.0
+    return int(np.sum(alone & (off > _OUTLIER * max(differences(x), resolution))))
+
+
+def _span(times: Array) -> str:
+    return f"{times[0]:g} s to {times[-1]:g} s"
+
+
+def _float(text: str, decimal: str) -> float:
+    """The number that a cell holds, nan if it is none."""
+    try:
+        return float(text.replace(decimal, ".").replace("_", "?"))
+    except ValueError:
+        return float("nan")
+
+
+def _short(text: str) -> str:
+    line = (text.splitlines() or [""])[0]
+    return repr(line if len(line) <= 80 else line[:77] + "...")
+
+
+def _named(names: Any) -> str:
+    return ", ".join(map(str, names))[:300]

@@ -29,7 +29,8 @@ SI: dict[str, float] = {
 class Channel(Record):
     """One measured signal: a marker's x, y [m], angle [rad] or rate of its angle [rad/s].
 
-    The signal is offset + scale * unit * (column - origin), positions also times the recording's `scale`.
+    The signal is offset + scale * unit * (column - origin); where the y axis grows down, y, angle and rate change sign
+    before `offset` is added.
     column, origin: names of columns; origin is that of a point that stands still, such as a tracked pivot
     unit: of the column; a rate is in the unit per second
     noise: standard deviation in SI units; offset: in SI units
@@ -95,9 +96,11 @@ class EngineSource(Clocked):
 class FileSource(Clocked):
     """Data from a CSV (gzip allowed) or Parquet file: `duration` s from `start` s on, every `every`-th sample.
 
-    path: beside the YAML file that names it; columns: names, where the file has no header line
+    path: beside the YAML file that names it; may itself be the YAML of a FileSource, whose fields then hold instead
+    columns: names, where the file has no header line
     time: the column of time, in `time_scale` s; or rate: samples per second, for files without one
-    y_axis: whether y grows up or down; swaps: whether samples with two markers exchanged are mended
+    y_axis: whether y grows up or down; down, angles and rates are clockwise and change their sign too
+    swaps: whether samples with two markers exchanged are mended
     """
 
     kind: Literal["file"] = "file"
@@ -106,11 +109,18 @@ class FileSource(Clocked):
     time: str = "t"
     time_scale: Positive = 1.0
     rate: Positive | None = None
-    start: NonNegative = 0.0
+    start: float = 0.0
     duration: Positive | None = None
     every: Annotated[int, Field(ge=1)] = 1
     y_axis: Literal["up", "down"] = "up"
     swaps: bool = True
+
+    @model_validator(mode="after")
+    def _with_columns(self) -> Self:
+        for channel in self.channels or ():
+            if not channel.column:
+                raise ValueError(f"channels: name the `column` of {channel.marker} {channel.quantity}")
+        return self
 
 
 Source = Annotated[EngineSource | FileSource, Field(discriminator="kind")]

@@ -13,7 +13,7 @@ import numpy as np
 from shoal.identification.forward import ForwardModel
 from shoal.trajectory import Array
 
-_STEPS = 10.0 ** np.arange(-5.0, -12.0, -1.0)
+_STEPS = 10.0 ** np.arange(-3.0, -12.0, -1.0)
 """Relative to the size of a parameter (see ForwardModel.sizes), largest first."""
 AGREED = 1e-2
 """Relative difference of two derivatives that count as one."""
@@ -72,6 +72,7 @@ def _differences(model: ForwardModel, point: Array, sizes: Array, basis: Array) 
         slopes = (seen[1 : 1 + len(steps)] - seen[1 + len(steps) :]) / width[:, None]
     slopes = slopes.reshape(len(_STEPS), count, -1)
     columns, doubts = np.zeros((slopes.shape[2], count)), np.full(count, np.inf)
+    least = np.zeros(count)
     for k in range(count):
         table = slopes[:, k]
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -80,11 +81,13 @@ def _differences(model: ForwardModel, point: Array, sizes: Array, basis: Array) 
         # What changes nothing at all is no reason to doubt.
         doubt[(size[:-1] == 0.0) & (size[1:] == 0.0)] = 0.0
         best = int(np.argmin(np.where(np.isfinite(doubt), doubt, np.inf)))
+        # Round-off adds to a difference, so that the smallest says the most where they disagree.
+        least[k] = np.min(size[np.isfinite(size)], initial=np.inf)
         if np.all(np.isfinite(table[best])):
             columns[:, k], doubts[k] = table[best], doubt[best]
     # Where two steps never agree and next to nothing changes, there is nothing but round-off.
     size = np.linalg.norm(columns, axis=0)
-    nothing = (doubts > AGREED) & (size < _NOTHING * np.max(size))
+    nothing = (doubts > AGREED) & (np.minimum(size, least) < _NOTHING * np.max(size))
     columns[:, nothing], doubts[nothing] = 0.0, 0.0
     return seen[0], columns, doubts
 

@@ -1,4 +1,4 @@
-"""How well the parameters are known: covariance, autocorrelation, rank, and the model's own error."""
+"""How well the parameters are known: covariance with correlated noise, intervals, and what the data leave open."""
 
 from __future__ import annotations
 
@@ -7,81 +7,87 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.identification.covariance import Block, Noise, correlate, estimate_noise
 from shoal.trajectory import Array
 
-RANK_TOLERANCE = 1e-9
-"""Singular values below this fraction of the largest (columns scaled to the parameters' size) carry nothing, and so do
-those along which a parameter could change by its own size within the noise."""
+RANK_TOLERANCE = 1e-6
+"""Singular values below this fraction of the largest (columns scaled to the parameters' size) carry nothing."""
+LEVEL = 0.95
+"""Of the intervals."""
 
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Covariance (p, p), directions the data do not fix (p, k) in scaled parameters, pseudo-inverse (p, m)."""
+    """What is known near the answer, to first order.
 
-    covariance: Array
+    unknown: directions the data do not fix, in scaled parameters, (p, k); pseudo_inverse: (p, rows); scale: (p,)
+    parts: the share of each block of residuals in the covariance, (blocks, p, p); noise: of each block
+    """
+
     unknown: Array
     pseudo_inverse: Array
     scale: Array
+    parts: Array
+    noise: tuple[Noise, ...]
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the parameters, (p, p)."""
+        return np.asarray(np.sum(self.parts, axis=0))
 
 
-def linearise(jacobian: Array, residual: Array, scale: Array, channels: int) -> Linearisation:
-    """Uncertainty from the Jacobian (m, p) and residuals (m,) at the optimum.
+@dataclass(frozen=True)
+class Spread:
+    """Of a number that depends on the parameters: standard deviation, half of its interval, whether the data fix it."""
 
-    scale: size of each parameter, (p,). Residuals that are autocorrelated carry less information than
-    their number says: the covariance grows by (1 + rho)/(1 - rho), rho being their lag-1 correlation
-    within a channel (effective sample size of an AR(1) process).
+    std: float
+    half: float
+    fixed: bool
+
+
+def linearise(jacobian: Array, residual: Array, scale: Array, blocks: list[Block]) -> Linearisation:
+    """Uncertainty from the Jacobian (m, p) and residuals (m,) at the optimum; scale: size of each parameter, (p,).
+
+    The covariance is the sandwich (J'J)^-1 J' R J (J'J)^-1 of an unweighted fit, R being the covariance of the noise
+    (Seber and Wild, Nonlinear Regression, 1989, 6.2).
     """
     left, singular, right = np.linalg.svd(jacobian * scale, full_matrices=False)
-    size = float(np.sqrt(residual @ residual / max(1, residual.size - len(singular))))
-    known = singular > max(RANK_TOLERANCE * singular[0], size, 1e-300)
+    known = singular > RANK_TOLERANCE * singular[0] if singular[0] > 0 else np.zeros(len(singular), dtype=bool)
     inverse = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
     pseudo_inverse = scale[:, None] * (right.T * inverse) @ left.T
-    freedom = max(1, residual.size - int(known.sum()))
-    variance = float(residual @ residual) / freedom
-    rho = autocorrelation(residual, channels)
-    inflation = (1 + max(rho, 0.0)) / (1 - min(max(rho, 0.0), 0.999))
-    covariance = variance * inflation * (scale[:, None] * (right.T * inverse**2) @ right * scale)
-    return Linearisation(covariance, right[~known].T, pseudo_inverse, scale)
+    noise = estimate_noise(residual, left[:, known], blocks)
+    parts = []
+    for block, seen in zip(blocks, noise, strict=True):
+        rows = pseudo_inverse.T[block.rows]
+        parts.append(seen.variance * rows.T @ correlate(block, seen.rho, rows))
+    return Linearisation(right[~known].T, pseudo_inverse, scale, np.array(parts), tuple(noise))
 
 
-def autocorrelation(residual: Array, channels: int) -> float:
-    """Lag-1 autocorrelation of residuals (samples * channels,), pooled over the channels."""
-    table = residual.reshape(-1, channels)
-    power = float(np.sum(table**2))
-    return float(np.sum(table[1:] * table[:-1]) / power) if power > 0 else 0.0
-
-
-def spread(function: Callable[[Array], float], point: Array, at: Linearisation) -> tuple[float, bool]:
-    """Standard deviation of a function of the parameters, and whether the data fix it."""
+def spread(function: Callable[[Array], float], point: Array, at: Linearisation) -> Spread:
+    """Uncertainty of a function of the parameters."""
     steps = 1e-6 * at.scale
     gradient = np.array([(function(point + step) - function(point - step)) for step in np.diag(steps)]) / (2 * steps)
     scaled = gradient * at.scale
     hidden = np.linalg.norm(scaled @ at.unknown) if at.unknown.size else 0.0
     fixed = bool(hidden <= 1e-3 * max(float(np.linalg.norm(scaled)), 1e-300))
-    variance = float(gradient @ at.covariance @ gradient)
-    return float(np.sqrt(max(0.0, variance))), fixed
+    shares = np.maximum(np.einsum("i,bij,j->b", gradient, at.parts, gradient), 0.0)
+    std = float(np.sqrt(np.sum(shares)))
+    return Spread(std, quantile(shares, at.noise) * std, fixed)
 
 
-def combinations(unknown: Array, names: tuple[str, ...]) -> list[str]:
-    """The directions that the data do not fix, in words: relative changes that leave the motion as it is."""
-    sentences = []
-    for direction in _sparse_basis(unknown).T:
-        largest = direction / direction[np.abs(direction).argmax()]
-        parts = [f"{names[k]} {value:+.2g}" for k, value in enumerate(largest) if abs(value) > 1e-2]
-        sentences.append("unchanged motion under relative changes of " + ", ".join(parts))
-    return sentences
+def quantile(shares: Array, noise: tuple[Noise, ...]) -> float:
+    """Student's t for a variance whose shares (blocks,) are known with the freedom of each (Welch 1947)."""
+    from scipy.stats import t  # slow to import
+
+    total = float(np.sum(shares))
+    if total <= 0.0:
+        return 0.0
+    doubt = float(np.sum([(share / total) ** 2 / seen.freedom for share, seen in zip(shares, noise, strict=True)]))
+    return float(t.ppf(0.5 + LEVEL / 2, 1.0 / max(doubt, 1e-9)))
 
 
-def _sparse_basis(unknown: Array) -> Array:
-    """The same space with as few parameters per direction as elimination gives."""
-    basis = unknown.copy()
-    taken: list[int] = []
-    for k in range(basis.shape[1]):
-        free = [i for i in range(len(basis)) if i not in taken]
-        row = free[int(np.abs(basis[free, k]).argmax())]
-        taken.append(row)
-        basis[:, k] /= basis[row, k]
-        for other in range(basis.shape[1]):
-            if other != k:
-                basis[:, other] -= basis[row, other] * basis[:, k]
-    return basis
+def autocorrelation(residual: Array, blocks: list[Block]) -> float:
+    """Lag-1 autocorrelation of residuals (rows,) within channels, pooled over them."""
+    measured = [residual[block.rows] for block in blocks if not block.known]
+    power = sum(float(part @ part) for part in measured)
+    return sum(float(part[1:] @ part[:-1]) for part in measured) / power if power > 0 else 0.0

@@ -9,8 +9,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 from scipy import optimize
@@ -24,10 +22,19 @@ Search = Callable[[ForwardModel, np.random.Generator, Progress], object]
 
 HUGE = 1e9
 """Fitness of a failed simulation for optimisers that want finite numbers [m^2]."""
-DETERMINISTIC = {"least-squares", "casadi", "DIRECT", "SHGO"}
+DETERMINISTIC = {
+    "auto",
+    "least-squares",
+    "progressive",
+    "multiple-shooting",
+    "casadi",
+    "casadi-multiple",
+    "DIRECT",
+    "SHGO",
+}
 """These take no random numbers: one run says all. A method that is not known here is run with every seed."""
 
-OWN_MODEL = {"casadi"}
+OWN_MODEL = {"casadi", "casadi-multiple"}
 """These fit a model of their own, not the one that all others share."""
 
 
@@ -46,28 +53,17 @@ class Contender:
 
 
 def contenders() -> list[Contender]:
-    """Everyone that is installed. A method with two names in METHODS, such as `auto`, takes part once."""
+    """Everyone. A method with two names in METHODS, such as `auto`, takes part once."""
     ours = {search: name for name, search in METHODS.items()}
     found = [Contender(name, "shoal", search) for search, name in ours.items()]
     found.append(Contender("least-squares, random start", "shoal", random_descent))
     found += [Contender(name, "scipy", search) for name, search in SCIPY.items()]
-    if find_spec("cma"):
-        found.append(Contender("CMA-ES with restarts", "pycma", cma_es))
     return found
 
 
 def random_descent(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> object:
     """Levenberg-Marquardt from one point anywhere in the box: what a local method does by itself."""
     return descend(model, model.lower + rng.random(len(model.lower)) * (model.upper - model.lower), progress)
-
-
-def differential_evolution(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> object:
-    """Storn and Price; a generation is one call."""
-
-    def fitness(columns: Any) -> Any:
-        return _fitness(model, np.atleast_2d(columns.T))
-
-    return optimize.differential_evolution(fitness, _bounds(model), rng=rng, vectorized=True, updating="deferred")
 
 
 def dual_annealing(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> object:
@@ -88,25 +84,7 @@ def shgo(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> o
         return optimize.shgo(_one(model), _bounds(model), n=64, iters=4, sampling_method="sobol")
 
 
-def cma_es(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> object:
-    """Covariance matrix adaptation in the unit box, restarted with twice as many points until the budget ends."""
-    import cma
-
-    size = len(model.lower)
-    options: dict[str, Any] = {"bounds": [0.0, 1.0], "verbose": -9}
-    population = 4 + int(3 * np.log(size))
-    while True:
-        options |= {"popsize": population, "seed": int(rng.integers(1, 2**31))}
-        strategy = cma.CMAEvolutionStrategy(rng.random(size), 0.3, options)
-        while not strategy.stop():
-            unit = strategy.ask()
-            points = model.lower + np.array(unit) * (model.upper - model.lower)
-            strategy.tell(unit, _fitness(model, points).tolist())
-        population *= 2
-
-
 SCIPY: dict[str, Search] = {
-    "differential evolution": differential_evolution,
     "dual annealing": dual_annealing,
     "DIRECT": direct,
     "SHGO": shgo,

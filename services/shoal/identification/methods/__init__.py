@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from shoal.errors import InputError
-from shoal.identification.methods.casadi_shooting import casadi
+from shoal.identification.methods.auto import auto
+from shoal.identification.methods.black_box import cma_es, differential_evolution
+from shoal.identification.methods.casadi_shooting import casadi, casadi_multiple
+from shoal.identification.methods.hybrid import hybrid
 from shoal.identification.methods.least_squares import least_squares
-from shoal.identification.methods.progressive import progressive
+from shoal.identification.methods.multi_start import multi_start
 from shoal.identification.methods.outcome import Method, Outcome
+from shoal.identification.methods.progressive import progressive
 from shoal.identification.methods.swarms import afsa, iafsa, iafsa_printed, iafsa_unseeded
 
 METHODS: dict[str, Method] = {
-    "auto": least_squares,
+    "auto": auto,
     "least-squares": least_squares,
     "progressive": progressive,
     "afsa": afsa,
     "iafsa": iafsa,
     "iafsa-unseeded": iafsa_unseeded,
     "iafsa-printed": iafsa_printed,
+    "multi-start": multi_start,
+    "hybrid": hybrid,
+    "differential-evolution": differential_evolution,
+    "cma-es": cma_es,
     "casadi": casadi,
+    "casadi-multiple": casadi_multiple,
 }
 
 

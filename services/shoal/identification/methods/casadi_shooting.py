@@ -1,6 +1,9 @@
-"""CasADi's direct single shooting with exact derivatives: the inverse baseline of another engine."""
+"""CasADi's direct single and multiple shooting with exact derivatives: the inverse baselines of another engine."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,38 +13,53 @@ from shoal.identification.methods.outcome import Outcome
 from shoal.identification.recording import Clocked
 from shoal.identification.starts import starting_points
 
+if TYPE_CHECKING:
+    from shoal.engines.casadi_shooting import ShootingResult
+
 
 def casadi(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """IPOPT on CasADi's own model, from the better start; initial angles and rates from one marker's position only."""
     from shoal.engines.casadi_shooting import identify_initial_angles
 
+    return _shoot(model, identify_initial_angles, progress)
+
+
+def casadi_multiple(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
+    """The same with the record in segments whose first states are unknowns too, for long and chaotic motions."""
+    from shoal.engines.casadi_multiple_shooting import identify_by_segments
+
+    return _shoot(model, identify_by_segments, progress)
+
+
+def _shoot(model: ForwardModel, search: Callable[..., ShootingResult], progress: Progress) -> Outcome:
+    paths, marker = _question(model)
+    recording = model.measurement.first
+    starts = starting_points(model)
+    # Shooting from a wrong elbow branch ends in a false minimum: one run of each start tells which is right.
+    start = starts[int(np.argmin(model.fitness(starts)))]
+    result = search(model.scene, paths, start, model.lower, model.upper, recording.times, marker, recording.values)
+    model.counter.charge(result.evaluations, result.values, result.fitness)
+    rows = [(result.iterations, result.fitness, result.fitness)]
+    progress(*rows[0])
+    return Outcome(result.values, result.fitness, rows, result.message)
+
+
+def _question(model: ForwardModel) -> tuple[list[str], str]:
+    """Paths of the parameters and the observed marker. Raises InputError for what shooting does not answer."""
     entries = model.parameters.entries.values()
     paths = [entry.parameter.path or "" for entry in entries]
     recording = model.measurement.first
     channels = recording.channels
     if len(model.measurement.recordings) > 1 or model.problem.ties or recording.stated != Clocked():
         raise InputError("method: casadi takes one recording without ties, clock and camera; use least-squares")
-    markers = {c.marker for c in channels}
+    if model.problem.loss != "squares" or any(entry.parameter.prior for entry in entries):
+        raise InputError("method: casadi takes no priors and no loss but squares; use least-squares")
+    if not np.allclose(model.rows.weight, 1.0):
+        raise InputError("method: casadi takes channels of equal noise; use least-squares")
     if not all(path.startswith("initial.") for path in paths) or np.any(model.parameters.logarithmic):
         raise InputError("method: casadi finds initial angles and rates only; use least-squares for other parameters")
     if not np.all(np.isfinite(recording.values)):
         raise InputError("method: casadi takes no gaps; use least-squares")
-    if len(markers) != 1 or [c.quantity for c in channels] != ["x", "y"]:
+    if len({c.marker for c in channels}) != 1 or [c.quantity for c in channels] != ["x", "y"]:
         raise InputError("method: casadi takes x and y of one marker; use least-squares for other channels")
-    starts = starting_points(model)
-    # Shooting from a wrong elbow branch ends in a false minimum: one run of each start tells which is right.
-    start = starts[int(np.argmin(model.fitness(starts)))]
-    result = identify_initial_angles(
-        model.scene,
-        paths,
-        start,
-        model.lower,
-        model.upper,
-        recording.times,
-        channels[0].marker,
-        recording.values,
-    )
-    fitness = float(result.fitness)
-    model.counter.charge(result.evaluations, np.asarray(result.values), fitness)
-    progress(result.iterations, fitness, fitness)
-    return Outcome(np.asarray(result.values), fitness, [(result.iterations, fitness, fitness)], result.message)
+    return paths, channels[0].marker

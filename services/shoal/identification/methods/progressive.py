@@ -1,100 +1,134 @@
-"""Fit a short horizon first, then as far as the answer predicts: how a chaotic motion is fitted by single shooting.
+"""Progressive horizon: fit the beginning, see how far the answer predicts, fit up to there, and so to the end.
 
-The landscape of a long record has many minima, that of its beginning few. The minimum of a short horizon lies in the
-basin of the longer one as long as its prediction has not left the data.
+Over a long record of a chaotic motion the squared residual has a great many minima and the true one is very narrow;
+over a short one it has few. The answer of a horizon lies in the basin of a longer one as long as it predicts the motion
+up to there (horizon continuation; Baake et al., Physical Review A 45, 1992; Pisarenko and Sornette, Physical Review E
+69, 2004).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.least_squares import Descent, descend
+from shoal.identification.methods.growth import spread_of_data
+from shoal.identification.methods.lanes import descend_many, distinct, history
+from shoal.identification.methods.least_squares import linearise
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.starts import starting_points
 from shoal.trajectory import Array
 
 FIRST = 0.5
-"""The first horizon [s], or a twentieth of the record if that is shorter."""
-SHORTEST, LONGEST = 1.15, 4.0
-"""By which factors a horizon may grow."""
-_LEFT = 0.1
-"""A prediction has left the data where it is off by this fraction of their spread, or by six times what the fit is."""
-_HOPELESS = 100.0
-"""A start whose first fit is worse than the best one's by this factor is given up."""
-_RIVAL = 4.0
+"""The first horizon [s], longer where the samples up to there are too few."""
+_ROWS = 3
+"""Numbers in the first horizon for each parameter, at least."""
+_LEAST, _MOST = 1.15, 3.0
+"""By how much a horizon grows."""
+_PREDICTED = 0.1
+"""A deviation below this fraction of the spread of the data is predicted, and so is one that the fit has as well."""
+_NOTICED = 5.0
+"""Times the deviation of the fit."""
+_ITERATIONS = 8
+"""Steps on each horizon."""
+_GAIN = 1e-3
+"""A step that promises to lower the squares by less than this fraction ends a horizon."""
+_HOPELESS = 25.0
+"""Times the fitness of the best branch on the same horizon: a branch that is worse is dropped."""
+_TRUST = 0.3
+"""Of its range: standard deviation of a parameter around the answer of the horizon before."""
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One start on its way. point: (parameters,); fitness: on its present horizon."""
+
+    point: Array
+    fitness: float
 
 
 def progressive(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
-    """Least squares on growing horizons, from every pose that the first samples allow.
+    """From every pose that the first samples allow over growing horizons to the whole record, then least squares."""
+    return extend(model, starting_points(model), progress)
 
-    Work is counted by simulated time; the fitness that is shown is that of the whole record.
+
+def extend(model: ForwardModel, starts: Array, progress: Progress) -> Outcome:
+    """The answers of the starts (starts, parameters), over growing horizons."""
+    branches = [Branch(start, np.inf) for start in starts]
+    horizon, end = first_horizon(model), model.measurement.end
+    while horizon < end:
+        part = model.until(horizon)
+        branches = _survivors(model, [fit(part, branch.point) for branch in branches])
+        horizon = max(_reach(model, branch, horizon) for branch in branches)
+    descents = descend_many(model, np.array([branch.point for branch in branches]), progress)
+    best = min(descents, key=lambda d: d.fitness)
+    others = [(d.point, d.fitness) for d in distinct(model, descents) if d is not best]
+    message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
+    return Outcome(best.point, best.fitness, history(descents), message, others)
+
+
+def first_horizon(model: ForwardModel) -> float:
+    """The time [s] up to which there are numbers enough for the parameters, at least FIRST."""
+    needed = _ROWS * len(model.names)
+    times = np.sort(model.rows.time)
+    enough = times[min(needed, len(times)) - 1]
+    begun = max(r.times[min(2, len(r.times) - 1)] for r in model.measurement.recordings.values())
+    return float(min(max(FIRST, enough, begun), model.measurement.end))
+
+
+def fit(model: ForwardModel, start: Array) -> Branch:
+    """Levenberg-Marquardt of a few steps, which leaves near the start what the samples do not tell.
+
+    The start counts as a prior whose standard deviation is a part of a parameter's range, against the deviation that
+    the fit has.
     """
-    first = min(FIRST, max(model.measurement.end / 20, _enough(model)))
-    start = model.until(first)
-    fits = sorted((descend(start, point, _silent) for point in starting_points(model)), key=lambda fit: fit.fitness)
-    rows: list[tuple[int, float, float]] = []
-    ends: list[Descent] = []
-    for fit in fits:
-        if ends and fit.fitness > _RIVAL * fits[0].fitness and ends[0].fitness < _HOPELESS * fits[0].fitness:
-            continue
-        if fit.fitness > _HOPELESS * fits[0].fitness:
-            continue
-        ends.append(_climb(model, fit, first, rows, progress))
-    best = min(ends, key=lambda end: end.fitness)
-    given_up = [(fit.point, float(f)) for fit in fits if (f := _whole(model, fit, ends)) is not None]
-    others = [(end.point, end.fitness) for end in ends if end is not best]
-    message = "" if best.converged else "no convergence on the whole record"
-    return Outcome(best.point, best.fitness, rows, message, [*others, *given_up])
-
-
-def _climb(
-    model: ForwardModel, fit: Descent, horizon: float, rows: list[tuple[int, float, float]], progress: Progress
-) -> Descent:
-    """From the fit of a first horizon to that of the whole record."""
-    end = model.measurement.end
-    while True:
-        residual = model.residuals(fit.point[None])[0]
-        now = float(model.cost(residual[None])[0])
-        rows.append((len(rows), min(now, rows[-1][1]) if rows else now, now))
-        progress(*rows[-1])
-        if horizon >= end * (1 - 1e-9):
-            return fit
-        horizon = min(end, _reach(model, fit, residual, horizon))
-        if end < SHORTEST * horizon:
-            horizon = end
-        part = model if horizon >= end else model.until(horizon)
-        fit = descend(part, fit.point, _silent)
-
-
-def _reach(model: ForwardModel, fit: Descent, residual: Array, horizon: float) -> float:
-    """How far the prediction of a fit follows the data [s], within the factors of growth."""
-    data = np.concatenate([r.values[np.isfinite(r.values)] for r in model.measurement.recordings.values()])
-    spread = float(np.std(data * model.rows.weight))
-    limit = max(6.0 * np.sqrt(fit.fitness / model.things), _LEFT * spread)
-    rows = residual[: len(model.rows.time)]
-    off = model.rows.time[~(np.abs(rows) <= limit)]
-    later = off[off > horizon]
-    left = float(later.min()) if later.size else model.measurement.end
-    return float(np.clip(left, SHORTEST * horizon, LONGEST * horizon))
-
-
-def _enough(model: ForwardModel) -> float:
-    """The time after which every recording has shown twice as many numbers as there are parameters [s]."""
-    ends = []
-    for recording in model.measurement.recordings.values():
-        samples = -(-2 * len(model.names) // len(recording.channels))
-        ends.append(float(recording.times[min(samples, len(recording.times) - 1)]))
-    return max(ends)
-
-
-def _whole(model: ForwardModel, fit: Descent, ends: list[Descent]) -> float | None:
-    """Fitness over the whole record of a start that was given up; None if it was not."""
     span = model.upper - model.lower
-    if any(np.max(np.abs(fit.point - end.point) / span) < 1e-2 for end in ends):
-        return None
-    return float(model.fitness(fit.point[None])[0])
+    point, damping = start, 1e-3
+    residual, jacobian = linearise(model, point)
+    for _ in range(_ITERATIONS):
+        cost = _squares(residual)
+        if not np.isfinite(cost):
+            break
+        trust = np.sqrt(cost / len(residual)) / _TRUST / span
+        scale = np.sqrt(np.sum(jacobian**2, axis=0) + trust**2)
+        normal = jacobian.T @ jacobian + np.diag(trust**2 + damping * scale**2)
+        gradient = jacobian.T @ residual + trust**2 * (point - start)
+        step = np.linalg.solve(normal / scale / scale[:, None], gradient / scale) / scale
+        trial = np.clip(point - step, model.lower, model.upper)
+        predicted = cost - _squares(residual + jacobian @ (trial - point))
+        if predicted < _GAIN * cost:
+            break
+        there = linearise(model, trial)
+        if _squares(there[0]) < cost:
+            point, (residual, jacobian) = trial, there
+            damping /= 10
+        else:
+            damping *= 100
+    return Branch(point, float(model.cost(residual[None])[0]))
 
 
-def _silent(*_: float) -> None:
-    return None
+def _survivors(model: ForwardModel, branches: list[Branch]) -> list[Branch]:
+    """The branches worth going on with, best first: none that is much worse than the best, none twice."""
+    span = model.upper - model.lower
+    found: list[Branch] = []
+    for branch in sorted(branches, key=lambda b: b.fitness):
+        new = all(np.max(np.abs(branch.point - other.point) / span) > 1e-5 for other in found)
+        if not found or (new and branch.fitness <= _HOPELESS * found[0].fitness):
+            found.append(branch)
+    return found
+
+
+def _reach(model: ForwardModel, branch: Branch, horizon: float) -> float:
+    """The next horizon [s] of a branch: where its prediction leaves the data."""
+    part = model.until(min(_MOST * horizon, model.measurement.end))
+    residual = part.residuals(branch.point[None])[0, : len(part.rows.time)]
+    allowed = max(_PREDICTED * spread_of_data(model), _NOTICED * float(np.sqrt(branch.fitness)))
+    off = part.rows.time[np.abs(residual) > allowed]
+    off = off[off > horizon]
+    reached = float(np.min(off)) if off.size else part.measurement.end
+    return min(max(reached, _LEAST * horizon), model.measurement.end)
+
+
+def _squares(residual: Array) -> float:
+    return float(residual @ residual) if np.all(np.isfinite(residual)) else float("inf")

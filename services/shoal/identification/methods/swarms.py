@@ -51,7 +51,10 @@ def seeds(model: ForwardModel, rng: np.random.Generator) -> tuple[Array, Array]:
     return least_squares(model, rng, lambda *_: None).point, pose
 
 
-def _search(model: ForwardModel, optimizer: Any, rng: np.random.Generator, progress: Progress) -> Outcome:
+def school(
+    model: ForwardModel, optimizer: Any, rng: np.random.Generator, progress: Progress, iterations: int = ITERATIONS
+) -> tuple[Any, list[tuple[int, float, float]]]:
+    """Let a swarm search; returns its last state, and rows of (iteration, best, mean fitness)."""
     rows: list[tuple[int, float, float]] = []
     last: list[float] = []
 
@@ -67,5 +70,9 @@ def _search(model: ForwardModel, optimizer: Any, rng: np.random.Generator, progr
             last.clear()
             progress(*rows[-1])
 
-    state = minimize(optimizer, evaluate, rng=rng, iterations=ITERATIONS, callback=note)
+    return minimize(optimizer, evaluate, rng=rng, iterations=iterations, callback=note), rows
+
+
+def _search(model: ForwardModel, optimizer: Any, rng: np.random.Generator, progress: Progress) -> Outcome:
+    state, rows = school(model, optimizer, rng, progress)
     return Outcome(state.best, state.best_value, rows, "")

@@ -1,0 +1,115 @@
+"""The method a user gets who does not choose: by how fast a deviation grows, and how well a fit ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.identification.forward import ForwardModel, Progress
+from shoal.identification.loss import noise_of
+from shoal.identification.methods.growth import growth, spread_of_data, swings
+from shoal.identification.methods.lanes import descend_many, distinct, linearise_many
+from shoal.identification.methods.least_squares import from_starts, linearise
+from shoal.identification.methods.outcome import Outcome
+from shoal.identification.methods.progressive import extend
+from shoal.identification.starts import starting_points
+from shoal.trajectory import Array
+
+LARGE = 30.0
+"""A deviation that grows by more than this over the record makes single shooting over all of it fail."""
+FRACTAL = 1e3
+"""From this growth on false minima are everywhere, and to list those near by tells nothing."""
+_UNEXPLAINED = 0.05
+"""Of the spread of the data: a fit that leaves more, and more than noise, is none."""
+_NOISES = 3.0
+_SWINGS = 3
+"""A record that swings more often may be fitted with another phase: false minima."""
+_LINE, _WIDTH, _LOOKED_AT = 41, 0.05, 4
+"""False minima are sought at points of a line, to this fraction of the box on both sides, in its lowest dips."""
+
+
+def auto(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
+    """Least squares where deviations stay small, else a progressive horizon; then a look for false minima near by.
+
+    A fit that leaves more than noise is followed by the next method.
+    """
+    starts = starting_points(model)
+    first = linearise_many(model, starts)
+    # The growth is that of the start which fits best: it is nearest to the motion that was measured.
+    grown = growth(model, first[1][int(np.argmin(model.cost(first[0])))])
+    methods: dict[str, Callable[[], Outcome]] = {
+        "least-squares": lambda: from_starts(model, starts, first, progress),
+        "progressive": lambda: extend(model, starts, progress),
+    }
+    if grown > LARGE:
+        del methods["least-squares"]
+    reason = f"a deviation grows {max(grown, 1.0):.1g}-fold over {model.measurement.end:.3g} s"
+    outcome = _first_that_explains(model, methods, reason)
+    if swings(model) < _SWINGS or grown > FRACTAL or not np.isfinite(outcome.fitness):
+        return outcome
+    near = [(outcome.point, outcome.fitness), *false_minima(model, outcome.point)]
+    # What looked like a false minimum may be the true one.
+    (point, fitness), *rest = sorted(near, key=lambda minimum: minimum[1])
+    choice = f"{outcome.choice}; then a look for false minima near by"
+    return replace(outcome, point=point, fitness=fitness, minima=[*outcome.minima, *rest], choice=choice)
+
+
+def _first_that_explains(model: ForwardModel, methods: dict[str, Callable[[], Outcome]], reason: str) -> Outcome:
+    """The outcome of the first method whose fit explains the data, else the best of all, with the way there."""
+    found: list[Outcome] = []
+    steps: list[str] = []
+    for name, search in methods.items():
+        try:
+            outcome = search()
+        except InputError as refusal:
+            if not found:
+                raise
+            steps.append(f"not {name} ({str(refusal).partition('; use')[0].removeprefix('method: ')})")
+            continue
+        steps.append(f"{name}: {reason}")
+        found.append(outcome)
+        if explains(model, outcome):
+            break
+        reason = f"the fit before left {np.sqrt(outcome.fitness / model.things):.2g}"
+    best = min(found, key=lambda outcome: outcome.fitness)
+    ends = [(o.point, o.fitness) for o in found if o is not best] + [m for o in found for m in o.minima]
+    apart = [(point, fitness) for point, fitness in ends if _apart(model, point, best.point)]
+    return replace(best, minima=apart, choice="; then ".join(steps))
+
+
+def explains(model: ForwardModel, outcome: Outcome) -> bool:
+    """Whether a fit leaves no more than noise, as stated or as the data tell it, or little of what was measured."""
+    rows = len(model.rows.time)
+    left = np.sqrt(outcome.fitness * model.samples / rows)
+    if model.noise is not None:
+        return bool(left <= _NOISES * model.noise)
+    noise = np.nanmax([np.nanmax(noise_of(recording)) for recording in model.measurement.recordings.values()])
+    return bool(left <= max(_UNEXPLAINED * spread_of_data(model), _NOISES * noise))
+
+
+def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]:
+    """Local minima near an answer: where descents end from the dips on a line along the direction the data fix least.
+
+    The direction is the last singular vector of the Jacobian in parameters relative to their ranges. One call for the
+    line, and one for each step of all descents.
+    """
+    span = model.upper - model.lower
+    _, jacobian = linearise(model, point)
+    direction = np.linalg.svd(jacobian * span)[2][-1]
+    reach = _WIDTH / np.max(np.abs(direction))
+    line = point + np.linspace(-reach, reach, _LINE)[:, None] * direction * span
+    values = model.fitness(np.clip(line, model.lower, model.upper))
+    inner = np.arange(1, _LINE - 1)
+    dips = inner[(values[inner] < values[inner - 1]) & (values[inner] < values[inner + 1]) & (inner != _LINE // 2)]
+    if not dips.size:
+        return []
+    lowest = dips[np.argsort(values[dips])][:_LOOKED_AT]
+    descents = descend_many(model, np.clip(line[lowest], model.lower, model.upper))
+    return [(d.point, d.fitness) for d in distinct(model, descents) if d.converged and _apart(model, d.point, point)]
+
+
+def _apart(model: ForwardModel, one: Array, other: Array) -> bool:
+    return bool(np.max(np.abs(one - other) / (model.upper - model.lower)) > 1e-3)

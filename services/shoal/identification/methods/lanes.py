@@ -1,0 +1,229 @@
+"""Levenberg-Marquardt from many starts side by side, by finite-difference lanes.
+
+An iteration simulates the trial points of all descents together with their neighbours, side by side, so a Jacobian is
+there when its trial is accepted (Nielsen's damping rule; Madsen, Nielsen, Tingleff, Methods for non-linear least
+squares problems, 2004).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shoal.identification.forward import ForwardModel, Progress
+from shoal.mechanics.integrators import facts
+from shoal.mechanics.tile import WIDE
+from shoal.trajectory import Array
+
+DIFFERENCE = 1e-6
+"""Step of the finite differences, relative to the size of a parameter (at least 1e-3 of its range)."""
+_ITERATIONS = 60
+_SMALL_STEP = 1e-9
+"""Relative to the size of a parameter; a smaller step is the end."""
+_SMALL_GAIN = 1e-8
+"""A step that promises to lower the fitness by less than this fraction is the end."""
+_LARGE_DAMPING = 1e12
+_SAME = 1e-4
+"""Two points are the same if no parameter differs by more than this fraction of its range."""
+
+
+@dataclass(frozen=True)
+class Descent:
+    """A local search: where it ended, residuals and Jacobian there, and its rows of (iteration, best, trial)."""
+
+    point: Array
+    residual: Array
+    jacobian: Array
+    fitness: float
+    rows: list[tuple[int, float, float]]
+    converged: bool
+
+
+def descend_many(
+    model: ForwardModel,
+    starts: Array,
+    progress: Progress = lambda *_: None,
+    *,
+    first: tuple[Array, Array] | None = None,
+    patience: float = np.inf,
+) -> list[Descent]:
+    """Minimise the squared residuals within the bounds from each start, (starts, parameters), in that order.
+
+    first: what `linearise_many` gives for the starts, if it is known.
+    A descent leaves when it has converged, when it has come to where a better one is, and when after two steps even
+    what its next step promises is more than `patience` times the best one's fitness. Those that leave early have not
+    converged.
+    """
+    searches = [_Search(model, *at) for at in zip(starts, *(first or linearise_many(model, starts)), strict=True)]
+    active = searches
+    _report(0, searches, searches, progress)
+    for iteration in range(1, _ITERATIONS):
+        limit = patience * min(search.fitness for search in searches) if iteration > 2 else np.inf
+        asked = [(search, trial) for search in _apart(active) if (trial := search.ask()) is not None]
+        going = [(search, trial) for search, trial in asked if search.promise <= limit]
+        if not going:
+            break
+        active = [search for search, _ in going]
+        trials = np.array([trial for _, trial in going])
+        for search, trial, residual, jacobian in zip(active, trials, *linearise_many(model, trials), strict=True):
+            search.tell(trial, residual, jacobian)
+        _report(iteration, searches, active, progress)
+    return [search.descent() for search in searches]
+
+
+def linearise_many(model: ForwardModel, points: Array) -> tuple[Array, Array]:
+    """Residuals at points, (points, rows), and their forward-difference Jacobians, (points, rows, parameters).
+
+    1 + parameters lanes for each point, in one call if the integrator's steps are fixed. Adaptive integrators take the
+    same steps in all lanes of a tile, so a point and its neighbours stand in one: differences of runs that were stepped
+    differently are those of the integrator's errors.
+    """
+    steps = DIFFERENCE * np.array([model.sizes(point) for point in points])
+    steps = np.where(points + steps > model.upper, -steps, steps)
+    count, size = points.shape
+    shifted = points[:, None] + np.concatenate([np.zeros((count, 1, size)), steps[:, None] * np.eye(size)], axis=1)
+    together = _together(model) or count
+    calls = [shifted[k : k + together].reshape(-1, size) for k in range(0, count, together)]
+    found = np.concatenate([model.residuals(call) for call in calls]).reshape(count, 1 + size, -1)
+    with np.errstate(invalid="ignore"):
+        jacobians = np.moveaxis((found[:, 1:] - found[:, :1]) / steps[:, :, None], 1, 2)
+    return found[:, 0], np.where(np.isfinite(jacobians), jacobians, 0.0)
+
+
+def _together(model: ForwardModel) -> int:
+    """How many points with their neighbours fit into one tile, where lanes share their steps; 0 where they do not."""
+    integrator = model.scene.solver.integrator
+    shared = integrator == "auto" or facts(integrator).adaptive
+    return max(1, len(WIDE) // (1 + len(model.names))) if shared else 0
+
+
+def history(descents: Sequence[Descent]) -> list[tuple[int, float, float]]:
+    """Rows of (iteration, best of all, mean of the trials) of descents that went side by side."""
+    rows = list[tuple[int, float, float]]()
+    for iteration in range(max(len(descent.rows) for descent in descents)):
+        current = [descent.rows[iteration] for descent in descents if iteration < len(descent.rows)]
+        best = min([row[1] for row in current] + [row[1] for row in rows[-1:]])
+        rows.append((iteration, best, _mean([row[2] for row in current])))
+    return rows
+
+
+def distinct(model: ForwardModel, descents: Sequence[Descent], apart: float = 1e-3) -> list[Descent]:
+    """The descents, best first, without those that ended where a better one did; apart: a fraction of the ranges."""
+    found: list[Descent] = []
+    for descent in sorted(descents, key=lambda d: d.fitness):
+        if np.isfinite(descent.fitness) and all(_distance(model, descent, other) > apart for other in found):
+            found.append(descent)
+    return found
+
+
+@dataclass
+class _Search:
+    """One descent between two calls of the model: `ask` for a trial point, then `tell` what was found there."""
+
+    model: ForwardModel
+    point: Array
+    residual: Array
+    jacobian: Array
+    damping: float = 1e-6
+    growth: float = 2.0
+    converged: bool = False
+    predicted: float = 0.0
+    """Cost that the last step should take away."""
+    cost: float = field(init=False)
+    scale: Array = field(init=False)
+    rows: list[tuple[int, float, float]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.cost = _cost(self.residual)
+        self.scale = np.full(len(self.point), 1e-300)
+        self.rows = [(0, self.fitness, self.fitness)]
+
+    @property
+    def fitness(self) -> float:
+        """Mean squared deviation at the point."""
+        return self.cost / self.model.samples
+
+    @property
+    def promise(self) -> float:
+        """Fitness after the step asked for last, if the model were linear."""
+        return (self.cost - self.predicted) / self.model.samples
+
+    def ask(self) -> Array | None:
+        """Where to look next, (parameters,), or None at the end."""
+        if self.converged or not np.isfinite(self.cost):
+            return None
+        model = self.model
+        self.scale = np.maximum(self.scale, np.linalg.norm(self.jacobian, axis=0))
+        while True:
+            wanted = self.point + self._step()
+            trial = np.clip(wanted, model.lower, model.upper)
+            moved = trial - self.point
+            self.predicted = self.cost - _cost(self.residual + self.jacobian @ moved)
+            # A step that a bound cuts may lead uphill: a shorter one does not.
+            cut = np.any(trial != wanted) and self.predicted < _SMALL_GAIN * self.cost
+            if not cut or self.damping > _LARGE_DAMPING:
+                break
+            self.damping = max(10 * self.damping, 1e-3)
+        small = np.max(np.abs(moved) / model.sizes(self.point)) < _SMALL_STEP
+        self.converged = bool(small or self.predicted < _SMALL_GAIN * self.cost)
+        return None if self.converged else trial
+
+    def tell(self, trial: Array, residual: Array, jacobian: Array) -> None:
+        """Take residuals (rows,) and Jacobian (rows, parameters) of the trial point."""
+        cost = _cost(residual)
+        if cost < self.cost:
+            ratio = (self.cost - cost) / self.predicted
+            self.point, self.residual, self.jacobian, self.cost = trial, residual, jacobian, cost
+            self.damping *= max(0.1, 1 - (2 * ratio - 1) ** 3)
+            self.growth = 2.0
+        else:
+            self.damping *= self.growth
+            self.growth *= 2
+            self.converged = self.damping > _LARGE_DAMPING
+        self.rows.append((len(self.rows), self.fitness, cost / self.model.samples))
+
+    def descent(self) -> Descent:
+        """What came out."""
+        return Descent(self.point, self.residual, self.jacobian, self.fitness, self.rows, self.converged)
+
+    def _step(self) -> Array:
+        """Damped least-squares step in parameters scaled by the columns of the Jacobian (Marquardt 1963).
+
+        Parameters that stand at a bound and are driven against it stay there.
+        """
+        downhill = -self.jacobian.T @ self.residual
+        held = (self.point <= self.model.lower) & (downhill < 0) | (self.point >= self.model.upper) & (downhill > 0)
+        jacobian = np.where(held, 0.0, self.jacobian / self.scale)
+        stacked = np.concatenate([jacobian, np.sqrt(self.damping) * np.eye(len(self.scale))])
+        wanted = np.concatenate([-self.residual, np.zeros(len(self.scale))])
+        return np.asarray(np.linalg.lstsq(stacked, wanted, rcond=None)[0] / self.scale)
+
+
+def _apart(searches: Sequence[_Search]) -> list[_Search]:
+    """The searches without those that came to where a better one is."""
+    kept: list[_Search] = []
+    for search in sorted(searches, key=lambda s: s.cost):
+        if all(_distance(search.model, search, other) > _SAME for other in kept):
+            kept.append(search)
+    return kept
+
+
+def _distance(model: ForwardModel, one: _Search | Descent, other: _Search | Descent) -> float:
+    """Largest difference of a parameter, as a fraction of its range."""
+    return float(np.max(np.abs(one.point - other.point) / (model.upper - model.lower)))
+
+
+def _report(iteration: int, searches: Sequence[_Search], active: Sequence[_Search], progress: Progress) -> None:
+    progress(iteration, min(search.fitness for search in searches), _mean([search.rows[-1][2] for search in active]))
+
+
+def _mean(values: Sequence[float]) -> float:
+    """Mean of those that are finite; inf if none is."""
+    finite = [value for value in values if np.isfinite(value)]
+    return float(np.mean(finite)) if finite else float("inf")
+
+
+def _cost(residual: Array) -> float:
+    return float(residual @ residual) if np.all(np.isfinite(residual)) else float("inf")

@@ -1,0 +1,140 @@
+"""What the residuals say about the model: their size against the noise, whether they are white, outliers."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from shoal.identification.covariance import Block, Noise
+from shoal.identification.forward import ForwardModel
+from shoal.identification.loss import noise_of
+from shoal.trajectory import Array, plain
+
+_LARGE = 3.0
+"""Times the noise, from where on a residual is more than noise and its own uncertainty."""
+_SURE = 1e-6
+"""Chance below which a test counts as failed; models are looked at for many reasons, so it is small."""
+_NO_FIT = 0.05
+"""Of the signal: a systematic residual above this is a wrong model, one below it an imperfect one."""
+_OUTLIER = 5.0
+_MAD = 1.4826
+"""Standard deviation over the median absolute deviation of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class ResidualTests:
+    """Sizes are RMS over (weighted) rows, in SI units; priors do not count.
+
+    noise: the stated one, else what the data show without any model; signal: spread of the data about their means
+    mesh: the model's own error, 0 if unknown; chance_of_size: that noise of this size and correlation leaves such a
+    residual (chi-square); chance_of_white: that white noise is so correlated (Ljung and Box 1978), by the worst channel
+    outliers: beyond five robust standard deviations of their channel; rows: how many there are
+    """
+
+    size: float
+    noise: float
+    noise_stated: bool
+    signal: float
+    mesh: float
+    chance_of_size: float
+    chance_of_white: float
+    outliers: int
+    rows: int
+
+    @property
+    def ratio(self) -> float:
+        """Size over what noise and mesh explain."""
+        return self.size / max(float(np.hypot(self.noise, self.mesh)), 1e-300)
+
+    @property
+    def white(self) -> bool:
+        """Whether the residuals may be white noise."""
+        return self.chance_of_white > _SURE
+
+    @property
+    def systematic(self) -> bool:
+        """Whether the residual is more than noise: much larger, by a chance that leaves no doubt."""
+        return self.ratio > _LARGE and self.chance_of_size < _SURE
+
+    @property
+    def wrong_model(self) -> bool:
+        """Whether the model is refuted: systematic against a stated noise, or against a good part of the signal."""
+        return self.systematic and (self.noise_stated or self.size > _NO_FIT * self.signal)
+
+    def sentences(self) -> list[str]:
+        """The tests in words."""
+        kind = "the stated noise" if self.noise_stated else "the noise that the data show without a model"
+        share = self.size / max(self.signal, 1e-300)
+        found = [
+            f"size: {self.size:.2g}, {self.size / max(self.noise, 1e-300):.2g} times {kind}, {share:.1g} of signal"
+        ]
+        found.append("correlation: none, like white noise" if self.white else "correlation: not white noise")
+        found.append(f"outliers: {self.outliers} of {self.rows} samples" if self.outliers else "outliers: none")
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """All fields, and what follows from them."""
+        return plain({**asdict(self), "systematic": self.systematic, "wrong_model": self.wrong_model})  # type: ignore[no-any-return]
+
+
+def residual_tests(
+    model: ForwardModel, residual: Array, blocks: list[Block], noise: tuple[Noise, ...], mesh: float
+) -> ResidualTests:
+    """Test the residuals (rows,) of an answer; blocks, noise: as estimated with it; mesh: the model's own error."""
+    from scipy.stats import chi2  # slow to import
+
+    measured = [(b, n) for b, n in zip(blocks, noise, strict=True) if not b.known]
+    rows = np.concatenate([block.rows for block, _ in measured])
+    size = float(np.sqrt(np.mean(residual[rows] ** 2)))
+    seen = model.noise if model.noise is not None else _without_model(model)
+    # As many samples as the residual's own memory leaves independent, less the parameters.
+    independent = sum(n.independent(len(b.rows)) for b, n in measured) - len(model.names)
+    freedom = max(1.0, independent)
+    explained = max(float(np.hypot(seen, mesh)), 1e-300)
+    whiteness = [ljung_box(residual[block.rows]) for block, _ in measured]
+    outlying = [_outlying(residual[block.rows]) for block, _ in measured]
+    return ResidualTests(
+        size=size,
+        noise=seen,
+        noise_stated=model.noise is not None,
+        signal=signal(model),
+        mesh=mesh,
+        chance_of_size=float(chi2.sf(freedom * (size / explained) ** 2, freedom)),
+        chance_of_white=min(1.0, min(whiteness) * len(whiteness)),
+        outliers=sum(outlying),
+        rows=len(rows),
+    )
+
+
+def ljung_box(signal: Array, lags: int = 10) -> float:
+    """Chance that white noise is as correlated as a signal (samples,) over its first lags."""
+    from scipy.stats import chi2  # slow to import
+
+    count, power = len(signal), float(signal @ signal)
+    lags = min(lags, count // 5)
+    if lags < 1 or power == 0.0:
+        return 1.0
+    rho = np.array([signal[lag:] @ signal[:-lag] for lag in range(1, lags + 1)]) / power
+    return float(chi2.sf(count * (count + 2) * np.sum(rho**2 / (count - np.arange(1, lags + 1))), lags))
+
+
+def signal(model: ForwardModel) -> float:
+    """Standard deviation of the (weighted) data about the mean of each channel."""
+    parts = []
+    for recording in model.measurement.recordings.values():
+        deviation = recording.values - np.nanmean(recording.values, axis=0)
+        parts.append(deviation[np.isfinite(recording.values)])
+    return float(np.sqrt(np.mean((np.concatenate(parts) * model.rows.weight) ** 2)))
+
+
+def _without_model(model: ForwardModel) -> float:
+    sizes = [noise_of(recording) for recording in model.measurement.recordings.values()]
+    squares = [sizes[r][c] ** 2 for r, c in zip(model.rows.recording, model.rows.channel, strict=True)]
+    return float(np.sqrt(np.mean(squares * model.rows.weight**2)))
+
+
+def _outlying(residual: Array) -> int:
+    deviation = np.abs(residual - np.median(residual))
+    return int(np.sum(deviation > _OUTLIER * _MAD * max(float(np.median(deviation)), 1e-300)))

@@ -1,0 +1,110 @@
+"""Which property of a measurement explains a misfit: the right one, with its value, and none where none is wrong."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shoal.engines import get_engine
+from shoal.identification import Measurement, Problem, identify, load_problem
+from shoal.identification.forward import ForwardModel
+from shoal.identification.methods.least_squares import least_squares, linearise
+from shoal.identification.suspects import Suspect, suspects
+from shoal_validation.coverage.cases import tip
+
+RECORDINGS = Path(__file__).parents[3] / "shared" / "data" / "multiarm_kaheman"
+ANGLE = {"lower": -np.pi, "upper": np.pi}
+
+
+def found(points: np.ndarray, times: np.ndarray, gravity: float = -9.81) -> dict[str, Suspect]:
+    """Suspects of both angles fitted to a tip's path, which has 1 mm of noise."""
+    data = {
+        "name": "suspects",
+        "scene": "rigid-double-pendulum",
+        "parameters": {
+            "theta1": {"path": "initial.OA.angle", **ANGLE},
+            "theta2": {"path": "initial.AB.angle", **ANGLE},
+        },
+        "channels": [{"marker": "B", "quantity": q, "column": q} for q in ("x", "y")],
+        "source": {"kind": "file"},
+    }
+    problem = Problem.parse(data, "suspects")
+    noisy = points + 1e-3 * np.random.default_rng(1).standard_normal(points.shape)
+    scene = problem.load_scene({"gravity.1": gravity})
+    measurement = Measurement.single(times, tuple(problem.channels), noisy, "scipy DOP853")
+    model = ForwardModel(problem, scene, get_engine("gauss"), measurement)
+    outcome = least_squares(model, np.random.default_rng(0), lambda *_: None)
+    return {suspect.name: suspect for suspect in suspects(model, outcome.point, *linearise(model, outcome.point))}
+
+
+TIMES = np.arange(1, 151) / 100
+TIP = tip(TIMES, np.pi / 4, np.pi / 6)
+
+
+def test_nothing_is_suspect_where_the_model_is_right() -> None:
+    assert found(TIP, TIMES) == {}
+
+
+def test_a_wrong_clock() -> None:
+    """Time runs 1.26 times as fast as recorded; gravity explains a free swing as well, by the square of that."""
+    named = found(tip(1.26 * TIMES, np.pi / 4, np.pi / 6), TIMES)
+    assert named["clock"].value == pytest.approx(1.26, rel=2e-3)
+    assert named["clock"].after < 2e-3 < 0.1 < named["clock"].before
+    assert named["gravity"].value == pytest.approx(-9.81 * 1.26**2, rel=4e-3)
+    assert "the clock: a factor of 1.26 would lower the misfit from" in str(named["clock"])
+
+
+def test_a_wrong_scale() -> None:
+    named = found(TIP / 1.1, TIMES)
+    assert named["scale"].value == pytest.approx(1.1, rel=2e-3)
+    assert next(iter(named)) == "scale"
+
+
+def test_a_tilted_camera() -> None:
+    c, s = np.cos(0.2), np.sin(0.2)
+    named = found(TIP @ np.array([[c, -s], [s, c]]), TIMES)
+    assert next(iter(named)) == "tilt"
+    assert named["tilt"].value == pytest.approx(0.2, abs=2e-3)
+
+
+def test_a_shifted_origin() -> None:
+    named = found(TIP - [0.15, 0.0], TIMES)
+    assert next(iter(named)) == "x"
+    assert named["x"].value == pytest.approx(0.15, abs=2e-3)
+
+
+def test_a_late_start() -> None:
+    """Recorded time 0 is 0.1 s after the release."""
+    named = found(tip(TIMES + 0.1, np.pi / 4, np.pi / 6), TIMES)
+    assert named["delay"].value == pytest.approx(0.1, abs=2e-3)
+
+
+def test_what_is_sought_is_no_suspect() -> None:
+    """A clock among the parameters finds its own value."""
+    data = {
+        "name": "clock",
+        "scene": "rigid-double-pendulum",
+        "parameters": {
+            "theta1": {"path": "initial.OA.angle", **ANGLE},
+            "theta2": {"path": "initial.AB.angle", **ANGLE},
+            "clock": {"path": "measurement.clock", "lower": 0.5, "upper": 2.0, "start": 1.2},
+        },
+        "channels": [{"marker": "B", "quantity": q, "column": q} for q in ("x", "y")],
+        "source": {"kind": "file"},
+    }
+    problem = Problem.parse(data, "clock")
+    points = tip(1.26 * TIMES, np.pi / 4, np.pi / 6) + 1e-3 * np.random.default_rng(1).standard_normal(TIP.shape)
+    measurement = Measurement.single(TIMES, tuple(problem.channels), points, "scipy DOP853")
+    estimate = identify(problem, method="least-squares", measurement=measurement)
+    assert estimate.suspects == []
+    assert estimate.parameters["clock"].lower <= 1.26 <= estimate.parameters["clock"].upper
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recordings are not here")
+@pytest.mark.parametrize(("name", "file"), [("kaheman-double", "double"), ("kaheman-single", "single")])
+def test_both_real_encoders_have_the_same_zero(name: str, file: str) -> None:
+    """Two recordings of different machines on one stand agree on a vertical that is off by a milliradian and a half."""
+    data = str(RECORDINGS / f"{file}_1kHz.csv.gz")
+    named = {
+        suspect.name: suspect for suspect in identify(load_problem(name), method="least-squares", data=data).suspects
+    }
+    assert named["tilt"].value == pytest.approx(-1.5e-3, abs=2e-4)
