@@ -13,6 +13,7 @@ from shoal.engines import sweep as sweeping
 from shoal.errors import InputError
 from shoal.identification import Estimate, Measurement, identify, load_problem, measure
 from shoal.identification.identify import load_truth
+from shoal.pictures.answer import Answer
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Trajectory
 
@@ -39,21 +40,16 @@ class Cell:
 
 @dataclass(frozen=True)
 class Fit:
-    """An estimate with the motion of the identified scene.
-
-    at_samples: the model at the samples of the measurement, (samples, channels)
-    motion: the model's markers on a fine grid of times from 0 to the last sample
-    """
+    """An estimate with the motion of the identified scene, by recording, on a fine grid of times."""
 
     cell: Cell
     estimate: Estimate
-    at_samples: Array
-    motion: Trajectory
+    motions: dict[str, Trajectory]
 
     @property
-    def residuals(self) -> Array:
-        """Model minus measurement, (samples, channels)."""
-        return np.asarray(self.at_samples - self.estimate.measurement.first.values)
+    def motion(self) -> Trajectory:
+        """That of the first recording."""
+        return next(iter(self.motions.values()))
 
 
 def measured(problem: str, data: str | None = None) -> Measurement:
@@ -76,10 +72,13 @@ def fit(cell: Cell, measurement: Measurement) -> Fit:
 
 
 def with_motion(cell: Cell, estimate: Estimate) -> Fit:
-    """An estimate with the motion of what it found."""
-    grid = np.linspace(0.0, float(estimate.measurement.first.times[-1]), _POINTS)
-    sampled = next(iter(estimate.predicted.values()))
-    return Fit(cell, estimate, sampled, get_engine(cell.engine).simulate(estimate.scene, grid))
+    """An estimate with the motion of what it found, over the time that each recording shows."""
+    engine, answer, motions = get_engine(cell.engine), Answer(load_problem(cell.problem), estimate), {}
+    for name, recording in estimate.measurement.recordings.items():
+        view = answer.view(name)
+        grid = np.linspace(0.0, view["clock"] * float(recording.times[-1]) + view["delay"], _POINTS)
+        motions[name] = engine.simulate(estimate.scenes[name], grid)
+    return Fit(cell, estimate, motions)
 
 
 def simulated(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene, Trajectory]:

@@ -3,53 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 from shoal.engines.compare import Comparison
-from shoal.identification import Measurement
+from shoal.identification import Estimate, Measurement, load_problem
+from shoal.pictures import titles
+from shoal.pictures.answer import Answer
+from shoal.pictures.convergence import convergence
+from shoal.pictures.engines import engines
+from shoal.pictures.gallery import gallery, motions
+from shoal.pictures.mesh_error import mesh_error
+from shoal.pictures.overlay import overlay
+from shoal.pictures.remainders import remainders
+from shoal.pictures.report import report
+from shoal.pictures.style import png, svg
 
-from shoal_flows.figures import titles
-from shoal_flows.figures.convergence import convergence
-from shoal_flows.figures.engines import engines
-from shoal_flows.figures.mesh_error import mesh_error
-from shoal_flows.figures.residuals import residuals
-from shoal_flows.figures.style import png, svg
-from shoal_flows.figures.trajectory import trajectory
 from shoal_flows.jobs import Cell, Fit, fit
 
 Picture = tuple[bytes, bytes]
 """The same picture as PNG and as SVG."""
 
 
-def fitted(cell: Cell, measurement: Measurement) -> tuple[Fit, bytes]:
-    """One optimisation and its picture as PNG."""
+@dataclass(frozen=True)
+class Album:
+    """What is shown of one optimisation: pictures as PNG by name, and the page with everything."""
+
+    pictures: dict[str, bytes]
+    page: str
+
+
+def fitted(cell: Cell, measurement: Measurement) -> tuple[Fit, Album]:
+    """One optimisation and what is shown of it."""
     found = fit(cell, measurement)
-    return found, png(trajectory(found, f"{cell.problem}: {cell.name}, RMS {found.estimate.rms:.2e}"))
+    return found, album(found)
+
+
+def album(found: Fit) -> Album:
+    """Every picture of a fit, and its page."""
+    answer = Answer(load_problem(found.cell.problem), found.estimate)
+    moving = motions(answer)
+    drawn = gallery(answer, moving)
+    return Album({one.name: png(one.figure) for one in drawn}, report(answer, moving, drawn))
 
 
 def draw_trajectory(fits: Sequence[Fit], name: str) -> Picture:
     """The model of the best fit over the data."""
-    return _both(trajectory(titles.best(fits), titles.follows(name, fits)))
+    return _both(overlay(titles.best(_labelled(fits)), name))
 
 
 def draw_convergence(fits: Sequence[Fit], name: str) -> Picture:
     """Fitness against evaluations."""
-    return _both(convergence(fits, titles.pays(name, fits)))
+    return _both(convergence(_labelled(fits), titles.pays(name, _labelled(fits))))
 
 
 def draw_residuals(fits: Sequence[Fit], name: str) -> Picture:
     """What each method leaves."""
-    return _both(residuals(fits, titles.leaves(name, fits)))
+    return _both(remainders(_labelled(fits), titles.leaves(name, _labelled(fits))))
 
 
 def draw_mesh_error(fits: Sequence[Fit], name: str) -> Picture:
     """Error against mesh."""
-    return _both(mesh_error(fits, titles.refines(name, fits)))
+    return _both(mesh_error(_labelled(fits), titles.refines(name, _labelled(fits))))
 
 
 def draw_engines(comparison: Comparison, marker: str) -> Picture:
     """The engines over each other."""
     return _both(engines(comparison, marker, titles.agrees(comparison, marker)))
+
+
+def _labelled(fits: Sequence[Fit]) -> dict[str, Estimate]:
+    return {found.cell.name: found.estimate for found in fits}
 
 
 def _both(figure: Figure) -> Picture:

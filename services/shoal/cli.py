@@ -312,9 +312,48 @@ def identify(
             progress=progress,
         )
     if out is not None:
-        terminal.write_estimate(estimate, out)
+        terminal.write_estimate(estimate, wanted, out)
     terminal.show(estimate.to_json(), as_json, lambda: terminal.estimate_table(estimate))
     _finish(estimate.verdict.trusted, f"{estimate.verdict}: {estimate.message}")
+
+
+@main.command()
+@click.argument("problem")
+@click.option("--data", multiple=True, metavar="[NAME=]FILE", callback=recordings, help="As for identify.")
+@click.option("--about", type=click.Choice(["answer", "start"]), help="The answer from the data, where there are any.")
+@click.option("--noise", type=float, metavar="METRES", help="Standard deviation of positions; else the problem's.")
+@click.option("--angle-noise", type=float, metavar="RADIANS", help="Standard deviation of angles; else the problem's.")
+@click.option("--duration", type=float, metavar="SECONDS", help="Of the measurement; else that of the data.")
+@click.option("--rate", type=float, metavar="HERTZ", help="Samples per second; else that of the data.")
+@click.option("--parameter", metavar="NAME", help="To be sharpened; else the weakest.")
+@option_set
+@option_json
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .json or .png.")
+def design(
+    problem: str,
+    data: str | dict[str, str] | None,
+    about: Literal["answer", "start"] | None,
+    values: dict[str, str],
+    as_json: bool,
+    out: Path | None,
+    **options: Any,
+) -> None:
+    """Which marker, how long and how often: what to measure to know the parameters of PROBLEM best."""
+    from shoal import terminal
+    from shoal.identification import load_problem
+    from shoal.identification.design import about_answer, design, has_data
+
+    terminal.check_output(out, (".json", ".png"))
+    wanted = load_problem(problem)
+    with terminal.working(f"designing a measurement for {wanted.name}"):
+        if about == "answer" or (about is None and (data is not None or has_data(wanted))):
+            found = about_answer(wanted, data=data, values=values, **options)
+        else:
+            found = design(wanted, values=values, **options)
+    if out is not None:
+        terminal.write_design(found, out)
+    terminal.show(found.to_json(), as_json, lambda: terminal.design_table(found))
+    _finish(found.ok, "no candidate tells every parameter; name one with --parameter")
 
 
 @main.command()

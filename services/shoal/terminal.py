@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +22,8 @@ if TYPE_CHECKING:
     from shoal.doctor import Check
     from shoal.engines.compare import Comparison
     from shoal.engines.sweep import Sweep
-    from shoal.identification import Estimate
+    from shoal.identification import Estimate, Problem
+    from shoal.identification.design import Design
     from shoal.mechanics.analysis.modes import Modes
     from shoal.mechanics.analysis.reactions import Reactions
     from shoal.mechanics.analysis.statics import Equilibrium
@@ -266,6 +266,35 @@ def _say(text: str, style: str = "") -> None:
     out.print(escape(text), style=style, width=min(80, out.width), soft_wrap=False)
 
 
+def design_table(found: Design) -> None:
+    """Candidates, the best first, each alone and beside the best one; then duration and rate."""
+    beside = dict(found.second)
+    best = found.ranked[0][0]
+    title = f"{found.problem}: what to measure, {found.duration:g} s at {found.rate:g} samples a second"
+    table = _table(title, "marker", "weakest", "std", "A", "D", f"with {best.name}: weakest", "std")
+    now = found.weakest(found.now)
+    table.add_row("as now", now[0], f"{now[1]:.2e}", f"{found.now.a:.1e}", f"{found.now.d:.1e}", "", "")
+    for candidate, precision in found.ranked:
+        name, std = found.weakest(precision)
+        second = found.weakest(beside[candidate]) if candidate in beside else None
+        pair = ("", "") if second is None else (second[0], f"{second[1]:.2e}")
+        table.add_row(candidate.label, name, f"{std:.2e}", f"{precision.a:.1e}", f"{precision.d:.1e}", *pair)
+    out.print(table)
+    table = _table(
+        f"{best.label}: largest std over range, by duration and samples a second",
+        "duration [s]",
+        *(f"{rate:g}" for rate in found.rates),
+    )
+    for duration, row in zip(found.durations, found.table, strict=True):
+        table.add_row(f"{duration:g}", *(f"{score:.1e}" for score in row))
+    out.print(table)
+    angle = "" if found.angle_noise is None else f", {found.angle_noise:g} rad"
+    values = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
+    out.print(f"noise {found.noise:g} m{angle}; about {values}")
+    out.print("A, D: root mean square and geometric mean of the standard deviations over the ranges of the parameters")
+    out.print(f"sensitivities by two steps differ by {found.doubt:.0e}")
+
+
 def sweep_table(sweep: Sweep) -> None:
     """Displacements of every marker over the grid."""
     markers = list(sweep.positions)
@@ -351,12 +380,20 @@ def write_trajectory(trajectory: Trajectory, scene: Scene, path: Path) -> None:
         _pictures().trajectory(trajectory, scene, path)
 
 
-def write_estimate(estimate: Estimate, path: Path) -> None:
-    """An estimate as JSON or picture."""
+def write_estimate(estimate: Estimate, problem: Problem, path: Path) -> None:
+    """An estimate as JSON, page, picture or moving picture."""
     if path.suffix == ".json":
         _write_json(estimate.to_json(), path)
     else:
-        _pictures().estimate(estimate, path)
+        _pictures().estimate(estimate, problem, path)
+
+
+def write_design(found: Design, path: Path) -> None:
+    """A design as JSON or picture."""
+    if path.suffix == ".json":
+        _write_json(found.to_json(), path)
+    else:
+        _pictures().design(found, path)
 
 
 def write_sweep(sweep: Sweep, path: Path) -> None:
@@ -380,8 +417,10 @@ def write_comparison(comparison: Comparison, path: Path) -> None:
 
 
 def _pictures() -> Any:
-    """The module that draws, which belongs to the pipeline and is not needed otherwise."""
-    return import_module("shoal_flows.figures.files")
+    """The module that draws, which is slow to import and not needed otherwise."""
+    from shoal.pictures import files
+
+    return files
 
 
 def _write_json(data: Mapping[str, Any], path: Path) -> None:

@@ -57,8 +57,9 @@ def test_artifacts_hold_the_full_trajectory_and_pictures(study: Any) -> None:
     names = {Path(item.path).name for item in _client().list_artifacts(child.info.run_id)}
     assert any(name.endswith((".csv", ".parquet")) for name in names)
     assert any(name.endswith(".png") for name in names)
+    assert "report.html" in names
     of_study = {Path(item.path).name for item in _client().list_artifacts(study.run_id)}
-    assert "overlay.html" in of_study
+    assert {"convergence.png", "residuals.png"} <= of_study
 
 
 def test_the_answer_is_plain_json(study: Any) -> None:

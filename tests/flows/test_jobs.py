@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
+from shoal.pictures.signals import residuals
 from shoal_flows import jobs
 from shoal_flows.jobs import Fit
 
@@ -11,10 +12,11 @@ from shoal_flows.jobs import Fit
 def test_fit_carries_the_motion_of_what_it_found(fits: list[Fit]) -> None:
     fit = fits[0]
     assert fit.estimate.verdict.trusted
-    assert np.mean(np.sum(fit.residuals**2, axis=1)) == pytest.approx(fit.estimate.fitness, rel=1e-9)
+    left = residuals(fit.estimate)["recording"]
+    assert np.mean(np.sum(left**2, axis=1)) == pytest.approx(fit.estimate.fitness, rel=1e-9)
     assert fit.motion.times[0] == 0
     assert fit.motion.times[-1] == fit.estimate.measurement.end
-    assert np.allclose(fit.motion.marker("B")[-1], fit.at_samples[-1], atol=1e-12)
+    assert np.allclose(fit.motion.marker("B")[-1], fit.estimate.predicted["recording"][-1], atol=1e-12)
 
 
 def test_sweep_covers_the_grid(sweep: Sweep) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
-from shoal_flows.figures.style import png
-from shoal_flows.figures.trajectory import trajectory
+from shoal.pictures.signals import signals
+from shoal_flows import pictures
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.tracking.engines import log_comparison, log_sweep
 from shoal_flows.tracking.identification import log_fit, log_outcome, open_study
@@ -30,18 +30,19 @@ def children(client: Any, run_id: str) -> list[Any]:
 
 
 def test_study_is_logged_with_a_child_per_fit(client: Any, fits: list[Fit], tmp_path: Path) -> None:
-    picture = png(trajectory(fits[0], "title"))
+    albums = [pictures.album(fit) for fit in fits]
+    some = next(iter(albums[0].pictures.values()))
     with open_study("a study", [fit.cell for fit in fits], fits[0].estimate.measurement) as study:
-        for fit in fits:
-            log_fit(fit, picture, study.run_id)
-        log_outcome(study, fits, {"other": "went wrong"}, {"some.png": picture})
+        for fit, album in zip(fits, albums, strict=True):
+            log_fit(fit, album, study.run_id)
+        log_outcome(study, fits, {"other": "went wrong"}, {"some.png": some})
     parent = client.get_run(study.run_id)
     assert parent.info.status == "FINISHED"
     assert parent.data.metrics["study/trusted"] == 2
     assert parent.data.metrics["study/failed"] == 1
     assert parent.data.tags["version.numpy"]
     assert parent.data.tags["platform"]
-    assert names(client, study.run_id) == {"some.png", "summary.md", "overlay.html"}
+    assert names(client, study.run_id) == {"some.png", "summary.md"}
 
     estimate = fits[0].estimate
     (child,) = (run for run in children(client, study.run_id) if run.data.params["seed"] == "0")
@@ -53,7 +54,10 @@ def test_study_is_logged_with_a_child_per_fit(client: Any, fits: list[Fit], tmp_
     error = estimate.parameters["theta1"].value - estimate.truth["theta1"]
     assert child.data.metrics["error/theta1"] == pytest.approx(error)
     assert child.data.metrics["interval/theta1/lower"] < estimate.truth["theta1"]
-    assert names(client, child.info.run_id) == {"trajectory.csv", "trajectory.png", "estimate.json"}
+    drawn = {f"{name}.png" for name in albums[0].pictures}
+    assert {"overlay.png", "residuals.png", "landscape.png", "correlations.png"} <= drawn
+    assert child.data.metrics["rms/recording/B.x"] == signals(estimate)[0].rms
+    assert names(client, child.info.run_id) == {"trajectory.csv", "estimate.json", "report.html", *drawn}
     best = client.get_metric_history(child.info.run_id, "fitness/best")
     assert [metric.value for metric in best] == [row[1] for row in estimate.iterations]
     tip = client.get_metric_history(child.info.run_id, "tip/x")

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +84,8 @@ def test_a_cut_off_end_is_dropped(tmp_path: Path, lost: int) -> None:
     assert found == ([True, True, False] if lost < 1000 else [False] * 3)
     again.keep(0.5, batches[2], batches[2])
     again.close()
-    assert Memory(path, "one").recall(0.5, batches[2]) is not None
+    with closing(Memory(path, "one")) as whole:
+        assert whole.recall(0.5, batches[2]) is not None
 
 
 def test_a_foreign_file_is_refused(tmp_path: Path) -> None:

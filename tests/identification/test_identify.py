@@ -51,9 +51,11 @@ def test_both_elbow_branches_are_looked_at() -> None:
     assert estimate.minima[0]["fitness"] > 100 * estimate.fitness
 
 
-@pytest.mark.parametrize(
-    "method", [name for name in METHODS if name not in ("auto", "casadi", "casadi-multiple", "afsa")]
-)
+# The multiple shooting is for rigid chains: test_multiple_shooting.py.
+OTHERS = ("auto", "casadi", "casadi-multiple", "multiple-shooting", "afsa")
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name not in OTHERS])
 def test_every_native_method_finds_the_angles(method: str) -> None:
     estimate = run("paper-case-1", method, seed=1)
     for parameter, true in estimate.truth.items():

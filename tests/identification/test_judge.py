@@ -75,6 +75,7 @@ def test_wrong_models_are_not_answers(noise: float | None, values: dict[str, Any
     assert estimate.advice
 
 
+@pytest.mark.slow
 def test_a_rigid_model_of_a_flexible_machine_is_rejected() -> None:
     """Data: Exudyn's beams."""
     values = {"bodies.OA.element": "rigid", "bodies.AB.element": "rigid", "solver.integrator": "rk4"}
@@ -90,7 +91,9 @@ def test_exchanged_markers_are_rejected() -> None:
     run = measurement.first
     wrong = replace(measurement, recordings={"recording": replace(run, values=run.values[:, [2, 3, 0, 1]])})
     assert identify(stated, method="least-squares", measurement=measurement).verdict is Verdict.IDENTIFIED
-    assert identify(stated, method="least-squares", measurement=wrong).verdict is Verdict.REJECTED
+    estimate = identify(stated, method="least-squares", measurement=wrong)
+    assert estimate.verdict is Verdict.REJECTED
+    assert "markers A and B seem exchanged" in estimate.message
 
 
 def concluded(model: ForwardModel, outcome: Outcome) -> Estimate:
@@ -132,6 +135,7 @@ def test_equal_minima_are_ambiguous_and_whole_turns_are_not() -> None:
     assert concluded(model, clearly_worse).verdict is Verdict.IDENTIFIED
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recordings are not here")
 def test_a_real_machine_is_not_rejected_for_a_small_systematic_residual() -> None:
     estimate = identify(

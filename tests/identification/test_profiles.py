@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shoal.identification import identify
+from shoal.identification import Problem, identify
 from shoal.identification.bootstrap import block_length, bootstrap
 from shoal.identification.conclude import Wishes
 from shoal.identification.covariance import blocks_of
@@ -38,8 +38,6 @@ def test_a_well_known_parameter_has_the_interval_of_linear_theory(name: str) -> 
 
 def test_a_parameter_without_effect_is_open_on_both_sides() -> None:
     """The first rod's density multiplies nothing when both densities and the friction may change with it."""
-    from shoal.identification import Problem
-
     case = CASES["angles, mass, friction; white"]
     both = case.problem.model_dump()
     both["parameters"]["first"] = {"path": "bodies.OA.density", "lower": 500.0, "upper": 2000.0, "scale": "log"}

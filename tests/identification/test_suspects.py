@@ -99,12 +99,12 @@ def test_what_is_sought_is_no_suspect() -> None:
     assert estimate.parameters["clock"].lower <= 1.26 <= estimate.parameters["clock"].upper
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recordings are not here")
-@pytest.mark.parametrize(("name", "file"), [("kaheman-double", "double"), ("kaheman-single", "single")])
-def test_both_real_encoders_have_the_same_zero(name: str, file: str) -> None:
-    """Two recordings of different machines on one stand agree on a vertical that is off by a milliradian and a half."""
-    data = str(RECORDINGS / f"{file}_1kHz.csv.gz")
-    named = {
-        suspect.name: suspect for suspect in identify(load_problem(name), method="least-squares", data=data).suspects
-    }
-    assert named["tilt"].value == pytest.approx(-1.5e-3, abs=2e-4)
+def test_the_zero_of_a_real_encoder() -> None:
+    """Most of the residual of the real single pendulum is a vertical that is off by 1.4 mrad."""
+    data = str(RECORDINGS / "single_1kHz.csv.gz")
+    estimate = identify(load_problem("kaheman-single"), method="least-squares", data=data)
+    named = {suspect.name: suspect for suspect in estimate.suspects}
+    assert named["tilt"].value == pytest.approx(-1.4e-3, abs=2e-4)
+    assert named["tilt"].after < 6e-4

@@ -31,8 +31,8 @@ def measure(problem: str, data: str | None) -> Measurement:
 def optimise(cell: Cell, measurement: Measurement, study: str) -> Fit:
     """One optimisation, logged as a child of the run `study`."""
     with events.work(f"{cell.problem}, {cell.name}"):
-        fit, picture = workers.run(pictures.fitted, cell, measurement)
-        log_fit(fit, picture, study)
+        fit, album = workers.run(pictures.fitted, cell, measurement)
+        log_fit(fit, album, study)
         return fit
 
 

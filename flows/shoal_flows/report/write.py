@@ -7,8 +7,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
 from shoal.home import home
+from shoal.pictures.report import environment
 
 from shoal_flows import provenance, workers
 from shoal_flows.pictures import Picture
@@ -28,8 +28,7 @@ def write_report(result: DemoResult, folder: Path | None = None) -> Path:
 
 def render(result: DemoResult) -> str:
     """The report as HTML without a reference to anything outside."""
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string((files("shoal_flows.report") / "template.html.j2").read_text(encoding="utf-8"))
+    template = environment().from_string((files("shoal_flows.report") / "template.html.j2").read_text(encoding="utf-8"))
     return template.render(
         headline=words.headline(result),
         trusted=result.trusted,

@@ -9,12 +9,12 @@ from typing import Any
 
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
+from shoal.pictures.engines import engines
+from shoal.pictures.style import png
+from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
 
-from shoal_flows.figures.engines import engines
-from shoal_flows.figures.style import png
-from shoal_flows.figures.sweep import sweep as draw_sweep
 from shoal_flows.jsontext import as_json_text
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run

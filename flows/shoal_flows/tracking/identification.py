@@ -7,11 +7,12 @@ from contextlib import contextmanager
 
 import numpy as np
 from shoal.identification import Measurement
+from shoal.pictures.signals import signals
 from shoal.scene import Rod
 
-from shoal_flows.figures.overlay import overlay
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.jsontext import as_json_text
+from shoal_flows.pictures import Album
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
 
@@ -37,7 +38,6 @@ def log_outcome(study: Run, fits: Sequence[Fit], failures: Mapping[str, str], pi
         best = min((f.estimate for f in fits), key=lambda e: e.fitness)
         study.metric("final/fitness", best.fitness)
         study.metric("final/rms", best.rms)
-        study.text(overlay(fits), "overlay.html")
 
 
 def summary(fits: Sequence[Fit], failures: Mapping[str, str]) -> str:
@@ -52,7 +52,7 @@ def summary(fits: Sequence[Fit], failures: Mapping[str, str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def log_fit(fit: Fit, picture: bytes, study: str) -> str:
+def log_fit(fit: Fit, album: Album, study: str) -> str:
     """A child of the run `study` with all there is to know about one fit; returns its id."""
     cell, estimate = fit.cell, fit.estimate
     tags = {"kind": "optimisation", "problem": cell.problem, "method": cell.method, "verdict": str(estimate.verdict)}
@@ -64,8 +64,12 @@ def log_fit(fit: Fit, picture: bytes, study: str) -> str:
         run.params({"mesh": ", ".join(f"{name}: {n}" for name, n in mesh.items()) or "rigid", **cell.values})
         _log_progress(run, fit)
         _log_result(run, fit)
-        log_motion(run, fit.motion, estimate.measurement.first.channels[0].marker)
-        run.picture(picture, "trajectory.png")
+        for name, recording in estimate.measurement.recordings.items():
+            prefix = f"{name}/" if len(fit.motions) > 1 else ""
+            log_motion(run, fit.motions[name], recording.channels[0].marker, prefix)
+        for name, picture in album.pictures.items():
+            run.picture(picture, f"{name}.png")
+        run.text(album.page, "report.html")
         run.text(as_json_text(estimate.to_json(), indent=1), "estimate.json")
         return run.run_id
 
@@ -88,6 +92,9 @@ def _log_result(run: Run, fit: Fit) -> None:
     run.metric("final/evaluations", estimate.evaluations)
     run.metric("final/wall_s", estimate.wall_s)
     run.metric("final/trusted", float(estimate.verdict.trusted))
+    run.metric("final/residual_autocorrelation", estimate.residual_autocorrelation)
+    for signal in signals(estimate):
+        run.metric(f"rms/{signal.recording}/{signal.channel.marker}.{signal.channel.quantity}", signal.rms)
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
         run.metric(f"final/{name}", value.value)
         run.metric(f"interval/{name}/lower", value.lower)

@@ -13,13 +13,13 @@ from shoal_flows.tracking.store import Run
 _POINTS = 300
 
 
-def log_motion(run: Run, motion: Trajectory, marker: str) -> None:
+def log_motion(run: Run, motion: Trajectory, marker: str, prefix: str = "") -> None:
     """Metrics `tip/x`, `tip/y` of a marker with the step in ms, and `trajectory.csv` of all markers."""
     chosen = np.unique(np.linspace(0, len(motion.times) - 1, min(_POINTS, len(motion.times))).round().astype(int))
     path = motion.marker(marker)
     for k, name in enumerate(("tip/x", "tip/y")):
-        run.series(name, ((round(1e3 * motion.times[row]), float(path[row, k])) for row in chosen))
-    run.text(as_csv(motion), "trajectory.csv")
+        run.series(prefix + name, ((round(1e3 * motion.times[row]), float(path[row, k])) for row in chosen))
+    run.text(as_csv(motion), prefix.replace("/", "-") + "trajectory.csv")
 
 
 def as_csv(motion: Trajectory) -> str:

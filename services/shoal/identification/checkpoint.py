@@ -46,18 +46,18 @@ class Memory:
         except OSError as error:
             raise InputError(f"checkpoint: {path} cannot be written: {error.strerror}") from None
 
-    def recall(self, end: float, points: Array) -> Array | None:
+    def recall(self, model: object, points: Array) -> Array | None:
         """What was kept for a batch, or None."""
-        found = self._known.get(_key(end, points))
+        found = self._known.get(_key(model, points))
         self.recalled += 0 if found is None else len(points)
         return found
 
-    def keep(self, end: float, points: Array, residuals: Array) -> None:
+    def keep(self, model: object, points: Array, residuals: Array) -> None:
         """Note the residuals of a batch."""
         buffer = io.BytesIO()
         np.save(buffer, residuals, allow_pickle=False)
         body = buffer.getvalue()
-        self._file.write(_HEAD.pack(_key(end, points), len(body), zlib.crc32(body)) + body)
+        self._file.write(_HEAD.pack(_key(model, points), len(body), zlib.crc32(body)) + body)
         self._file.flush()
 
     def close(self) -> None:
@@ -85,5 +85,6 @@ class Memory:
         return place
 
 
-def _key(end: float, points: Array) -> bytes:
-    return hashlib.sha1(struct.pack("<d", end) + points.tobytes() + repr(points.shape).encode()).digest()
+def _key(model: object, points: Array) -> bytes:
+    """Of a batch; model: what tells the models of one identification apart, by its `repr`."""
+    return hashlib.sha1(repr((model, points.shape)).encode() + points.tobytes()).digest()

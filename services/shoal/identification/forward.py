@@ -232,19 +232,23 @@ class ForwardModel:
     def _residuals(self, points: Array) -> Array:
         if self.deadline is not None and time.monotonic() > self.deadline:
             raise TimeIsUp
-        key = (self.measurement.end, points)
-        if self.memory is not None and (known := self.memory.recall(*key)) is not None:
-            found = known
-        else:
-            found = self._simulated_residuals(points)
-            if self.memory is not None:
-                self.memory.keep(*key, found)
+        found = self._remembered(points) if self.memory is not None else self._simulated_residuals(points)
         self.work += len(points)
         if self.whole is not None:
             whole = self.whole
             whole.work += len(points) * self.measurement.end / whole.measurement.end
             # Values of a part cannot be compared with those of the whole, so it counts without a best value.
             whole.counter.charge(len(points), points[0], np.inf)
+        return found
+
+    def _remembered(self, points: Array) -> Array:
+        assert self.memory is not None
+        # One identification may run models of several meshes and horizons.
+        model = (self.scene.fingerprint, self.measurement.end)
+        if (known := self.memory.recall(model, points)) is not None:
+            return known
+        found = self._simulated_residuals(points)
+        self.memory.keep(model, points, found)
         return found
 
     def _simulated_residuals(self, points: Array) -> Array:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
-from importlib import import_module
 
 import numpy as np
 
@@ -15,6 +13,7 @@ from shoal.identification.methods import Outcome
 from shoal.identification.residual_tests import ResidualTests
 from shoal.identification.sensitivity import Sensitivity
 from shoal.identification.suspects import Suspect, suspects
+from shoal.identification.swaps import exchanged
 from shoal.identification.uncertainty import LEVEL, Linearisation
 from shoal.trajectory import Array
 
@@ -72,7 +71,7 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
         equals = [other.name for other in found[1:] if other.after < 1.5 * found[0].after]
         reason += f" (as would {', '.join(equals)})" if equals else ""
         advice.append(f"check the {' or the '.join(s.name for s in found)}, or seek it as a parameter")
-    if (exchange := _exchanged(model)) is not None:
+    if (exchange := exchanged(model)) is not None:
         reason += f"; {exchange}"
         advice.append("check which column is which marker")
     advice.append("look for another minimum (--method multi-start)")
@@ -158,11 +157,3 @@ def _differing(model: ForwardModel, one: Array, other: Array) -> Array:
     turned = np.abs(difference - 2 * np.pi * np.round(difference / (2 * np.pi)))
     difference = np.where(turning, turned, difference)
     return np.asarray(difference / (model.upper - model.lower) > _APART)
-
-
-def _exchanged(model: ForwardModel) -> str | None:
-    """Whether markers look exchanged in the whole recording."""
-    with suppress(ImportError, AttributeError):
-        found = import_module("shoal.identification.swaps").exchanged(model)
-        return None if found is None else str(found)
-    return None

@@ -61,7 +61,8 @@ def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array
         freed.append((promise, name, free, start, begin))
     freed.sort(key=lambda entry: entry[0])
     found = [_fitted(name, free, start, begin, before) for _, name, free, start, begin in freed[:_CONFIRMED]]
-    return sorted((suspect for suspect in found if suspect.explains), key=lambda suspect: suspect.after)
+    # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
+    return sorted((s for s in found if s.explains), key=lambda s: (float(f"{s.after:.1e}"), s.name))
 
 
 def _freed(model: ForwardModel, point: Array) -> Iterator[tuple[str, ForwardModel, Array]]:

@@ -9,6 +9,7 @@ from shoal.identification.methods.casadi_shooting import casadi, casadi_multiple
 from shoal.identification.methods.hybrid import hybrid
 from shoal.identification.methods.least_squares import least_squares
 from shoal.identification.methods.multi_start import multi_start
+from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Method, Outcome
 from shoal.identification.methods.progressive import progressive
 from shoal.identification.methods.swarms import afsa, iafsa, iafsa_printed, iafsa_unseeded
@@ -17,6 +18,7 @@ METHODS: dict[str, Method] = {
     "auto": auto,
     "least-squares": least_squares,
     "progressive": progressive,
+    "multiple-shooting": multiple_shooting,
     "afsa": afsa,
     "iafsa": iafsa,
     "iafsa-unseeded": iafsa_unseeded,

@@ -1,4 +1,4 @@
-"""The method a user gets who does not choose: by how fast a deviation grows, and how well a fit ends."""
+"""The method a user gets who does not choose: by how fast a deviation grows in the record, and by what a fit leaves."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from shoal.identification.loss import noise_of
 from shoal.identification.methods.growth import growth, spread_of_data, swings
 from shoal.identification.methods.lanes import descend_many, distinct, linearise_many
 from shoal.identification.methods.least_squares import from_starts, linearise
+from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
 from shoal.identification.starts import starting_points
@@ -27,14 +28,14 @@ _UNEXPLAINED = 0.05
 _NOISES = 3.0
 _SWINGS = 3
 """A record that swings more often may be fitted with another phase: false minima."""
-_LINE, _WIDTH, _LOOKED_AT = 41, 0.05, 4
-"""False minima are sought at points of a line, to this fraction of the box on both sides, in its lowest dips."""
+_LINE, _WIDTH, _LOOKED_AT = 41, 0.05, 2
+"""Points of the line on which false minima are sought, its half by the box, and the dips that are followed."""
 
 
 def auto(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """Least squares where deviations stay small, else a progressive horizon; then a look for false minima near by.
 
-    A fit that leaves more than noise is followed by the next method.
+    A fit that leaves more than noise is followed by the next method, progressive horizon and then multiple shooting.
     """
     starts = starting_points(model)
     first = linearise_many(model, starts)
@@ -43,10 +44,11 @@ def auto(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> O
     methods: dict[str, Callable[[], Outcome]] = {
         "least-squares": lambda: from_starts(model, starts, first, progress),
         "progressive": lambda: extend(model, starts, progress),
+        "multiple-shooting": lambda: multiple_shooting(model, rng, progress),
     }
     if grown > LARGE:
         del methods["least-squares"]
-    reason = f"a deviation grows {max(grown, 1.0):.1g}-fold over {model.measurement.end:.3g} s"
+    reason = f"a deviation grows {max(grown, 1.0):.2g}-fold over {model.measurement.end:.3g} s"
     outcome = _first_that_explains(model, methods, reason)
     if swings(model) < _SWINGS or grown > FRACTAL or not np.isfinite(outcome.fitness):
         return outcome

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from io import BytesIO
+from textwrap import fill
 from typing import Any, ParamSpec
 
 from matplotlib import rc_context
@@ -16,6 +17,9 @@ P = ParamSpec("P")
 # Okabe and Ito (2008), Color Universal Design.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#767676"
+
+_WIDTH = 64
+"""Characters in a line of a title."""
 
 METHODS: dict[str, dict[str, Any]] = {
     "auto": {"color": BLACK, "marker": "o"},
@@ -68,6 +72,11 @@ def canvas(height: float = 4.2, **layout: Any) -> tuple[Figure, Any]:
     """A figure that stays legible at the width of a phone, and its axes; `layout` goes to `Figure.subplots`."""
     figure = Figure(figsize=(6.4, height))
     return figure, figure.subplots(**layout)
+
+
+def headline(figure: Figure, text: str) -> None:
+    """What a picture says, above all its axes; folded so that nothing is cut off."""
+    figure.suptitle(fill(text, _WIDTH), x=0.01, ha="left", fontsize=11, fontweight="bold")
 
 
 def log_ticks(axes: Axes) -> None:

@@ -5,17 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 
 from matplotlib.figure import Figure
+
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
-from shoal.identification import Estimate
+from shoal.identification import Estimate, Problem
+from shoal.identification.design import Design
+from shoal.pictures import design as designing
+from shoal.pictures import engines as comparing
+from shoal.pictures import style
+from shoal.pictures import sweep as sweeping
+from shoal.pictures.answer import Answer
+from shoal.pictures.gif import gif
+from shoal.pictures.motion import motion
+from shoal.pictures.overlay import overlay
+from shoal.pictures.report import report
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
-
-from shoal_flows.figures import engines as comparing
-from shoal_flows.figures import style
-from shoal_flows.figures import sweep as sweeping
-from shoal_flows.figures import trajectory as fitting
-from shoal_flows.jobs import Cell, with_motion
 
 
 def trajectory(motion: Trajectory, scene: Scene, path: Path) -> None:
@@ -35,10 +40,21 @@ def trajectory(motion: Trajectory, scene: Scene, path: Path) -> None:
     _write(figure, path)
 
 
-def estimate(found: Estimate, path: Path) -> None:
-    """The identified motion over the measured one."""
-    fit = with_motion(Cell(found.problem, found.method, found.seed, found.engine), found)
-    _write(fitting.trajectory(fit, f"{found.problem}: {found.verdict}, {found.evaluations} simulations"), path)
+def estimate(found: Estimate, problem: Problem, path: Path) -> None:
+    """`.html`: a page with everything; `.gif`: the motion of the first recording; else the model over the data."""
+    answer = Answer(problem, found)
+    if path.suffix == ".html":
+        path.write_text(report(answer), encoding="utf-8")
+    elif path.suffix == ".gif":
+        first = next(iter(found.measurement.recordings))
+        path.write_bytes(gif(motion(answer, first, frames=60), f"{found.problem}: {found.verdict}"))
+    else:
+        _write(overlay(found), path)
+
+
+def design(found: Design, path: Path) -> None:
+    """The candidates, and what duration does."""
+    _write(designing.design(found), path)
 
 
 def sweep(result: Sweep, path: Path) -> None:

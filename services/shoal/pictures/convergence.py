@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from shoal_flows.figures.style import GREY, METHODS, OTHER, canvas, log_ticks, styled
-from shoal_flows.jobs import Fit
+from shoal.identification import Estimate
+from shoal.pictures.style import GREY, METHODS, OTHER, canvas, log_ticks, styled
 
 
 @styled
-def convergence(fits: Sequence[Fit], title: str) -> Figure:
+def convergence(estimates: Mapping[str, Estimate], title: str) -> Figure:
     """Best fitness so far over the evaluations, both logarithmic; a marker stands where a method ended."""
     figure, axes = canvas(4.6)
-    for fit in fits:
-        style = METHODS.get(fit.cell.method, OTHER)
+    for estimate in estimates.values():
+        style = METHODS.get(estimate.method, OTHER)
         line = {key: value for key, value in style.items() if key != "marker"}
-        estimate = fit.estimate
         counted, best = estimate.history
         if len(counted):
             axes.plot(counted, best, drawstyle="steps-post", **line)
@@ -26,12 +24,12 @@ def convergence(fits: Sequence[Fit], title: str) -> Figure:
             [estimate.evaluations],
             [estimate.fitness],
             **{**style, "linestyle": "none", "markersize": 8},
-            label=f"{fit.cell.method} ({estimate.evaluations})",
+            label=f"{estimate.method} ({estimate.evaluations})",
         )
-    floor = [f.estimate.model_error_rms for f in fits if f.estimate.model_error_rms is not None]
+    floor = [(e.model_error_rms, e) for e in estimates.values() if e.model_error_rms is not None]
     if floor:
-        things = fits[0].estimate.measurement.first.things
-        level = things * float(np.min(floor)) ** 2
+        error, estimate = min(floor, key=lambda pair: pair[0])
+        level = estimate.measurement.first.things * error**2
         axes.axhline(level, color=GREY, linewidth=1, linestyle=(0, (1, 2)))
         axes.annotate("mesh error of the model", (1, level), (0, -4), textcoords="offset points", va="top", color=GREY)
         axes.set_ylim(bottom=level / 6)
@@ -43,6 +41,7 @@ def convergence(fits: Sequence[Fit], title: str) -> Figure:
     log_ticks(axes)
     axes.set_title(title)
     axes.set_xlabel("model evaluations, every one counted")
-    axes.set_ylabel("best fitness so far [m²]")
+    lengths = all(c.is_position for r in estimate.measurement.recordings.values() for c in r.channels)
+    axes.set_ylabel(f"best fitness so far [{'m²' if lengths else 'mean square, SI units'}]")
     axes.legend(title="method (evaluations)", loc="upper right")
     return figure

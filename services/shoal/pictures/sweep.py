@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
+
 from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
+from shoal.pictures.style import BLUE, ORANGE, canvas, styled
+from shoal.pictures.units import labelled
 from shoal.trajectory import Status
-
-from shoal_flows.figures.style import BLUE, ORANGE, canvas, styled
 
 
 @styled
@@ -32,7 +33,7 @@ def _lines(result: Sweep, marker: str) -> Figure:
     axes.plot(values, moved[:, 0], color=BLUE, label="horizontal")
     axes.plot(values, moved[:, 1], color=ORANGE, linestyle="--", label="vertical")
     axes.set_title(f"{result.scene.name}: where {marker} has moved after {result.time:g} s")
-    axes.set_xlabel(_labelled(path))
+    axes.set_xlabel(labelled(path))
     axes.set_ylabel(f"displacement of {marker} [m]")
     axes.legend()
     return figure
@@ -46,20 +47,8 @@ def _maps(result: Sweep, marker: str) -> Figure:
     for k, (panel, direction) in enumerate(zip(axes, ("horizontal", "vertical"), strict=True)):
         image = panel.pcolormesh(x, y, moved[:, k].reshape(len(x), len(y)).T, cmap="viridis", shading="nearest")
         figure.colorbar(image, ax=panel, label=f"{direction} [m]")
-        panel.set_ylabel(_labelled(other))
+        panel.set_ylabel(labelled(other))
         panel.grid(False)
     axes[0].set_title(f"{result.scene.name}: displacement of {marker} after {result.time:g} s")
-    axes[-1].set_xlabel(_labelled(one))
+    axes[-1].set_xlabel(labelled(one))
     return figure
-
-
-def _labelled(path: str) -> str:
-    unit = {
-        "angle": " [rad]",
-        "rate": " [rad/s]",
-        "length": " [m]",
-        "height": " [m]",
-        "width": " [m]",
-        "density": " [kg/m³]",
-    }
-    return path + unit.get(path.rpartition(".")[2], "")

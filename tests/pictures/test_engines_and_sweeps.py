@@ -10,10 +10,10 @@ import pytest
 from shoal.engines import get_engine
 from shoal.engines.compare import compare
 from shoal.engines.sweep import sweep
+from shoal.pictures import files
+from shoal.pictures.engines import engines
+from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import load_scene
-from shoal_flows.figures import files
-from shoal_flows.figures.engines import engines
-from shoal_flows.figures.sweep import sweep as draw_sweep
 
 SCENE = load_scene("single-pendulum")
 

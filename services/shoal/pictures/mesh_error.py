@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from shoal_flows.figures.style import BLUE, ORANGE, VERMILION, canvas, log_ticks, styled
-from shoal_flows.jobs import Fit
+from shoal.identification import Estimate
+from shoal.pictures.style import BLUE, ORANGE, VERMILION, canvas, log_ticks, styled
 
 
 @styled
-def mesh_error(fits: Sequence[Fit], title: str) -> Figure:
+def mesh_error(estimates: Mapping[str, Estimate], title: str) -> Figure:
     """Size of the true error of every parameter, of the error predicted from the mesh, and of the interval."""
-    names = list(fits[0].estimate.truth)
+    names = list(next(iter(estimates.values())).truth)
     figure, axes = canvas(1.6 + 2.0 * len(names), nrows=len(names), sharex=True, sharey=True, squeeze=False)
-    places = np.arange(len(fits))
+    places = np.arange(len(estimates))
     for panel, name in zip(axes[:, 0], names, strict=True):
-        values = [f.estimate.parameters[name] for f in fits]
-        true = [abs(v.value - f.estimate.truth[name]) for v, f in zip(values, fits, strict=True)]
+        values = [e.parameters[name] for e in estimates.values()]
+        true = [abs(e.parameters[name].value - e.truth[name]) for e in estimates.values()]
         predicted = [abs(v.correction) if v.correction is not None else np.nan for v in values]
         half = [(v.upper - v.lower) / 2 for v in values]
         dots = {"linestyle": "none", "markersize": 9}
@@ -37,9 +37,9 @@ def mesh_error(fits: Sequence[Fit], title: str) -> Figure:
         panel.set_yscale("log")
         log_ticks(panel)
         panel.set_ylabel(f"error of {name} [°]")
-    axes[-1, 0].set_xticks(places, [f.cell.name.replace(" ", "\n") for f in fits])
+    axes[-1, 0].set_xticks(places, [label.replace(" ", "\n") for label in estimates])
     axes[-1, 0].set_xlabel("elements on OA / AB, quadrature")
-    axes[-1, 0].set_xlim(-0.5, len(fits) - 0.5)
+    axes[-1, 0].set_xlim(-0.5, len(estimates) - 0.5)
     axes[0, 0].set_title(title)
     axes[0, 0].legend(loc="lower left")
     return figure

@@ -6,9 +6,9 @@ from itertools import combinations
 
 import numpy as np
 from matplotlib.figure import Figure
-from shoal.engines.compare import Comparison
 
-from shoal_flows.figures.style import BLACK, ENGINES, GREY, OTHER, VERMILION, canvas, log_ticks, styled
+from shoal.engines.compare import Comparison
+from shoal.pictures.style import BLACK, ENGINES, GREY, OTHER, VERMILION, canvas, log_ticks, styled
 
 _WIDTHS = (5.0, 3.0, 1.8)
 _PAIRS = (BLACK, VERMILION, GREY)

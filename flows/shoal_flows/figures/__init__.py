@@ -1,1 +1,0 @@
-"""Pictures, one file each: a function from results to a Matplotlib figure."""

@@ -1,0 +1,49 @@
+"""Which parameters the data tell apart only together."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from shoal.pictures.answer import Answer
+from shoal.pictures.style import canvas, headline, styled
+
+
+@styled
+def correlations(answer: Answer) -> Figure:
+    """Correlations of the estimated parameters: blue vary together, red against each other."""
+    found, names = answer.correlation, answer.names
+    size = min(8.0, 3.2 + 0.4 * len(names))
+    figure, axes = canvas(size)
+    # What a parameter has with itself says nothing.
+    image = axes.imshow(np.where(np.eye(len(names)) > 0, np.nan, found), cmap="RdBu", vmin=-1, vmax=1)
+    axes.grid(False)
+    axes.set_xticks(range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor")
+    axes.set_yticks(range(len(names)), names)
+    for row, column in np.ndindex(found.shape):
+        value = found[row, column]
+        text = f"{value:+.2f}" if np.isfinite(value) and row != column else ""
+        axes.text(
+            column, row, text, ha="center", va="center", fontsize=8, color="white" if abs(value) > 0.6 else "black"
+        )
+    figure.colorbar(image, ax=axes, label="correlation")
+    headline(figure, _says(answer))
+    return figure
+
+
+def strongest(answer: Answer) -> tuple[int, int]:
+    """The two parameters with the largest correlation."""
+    size = np.abs(np.triu(np.nan_to_num(answer.correlation), 1))
+    row, column = np.unravel_index(int(np.argmax(size)), size.shape)
+    return (int(row), int(column)) if row != column else (0, 1)
+
+
+def _says(answer: Answer) -> str:
+    one, other = strongest(answer)
+    value = answer.correlation[one, other]
+    if not np.isfinite(value):
+        return f"{answer.problem.name}: correlations unknown"
+    names = answer.names
+    if abs(value) < 0.5:
+        return f"{answer.problem.name}: each parameter shows by itself (|r| < 0.5)"
+    return f"{answer.problem.name}: {names[one]}, {names[other]} are tied (r = {value:+.3f})"

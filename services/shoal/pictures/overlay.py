@@ -1,0 +1,71 @@
+"""The fitted model over the measured motion."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from shoal.identification import Estimate
+from shoal.pictures.signals import Signal, gaps, handy, signals, worst
+from shoal.pictures.style import BLACK, GREY, VERMILION, canvas, headline, styled
+
+_PANELS = 6
+_MANY = 150
+"""From so many samples on, circles would hide the line."""
+
+
+@styled
+def overlay(estimate: Estimate, title: str = "") -> Figure:
+    """Each channel against time: circles are measured, the line is the model, gaps in the data are grey.
+
+    At most six panels: the channels that fit worst.
+    """
+    found = signals(estimate)
+    shown = worst(found, _PANELS)
+    figure, axes = canvas(1.5 + 1.6 * len(shown), nrows=len(shown), squeeze=False)
+    one_clock = len({signal.recording for signal in shown}) == 1
+    for panel, signal in zip(axes[:, 0], shown, strict=True):
+        _draw(panel, signal)
+        if not (one_clock and panel is not axes[-1, 0]):
+            panel.set_xlabel("time [s]")
+        else:
+            panel.tick_params(labelbottom=False)
+    first = axes[0, 0]
+    headline(figure, title or f"{estimate.problem}: {follows(estimate)}")
+    figure.align_ylabels()
+    handles, labels = first.get_legend_handles_labels()
+    note = f"worst {len(shown)} of {len(found)} channels" if len(shown) < len(found) else None
+    figure.legend(handles, labels, loc="outside lower left", ncols=len(labels), title=note)
+    return figure
+
+
+def follows(estimate: Estimate) -> str:
+    """How closely the fit follows the data, in words."""
+    sizes: dict[str, list[float]] = {}
+    for signal in signals(estimate):
+        sizes.setdefault(signal.unit, []).append(signal.rms)
+    parts = []
+    for unit, values in sizes.items():
+        size = float(np.sqrt(np.mean(np.square(values))))
+        factor, handier = handy(size, unit)
+        parts.append(f"{factor * size:.2g} {handier}")
+    return f"the model follows the data to {' and '.join(parts)} (RMS)"
+
+
+def _draw(panel: Axes, signal: Signal) -> None:
+    many = len(signal.times) > _MANY
+    for k, (begin, end) in enumerate(gaps(signal)):
+        panel.axvspan(begin, end, color="#EEEEEE", zorder=0, label="no data" if k == 0 else None)
+    panel.plot(
+        signal.times,
+        signal.measured,
+        linestyle="none",
+        marker="." if many else "o",
+        markersize=3 if many else 5,
+        markerfacecolor=GREY if many else "none",
+        color=GREY if many else BLACK,
+        label="measured",
+    )
+    panel.plot(signal.times, signal.fitted, color=VERMILION, linewidth=1.4, label="fitted model")
+    panel.set_ylabel(f"{signal.name}\n[{signal.unit}]")

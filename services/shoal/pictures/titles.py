@@ -1,0 +1,56 @@
+"""What a picture says, in its title: sentences from the numbers that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from shoal.engines.compare import Comparison
+from shoal.identification import Estimate
+
+_AS_GOOD = 1.01
+"""A fitness within this factor of the best is as good as the best."""
+
+
+def best(estimates: Mapping[str, Estimate]) -> Estimate:
+    """The first of the estimates that is as good as the best."""
+    lowest = min(e.fitness for e in estimates.values())
+    return next(e for e in estimates.values() if e.fitness <= _AS_GOOD * lowest)
+
+
+def pays(name: str, estimates: Mapping[str, Estimate]) -> str:
+    """How many runs the cheapest and the dearest of the good methods need."""
+    level = _AS_GOOD * min(e.fitness for e in estimates.values())
+    good = sorted((e.evaluations, e.method) for e in estimates.values() if e.fitness <= level)
+    if len(good) < 2:
+        return f"{name}: {good[0][1]} needs {good[0][0]} runs of the model"
+    return f"{name}: {good[0][1]} needs {good[0][0]} runs, {good[-1][1]} {good[-1][0]}"
+
+
+def leaves(name: str, estimates: Mapping[str, Estimate]) -> str:
+    """Who found the minimum and who did not."""
+    level = _AS_GOOD * min(e.fitness for e in estimates.values())
+    short = [e.method for e in estimates.values() if e.fitness > level]
+    if not short:
+        return f"{name}: every method leaves the same remainder"
+    return f"{name}: {' and '.join(short)} did not reach the best fit"
+
+
+def refines(name: str, estimates: Mapping[str, Estimate]) -> str:
+    """What the finest mesh gains on the coarsest."""
+    labels = list(estimates)
+    first, last = (_error(estimates[labels[k]]) for k in (0, -1))
+    return f"{name}: {labels[0]} is off by {first:.2g}°, {labels[-1]} by {last:.1g}°"
+
+
+def agrees(comparison: Comparison, marker: str) -> str:
+    """How far apart the engines come out at a marker."""
+    found = [row["largest"] for row in comparison.differences() if row["marker"] == marker]
+    if not found or None in found:
+        return f"{comparison.scene.name}: {marker} by each engine"
+    return f"{len(comparison.trajectories)} engines place {marker} within {1e6 * max(found):.2g} µm of each other"
+
+
+def _error(estimate: Estimate) -> float:
+    return float(np.degrees(max(abs(estimate.parameters[name].value - true) for name, true in estimate.truth.items())))

@@ -1,0 +1,75 @@
+"""Estimates that the tests of pictures share, each fitted to data of another engine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.identification import Estimate, Measurement, Problem, identify, load_problem, measure
+from shoal.pictures.answer import Answer
+
+
+@pytest.fixture(scope="session")
+def estimates() -> dict[str, Estimate]:
+    """Case 1 of the paper on two meshes."""
+    problem = load_problem("paper-case-1")
+    measurement = measure(problem, problem.load_scene())
+    meshes = {"coarse": 2, "fine": 4}
+    return {
+        name: identify(
+            problem,
+            method="least-squares",
+            measurement=measurement,
+            values={"bodies.OA.elements": count, "bodies.AB.elements": 2 * count},
+        )
+        for name, count in meshes.items()
+    }
+
+
+@pytest.fixture(scope="session")
+def flexible(estimates: dict[str, Estimate]) -> Answer:
+    """The finer of them, as an answer."""
+    return Answer(load_problem("paper-case-1"), estimates["fine"])
+
+
+@pytest.fixture(scope="session")
+def several() -> Answer:
+    """Two recordings of five channels in all with noise, a gap, a slow clock and a camera that stands askew."""
+    angle = {"lower": -3.3, "upper": 3.3, "own": True}
+    source: dict[str, Any] = {"kind": "engine", "engine": "casadi", "noise": 0.003}
+    tip = [{"marker": "B", "quantity": "x"}, {"marker": "B", "quantity": "y"}]
+    problem = Problem.parse(
+        {
+            "name": "several",
+            "scene": "rigid-double-pendulum",
+            "parameters": {
+                "theta1": {"path": "initial.OA.angle", **angle},
+                "theta2": {"path": "initial.AB.angle", **angle},
+                "density": {"path": "bodies.AB.density", "lower": 200.0, "upper": 4000.0, "scale": "log"},
+            },
+            "channels": [*tip, {"marker": "A", "quantity": "angle"}],
+            "recordings": {
+                "high": {**source, "stop": 1.0, "count": 60},
+                "low": {
+                    **source,
+                    "stop": 0.6,
+                    "count": 50,
+                    "clock": 2.0,
+                    "tilt": 0.3,
+                    "x": 0.5,
+                    "channels": tip,
+                    "values": {"initial.OA.angle": -0.7, "initial.AB.angle": -1.2},
+                },
+            },
+            "noise": 0.003,
+        },
+        "several",
+    )
+    measured = measure(problem, problem.load_scene())
+    high = measured.recordings["high"]
+    values = high.values.copy()
+    values[20:30, 0] = np.nan
+    gappy = Measurement({**measured.recordings, "high": replace(high, values=values)}, measured.truth)
+    return Answer(problem, identify(problem, method="least-squares", measurement=gappy))
