@@ -16,6 +16,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from shoal.errors import InputError
+from shoal.pictures.numbers import rounded
 from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
@@ -196,8 +197,8 @@ def estimate_table(estimate: Estimate) -> None:
         known = "yes" if value.identifiable else "at bound" if value.at_bound else "no"
         # Two digits of the uncertainty; a value that is not known has none that mean anything.
         unit = value.std if value.identifiable and value.std > 0 else abs(value.value) * 1e-2
-        interval = f"{_rounded(value.lower, unit)} to {_rounded(value.upper, unit)}" if value.identifiable else "-"
-        table.add_row(name, _rounded(value.value, unit), interval, known)
+        interval = f"{rounded(value.lower, unit)} to {rounded(value.upper, unit)}" if value.identifiable else "-"
+        table.add_row(name, rounded(value.value, unit), interval, known)
     out.print(table)
     for sentence in estimate.combinations:
         _say(sentence)
@@ -248,17 +249,6 @@ def _effort(estimate: Estimate) -> None:
         _say(f"against the truth of the computed data: {', '.join(errors)}")
     if estimate.model_error_rms is not None:
         _say(f"the mesh of the model is off by {estimate.model_error_rms:.1e} m (RMS); the intervals include it")
-
-
-def _rounded(value: float, unit: float) -> str:
-    """A number to two digits of its uncertainty."""
-    if not np.isfinite([value, unit]).all() or unit <= 0:
-        return f"{value:.6g}"
-    decimals = 1 - int(np.floor(np.log10(unit)))
-    if 0 <= decimals <= 9:
-        return f"{value:.{decimals}f}"
-    digits = max(0, int(np.floor(np.log10(max(abs(value), unit)))) + decimals)
-    return f"{value:.{digits}e}"
 
 
 def _say(text: str, style: str = "") -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from shoal.pictures.numbers import length, power
 
 from shoal_flows.jobs import Fit
 from shoal_flows.plan import MESHES, mesh_values, same_mesh_cells
 from shoal_flows.report.paper import TABLES
-from shoal_flows.report.words import covered, degrees, errors, length, power
+from shoal_flows.report.words import covered, degrees, errors
 from shoal_flows.results import Compared, Study
 
 _PRINTED_NAMES = {"afsa": "AFSA", "iafsa": "IAFSA"}

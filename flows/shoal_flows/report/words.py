@@ -3,30 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from shoal.pictures.numbers import length, power
 
 from shoal_flows.jobs import Fit
 from shoal_flows.results import Compared, DemoResult, Study
-
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def power(value: float | None, digits: int = 4) -> str:
-    """A number in scientific notation, 2.1674 × 10⁻⁶."""
-    if value is None or not np.isfinite(value):
-        return "none"
-    mantissa, _, exponent = f"{value:.{digits}e}".partition("e")
-    return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}"
-
-
-def length(metres: float | None) -> str:
-    """A length in the unit that needs no zeros."""
-    if metres is None or not np.isfinite(metres):
-        return "unknown"
-    for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
-        if abs(metres) >= size:
-            return f"{metres / size:.3g} {unit}"
-    return f"{metres / 1e-9:.3g} nm"
-
 
 def degrees(radians: float | None, digits: int = 4) -> str:
     """An angle in degrees, with its sign only if negative."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from shoal.home import home
+from shoal.pictures.numbers import length
 from shoal.pictures.report import environment
 
 from shoal_flows import provenance, workers
@@ -64,7 +65,7 @@ def _case(result: DemoResult, case: str) -> dict[str, Any]:
         "engines_figure": _picture(
             compared.picture,
             f"{title}: position of the tip against time by {', '.join(compared.comparison.trajectories)}, which lie on "
-            f"one line, and below their distances, at most {words.length(words.largest_distance(compared))}.",
+            f"one line, and below their distances, at most {length(words.largest_distance(compared))}.",
             "Above, the motions, drawn in falling widths so that each shows; below, what lies between them.",
         ),
         "mesh_figure": _picture(

@@ -15,6 +15,10 @@ from shoal.trajectory import Array
 
 _STEPS = 10.0 ** np.arange(-3.0, -12.0, -1.0)
 """Relative to the size of a parameter (see ForwardModel.sizes), largest first."""
+_USUAL = _STEPS[2:4]
+"""Enough where they agree at once."""
+_SURE = 1e-4
+"""Relative difference of two derivatives between which no other step need decide."""
 AGREED = 1e-2
 """Relative difference of two derivatives that count as one."""
 
@@ -51,26 +55,36 @@ def sensitivity(model: ForwardModel, point: Array) -> Sensitivity:
     """
     sizes = model.sizes(point)
     basis = np.eye(len(point))
+    residual, columns, doubt = _differences(model, point, sizes, basis, _USUAL)
+    if np.max(doubt) < _SURE and (growth := _growth(columns)) < _WELL_CONDITIONED:
+        return Sensitivity(residual, columns / sizes, float(np.max(doubt)), growth)
     for _ in range(_ROUNDS):
-        residual, columns, doubt = _differences(model, point, sizes, basis)
-        _, singular, turned = np.linalg.svd(columns, full_matrices=False)
-        growth = float(singular[0] / max(singular[-1], 1e-300))
+        residual, columns, doubt = _differences(model, point, sizes, basis, _STEPS)
+        turned = np.linalg.svd(columns, full_matrices=False)[2]
+        growth = _growth(columns)
         if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(turned) - np.eye(len(point)))) < AGREED / growth:
             break
         basis = basis @ turned.T
     return Sensitivity(residual, columns @ basis.T / sizes, float(np.max(doubt)), growth)
 
 
-def _differences(model: ForwardModel, point: Array, sizes: Array, basis: Array) -> tuple[Array, Array, Array]:
+def _growth(columns: Array) -> float:
+    singular = np.linalg.svd(columns, compute_uv=False)
+    return float(singular[0] / max(singular[-1], 1e-300))
+
+
+def _differences(
+    model: ForwardModel, point: Array, sizes: Array, basis: Array, widths: Array
+) -> tuple[Array, Array, Array]:
     """Residuals, their derivatives along the columns of `basis` (scaled parameters), and the doubt of each."""
     count = len(point)
-    steps = np.concatenate([step * sizes * basis.T for step in _STEPS])
+    steps = np.concatenate([step * sizes * basis.T for step in widths])
     ahead, behind = (_inside(model, point, move) for move in (steps, -steps))
     seen = model.uncounted(np.concatenate([point[None], point + ahead, point + behind]))
     width = np.linalg.norm((ahead - behind) / sizes, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         slopes = (seen[1 : 1 + len(steps)] - seen[1 + len(steps) :]) / width[:, None]
-    slopes = slopes.reshape(len(_STEPS), count, -1)
+    slopes = slopes.reshape(len(widths), count, -1)
     columns, doubts = np.zeros((slopes.shape[2], count)), np.full(count, np.inf)
     least = np.zeros(count)
     for k in range(count):

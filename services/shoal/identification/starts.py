@@ -11,10 +11,15 @@ import numpy as np
 from shoal.identification.forward import ForwardModel
 from shoal.trajectory import Array
 
-_CANDIDATES = 64
+_CANDIDATES = 16
+"""Poses that are tried for each angle."""
 _MOST = 8
 """Starting points, at most."""
 _ITERATIONS = 30
+_SMALL_STEP = 1e-4
+"""Of an angle [rad]; a pose that moves less has arrived, as the steps shrink quadratically."""
+_STUCK = 100.0
+"""Damping of a pose that no step betters."""
 _FIRST_SAMPLES = 5
 _SAME = 1e-3
 """Two poses are the same if no parameter differs by more than this fraction of its range."""
@@ -78,29 +83,41 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
     """Distinct minimisers of the pose error over the angles, best first, (points, parameters)."""
     from scipy.stats import qmc  # slow to import
 
-    scatter = qmc.Sobol(len(angles), seed=0).random(_CANDIDATES)
-    points = np.repeat(middle[None], _CANDIDATES, axis=0)
+    count = _CANDIDATES * 2 ** (len(angles) - 1).bit_length()
+    scatter = qmc.Sobol(len(angles), seed=0).random(count)
+    points = np.repeat(middle[None], count, axis=0)
     points[:, angles] = model.lower[angles] + scatter * (model.upper - model.lower)[angles]
-    damping = np.full(_CANDIDATES, 1e-3)
+    damping = np.full(count, 1e-3)
     error, jacobian = _pose_error(model, name, points, angles, pose)
     cost = np.sum(error**2, axis=1)
+    going = np.arange(count)
     for _ in range(_ITERATIONS):
-        normal = np.einsum("nck,ncl->nkl", jacobian, jacobian)
-        gradient = np.einsum("nck,nc->nk", jacobian, error)
-        scale = np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(len(angles))
-        step = np.linalg.solve(
-            normal + damping[:, None, None] * scale + 1e-14 * np.eye(len(angles)), gradient[..., None]
-        )
-        trial = points.copy()
-        trial[:, angles] -= step[..., 0]
+        step = _damped_step(error[going], jacobian[going], damping[going])
+        trial = points[going]
+        trial[:, angles] -= step
         trial = np.clip(trial, model.lower, model.upper)
         trial_error, trial_jacobian = _pose_error(model, name, trial, angles, pose)
         trial_cost = np.sum(trial_error**2, axis=1)
-        better = trial_cost < cost
-        points[better], error[better], jacobian[better] = trial[better], trial_error[better], trial_jacobian[better]
-        cost = np.where(better, trial_cost, cost)
-        damping = np.where(better, damping / 10, damping * 10)
+        better = trial_cost < cost[going]
+        small = np.max(np.abs(trial - points[going]), axis=1) < _SMALL_STEP
+        damping[going] *= np.where(better, 0.1, 10.0)
+        taken = going[better]
+        points[taken], error[taken], jacobian[taken] = trial[better], trial_error[better], trial_jacobian[better]
+        cost[taken] = trial_cost[better]
+        going = going[~small & (damping[going] < _STUCK)]
+        if not going.size:
+            break
     return _distinct(model, points, cost, angles)
+
+
+def _damped_step(error: Array, jacobian: Array, damping: Array) -> Array:
+    """What Levenberg-Marquardt takes off each point, (points, angles)."""
+    normal = np.einsum("nck,ncl->nkl", jacobian, jacobian)
+    gradient = np.einsum("nck,nc->nk", jacobian, error)
+    unit = np.eye(normal.shape[1])
+    scale = np.trace(normal, axis1=1, axis2=2)[:, None, None] * unit
+    damped = normal + damping[:, None, None] * scale + 1e-14 * unit
+    return np.asarray(np.linalg.solve(damped, gradient[..., None])[..., 0])
 
 
 def _distinct(model: ForwardModel, points: Array, cost: Array, angles: list[int]) -> Array:

@@ -1,4 +1,4 @@
-"""The identified motion as a small moving picture, for slides and messages."""
+"""A motion as a small moving picture, for slides and messages."""
 
 from __future__ import annotations
 
@@ -6,54 +6,82 @@ from io import BytesIO
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
 from shoal.pictures.motion import Motion
-from shoal.pictures.style import BLACK, BLUE, VERMILION, canvas, styled
+from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
 
 _FRAMES = 60
 _PAUSE_MS = 80
-
-
-def gif(found: Motion, title: str) -> bytes:
-    """The motion as GIF of sixty frames, slowed down or sped up to about five seconds."""
-    figure, images = _first(found, title), []
-    drawing: Any = FigureCanvasAgg(figure)
-    axes = figure.axes[0]
-    for k in np.linspace(0, len(found.times) - 1, _FRAMES).round().astype(int):
-        for line, outline in zip(axes.lines, found.outlines.values(), strict=False):
-            line.set_data(*outline[k].T)
-        places = axes.lines[len(found.outlines) :]
-        shown = [*found.markers.values(), *found.measured.values()]
-        for line, path in zip(places, shown, strict=True):
-            line.set_data(path[[k], 0], path[[k], 1])
-        axes.set_xlabel(f"x [m], t = {found.times[k]:.3f} s")
-        drawing.draw()
-        figure.set_layout_engine("none")
-        images.append(Image.fromarray(np.asarray(drawing.buffer_rgba())).convert("RGB").quantize(64))
-    stream = BytesIO()
-    images[0].save(stream, "GIF", save_all=True, append_images=images[1:], duration=_PAUSE_MS, loop=0)
-    return stream.getvalue()
+_COLOURS = 32
 
 
 @styled
-def _first(found: Motion, title: str) -> Figure:
-    figure, axes = canvas(5.0)
-    every = np.concatenate([o.reshape(-1, 2) for o in (*found.outlines.values(), *found.measured.values())])
-    low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)
-    border = 0.06 * float(np.max(high - low))
-    for _ in found.outlines:
-        axes.plot([], [], color=BLUE, linewidth=3)
-    for number, _ in enumerate(found.markers):
-        axes.plot([], [], "o", color=VERMILION, label="" if number else "fitted model")
-    for number, _ in enumerate(found.measured):
-        axes.plot([], [], "o", color=BLACK, fillstyle="none", markersize=10, label="" if number else "measured")
-    axes.set_xlim(low[0] - border, high[0] + border)
-    axes.set_ylim(low[1] - border, high[1] + border)
-    axes.set_aspect("equal")
-    axes.set_title(title)
+def gif(found: Motion, title: str) -> bytes:
+    """The motion as GIF of sixty frames, slowed down or sped up to about five seconds."""
+    figure, moving, clock = _stage(found, title)
+    drawing: Any = FigureCanvasAgg(figure)
+    drawing.draw()
+    figure.set_layout_engine("none")
+    drawing.draw()
+    still = drawing.copy_from_bbox(figure.bbox)
+    images = []
+    for k in np.linspace(0, len(found.times) - 1, _FRAMES).round().astype(int):
+        # What stands still is drawn once.
+        drawing.restore_region(still)
+        for line, path in moving:
+            line.set_data(*np.atleast_2d(path[k]).T)
+            figure.draw_artist(line)
+        clock.set_text(f"t = {found.times[k]:.3f} s")
+        figure.draw_artist(clock)
+        images.append(Image.fromarray(np.asarray(drawing.buffer_rgba())).convert("RGB"))
+    # One palette for all frames, so that nothing flickers.
+    palette = images[len(images) // 2].quantize(_COLOURS)
+    frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    stream = BytesIO()
+    frames[0].save(stream, "GIF", save_all=True, append_images=frames[1:], duration=_PAUSE_MS, loop=0)
+    return stream.getvalue()
+
+
+def _stage(found: Motion, title: str) -> tuple[Figure, list[tuple[Any, Any]], Any]:
+    """The figure without what moves, the lines that do with their data by frame, and the clock."""
+    figure, axes = canvas(5.2)
+    low, high = found.box
+    size = float(np.max(high - low)) or 1.0
+    shown: list[tuple[Any, Any]] = []
+
+    def line(path: Any, style: str, label: str, **look: Any) -> None:
+        (drawn,) = axes.plot([], [], style, label=label, **look)
+        shown.append((drawn, path))
+
+    for place in found.ground:
+        axes.plot(*place, "s", color=GREY, markersize=8)
+    for outline in found.outlines.values():
+        line(outline, "o-", "", color=BLUE, linewidth=3, markersize=4, markevery=[0, -1])
+    for number, path in enumerate(found.markers.values()):
+        line(path, "o", "" if number else "marker", color=VERMILION, markersize=6)
+    for number, path in enumerate(found.measured.values()):
+        line(path, "o", "" if number else "measured", color=BLACK, fillstyle="none", markersize=11)
+    for number, (name, angle) in enumerate(found.directions.items()):
+        arm = 0.08 * size * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        path = np.stack([found.markers[name], found.markers[name] + arm], axis=1)
+        line(path, "-", "" if number else "measured direction", color=ORANGE, linewidth=3)
+    axes.set_xlim(low[0] - 0.08 * size, high[0] + 0.08 * size)
+    axes.set_ylim(low[1] - 0.08 * size, high[1] + 0.08 * size)
+    axes.set_aspect("equal", adjustable="datalim")
+    headline(figure, title)
+    axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
-    axes.legend(loc="upper left")
-    return figure
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=3)
+    clock = axes.text(0.99, 0.99, "", transform=axes.transAxes, ha="right", va="top", family="monospace")
+    for artist in (*(drawn for drawn, _ in shown), clock):
+        _animated(artist)
+    return figure, shown, clock
+
+
+def _animated(artist: Artist) -> None:
+    """Leave it out of the still picture."""
+    artist.set_animated(True)

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shoal.identification import Estimate
-from shoal.pictures.signals import Signal, gaps, handy, signals, worst
+from shoal.pictures.numbers import handy
+from shoal.pictures.signals import Signal, gaps, signals, worst
 from shoal.pictures.style import BLACK, GREY, VERMILION, canvas, headline, styled
 
 _PANELS = 6

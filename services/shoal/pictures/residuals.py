@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shoal.identification import Estimate
-from shoal.pictures.signals import Signal, handy, signals, worst
+from shoal.pictures.numbers import handy
+from shoal.pictures.signals import Signal, signals, worst
 from shoal.pictures.style import BLACK, BLUE, ORANGE, canvas, headline, styled
 from shoal.trajectory import Array
 

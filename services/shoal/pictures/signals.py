@@ -89,14 +89,6 @@ def residuals(estimate: Estimate) -> dict[str, Array]:
     return {name: estimate.predicted[name] - r.values for name, r in estimate.measurement.recordings.items()}
 
 
-def handy(size: float, unit: str) -> tuple[float, str]:
-    """Factor and unit in which numbers of a size [unit] need no zeros: 2e-4 m is 0.2 mm."""
-    for prefix, power in (("", 1.0), ("m", 1e-3), ("µ", 1e-6), ("n", 1e-9)):
-        if size >= 0.1 * power:
-            return 1.0 / power, prefix + unit
-    return 1e12, "p" + unit
-
-
 def gaps(signal: Signal) -> list[tuple[float, float]]:
     """Intervals of time [s] in which nothing was measured: samples without a value, and steps far above the usual."""
     known = signal.times[np.isfinite(signal.measured)]
