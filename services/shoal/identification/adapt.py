@@ -9,6 +9,7 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods import Method, Outcome
+from shoal.identification.methods.auto import explains
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.starts import starting_points
 from shoal.selection import Selection, select
@@ -16,6 +17,8 @@ from shoal.trajectory import Array
 
 COARSER = 30.0
 """The search goes by a model whose error may be larger by this factor than that of the final one."""
+_OFF = 3.0
+"""A fit that leaves more than this many times the tolerance is not off by the model alone."""
 
 
 @dataclass(frozen=True)
@@ -48,14 +51,20 @@ def coarse_to_fine(
     stages.append(_stage(chosen, coarse.counter.evaluations))
     fine, chosen = _chosen(coarse, outcome.point, tolerance)
     descent = descend(fine, outcome.point, progress)
+    point, fitness, rows = descent.point, descent.fitness, descent.rows
+    # The coarse model may have led to the wrong minimum.
+    if np.sqrt(fitness) > _OFF * tolerance and not explains(fine, replace(outcome, fitness=fitness)):
+        again = search(fine, rng, progress)
+        rows = rows + [(len(rows) + i, best, mean) for i, best, mean in again.iterations]
+        point, fitness = min((point, fitness), (again.point, again.fitness), key=lambda end: end[1])
     stages.append(_stage(chosen, fine.counter.evaluations))
     # Values of different models cannot be compared, so the search on the coarse one counts without a best value.
     fine.counter.charge(coarse.counter.evaluations, outcome.point, np.inf)
-    rows = outcome.iterations + [(len(outcome.iterations) + i, best, mean) for i, best, mean in descent.rows]
+    rows = outcome.iterations + [(len(outcome.iterations) + i, best, mean) for i, best, mean in rows]
     message = "" if chosen.met else f"the model is off by about {chosen.chosen.error:.1g} m: {chosen.reason}"
     return (
         fine,
-        replace(outcome, point=descent.point, fitness=descent.fitness, iterations=rows, message=message),
+        replace(outcome, point=point, fitness=fitness, iterations=rows, message=message),
         stages,
     )
 

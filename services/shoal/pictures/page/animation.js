@@ -1,4 +1,4 @@
-// Draws the identified motion over the measured places on each canvas.animation; its data stand in the page as JSON.
+// Draws a machine in motion on each canvas of a figure.animation; its data stand in the page as JSON.
 "use strict";
 const BLUE = "#0072B2", VERMILION = "#D55E00", BLACK = "#000000", ORANGE = "#E69F00", GREY = "#767676";
 
@@ -8,20 +8,30 @@ function animate(figure) {
   const button = figure.querySelector("button"), clock = figure.querySelector("output");
   const speed = figure.querySelector("select"), context = canvas.getContext("2d");
   const count = run.times.length, last = count - 1;
-  let frame = 0, playing = false, before = 0, elapsed = 0;
+  let frame = 0, playing = false, before = 0, elapsed = 0, width = 0, height = 0;
   slider.max = last;
 
-  const place = () => {
-    const [left, bottom, right, top] = run.box, border = 64;
-    const size = Math.min((canvas.width - 2 * border) / (right - left || 1),
-                          (canvas.height - 2 * border) / (top - bottom || 1));
-    const x0 = (canvas.width - size * (right - left)) / 2, y0 = (canvas.height - size * (top - bottom)) / 2;
-    return { size, to: (p) => [x0 + size * (p[0] - left), canvas.height - y0 - size * (p[1] - bottom)] };
-  };
+  function fit() {
+    // As many dots as the screen has, so that lines and letters keep their size on a phone.
+    const dots = window.devicePixelRatio || 1;
+    width = canvas.clientWidth;
+    height = canvas.clientHeight;
+    canvas.width = Math.round(width * dots);
+    canvas.height = Math.round(height * dots);
+    context.setTransform(dots, 0, 0, dots, 0, 0);
+    draw();
+  }
 
-  function line(points, colour, width) {
+  function place() {
+    const [left, bottom, right, top] = run.box, border = 40;
+    const size = Math.min((width - 2 * border) / (right - left || 1e-9), (height - 2 * border) / (top - bottom || 1e-9));
+    const x0 = (width - size * (right - left)) / 2, y0 = (height - size * (top - bottom)) / 2;
+    return { size, to: (p) => [x0 + size * (p[0] - left), height - y0 - size * (p[1] - bottom)] };
+  }
+
+  function line(points, colour, thickness) {
     context.strokeStyle = colour;
-    context.lineWidth = width;
+    context.lineWidth = thickness;
     context.beginPath();
     points.forEach((p, k) => (k ? context.lineTo(...p) : context.moveTo(...p)));
     context.stroke();
@@ -35,39 +45,45 @@ function animate(figure) {
     if (filled) context.fill(); else context.stroke();
   }
 
-  function scaleBar(size, to) {
-    const wanted = canvas.width / 5 / size, power = 10 ** Math.floor(Math.log10(wanted));
+  function text(words, x, y, colour, weight) {
+    context.fillStyle = colour;
+    context.font = `${weight} 14px system-ui, sans-serif`;
+    context.fillText(words, x, y);
+  }
+
+  function scaleBar(size) {
+    const wanted = width / 5 / size, power = 10 ** Math.floor(Math.log10(wanted));
     const length = power * (wanted / power >= 5 ? 5 : wanted / power >= 2 ? 2 : 1);
-    line([[14, canvas.height - 14], [14 + size * length, canvas.height - 14]], GREY, 3);
-    context.fillStyle = "#444";
-    context.font = "16px system-ui, sans-serif";
-    context.fillText(`${+length.toPrecision(2)} m`, 14, canvas.height - 21);
+    line([[12, height - 12], [12 + size * length, height - 12]], GREY, 3);
+    text(`${+length.toPrecision(2)} m`, 12, height - 19, "#444", "normal");
   }
 
   function draw() {
     const { size, to } = place();
-    context.clearRect(0, 0, canvas.width, canvas.height);
+    context.clearRect(0, 0, width, height);
     context.lineCap = context.lineJoin = "round";
-    for (const path of Object.values(run.markers)) line(path.slice(0, frame + 1).map(to), "#F0B48C", 2);
+    for (const p of run.ground.map(to)) {
+      context.fillStyle = GREY;
+      context.fillRect(p[0] - 6, p[1] - 6, 12, 12);
+    }
+    for (const path of Object.values(run.markers)) line(path.slice(0, frame + 1).map(to), "#F0B48C", 1.5);
     for (const outline of Object.values(run.outlines)) {
-      line(outline[frame].map(to), BLUE, 5);
-      for (const end of [outline[frame][0], outline[frame].at(-1)]) circle(to(end), 5, BLUE, true);
-    }
-    for (const [name, path] of Object.entries(run.markers)) {
-      const p = to(path[frame]);
-      circle(p, 4.5, VERMILION, true);
-      context.fillStyle = BLACK;
-      context.font = "bold 18px system-ui, sans-serif";
-      context.fillText(name, p[0] + 12, p[1] - 10);
-    }
-    for (const path of Object.values(run.measured)) {
-      if (path[frame][0] !== null && path[frame][1] !== null) circle(to(path[frame]), 9, BLACK, false);
+      line(outline[frame].map(to), BLUE, 4);
+      for (const end of [outline[frame][0], outline[frame].at(-1)]) circle(to(end), 4, BLUE, true);
     }
     for (const [name, angles] of Object.entries(run.directions)) {
       const p = to(run.markers[name][frame]), a = angles[frame];
-      if (a !== null) line([p, [p[0] + 46 * Math.cos(a), p[1] - 46 * Math.sin(a)]], ORANGE, 4);
+      if (a !== null) line([p, [p[0] + 34 * Math.cos(a), p[1] - 34 * Math.sin(a)]], ORANGE, 3);
     }
-    scaleBar(size, to);
+    for (const [name, path] of Object.entries(run.markers)) {
+      const p = to(path[frame]);
+      circle(p, 3.5, VERMILION, true);
+      text(name, p[0] + 11, p[1] - 9, BLACK, "bold");
+    }
+    for (const path of Object.values(run.measured)) {
+      if (path[frame][0] !== null && path[frame][1] !== null) circle(to(path[frame]), 7, BLACK, false);
+    }
+    scaleBar(size);
     slider.value = frame;
     clock.textContent = `t = ${run.times[frame].toFixed(3)} s`;
     slider.setAttribute("aria-valuetext", clock.textContent);
@@ -79,26 +95,33 @@ function animate(figure) {
     before = now;
     const span = run.times[last] - run.times[0];
     if (elapsed > span) elapsed = 0;
-    while (frame < last && run.times[frame + 1] - run.times[0] <= elapsed) frame += 1;
     if (run.times[frame] - run.times[0] > elapsed) frame = 0;
+    while (frame < last && run.times[frame + 1] - run.times[0] <= elapsed) frame += 1;
     draw();
+    requestAnimationFrame(tick);
+  }
+
+  function start(now) {
+    if (frame === last) frame = 0;
+    elapsed = run.times[frame] - run.times[0];
+    before = now;
     requestAnimationFrame(tick);
   }
 
   button.addEventListener("click", () => {
     playing = !playing;
     button.textContent = playing ? "Pause" : "Play";
-    if (frame === last) frame = 0;
-    elapsed = run.times[frame] - run.times[0];
-    before = performance.now();
-    if (playing) requestAnimationFrame(tick);
+    if (playing) requestAnimationFrame(start);
   });
   slider.addEventListener("input", () => {
     frame = Number(slider.value);
     elapsed = run.times[frame] - run.times[0];
     draw();
   });
-  draw();
+  window.addEventListener("resize", fit);
+  window.addEventListener("beforeprint", fit);
+  window.addEventListener("afterprint", fit);
+  fit();
 }
 
 document.querySelectorAll("figure.animation").forEach(animate);
