@@ -76,7 +76,7 @@ def with_motion(cell: Cell, estimate: Estimate) -> Fit:
     engine, answer, motions = get_engine(cell.engine), Answer(load_problem(cell.problem), estimate), {}
     for name, recording in estimate.measurement.recordings.items():
         view = answer.view(name)
-        grid = np.linspace(0.0, view["clock"] * float(recording.times[-1]) + view["delay"], _POINTS)
+        grid = np.linspace(0.0, float(recording.times[-1]) / view["clock"] + view["delay"], _POINTS)
         motions[name] = engine.simulate(estimate.scenes[name], grid)
     return Fit(cell, estimate, motions)
 

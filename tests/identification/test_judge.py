@@ -37,7 +37,7 @@ def problem(noise: float | None, markers: tuple[str, ...] = ("B",), source: dict
 def textbook(problem: Problem, clock: float = 1.0, **machine: float) -> Measurement:
     """Tip by Lagrange's equations with 1 mm of noise, recorded by a clock that is off by a factor."""
     times = np.arange(1, 151) / 100
-    points = tip(clock * times, **TRUTH, **machine)
+    points = tip(times / clock, **TRUTH, **machine)
     points = points + 1e-3 * np.random.default_rng(4).standard_normal(points.shape)
     return Measurement.single(times, tuple(problem.channels), points, "scipy DOP853", TRUTH, problem.noise)
 

@@ -239,7 +239,7 @@ def test_a_prior_needs_noise_to_weigh_against(tmp_path: Path) -> None:
 
 
 def test_a_video_of_the_textbook_motion_gives_its_angles_and_its_clock(tmp_path: Path) -> None:
-    """Pixels of 2 mm, y down, a tracked pivot, dropped frames, gaps, and a camera faster by a quarter than stated."""
+    """Pixels of 2 mm, y down, a tracked pivot, dropped frames, gaps, and a camera that takes 125 frames a second, not 100."""
     from shoal_validation.problems.double_pendulum import settle
 
     rng = np.random.default_rng(0)
@@ -270,5 +270,5 @@ def test_a_video_of_the_textbook_motion_gives_its_angles_and_its_clock(tmp_path:
     (tmp_path / "problem.yaml").write_text(yaml.safe_dump(problem))
     estimate = identify(load_problem(str(tmp_path / "problem.yaml")), method="least-squares")
     found = {name: value.value for name, value in estimate.parameters.items()}
-    assert found == pytest.approx({"first": np.pi / 4, "second": np.pi / 6, "clock": 0.8}, abs=2e-3)
+    assert found == pytest.approx({"first": np.pi / 4, "second": np.pi / 6, "clock": 1.25}, abs=3e-3)
     assert estimate.rms == pytest.approx(0.2, rel=0.5)

@@ -56,7 +56,7 @@ def several() -> Answer:
                     **source,
                     "stop": 0.6,
                     "count": 50,
-                    "clock": 2.0,
+                    "clock": 0.5,
                     "tilt": 0.3,
                     "x": 0.5,
                     "channels": tip,

@@ -73,7 +73,7 @@ def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[Forwar
     """The forward model on the scene that is chosen at a point, by the longest recording."""
     name, recording = max(model.measurement.recordings.items(), key=lambda item: item[1].times[-1])
     clock = model.parameters.measurement_values(point[None], name, recording.stated)
-    times = clock["clock"][0] * recording.times + clock["delay"][0]
+    times = recording.times / clock["clock"][0] + clock["delay"][0]
     selection = select(model.scene_at(point, name), tolerance, times)
     fields = {
         path: value for rod, level in selection.chosen.levels.items() for path, value in level.fields(rod).items()

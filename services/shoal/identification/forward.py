@@ -173,7 +173,7 @@ class ForwardModel:
         possible = self._possible(points, values, scene)
         for clock, delay in np.unique(pace[possible], axis=0):
             lanes = np.flatnonzero(possible & np.all(pace == (clock, delay), axis=1))
-            instants = clock * times + delay
+            instants = times / clock + delay
             if instants[0] < 0:
                 continue
             inputs = {path: numbers[lanes] for path, numbers in values.items()}

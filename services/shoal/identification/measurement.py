@@ -134,7 +134,7 @@ def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) 
     truth = scene.with_values({**source.known, **source.values})
     times = np.linspace(0.0, source.stop, source.count + 1)[1:]
     channels = problem.channels_of(source)
-    trajectory = get_engine(source.engine).simulate(truth, source.clock * times + source.delay)
+    trajectory = get_engine(source.engine).simulate(truth, times / source.clock + source.delay)
     if not trajectory.ok:
         raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
     values = observe(trajectory, channels, camera(source))[0]

@@ -60,8 +60,9 @@ class Channel(Record):
 
 
 class Clocked(Record):
-    """What a recording of any kind says: the motion's time is clock * recorded time + delay [s] after its start.
+    """What a recording of any kind says: the motion's time is recorded time / clock + delay [s] after its start.
 
+    So `clock` is how many seconds the recording's clock shows in one second: 1.26 is a clock that is fast by 26 %.
     A marker at X [m] is recorded at rotation(-tilt) (X - [x, y]) / scale, angles less `tilt`: clock, delay, scale, x, y
     and tilt may be parameters, with the paths `measurement.clock` and so on.
     known: fields of the scene that are different in this recording

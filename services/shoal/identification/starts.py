@@ -60,7 +60,7 @@ def _first_pose(model: ForwardModel, name: str) -> tuple[Array, Array]:
     pose, slope = np.full((2, len(recording.channels)), np.nan)
     for k, signal in enumerate(recording.values.T):
         first = np.flatnonzero(np.isfinite(signal))[:_FIRST_SAMPLES]
-        times, values = clock["clock"][0] * recording.times[first] + clock["delay"][0], signal[first]
+        times, values = recording.times[first] / clock["clock"][0] + clock["delay"][0], signal[first]
         if len(first) == 0:
             continue
         variable = times**2 if at_rest else times

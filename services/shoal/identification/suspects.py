@@ -95,7 +95,7 @@ def _candidates(model: ForwardModel) -> Iterator[tuple[str, str, float, Paramete
         free = Parameter(path=f"{RESERVED}.{name}", lower=stated - width, upper=stated + width)
         yield name, f"{RESERVED}.{name}", stated, free
     stated = first.stated.delay
-    lower = stated - first.stated.clock * begin
+    lower = stated - begin / first.stated.clock
     free = Parameter(path=f"{RESERVED}.delay", lower=lower - 1e-12, upper=stated + 0.2 * end)
     yield "delay", f"{RESERVED}.delay", stated, free
     size = model.scene.gravity[1]

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.errors import ComputationError
-from shoal.pictures.answer import Answer
 from shoal.pictures.outline import ground, outlined
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
+
+if TYPE_CHECKING:
+    from shoal.pictures.answer import Answer
 
 _FRAMES = 150
 
@@ -21,14 +23,14 @@ _FRAMES = 150
 class Motion:
     """One run as the machine's frame sees it; times by the recording's clock [s], (frames,).
 
-    name: of the recording or scene; ground: fixed places [m]; outlines: points of each body [m], (frames, points, 2)
-    markers: of the model [m], (frames, 2)
+    name: of the recording or scene; ground: fixed places [m], (places, 2)
+    outlines: points of each body [m], (frames, points, 2); markers: of the model [m], (frames, 2)
     measured: places [m], (frames, 2), nan where none was measured near that time; directions: measured angles [rad]
     """
 
     name: str
     times: Array
-    ground: list[tuple[float, float]]
+    ground: Array
     outlines: dict[str, Array]
     markers: dict[str, Array]
     measured: dict[str, Array] = field(default_factory=dict)
@@ -64,10 +66,10 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
     """The motion that was identified, over what a recording shows. Raises InputError."""
     view = answer.view(recording)
     samples = answer.estimate.measurement.recordings[recording]
-    earliest = max(0.0, -view["delay"] / view["clock"])
+    earliest = max(0.0, -view["delay"] * view["clock"])
     times = np.linspace(earliest, float(samples.times[-1]), frames)
     traced, points = outlined(answer.estimate.scenes[recording])
-    seen = answer.model.engine.simulate(traced, np.maximum(0.0, view["clock"] * times + view["delay"]))
+    seen = answer.model.engine.simulate(traced, np.maximum(0.0, times / view["clock"] + view["delay"]))
     outlines = {body: np.stack([seen.marker(name) for name in names], axis=1) for body, names in points.items()}
     markers = {channel.marker: seen.marker(channel.marker) for channel in samples.channels}
     nearest = np.abs(samples.times[None] - times[:, None]).argmin(axis=1)

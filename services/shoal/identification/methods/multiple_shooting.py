@@ -220,7 +220,7 @@ def cut(model: ForwardModel) -> Segments:
     """A record in segments. Raises InputError where the machine's state is more than angles and rates of its bodies."""
     _check(model)
     recording = model.measurement.first
-    times = recording.stated.clock * recording.times + recording.stated.delay
+    times = recording.times / recording.stated.clock + recording.stated.delay
     wanted = np.arange(SEGMENT, times[-1], SEGMENT)
     picked = np.unique(np.searchsorted(times, wanted))
     picked = picked[(picked >= _SAMPLES) & (picked <= len(times) - _SAMPLES)]
