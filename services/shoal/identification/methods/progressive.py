@@ -20,8 +20,8 @@ from shoal.identification.methods.outcome import Outcome
 from shoal.identification.starts import starting_points
 from shoal.trajectory import Array
 
-FIRST = 0.5
-"""The first horizon [s], longer where the samples up to there are too few."""
+FIRST, _PART = 0.5, 0.1
+"""The first horizon [s], and of the record, at most; longer where the samples up to there are too few."""
 _ROWS = 3
 """Numbers in the first horizon for each parameter, at least."""
 _LEAST, _MOST = 1.15, 3.0
@@ -69,12 +69,12 @@ def extend(model: ForwardModel, starts: Array, progress: Progress) -> Outcome:
 
 
 def first_horizon(model: ForwardModel) -> float:
-    """The time [s] up to which there are numbers enough for the parameters, at least FIRST."""
+    """The time [s] up to which there are numbers enough for the parameters, and FIRST or a part of the record."""
     needed = _ROWS * len(model.names)
     times = np.sort(model.rows.time)
     enough = times[min(needed, len(times)) - 1]
     begun = max(r.times[min(2, len(r.times) - 1)] for r in model.measurement.recordings.values())
-    return float(min(max(FIRST, enough, begun), model.measurement.end))
+    return float(min(max(min(FIRST, _PART * model.measurement.end), enough, begun), model.measurement.end))
 
 
 def fit(model: ForwardModel, start: Array) -> Branch:
