@@ -26,7 +26,7 @@ def main() -> int:
     """Returns the exit status: 0 if the answers can be trusted and the engines agree."""
     from rich.console import Console
 
-    from shoal_flows.terminal import demo_tables, following
+    from shoal_flows.terminal import demo_tables, following, notice
 
     begin = time.perf_counter()
     with following("demo") as listener:
@@ -36,6 +36,7 @@ def main() -> int:
         report = write_report(result)
     console = Console(highlight=False)
     demo_tables(console, result)
+    notice()
     console.print(f"\ndone in {time.perf_counter() - begin:.0f} s")
     console.print(f"report: {_short(report)}", soft_wrap=True)
     console.print("runs:   shoal ui", soft_wrap=True)

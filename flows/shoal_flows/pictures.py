@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from matplotlib.figure import Figure
 from shoal.engines.compare import Comparison
 from shoal.identification import Estimate, Measurement, load_problem
 from shoal.pictures import titles
 from shoal.pictures.answer import Answer
+from shoal.pictures.archive import archived
 from shoal.pictures.convergence import convergence
 from shoal.pictures.engines import engines
+from shoal.pictures.files import moving_picture
 from shoal.pictures.gallery import gallery, motions
 from shoal.pictures.mesh_error import mesh_error
-from shoal.pictures.overlay import overlay
+from shoal.pictures.motion import motion
+from shoal.pictures.overlay import follows, overlay
+from shoal.pictures.pages import animation
 from shoal.pictures.remainders import remainders
 from shoal.pictures.report import report
 from shoal.pictures.style import png, svg
@@ -27,10 +32,11 @@ Picture = tuple[bytes, bytes]
 
 @dataclass(frozen=True)
 class Album:
-    """What is shown of one optimisation: pictures as PNG by name, and the page with everything."""
+    """What is shown of one optimisation: pictures by the name of their file, the page, and all that it is made of."""
 
     pictures: dict[str, bytes]
     page: str
+    archive: dict[str, Any]
 
 
 def fitted(cell: Cell, measurement: Measurement) -> tuple[Fit, Album]:
@@ -44,12 +50,21 @@ def album(found: Fit) -> Album:
     answer = Answer(load_problem(found.cell.problem), found.estimate)
     moving = motions(answer)
     drawn = gallery(answer, moving)
-    return Album({one.name: png(one.figure) for one in drawn}, report(answer, moving, drawn))
+    pictures = {f"{one.name}.png": png(one.figure) for one in drawn}
+    return Album({**pictures, "motion.gif": moving_picture(answer)}, report(answer, moving, drawn), archived(answer))
 
 
 def draw_trajectory(fits: Sequence[Fit], name: str) -> Picture:
     """The model of the best fit over the data."""
-    return _both(overlay(titles.best(_labelled(fits)), name))
+    best = titles.best(_labelled(fits))
+    return _both(overlay(best, f"{name}: {follows(best)}"))
+
+
+def show_motion(fits: Sequence[Fit]) -> dict[str, Any]:
+    """The motion of the best fit, as the macro `animation` of a page takes it."""
+    best = titles.best(_labelled(fits))
+    answer = Answer(load_problem(best.problem), best)
+    return animation(motion(answer, next(iter(best.measurement.recordings))), "The identified machine")
 
 
 def draw_convergence(fits: Sequence[Fit], name: str) -> Picture:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import subprocess
 from functools import cache
@@ -20,7 +21,12 @@ def versions() -> dict[str, str]:
 
 @cache
 def revision() -> str | None:
-    """The git revision of the source, with `+changes` if files differ from it; None outside a repository."""
+    """The git revision of the source, with `+changes` if files differ from it; None outside a repository.
+
+    SHOAL_REVISION says it where there is no repository, as in a container.
+    """
+    if stated := os.environ.get("SHOAL_REVISION"):
+        return stated
     commit = _git("rev-parse", "HEAD")
     if commit is None:
         return None

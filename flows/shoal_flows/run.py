@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, get_origin, get_type_hints
 
 import yaml
 from shoal.errors import InputError
 
 from shoal_flows import events, server, workers
-from shoal_flows.terminal import following, show
+from shoal_flows.terminal import following, notice, show
 
 
 def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> bool:
     """Run a flow with its progress on standard error, print its answer; returns whether it can be trusted."""
     with following(f"flow {name}") as listener, events.listening(listener):
         result = run_flow(name, parameters)
+    notice()
     if as_json:
         from shoal_flows.jsontext import as_json_text
 
@@ -34,13 +34,11 @@ def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
     from prefect.exceptions import ParameterTypeError
 
     from shoal_flows.flows import FLOWS
-    from shoal_flows.tracking.store import connect
 
     if name not in FLOWS:
         raise InputError(f"flow: no flow {name!r}; there are {', '.join(FLOWS)}")
     flow = FLOWS[name]
-    wanted = _parsed(name, inspect.signature(flow.fn), parameters)
-    connect()
+    wanted = _parsed(name, flow.fn, parameters)
     with events.work("kernels (compiled on first use)"):
         ready.result()
     server.wait()
@@ -50,18 +48,19 @@ def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
         raise InputError(f"{name}: {' '.join(str(error).split())}") from None
 
 
-def _parsed(flow: str, signature: inspect.Signature, parameters: Mapping[str, Any]) -> dict[str, Any]:
+def _parsed(flow: str, function: Callable[..., Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
     parsed = {}
+    types = get_type_hints(function)
+    known = [name for name in types if name != "return"]
     for name, value in parameters.items():
-        if name not in signature.parameters:
-            raise InputError(f"{flow}: no parameter {name!r}; there are {', '.join(signature.parameters) or 'none'}")
+        if name not in known:
+            raise InputError(f"{flow}: no parameter {name!r}; there are {', '.join(known) or 'none'}")
         if isinstance(value, str):
             try:
                 value = yaml.safe_load(value)
             except yaml.YAMLError:
                 raise InputError(f"{flow}: {name}: {value!r} is not a value (write lists as [a, b])") from None
-        annotation = str(signature.parameters[name].annotation)
-        if annotation.startswith("list") and not isinstance(value, list):
+        if get_origin(types[name]) is list and not isinstance(value, list | dict):
             value = value.split(",") if isinstance(value, str) else [value]
         parsed[name] = value
     return parsed

@@ -13,7 +13,10 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from shoal_flows import remembered
 from shoal_flows.events import Listener
+from shoal_flows.tracking import outbox
+from shoal_flows.tracking.record import LOCAL
 
 if TYPE_CHECKING:
     from shoal_flows.results import Compared, DemoResult, Study
@@ -63,8 +66,18 @@ def show(result: Any) -> None:
             console.print(f"{name} at {result.motion.times[-1]:g} s: ({x:.9f}, {y:.9f}) m")
     elif isinstance(result, Swept):
         console.print(f"{len(result.sweep.status)} points in {result.sweep.wall_s:.2f} s")
-    if not isinstance(result, DemoResult):
+    if not isinstance(result, DemoResult) and not result.run_id.startswith(LOCAL):
         console.print(f"logged to MLflow as run {result.run_id}; browse it with `shoal ui`", soft_wrap=True)
+
+
+def notice() -> None:
+    """Say on standard error what was not computed now, and what MLflow has not been told, where something is."""
+    console = Console(stderr=True, highlight=False)
+    if count := remembered.reused():
+        console.print(f"{count} results were computed before; SHOAL_FRESH=1 computes them anew", soft_wrap=True)
+    if waiting := len(outbox.pending()):
+        text = f"{waiting} runs that MLflow could not be told of are in {outbox.folder()}; `shoal upload` sends them"
+        console.print(text, soft_wrap=True)
 
 
 def demo_tables(console: Console, result: DemoResult) -> None:

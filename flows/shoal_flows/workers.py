@@ -5,22 +5,39 @@ from __future__ import annotations
 import atexit
 import os
 from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from multiprocessing import get_all_start_methods, get_context
-from typing import ParamSpec, TypeVar
+from typing import ParamSpec, Protocol, TypeVar
+
+from shoal_flows import cluster
 
 P = ParamSpec("P")
 T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
 
 
 def count() -> int:
     """Computations that run at a time."""
+    if cluster.setting():
+        return cluster.cores()
     return max(1, os.cpu_count() or 1)
 
 
-def submit(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-    """Run a module-level function in a worker process; arguments and result are pickled."""
+class Pending(Protocol[T_co]):
+    """A computation that was asked for."""
+
+    def result(self) -> T_co:
+        """What it gave; an exception of the function is raised here."""
+        ...
+
+
+def submit(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Pending[T]:
+    """Run a module-level function in a worker process, here or on a cluster; arguments and result are pickled."""
+    if cluster.setting():
+        # Not by its arguments: what is asked for again may be meant to be computed again.
+        found: Pending[T] = cluster.client().submit(function, *args, pure=False, **kwargs)
+        return found
     return _pool().submit(function, *args, **kwargs)
 
 
@@ -29,7 +46,7 @@ def run(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     return submit(function, *args, **kwargs).result()
 
 
-def warm_up() -> Future[int]:
+def warm_up() -> Pending[int]:
     """Start the processes; they load and compile while the caller does something else. The result waits for that."""
     return submit(os.getpid)
 

@@ -14,6 +14,11 @@ import click
 from shoal.errors import InputError, ShoalError
 
 EXIT_UNTRUSTED = 3
+EXTRAS = {
+    "pipeline": ("prefect", "mlflow", "jinja2", "shoal_flows"),
+    "services": ("fastapi", "starlette", "uvicorn", "pydantic_settings", "orjson"),
+}
+"""Modules that only an extra of the package brings."""
 
 
 class Program(click.Group):
@@ -96,9 +101,8 @@ def option_json(command: Command) -> Command:
 
 def option_engine(command: Command) -> Command:
     """--engine."""
-    return click.option("--engine", default="gauss", show_default=True, help="gauss, exudyn, exudyn-ge or casadi.")(
-        command
-    )
+    text = "gauss, exudyn, exudyn-ge, casadi, or the address of a service (see `shoal serve`)."
+    return click.option("--engine", default="gauss", show_default=True, help=text)(command)
 
 
 @click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -148,7 +152,7 @@ def scenes(name: str | None) -> None:
 )
 @click.option("--verify/--no-verify", default=True, show_default=True, help="Estimate the error by a second run.")
 @option_json
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .csv, .json or .png.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .html, .gif, .png, .csv or .json.")
 def simulate(
     scene: str,
     engine: str,
@@ -165,7 +169,7 @@ def simulate(
     from shoal.engines.verification import verified
     from shoal.scene import load_scene
 
-    terminal.check_output(out, (".csv", ".json", ".png"))
+    terminal.check_output(out, (".html", ".gif", ".png", ".csv", ".json"))
     wanted = load_scene(scene).with_values(values)
     selection = None
     if tolerance is not None:
@@ -181,7 +185,7 @@ def simulate(
         with terminal.working(f"simulating {wanted.name} with {engine}"):
             trajectory = verified(chosen, wanted, times) if verify else chosen.simulate(wanted, times)
     if out is not None:
-        terminal.write_trajectory(trajectory, wanted, out)
+        terminal.write_trajectory(trajectory, wanted, out, selection)
     report = trajectory.to_json() | ({} if selection is None else {"selection": selection.to_json()})
     terminal.show(report, as_json, lambda: terminal.trajectory_table(trajectory, wanted, selection))
     _finish(trajectory.ok, trajectory.message)
@@ -318,6 +322,37 @@ def identify(
 
 
 @main.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=Path("report.html"),
+    show_default=True,
+    help="Write .html.",
+)
+def report(runs: tuple[str, ...], out: Path) -> None:
+    """Make one page of identifications of one problem.
+
+    RUN is a file that `shoal identify --out FILE.json` wrote, or the id of a run in MLflow.
+    """
+    from shoal import terminal
+    from shoal.pictures import archive
+    from shoal.pictures.study import best_of
+
+    terminal.check_output(out, (".html",))
+    found: dict[str, Any] = {}
+    for run in runs:
+        if Path(run).suffix or Path(run).exists():
+            found[Path(run).stem if Path(run).stem not in found else run] = archive.read(Path(run))
+        else:
+            found |= _pipeline("shoal_flows.report.stored").stored(run)
+    terminal.write_report(found, out)
+    click.echo(f"report: {out}")
+    best = found[best_of({name: answer.estimate for name, answer in found.items()})].estimate
+    _finish(best.verdict.trusted, f"{best.verdict}: {best.message}")
+
+
+@main.command()
 @click.argument("problem")
 @click.option("--data", multiple=True, metavar="[NAME=]FILE", callback=recordings, help="As for identify.")
 @click.option("--about", type=click.Choice(["answer", "start"]), help="The answer from the data, where there are any.")
@@ -426,8 +461,23 @@ def compare(
 @click.option("--param", "parameters", multiple=True, metavar="K=V", callback=key_value, help="JSON or plain text.")
 @option_json
 def run(flow: str, parameters: dict[str, str], as_json: bool) -> None:
-    """Run a Prefect FLOW (forward, identify, compare, sweep) and log it to MLflow."""
+    """Run a Prefect FLOW (forward, identify, compare, sweep, nightly) and log it to MLflow."""
     _finish(bool(_pipeline("shoal_flows.run").main(flow, parameters, as_json)), "the flow did not end well")
+
+
+@main.command()
+@click.argument("run_id")
+@option_json
+def rerun(run_id: str, as_json: bool) -> None:
+    """Repeat the study of an MLflow run from what the run says, and compare the figures."""
+    _finish(bool(_pipeline("shoal_flows.rerun").main(run_id, as_json)), "the figures do not agree")
+
+
+@main.command()
+def upload() -> None:
+    """Send the runs to MLflow that it could not be told of when they ended."""
+    count = _pipeline("shoal_flows.tracking.upload").upload()
+    click.echo(f"{count} runs uploaded")
 
 
 @main.command()
@@ -436,6 +486,15 @@ def run(flow: str, parameters: dict[str, str], as_json: bool) -> None:
 def ui(host: str, port: int) -> None:
     """Serve the MLflow dashboard of all runs until Ctrl-C."""
     _pipeline("shoal_flows.ui").ui(host, port)
+
+
+@main.command()
+@click.argument("engine", type=click.Choice(["gauss", "exudyn", "exudyn-ge", "casadi"]))
+@click.option("--host", default="127.0.0.1", show_default=True)
+@click.option("--port", type=click.IntRange(1, 65535), metavar="PORT", help="8001 gauss, 8002 exudyn, 8003 casadi.")
+def serve(engine: str, host: str, port: int | None) -> None:
+    """Serve ENGINE over HTTP until Ctrl-C; SHOAL_API_* in the environment sets the limits."""
+    _optional("shoal.api.serve", "services").serve(engine, host, port)
 
 
 @main.command()
@@ -468,11 +527,16 @@ def doctor(as_json: bool) -> None:
 
 def _pipeline(module: str) -> Any:
     """A module of the pipeline, which the library itself does not depend on. Raises InputError."""
+    return _optional(module, "pipeline")
+
+
+def _optional(module: str, extra: str) -> Any:
+    """A module that needs an extra of the package. Raises InputError."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] in ("prefect", "mlflow", "jinja2", "shoal_flows"):
-            raise InputError(f"{error.name} is not installed; install shoal with its extra 'pipeline'") from None
+        if (error.name or "").split(".")[0] in EXTRAS[extra]:
+            raise InputError(f"{error.name} is not installed; install shoal with its extra '{extra}'") from None
         raise
 
 

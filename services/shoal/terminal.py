@@ -16,6 +16,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from shoal.errors import InputError
+from shoal.pictures.choice import rows
 from shoal.pictures.numbers import rounded
 from shoal.trajectory import Array, plain
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from shoal.mechanics.analysis.modes import Modes
     from shoal.mechanics.analysis.reactions import Reactions
     from shoal.mechanics.analysis.statics import Equilibrium
+    from shoal.pictures.answer import Answer
     from shoal.scene import Scene
     from shoal.selection import Selection
     from shoal.trajectory import Trajectory
@@ -124,13 +126,8 @@ def selection_table(selection: Selection) -> None:
         f"models for {selection.tolerance:g} m at the markers: {len(selection.rungs)} runs, {selection.wall_s:.2f} s"
     )
     table = _table(title, "model", "unknowns", "steps", "ms", "error [m]", "")
-    for rung in selection.rungs:
-        facts = rung.trajectory.model
-        verdict = "chosen" if rung is chosen else "" if rung.ok else str(rung.trajectory.status[0])
-        error = f"{rung.error:.1e}" if np.isfinite(rung.error) else "-"
-        name = rung.name if rung.flexible else f"{rung.name}, tolerance {rung.tolerance:g}"
-        cost = f"{rung.trajectory.wall_s * 1e3:.1f}"
-        table.add_row(name, str(facts["unknowns"]), str(rung.trajectory.steps), cost, error, verdict)
+    for row in rows(selection):
+        table.add_row(*row)
     out.print(table)
     for rod, reason in selection.rigid.items():
         out.print(f"{rod} stays rigid: {reason}")
@@ -356,8 +353,8 @@ def check_output(path: Path | None, endings: tuple[str, ...]) -> None:
         raise InputError(f"out: the folder {path.absolute().parent} does not exist")
 
 
-def write_trajectory(trajectory: Trajectory, scene: Scene, path: Path) -> None:
-    """One lane as CSV, JSON or picture."""
+def write_trajectory(trajectory: Trajectory, scene: Scene, path: Path, selection: Selection | None = None) -> None:
+    """One lane as CSV, JSON, page, picture or moving picture; selection: how its model was chosen."""
     if path.suffix == ".csv":
         columns, table = ["t"], [trajectory.times]
         for name in trajectory.markers:
@@ -367,15 +364,24 @@ def write_trajectory(trajectory: Trajectory, scene: Scene, path: Path) -> None:
     elif path.suffix == ".json":
         _write_json(trajectory.to_json(), path)
     else:
-        _pictures().trajectory(trajectory, scene, path)
+        _pictures().trajectory(trajectory, scene, path, selection)
 
 
 def write_estimate(estimate: Estimate, problem: Problem, path: Path) -> None:
-    """An estimate as JSON, page, picture or moving picture."""
+    """An estimate as JSON (all of it, for `shoal report`), page, picture or moving picture."""
     if path.suffix == ".json":
-        _write_json(estimate.to_json(), path)
+        from shoal.pictures import answer, archive
+
+        _write_json(archive.archived(answer.Answer(problem, estimate)), path)
     else:
         _pictures().estimate(estimate, problem, path)
+
+
+def write_report(answers: Mapping[str, Answer], path: Path) -> None:
+    """Identifications by name as one page. Raises InputError."""
+    from shoal.pictures.study import study
+
+    path.write_text(study(answers), encoding="utf-8")
 
 
 def write_design(found: Design, path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
@@ -30,4 +31,4 @@ def comparison() -> Comparison:
 
 @pytest.fixture(scope="session")
 def sweep() -> Sweep:
-    return jobs.swept(SCENE, {"initial.OA.angle": (0.0, 1.0, 5)}, "gauss", None)
+    return jobs.swept(SCENE, {"initial.OA.angle": np.linspace(0.0, 1.0, 5)}, "gauss", None)

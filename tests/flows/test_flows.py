@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
 from shoal.errors import InputError
 from shoal_flows import run
+from shoal_flows.rerun import rerun
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +78,18 @@ def test_forward_sweep_and_compare_are_logged() -> None:
         assert _client().get_run(result.run_id).info.status == "FINISHED"
 
 
+def test_a_night_is_a_run_with_a_metric_per_line() -> None:
+    # Not `trusted`: this machine may be busy, and a line then takes longer than it should.
+    night = run.run_flow("nightly", {"only": "four-bar-2", "quick": "true"})
+    metrics = _client().get_run(night.run_id).data.metrics
+    lines = {"/".join(line.key).replace(",", "") for line in night.night.lines if line.error is not None}
+    assert lines
+    assert {name.partition("/")[2] for name in metrics if name.startswith("error/")} == lines
+    assert metrics["lines/passed"] == night.night.counts["passed"]
+    names = {item.path for item in _client().list_artifacts(night.run_id)}
+    assert {"index.html", "night.json", "call.json"} <= names
+
+
 @pytest.mark.parametrize(
     ("flow", "parameters", "word"),
     [
@@ -91,3 +105,18 @@ def test_bad_parameters_are_refused_in_one_line(flow: str, parameters: dict[str,
     with pytest.raises(InputError, match=word) as refusal:
         run.run_flow(flow, parameters)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_study_is_repeated_from_its_run_alone(tmp_path: Path) -> None:
+    scene = tmp_path / "mine.yaml"
+    scene.write_text((files("shoal.scene") / "library" / "single-pendulum.yaml").read_text())
+    first = run.run_flow("forward", {"scene": str(scene), "values": "{initial.OA.angle: 0.4}"})
+    scene.unlink()
+    again = rerun(first.run_id)
+    assert again.now != first.run_id
+    assert not again.different
+    assert again.figures["final/x"][0] == first.motion.marker(first.motion.markers[-1])[-1, 0]
+    assert len(again.figures) >= 5
+    # As if the first had found something else.
+    _client().log_metric(first.run_id, "final/x", 0.0)
+    assert set(rerun(first.run_id).different) == {"final/x"}

@@ -7,9 +7,11 @@ from typing import Any
 import pytest
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
+from shoal.errors import InputError
 from shoal.pictures.signals import signals
 from shoal_flows import pictures
 from shoal_flows.jobs import Cell, Fit
+from shoal_flows.report.stored import stored
 from shoal_flows.tracking.engines import log_comparison, log_sweep
 from shoal_flows.tracking.identification import log_fit, log_outcome, open_study
 from shoal_flows.tracking.store import connect
@@ -54,10 +56,15 @@ def test_study_is_logged_with_a_child_per_fit(client: Any, fits: list[Fit], tmp_
     error = estimate.parameters["theta1"].value - estimate.truth["theta1"]
     assert child.data.metrics["error/theta1"] == pytest.approx(error)
     assert child.data.metrics["interval/theta1/lower"] < estimate.truth["theta1"]
-    drawn = {f"{name}.png" for name in albums[0].pictures}
-    assert {"overlay.png", "residuals.png", "landscape.png", "correlations.png"} <= drawn
+    drawn = set(albums[0].pictures)
+    assert {"overlay.png", "residuals.png", "landscape.png", "correlations.png", "motion.gif"} <= drawn
+    assert sum(map(len, albums[0].pictures.values())) + len(albums[0].page) < 2e6
     assert child.data.metrics["rms/recording/B.x"] == signals(estimate)[0].rms
     assert names(client, child.info.run_id) == {"trajectory.csv", "estimate.json", "report.html", *drawn}
+    again = stored(study.run_id)
+    assert set(again) == {fit.cell.name for fit in fits}
+    assert again[fits[0].cell.name].estimate.parameters == estimate.parameters
+    assert list(stored(child.info.run_id)) == [fits[0].cell.name]
     best = client.get_metric_history(child.info.run_id, "fitness/best")
     assert [metric.value for metric in best] == [row[1] for row in estimate.iterations]
     tip = client.get_metric_history(child.info.run_id, "tip/x")
@@ -67,6 +74,13 @@ def test_study_is_logged_with_a_child_per_fit(client: Any, fits: list[Fit], tmp_
     with Path(file).open() as lines:
         rows = list(csv.DictReader(lines))
     assert float(rows[-1]["B.x"]) == fits[0].motion.marker("B")[-1, 0]
+
+
+def test_a_run_that_holds_no_identification_is_one_line(client: Any, sweep: Sweep) -> None:
+    with pytest.raises(InputError, match="neither a file nor the id of a run"):
+        stored("nothing")
+    with pytest.raises(InputError, match="holds no identification"):
+        stored(log_sweep(sweep))
 
 
 def test_failed_block_leaves_a_failed_run(client: Any, fits: list[Fit]) -> None:

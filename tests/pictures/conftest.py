@@ -1,14 +1,23 @@
-"""Estimates that the tests of pictures share, each fitted to data of another engine."""
+"""Estimates, each fitted to data of another engine, and pages that the tests of pictures share."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from shoal.engines import get_engine
+from shoal.engines.verification import verified
 from shoal.identification import Estimate, Measurement, Problem, identify, load_problem, measure
 from shoal.pictures.answer import Answer
+from shoal.pictures.report import report
+from shoal.pictures.simulation import simulation
+from shoal.pictures.study import study
+from shoal.scene import load_scene
+from shoal.selection import select
 
 
 @pytest.fixture(scope="session")
@@ -73,3 +82,33 @@ def several() -> Answer:
     values[20:30, 0] = np.nan
     gappy = Measurement({**measured.recordings, "high": replace(high, values=values)}, measured.truth)
     return Answer(problem, identify(problem, method="least-squares", measurement=gappy))
+
+
+@pytest.fixture(scope="session")
+def rejected(estimates: dict[str, Estimate]) -> Answer:
+    """A model whose second rod is a tenth too short for the data."""
+    problem = load_problem("paper-case-1")
+    values = {"bodies.AB.length": 1.8}
+    return Answer(problem, identify(problem, values=values, measurement=estimates["fine"].measurement))
+
+
+@pytest.fixture(scope="session")
+def pages(several: Answer, request: pytest.FixtureRequest) -> Callable[[str], str]:
+    """Every kind of page there is, made when it is first asked for: a function of the kind."""
+
+    @cache
+    def page(kind: str) -> str:
+        if kind == "estimate":
+            return report(several)
+        if kind == "rejected":
+            return report(request.getfixturevalue("rejected"))
+        if kind == "study":
+            case, estimates = load_problem("paper-case-1"), request.getfixturevalue("estimates")
+            return study({name: Answer(case, estimate) for name, estimate in estimates.items()})
+        scene = load_scene("flexible-double-pendulum")
+        if kind == "simulation":
+            return simulation(verified(get_engine("gauss"), scene), scene)
+        selection = select(scene, 3e-2)
+        return simulation(selection.trajectory, selection.chosen.scene, selection)
+
+    return page

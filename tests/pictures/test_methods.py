@@ -34,7 +34,7 @@ def test_figure_is_drawn_without_warnings_and_labelled(
         figure = draw(estimates, "title")
         assert png(figure).startswith(b"\x89PNG")
         assert ElementTree.fromstring(svg(figure)).tag.endswith("svg")
-    assert figure.axes[0].get_title(loc="left")
+    assert figure.get_suptitle() == "title"
     assert figure.axes[-1].get_xlabel()
     assert all(axes.get_ylabel() for axes in figure.axes)
 

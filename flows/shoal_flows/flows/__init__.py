@@ -14,8 +14,9 @@ from shoal_flows.flows.compare import compare  # noqa: E402
 from shoal_flows.flows.demo import demo  # noqa: E402
 from shoal_flows.flows.forward import forward  # noqa: E402
 from shoal_flows.flows.identify import identify  # noqa: E402
+from shoal_flows.flows.nightly import nightly  # noqa: E402
 from shoal_flows.flows.sweep import sweep  # noqa: E402
 
-FLOWS: dict[str, Flow[..., Any]] = {flow.name: flow for flow in (forward, identify, compare, sweep, demo)}
+FLOWS: dict[str, Flow[..., Any]] = {flow.name: flow for flow in (forward, identify, compare, sweep, nightly, demo)}
 
 __all__ = ["FLOWS"]

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from prefect import flow
 
+from shoal_flows.flows import tables
+from shoal_flows.flows.parameters import Engines, SceneName, Values
+from shoal_flows.flows.shown import progress, show_result
 from shoal_flows.flows.tasks import run_engines
 from shoal_flows.results import Compared
 
 
 @flow(name="compare", flow_run_name="compare {scene}")
 def compare(
-    scene: str = "flexible-double-pendulum",
-    engines: list[str] = ["gauss", "exudyn", "casadi"],  # noqa: B006 - Prefect shows the default in its form
-    values: dict[str, Any] = {},  # noqa: B006
+    scene: SceneName = "flexible-double-pendulum",
+    engines: Engines = ["gauss", "exudyn", "casadi"],  # noqa: B006 - Prefect shows the default in its form
+    values: Values = {},  # noqa: B006
 ) -> Compared:
     """Simulate a scene on several engines and log how far apart they come out.
 
     Args:
-        scene: Built-in scene, or the path of a YAML file.
-        engines: Engines to run it on.
-        values: Fields of the scene to set, as {path: value}.
+        scene: The machine to simulate; `shoal scenes` says what each is.
+        engines: Who simulates, two or more; gauss is Shoal's own solver.
+        values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
     """
-    comparison, picture, run_id = run_engines(scene, engines, values)
+    with progress(1, f"{scene} on {', '.join(engines)}"):
+        comparison, picture, run_id = run_engines(scene, engines, values)
+    show_result(f"{scene}: engines", tables.of_comparison(comparison), run_id)
     return Compared(comparison, run_id, picture)

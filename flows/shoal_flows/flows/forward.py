@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from prefect import flow
 
+from shoal_flows.flows import tables
+from shoal_flows.flows.parameters import EngineName, SceneName, Values
+from shoal_flows.flows.shown import progress, show_result
 from shoal_flows.flows.tasks import simulate
 from shoal_flows.results import Simulated
 
 
 @flow(name="forward", flow_run_name="forward {scene}")
 def forward(
-    scene: str = "flexible-double-pendulum",
-    engine: str = "gauss",
-    values: dict[str, Any] = {},  # noqa: B006 - Prefect shows the default in its form; nothing changes it
+    scene: SceneName = "flexible-double-pendulum",
+    engine: EngineName = "gauss",
+    values: Values = {},  # noqa: B006 - Prefect shows the default in its form; nothing changes it
 ) -> Simulated:
     """Simulate a scene on one engine and log its motion.
 
     Args:
-        scene: Built-in scene, or the path of a YAML file.
-        engine: Engine that simulates it.
-        values: Fields of the scene to set, as {path: value}, such as {"initial.OA.angle": 0.7}.
+        scene: The machine to simulate; `shoal scenes` says what each is.
+        engine: Who simulates; gauss is Shoal's own solver.
+        values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
     """
-    return Simulated(*simulate(scene, engine, values))
+    with progress(1, f"{scene} on {engine}"):
+        result = Simulated(*simulate(scene, engine, values))
+    show_result(f"{scene} on {engine}", tables.of_motion(result.motion), result.run_id)
+    return result

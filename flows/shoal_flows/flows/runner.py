@@ -1,4 +1,4 @@
-"""How many tasks of a flow run at a time: as many as there are worker processes."""
+"""How many tasks of a flow run at a time: as many as there are worker processes, or enough to keep a cluster busy."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from typing import Any
 
 from prefect.task_runners import ThreadPoolTaskRunner
 
-from shoal_flows import workers
+from shoal_flows import cluster, workers
+
+_ON_CLUSTER = 64
+"""Threads that do nothing but wait for a cluster, whose size is not known before it is asked."""
 
 
 def side_by_side() -> Any:
     """Threads that wait for the worker processes."""
-    return ThreadPoolTaskRunner(max_workers=workers.count())
+    return ThreadPoolTaskRunner(max_workers=_ON_CLUSTER if cluster.setting() else workers.count())

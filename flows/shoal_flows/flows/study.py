@@ -34,8 +34,11 @@ class Running:
         """Queue one of the optimisations."""
         self.futures[cell.name] = optimise.submit(cell, self.measurement, self.run.run_id)
 
-    def finish(self, title: str, pictures: Mapping[str, Draw]) -> Study:
-        """Wait for all, draw what they found together (functions by the name of the file), log it."""
+    def finish(self, title: str, pictures: Mapping[str, Draw], ended: Callable[[], None] = lambda: None) -> Study:
+        """Wait for all, draw what they found together (functions by the name of the file), log it.
+
+        ended: called after each optimisation
+        """
         fits: list[Fit] = []
         failures: dict[str, str] = {}
         for cell in self.cells:
@@ -44,6 +47,7 @@ class Running:
                 fits.append(result)
             else:
                 failures[cell.name] = str(result)
+            ended()
         drawn = {}
         if fits:
             waiting = {name: workers.submit(draw, fits, title) for name, draw in pictures.items()}

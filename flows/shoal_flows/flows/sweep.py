@@ -4,23 +4,29 @@ from __future__ import annotations
 
 from prefect import flow
 
+from shoal_flows.flows import tables
+from shoal_flows.flows.parameters import Axes, Axis, EngineName, Instant, SceneName
+from shoal_flows.flows.shown import progress, show_result
 from shoal_flows.flows.tasks import run_grid
 from shoal_flows.results import Swept
 
 
 @flow(name="sweep", flow_run_name="sweep {scene}")
 def sweep(
-    scene: str = "flexible-double-pendulum",
-    vary: dict[str, tuple[float, float, int]] = {"initial.OA.angle": (0.0, 1.5, 61)},  # noqa: B006 - shown in a form
-    engine: str = "gauss",
-    time: float | None = None,
+    scene: SceneName = "flexible-double-pendulum",
+    vary: Axes = [Axis(path="initial.OA.angle", low=0.0, high=1.5, count=61)],  # noqa: B006, B008 - shown in a form
+    engine: EngineName = "gauss",
+    time: Instant = None,
 ) -> Swept:
     """Simulate a scene over the full grid of some of its values and log where its markers have moved.
 
     Args:
-        scene: Built-in scene, or the path of a YAML file.
-        vary: What to vary, as {path: [low, high, count]}.
-        engine: Engine that simulates it.
-        time: Instant [s] at which to look; the end of the scene's duration if left out.
+        scene: The machine to simulate; `shoal scenes` says what each is.
+        vary: Values of which every combination is simulated, each evenly from one number to another.
+        engine: Who simulates; gauss is Shoal's own solver.
+        time: Instant [s] at which to look; none means the end of the scene's duration.
     """
-    return Swept(*run_grid(scene, vary, engine, time))
+    with progress(1, f"{scene} over {', '.join(axis.path for axis in vary)}"):
+        result = Swept(*run_grid(scene, {axis.path: (axis.low, axis.high, axis.count) for axis in vary}, engine, time))
+    show_result(f"{scene}: sweep", tables.of_sweep(result.sweep), result.run_id)
+    return result

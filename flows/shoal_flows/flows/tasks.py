@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from prefect import task
@@ -13,7 +14,7 @@ from shoal.identification import Measurement
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
 
-from shoal_flows import events, jobs, pictures, workers
+from shoal_flows import events, fingerprint, jobs, pictures, remembered, workers
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.pictures import Picture
 from shoal_flows.tracking import engines as tracked
@@ -31,7 +32,7 @@ def measure(problem: str, data: str | None) -> Measurement:
 def optimise(cell: Cell, measurement: Measurement, study: str) -> Fit:
     """One optimisation, logged as a child of the run `study`."""
     with events.work(f"{cell.problem}, {cell.name}"):
-        fit, album = workers.run(pictures.fitted, cell, measurement)
+        fit, album = remembered.run(fingerprint.of_cell(cell, measurement), pictures.fitted, cell, measurement)
         log_fit(fit, album, study)
         return fit
 
@@ -40,7 +41,8 @@ def optimise(cell: Cell, measurement: Measurement, study: str) -> Fit:
 def run_engines(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -> tuple[Comparison, Picture, str]:
     """One scene on several engines; with its picture and the id of its run."""
     with events.work(f"{scene} on {', '.join(engines)}"):
-        comparison = workers.run(jobs.compared, scene, engines, values)
+        key = fingerprint.of_simulations("compare", scene, values, tuple(engines))
+        comparison = remembered.run(key, jobs.compared, scene, engines, values)
         marker = tracked.tip(comparison.scene)
         picture = workers.run(pictures.draw_engines, comparison, marker)
         return comparison, picture, tracked.log_comparison(comparison, picture[0])
@@ -58,5 +60,16 @@ def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene,
 def run_grid(scene: str, vary: Mapping[str, Sequence[float]], engine: str, time: float | None) -> tuple[Sweep, str]:
     """One scene over a grid, with the id of its run."""
     with events.work(f"{scene} over {', '.join(vary)}"):
-        result = workers.run(jobs.swept, scene, vary, engine, time)
+        result = jobs.joined([part.result() for part in _parts(scene, vary, engine, time)])
         return result, tracked.log_sweep(result)
+
+
+def _parts(scene: str, vary: Mapping[str, Sequence[float]], engine: str, time: float | None) -> Sequence[Future[Sweep]]:
+    """The grid in pieces, each a computation of its own, which is found again if the whole is broken off."""
+    pieces = jobs.pieces(vary, workers.count())
+    keys = [fingerprint.of_simulations("sweep", scene, {}, repr(piece), engine, time) for piece in pieces]
+    with ThreadPoolExecutor(len(pieces)) as waiting:
+        return [
+            waiting.submit(remembered.run, key, jobs.swept, scene, piece, engine, time)
+            for key, piece in zip(keys, pieces, strict=True)
+        ]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import base64
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from jinja2 import PackageLoader
 from shoal.home import home
 from shoal.pictures.numbers import length
-from shoal.pictures.report import environment
+from shoal.pictures.pages import environment
 
 from shoal_flows import provenance, workers
-from shoal_flows.pictures import Picture
+from shoal_flows.pictures import Picture, show_motion
 from shoal_flows.plan import CASES, SEED, TITLES
 from shoal_flows.report import tables, words
 from shoal_flows.report.paper import TABLES
@@ -29,9 +29,10 @@ def write_report(result: DemoResult, folder: Path | None = None) -> Path:
 
 def render(result: DemoResult) -> str:
     """The report as HTML without a reference to anything outside."""
-    template = environment().from_string((files("shoal_flows.report") / "template.html.j2").read_text(encoding="utf-8"))
+    template = environment(PackageLoader("shoal_flows", "report")).get_template("demo.html.j2")
     return template.render(
-        headline=words.headline(result),
+        title="Two initial angles from the motion of the tip",
+        lead=words.headline(result),
         trusted=result.trusted,
         cases=[_case(result, case) for case in result.studies],
         provenance=_provenance(),
@@ -61,6 +62,7 @@ def _case(result: DemoResult, case: str) -> dict[str, Any]:
         "fingerprints": [
             list(row) for row in tables.fingerprints([*study.fits, *mesh.fits, *result.same_mesh[case].fits]).items()
         ],
+        "motion": workers.run(show_motion, study.fits) if study.fits else None,
         "figures": [_figure(title, name, study) for name in study.pictures],
         "engines_figure": _picture(
             compared.picture,

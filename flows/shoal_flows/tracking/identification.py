@@ -16,6 +16,9 @@ from shoal_flows.pictures import Album
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
 
+ARCHIVE = "estimate.json"
+"""The artifact that `shoal report` reads."""
+
 
 @contextmanager
 def open_study(name: str, cells: Sequence[Cell], measurement: Measurement) -> Iterator[Run]:
@@ -68,9 +71,9 @@ def log_fit(fit: Fit, album: Album, study: str) -> str:
             prefix = f"{name}/" if len(fit.motions) > 1 else ""
             log_motion(run, fit.motions[name], recording.channels[0].marker, prefix)
         for name, picture in album.pictures.items():
-            run.picture(picture, f"{name}.png")
+            run.picture(picture, name)
         run.text(album.page, "report.html")
-        run.text(as_json_text(estimate.to_json(), indent=1), "estimate.json")
+        run.text(as_json_text(album.archive, indent=1), ARCHIVE)
         return run.run_id
 
 

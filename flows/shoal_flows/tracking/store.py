@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
+import logging
 import os
-import re
 import time
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,7 +15,12 @@ from typing import Any
 from shoal.errors import ComputationError
 
 from shoal_flows import provenance, settings
+from shoal_flows.tracking import origin, outbox
+from shoal_flows.tracking.record import LOCAL, Run
 
+log = logging.getLogger(__name__)
+_PAUSE = 60.0
+_silent_until = 0.0
 _BATCH = 1000
 _KIND = "custom_model_development"
 """What makes MLflow open on runs and metrics instead of traces of language models."""
@@ -26,52 +29,8 @@ _EXPERIMENTS = {
     "Comparison": "One scene on several engines: a parent run per scene, a child per engine.",
     "Sweep": "One scene over a grid of values.",
     "Forward": "Motion of one scene on one engine.",
+    "Validation": "The nights of `shoal validate`: error and time of every problem, engine and method.",
 }
-
-
-@dataclass
-class Run:
-    """An open run of MLflow; what is added is sent when it ends or in full batches."""
-
-    client: Any
-    run_id: str
-    _metrics: list[tuple[str, float, int, int]] = field(default_factory=list)
-    _params: list[tuple[str, str]] = field(default_factory=list)
-
-    def params(self, values: Mapping[str, Any]) -> None:
-        """Settings, which never change; what is too long for MLflow is cut."""
-        self._params += [(name, str(value)[:6000]) for name, value in values.items()]
-
-    def metric(self, name: str, value: float, step: int = 0) -> None:
-        """One number; what is not finite is left out."""
-        if math.isfinite(value):
-            self._metrics.append((_plain(name), float(value), int(time.time() * 1000), step))
-
-    def series(self, name: str, values: Iterable[tuple[int, float]]) -> None:
-        """Numbers by step."""
-        for step, value in values:
-            self.metric(name, value, step)
-
-    def text(self, content: str, path: str) -> None:
-        """A text artifact at `path`."""
-        self.client.log_text(self.run_id, content, path)
-
-    def picture(self, content: bytes, path: str) -> None:
-        """A PNG artifact named `path`."""
-        with TemporaryDirectory() as folder:
-            file = Path(folder) / path
-            file.write_bytes(content)
-            self.client.log_artifact(self.run_id, str(file))
-
-    def flush(self) -> None:
-        """Send what was added, at most 1000 metrics and 100 settings a call."""
-        from mlflow.entities import Metric, Param
-
-        while self._metrics or self._params:
-            metrics = [Metric(*row) for row in self._metrics[:_BATCH]]
-            params = [Param(*row) for row in self._params[:100]]
-            self.client.log_batch(self.run_id, metrics=metrics, params=params)
-            del self._metrics[:_BATCH], self._params[:100]
 
 
 @contextmanager
@@ -85,28 +44,91 @@ def open_run(
 ) -> Iterator[Run]:
     """A run from its start to its end, failed if an exception leaves the block; parent: the id of a run.
 
-    Raises ComputationError if MLflow cannot be reached.
+    Where MLflow does not answer, the run goes to the outbox: a result is never lost for that.
     """
-    client = connect()
-    from mlflow.exceptions import MlflowException
-
-    try:
-        all_tags = {**_common_tags(), **(tags or {}), "mlflow.runName": name}
-        if parent:
-            all_tags["mlflow.parentRunId"] = parent
-        if description:
-            all_tags["mlflow.note.content"] = description
-        created = client.create_run(_experiment(experiment), tags=all_tags, run_name=name)
-    except MlflowException as error:
-        raise _unreachable(error) from None
-    run = Run(client, created.info.run_id)
+    run = Run(experiment, name, {**_common_tags(), **(tags or {})}, parent)
+    if description:
+        run.tags["mlflow.note.content"] = description
+    if parent is None and (call := origin.of_flow()) is not None:
+        run.files |= call
+    if not _waits(run):
+        _attempt(_make, run)
     try:
         yield run
-        run.flush()
     except BaseException:
-        client.set_terminated(run.run_id, "FAILED")
+        run.end("FAILED")
+        _deliver(run)
         raise
-    client.set_terminated(run.run_id, "FINISHED")
+    run.end("FINISHED")
+    _deliver(run)
+    if parent is None and time.monotonic() >= _silent_until:
+        # MLflow answers: what an earlier study could not tell it goes along.
+        with suppress(ComputationError):
+            upload()
+
+
+def upload() -> int:
+    """Send the runs of the outbox; returns how many. Raises ComputationError if MLflow does not answer."""
+    try:
+        return outbox.upload(_make, _send)
+    except _failures() as error:
+        raise _unreachable(error) from None
+
+
+def _attempt(what: Callable[[Run], None], run: Run) -> bool:
+    """Whether MLflow took it; one that does not answer is not asked again for a while, as every try takes seconds."""
+    global _silent_until
+    if time.monotonic() < _silent_until:
+        return False
+    try:
+        what(run)
+    except _failures() as error:
+        _silent_until = time.monotonic() + _PAUSE
+        log.warning("%s; run %r is kept in %s", _unreachable(error), run.name, outbox.folder())
+        return False
+    return True
+
+
+def _deliver(run: Run) -> None:
+    if not run.known or not _attempt(_send, run):
+        outbox.keep(run)
+
+
+def _waits(run: Run) -> bool:
+    """Whether it is part of a study that MLflow does not know yet."""
+    return run.parent is not None and run.parent.startswith(LOCAL)
+
+
+def _make(run: Run) -> None:
+    tags = {**run.tags, "mlflow.runName": run.name}
+    if run.parent:
+        tags["mlflow.parentRunId"] = run.parent
+    client = connect()
+    made = client.create_run(_experiment(run.experiment), start_time=run.started, tags=tags, run_name=run.name)
+    run.run_id = made.info.run_id
+
+
+def _send(run: Run) -> None:
+    """All of a run, in calls of at most 1000 metrics and 100 settings; what MLflow already has is sent again."""
+    from mlflow.entities import Metric, Param
+
+    client = connect()
+    metrics = [Metric(*row) for row in run.metrics]
+    params = [Param(*row) for row in run.kept_params.items()]
+    for start in range(0, max(len(metrics), 10 * len(params)), _BATCH):
+        some = params[start // 10 : start // 10 + _BATCH // 10]
+        client.log_batch(run.run_id, metrics=metrics[start : start + _BATCH], params=some)
+    with TemporaryDirectory() as folder:
+        run.write_files(Path(folder))
+        client.log_artifacts(run.run_id, folder)
+    client.set_terminated(run.run_id, run.status, run.ended)
+
+
+def _failures() -> tuple[type[Exception], ...]:
+    """What a server that is down, or a database that cannot be written, leads to."""
+    from mlflow.exceptions import MlflowException
+
+    return ComputationError, MlflowException, OSError
 
 
 @cache
@@ -126,6 +148,8 @@ def connect() -> Any:
 
 
 def _unreachable(error: Exception) -> ComputationError:
+    if isinstance(error, ComputationError):
+        return error
     return ComputationError(f"MLflow at {os.environ['MLFLOW_TRACKING_URI']}: {str(error).splitlines()[0]}")
 
 
@@ -160,9 +184,4 @@ def _common_tags() -> dict[str, str]:
     return {**tags, "platform": provenance.machine(), "mlflow.source.name": "shoal", "mlflow.source.type": "PROJECT"}
 
 
-def _plain(name: str) -> str:
-    """A name that MLflow accepts for a metric."""
-    return re.sub(r"[^\w\-. /]", "_", name)
-
-
-__all__ = ["Run", "connect", "open_run"]
+__all__ = ["Run", "connect", "open_run", "upload"]

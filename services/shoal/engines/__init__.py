@@ -40,10 +40,20 @@ ENGINES: dict[str, Callable[[], Engine]] = {
 }
 
 
+def _remote(url: str) -> Engine:
+    try:
+        from shoal.engines.remote import RemoteEngine
+    except ModuleNotFoundError as error:
+        raise InputError(f"{error.name} is not installed; install shoal with its extra 'services'") from None
+    return RemoteEngine(url)
+
+
 def get_engine(name: str) -> Engine:
-    """The engine of that name. Raises InputError."""
+    """The engine of that name, or the one that a service at an http(s) address runs. Raises InputError."""
+    if name.startswith(("http://", "https://")):
+        return _remote(name)
     if name not in ENGINES:
-        raise InputError(f"engine: no engine {name!r}; there are {', '.join(ENGINES)}")
+        raise InputError(f"engine: no engine {name!r}; there are {', '.join(ENGINES)}, or the address of a service")
     return ENGINES[name]()
 
 

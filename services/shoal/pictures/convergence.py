@@ -7,14 +7,16 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure
 
 from shoal.identification import Estimate
-from shoal.pictures.style import GREY, METHODS, OTHER, canvas, log_ticks, styled
+from shoal.pictures.style import GREY, METHODS, OTHER, canvas, headline, log_ticks, styled
+from shoal.pictures.units import fitness_unit
 
 
 @styled
 def convergence(estimates: Mapping[str, Estimate], title: str) -> Figure:
     """Best fitness so far over the evaluations, both logarithmic; a marker stands where a method ended."""
     figure, axes = canvas(4.6)
-    for estimate in estimates.values():
+    several = len({estimate.method for estimate in estimates.values()}) < len(estimates)
+    for name, estimate in estimates.items():
         style = METHODS.get(estimate.method, OTHER)
         line = {key: value for key, value in style.items() if key != "marker"}
         counted, best = estimate.history
@@ -24,7 +26,7 @@ def convergence(estimates: Mapping[str, Estimate], title: str) -> Figure:
             [estimate.evaluations],
             [estimate.fitness],
             **{**style, "linestyle": "none", "markersize": 8},
-            label=f"{estimate.method} ({estimate.evaluations})",
+            label=f"{name if several else estimate.method} ({estimate.evaluations})",
         )
     floor = [(e.model_error_rms, e) for e in estimates.values() if e.model_error_rms is not None]
     if floor:
@@ -35,13 +37,11 @@ def convergence(estimates: Mapping[str, Estimate], title: str) -> Figure:
         axes.set_ylim(bottom=level / 6)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    # Room for the legend above the lines.
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high * 1e3)
+    axes.set_ylim(low, max(2 * high, 100 * low))
     log_ticks(axes)
-    axes.set_title(title)
+    headline(figure, title)
     axes.set_xlabel("model evaluations, every one counted")
-    lengths = all(c.is_position for r in estimate.measurement.recordings.values() for c in r.channels)
-    axes.set_ylabel(f"best fitness so far [{'m²' if lengths else 'mean square, SI units'}]")
-    axes.legend(title="method (evaluations)", loc="upper right")
+    axes.set_ylabel(f"best fitness so far (mean square) [{fitness_unit(next(iter(estimates.values())))}]")
+    figure.legend(title="method (evaluations)", loc="outside lower left", ncols=3)
     return figure

@@ -13,7 +13,7 @@ from shoal.pictures.style import canvas, headline, styled
 def correlations(answer: Answer) -> Figure:
     """Correlations of the estimated parameters: blue vary together, red against each other."""
     found, names = answer.correlation, answer.names
-    size = min(8.0, 3.2 + 0.4 * len(names))
+    size = min(7.0, 3.0 + 0.25 * len(names))
     figure, axes = canvas(size)
     # What a parameter has with itself says nothing.
     image = axes.imshow(np.where(np.eye(len(names)) > 0, np.nan, found), cmap="RdBu", vmin=-1, vmax=1)
@@ -26,7 +26,7 @@ def correlations(answer: Answer) -> Figure:
         axes.text(
             column, row, text, ha="center", va="center", fontsize=8, color="white" if abs(value) > 0.6 else "black"
         )
-    figure.colorbar(image, ax=axes, label="correlation")
+    figure.colorbar(image, ax=axes, label="correlation", shrink=0.6)
     headline(figure, _says(answer))
     return figure
 

@@ -9,24 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shoal.identification.design import Design
-from shoal.pictures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    canvas,
-    headline,
-    log_ticks,
-    styled,
-)
+from shoal.pictures.style import BLACK, BLUE, GREY, LINES, ORANGE, canvas, headline, log_ticks, styled
 
 _SHOWN = 8
-_COLOURS = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY)
-_DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
 
 
 @styled
@@ -58,8 +43,8 @@ def _candidates(panel: Axes, found: Design) -> None:
 
 
 def _durations(panel: Axes, found: Design) -> None:
-    for (candidate, _), row, colour, dash in zip(found.ranked, found.course, _COLOURS, _DASHES, strict=False):
-        panel.plot(found.times, row, color=colour, linestyle=dash, label=candidate.label)
+    for (candidate, _), row, look in zip(found.ranked, found.course, LINES, strict=False):
+        panel.plot(found.times, row, label=candidate.label, **look)
     panel.axvline(found.duration, color=GREY, linewidth=1)
     panel.annotate(
         "today",

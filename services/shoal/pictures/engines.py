@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from shoal.engines.compare import Comparison
-from shoal.pictures.style import BLACK, ENGINES, GREY, OTHER, VERMILION, canvas, log_ticks, styled
+from shoal.pictures.style import BLACK, ENGINES, GREY, OTHER, VERMILION, canvas, headline, log_ticks, styled
 
 _WIDTHS = (5.0, 3.0, 1.8)
 _PAIRS = (BLACK, VERMILION, GREY)
@@ -32,7 +32,7 @@ def engines(comparison: Comparison, marker: str, title: str) -> Figure:
         below.plot(a.times, 1e6 * distance, label=f"{one}, {other}", **style)
     below.set_yscale("log")
     log_ticks(below)
-    above.set_title(title)
+    headline(figure, title)
     above.set_ylabel(f"position of {marker} [m]")
     above.legend()
     below.set_ylabel("distance [µm]")

@@ -2,42 +2,23 @@
 
 from __future__ import annotations
 
-import base64
-from dataclasses import dataclass
-
 import numpy as np
-from matplotlib.figure import Figure
 
+from shoal.pictures import titles
 from shoal.pictures.answer import Answer
+from shoal.pictures.choice import why
+from shoal.pictures.convergence import convergence
 from shoal.pictures.correlations import correlations, strongest
-from shoal.pictures.landscape import landscape, survey
-from shoal.pictures.motion import Motion, motion, poses
+from shoal.pictures.drawn import Drawn
+from shoal.pictures.ladder import ladder
+from shoal.pictures.landscape import has_ellipse, landscape, survey
+from shoal.pictures.motion import Motion, motion
 from shoal.pictures.overlay import follows, overlay
+from shoal.pictures.poses import poses
 from shoal.pictures.profiles import profiles
 from shoal.pictures.residuals import residuals, white
-from shoal.pictures.style import png, svg
 from shoal.pictures.waterfall import waterfall
-
-_HEAVY = 400_000
-"""An SVG of more bytes is shown as PNG."""
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """A picture by its name; alt: its content for those who cannot see it; caption: how to read it."""
-
-    name: str
-    figure: Figure
-    alt: str
-    caption: str
-
-    def embedded(self) -> dict[str, str]:
-        """For a page that needs nothing else: `source` (a data URL), `alt`, `caption`."""
-        drawn, kind = svg(self.figure), "svg+xml"
-        if len(drawn) > _HEAVY:
-            drawn, kind = png(self.figure), "png"
-        source = f"data:image/{kind};base64,{base64.b64encode(drawn).decode()}"
-        return {"source": source, "alt": self.alt, "caption": self.caption}
+from shoal.selection import select
 
 
 def motions(answer: Answer) -> list[Motion]:
@@ -49,6 +30,8 @@ def gallery(answer: Answer, moving: list[Motion]) -> list[Drawn]:
     """Every picture that this identification has something to show in."""
     estimate = answer.estimate
     drawn = [_overlay(answer), *(_poses(answer, one) for one in moving[:1]), _residuals(answer)]
+    if len(estimate.history[0]) > 1:
+        drawn.append(_convergence(answer))
     if estimate.minima:
         values = ", ".join(f"{other['fitness']:.3g}" for other in estimate.minima)
         alt = f"Fitness of the answer, {estimate.fitness:.3g}, and where other searches ended: {values}."
@@ -62,7 +45,21 @@ def gallery(answer: Answer, moving: list[Motion]) -> list[Drawn]:
         drawn.append(Drawn("profiles", profiles(estimate, answer.problem), alt, caption))
     if len(answer.names) > 1 and np.all(np.isfinite(answer.point)):
         drawn += _around(answer)
+    if estimate.model.get("selection"):
+        drawn.append(model_choice(answer))
     return drawn
+
+
+def model_choice(answer: Answer) -> Drawn:
+    """The models that were open, tried once more at the answer, over the longest recording."""
+    recordings = answer.estimate.measurement.recordings
+    name = max(recordings, key=lambda one: recordings[one].times[-1])
+    view, stage = answer.view(name), answer.estimate.model["selection"][-1]
+    times = view["clock"] * recordings[name].times + view["delay"]
+    found = select(answer.estimate.scenes[name], stage["tolerance"], np.maximum(times, 0.0))
+    alt = f"Estimated error over the cost of a run for {len(found.rungs)} models; {found.chosen.name} is taken."
+    caption = f"Models tried at the answer; it was found with {stage['model']}. {' '.join(why(found))}"
+    return Drawn("ladder", ladder(found), alt, caption)
 
 
 def _around(answer: Answer) -> list[Drawn]:
@@ -73,7 +70,8 @@ def _around(answer: Answer) -> list[Drawn]:
     for zoom in (False, True):
         name = "landscape-zoom" if zoom else "landscape"
         alt = f"Contours of the fitness over {one} and {other}, {'around the answer' if zoom else 'in the whole box'}."
-        caption = "Dark is a good fit. The ellipse is what the interval takes the valley for."
+        ellipse = " The ellipse is what the interval takes the valley for." if zoom and has_ellipse(answer) else ""
+        caption = f"Dark is a good fit.{ellipse}"
         drawn.append(Drawn(name, landscape(answer, survey(answer, pair, zoom=zoom)), alt, caption))
     value = answer.correlation[pair]
     alt = f"Table of correlations of {', '.join(answer.names)}; the largest is {value:+.3f}, of {one} and {other}."
@@ -84,13 +82,23 @@ def _around(answer: Answer) -> list[Drawn]:
 def _overlay(answer: Answer) -> Drawn:
     figure = overlay(answer.estimate)
     alt = f"Measured values as circles with the fitted model as a line. Overall, {follows(answer.estimate)}."
-    return Drawn("overlay", figure, alt, "The fitted model over the data. Where nothing was measured it is grey.")
+    return Drawn("overlay", figure, alt, "The fitted model (red) over the data. Where nothing was measured it is grey.")
 
 
 def _poses(answer: Answer, found: Motion) -> Drawn:
-    title = f"{answer.problem.name}: the identified machine until {found.times[-1]:.3g} s"
+    what = "identified" if answer.estimate.verdict.trusted else "fitted"
+    title = f"{answer.problem.name}: the {what} machine until {found.times[-1]:.3g} s"
     alt = f"The bodies {', '.join(found.outlines)} at several instants, later ones darker, over the measured places."
-    return Drawn("poses", poses(found, title), alt, "The later, the darker.")
+    return Drawn(
+        "poses", poses(found, title), alt, "The later, the darker; black circles and orange lines are measured."
+    )
+
+
+def _convergence(answer: Answer) -> Drawn:
+    estimate = answer.estimate
+    figure = convergence({estimate.method: estimate}, titles.pays(estimate.problem, {estimate.method: estimate}))
+    alt = f"Best fitness against counted evaluations, both axes logarithmic; it ends at {estimate.fitness:.3g}."
+    return Drawn("convergence", figure, alt, "What the search paid for what it found; the marker is its end.")
 
 
 def _residuals(answer: Answer) -> Drawn:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -16,7 +17,8 @@ from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, h
 
 _FRAMES = 60
 _PAUSE_MS = 80
-_COLOURS = 32
+_SHADES = 12
+"""Of each colour, from white on."""
 
 
 @styled
@@ -38,17 +40,26 @@ def gif(found: Motion, title: str) -> bytes:
         clock.set_text(f"t = {found.times[k]:.3f} s")
         figure.draw_artist(clock)
         images.append(Image.fromarray(np.asarray(drawing.buffer_rgba())).convert("RGB"))
-    # One palette for all frames, so that nothing flickers.
-    palette = images[len(images) // 2].quantize(_COLOURS)
+    palette = _palette()
     frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     stream = BytesIO()
     frames[0].save(stream, "GIF", save_all=True, append_images=frames[1:], duration=_PAUSE_MS, loop=0)
     return stream.getvalue()
 
 
+def _palette() -> Image.Image:
+    """The colours that are drawn with and their way to white: one palette for all frames, so that nothing flickers."""
+    shares = np.linspace(0.0, 1.0, _SHADES)
+    colours = [np.array(to_rgb(name)) for name in (BLACK, GREY, BLUE, ORANGE, VERMILION)]
+    table = [255 * (share * colour + 1.0 - share) for colour in colours for share in shares]
+    found = Image.new("P", (1, 1))
+    found.putpalette(np.round(table).astype(np.uint8).tobytes())
+    return found
+
+
 def _stage(found: Motion, title: str) -> tuple[Figure, list[tuple[Any, Any]], Any]:
     """The figure without what moves, the lines that do with their data by frame, and the clock."""
-    figure, axes = canvas(5.2)
+    figure, axes = canvas(1.4 + 5.6 * found.aspect)
     low, high = found.box
     size = float(np.max(high - low)) or 1.0
     shown: list[tuple[Any, Any]] = []
@@ -57,8 +68,7 @@ def _stage(found: Motion, title: str) -> tuple[Figure, list[tuple[Any, Any]], An
         (drawn,) = axes.plot([], [], style, label=label, **look)
         shown.append((drawn, path))
 
-    for place in found.ground:
-        axes.plot(*place, "s", color=GREY, markersize=8)
+    axes.plot(*found.ground.T, "s", color=GREY, markersize=8)
     for outline in found.outlines.values():
         line(outline, "o-", "", color=BLUE, linewidth=3, markersize=4, markevery=[0, -1])
     for number, path in enumerate(found.markers.values()):
@@ -71,7 +81,7 @@ def _stage(found: Motion, title: str) -> tuple[Figure, list[tuple[Any, Any]], An
         line(path, "-", "" if number else "measured direction", color=ORANGE, linewidth=3)
     axes.set_xlim(low[0] - 0.08 * size, high[0] + 0.08 * size)
     axes.set_ylim(low[1] - 0.08 * size, high[1] + 0.08 * size)
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_aspect("equal")
     headline(figure, title)
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")

@@ -66,13 +66,15 @@ def landscape(answer: Answer, found: Landscape) -> Figure:
         level = np.log10(np.where(np.isfinite(found.fitness), np.maximum(found.fitness, 1e-300), np.nan))
     image = axes.contourf(first, second, level.T, levels=24, cmap="cividis")
     axes.grid(False)
-    figure.colorbar(image, ax=axes, label="log10 of the fitness (mean square)", format="%.1f")
+    figure.colorbar(image, ax=axes, label="log10 of the fitness (mean square)", format="%.2f")
     _mark(axes, answer, found)
     for k, setter in zip(found.pair, (axes.set_xlabel, axes.set_ylabel), strict=True):
         setter(units.parameter(answer.problem, answer.names[k]))
     for k, name in zip(found.pair, ("x", "y"), strict=True):
         if answer.model.parameters.logarithmic[k] and not found.zoomed:
             getattr(axes, f"set_{name}scale")("log")
+        else:
+            axes.locator_params(axis=name, nbins=5)
     axes.set_xlim(first[0], first[-1])
     axes.set_ylim(second[0], second[-1])
     headline(figure, _says(answer, found))
@@ -95,8 +97,7 @@ def _mark(axes: Axes, answer: Answer, found: Landscape) -> None:
             label="where other searches ended",
             **inside,
         )
-    # Where a direction is open the covariance is singular and has no ellipse.
-    if not answer.linearised.unknown.size:
+    if found.zoomed and has_ellipse(answer):
         values = answer.model.parameters.to_values(_ellipse(answer, found.pair))
         # The white rim shows the line on any colour.
         axes.plot(values[:, one], values[:, other], color="white", linewidth=3.5)
@@ -104,6 +105,11 @@ def _mark(axes: Axes, answer: Answer, found: Landscape) -> None:
     answer_values = answer.model.parameters.to_values(answer.point)
     place = ([answer_values[one]], [answer_values[other]])
     axes.plot(*place, marker="*", color=VERMILION, markersize=13, label="the answer", **inside)
+
+
+def has_ellipse(answer: Answer) -> bool:
+    """Whether the covariance is regular; it is not where a direction is open."""
+    return not answer.linearised.unknown.size
 
 
 def _ellipse(answer: Answer, pair: tuple[int, int]) -> Array:
@@ -121,7 +127,8 @@ def _ellipse(answer: Answer, pair: tuple[int, int]) -> Array:
 def _says(answer: Answer, found: Landscape) -> str:
     where = f"{answer.problem.name}: {'around the answer' if found.zoomed else 'the whole box'}"
     if len(answer.names) > 2:
-        return f"{where}, a cut with the other {len(answer.names) - 2} fixed"
+        others = len(answer.names) - 2
+        return f"{where}, the other {f'{others} parameters' if others > 1 else 'parameter'} fixed"
     if found.zoomed:
         return f"{where}, ± {_SIGMAS:g} standard deviations"
     count = _local_minima(found.fitness)

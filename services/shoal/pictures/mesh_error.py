@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from shoal.identification import Estimate
-from shoal.pictures.style import BLUE, ORANGE, VERMILION, canvas, log_ticks, styled
+from shoal.pictures.style import BLUE, ORANGE, VERMILION, canvas, headline, log_ticks, styled
 
 
 @styled
@@ -40,6 +40,6 @@ def mesh_error(estimates: Mapping[str, Estimate], title: str) -> Figure:
     axes[-1, 0].set_xticks(places, [label.replace(" ", "\n") for label in estimates])
     axes[-1, 0].set_xlabel("elements on OA / AB, quadrature")
     axes[-1, 0].set_xlim(-0.5, len(estimates) - 0.5)
-    axes[0, 0].set_title(title)
+    headline(figure, title)
     axes[0, 0].legend(loc="lower left")
     return figure

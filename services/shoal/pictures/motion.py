@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shoal.engines.contract import Engine
-from shoal.errors import ComputationError
+from shoal.errors import ComputationError, InputError
 from shoal.pictures.outline import ground, outlined
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
@@ -48,9 +48,18 @@ class Motion:
         every = np.concatenate(shown)
         return np.nanmin(every, axis=0), np.nanmax(every, axis=0)
 
+    @property
+    def aspect(self) -> float:
+        """Height over width of a picture that suits the box."""
+        low, high = self.box
+        width, height = high - low
+        return float(np.clip((height + 0.1 * width) / max(width, 1e-9), 0.3, 0.8))
+
 
 def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAMES) -> Motion:
     """The motion of a scene until a time [s], as far as it can be computed. Raises InputError, ComputationError."""
+    if until <= 0:
+        raise InputError("out: a motion that is shown lasts longer than 0 s; choose later times with --at")
     traced, points = outlined(scene)
     seen = engine.simulate(traced, np.linspace(0.0, until, frames))
     known = np.all(np.isfinite(seen.points[..., 0]), axis=(1, 2))

@@ -9,16 +9,16 @@ from matplotlib.figure import Figure
 from shoal.identification import Estimate
 from shoal.pictures.numbers import handy
 from shoal.pictures.signals import Signal, gaps, signals, worst
-from shoal.pictures.style import BLACK, GREY, VERMILION, canvas, headline, styled
+from shoal.pictures.style import BLACK, SKY, VERMILION, canvas, headline, styled
 
 _PANELS = 6
 _MANY = 150
-"""From so many samples on, circles would hide the line."""
+"""From so many samples on, circles run together: then they are a band that the line lies in."""
 
 
 @styled
 def overlay(estimate: Estimate, title: str = "") -> Figure:
-    """Each channel against time: circles are measured, the line is the model, gaps in the data are grey.
+    """Each channel against time: circles (a pale band) are measured, the line is the model, gaps in the data are grey.
 
     At most six panels: the channels that fit worst.
     """
@@ -51,7 +51,8 @@ def follows(estimate: Estimate) -> str:
         size = float(np.sqrt(np.mean(np.square(values))))
         factor, handier = handy(size, unit)
         parts.append(f"{factor * size:.2g} {handier}")
-    return f"the model follows the data to {' and '.join(parts)} (RMS)"
+    how = "follows the data to" if estimate.verdict.trusted else "is off the data by"
+    return f"the model {how} {' and '.join(parts)} (RMS)"
 
 
 def _draw(panel: Axes, signal: Signal) -> None:
@@ -62,10 +63,11 @@ def _draw(panel: Axes, signal: Signal) -> None:
         signal.times,
         signal.measured,
         linestyle="none",
-        marker="." if many else "o",
-        markersize=3 if many else 5,
-        markerfacecolor=GREY if many else "none",
-        color=GREY if many else BLACK,
+        marker="o",
+        markersize=6 if many else 5,
+        markeredgewidth=0 if many else 1,
+        markerfacecolor=SKY if many else "none",
+        color=SKY if many else BLACK,
         label="measured",
     )
     panel.plot(signal.times, signal.fitted, color=VERMILION, linewidth=1.4, label="fitted model")

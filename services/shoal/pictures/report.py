@@ -2,121 +2,124 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
-
+from shoal.identification import Estimate
+from shoal.identification.estimate import Value
+from shoal.pictures import units
 from shoal.pictures.answer import Answer
-from shoal.pictures.gallery import Drawn, gallery, motions
-from shoal.pictures.motion import Motion, plain_motion
+from shoal.pictures.drawn import Drawn
+from shoal.pictures.gallery import gallery, motions
+from shoal.pictures.motion import Motion
+from shoal.pictures.numbers import length, rounded
 from shoal.pictures.overlay import follows
-from shoal.versions import versions
+from shoal.pictures.pages import animation, render, software
 
-_SPEEDS = {"half": 0.5, "a fifth": 0.2, "a tenth": 0.1, "a fiftieth": 0.02, "five times": 5.0}
 _ENDS = 5
 """Ends of other searches that are listed."""
-_SHOWN = 5.0
-"""Seconds that a motion should take on the screen."""
-
-
-def environment() -> Environment:
-    """Jinja's environment with the parts that pages share: macros.html.j2, page.css, animation.js."""
-    loader = PackageLoader("shoal.pictures", "page")
-    return Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, loader=loader)
 
 
 def report(answer: Answer, moving: list[Motion] | None = None, drawn: list[Drawn] | None = None) -> str:
     """The page as HTML without a reference to anything outside. Raises InputError."""
-    moving = motions(answer) if moving is None else moving
-    drawn = gallery(answer, moving) if drawn is None else drawn
-    estimate = answer.estimate
-    return (
-        environment()
-        .get_template("estimate.html.j2")
-        .render(
-            estimate=estimate,
-            verdict=_verdict(answer),
-            headings=[
-                "parameter",
-                "value",
-                "standard deviation",
-                "95 % interval",
-                "known",
-                *(["truth"] * bool(estimate.truth)),
-            ],
-            rows=_rows(answer),
-            remarks=_remarks(answer),
-            motions=[_moving(answer, one) for one in moving],
-            speeds=list(_SPEEDS.items()),
-            pictures=[one.embedded() for one in drawn],
-            provenance=_provenance(answer),
-        )
+    return render(
+        "estimate.html.j2",
+        title=answer.estimate.problem,
+        trusted=answer.estimate.verdict.trusted,
+        lead=verdict(answer.estimate),
+        provenance=provenance(answer.estimate),
+        **findings(answer, moving, drawn),
     )
 
 
-def _verdict(answer: Answer) -> str:
+def findings(answer: Answer, moving: list[Motion] | None = None, drawn: list[Drawn] | None = None) -> dict[str, Any]:
+    """What findings.html.j2 takes: answer, motion and evidence. Raises InputError."""
+    moving = motions(answer) if moving is None else moving
+    drawn = gallery(answer, moving) if drawn is None else drawn
     estimate = answer.estimate
-    reason = f" ({estimate.message})" if estimate.message else ""
+    truth = ["truth"] * bool(estimate.truth)
+    return {
+        "answer_title": "The answer" if estimate.verdict.trusted else "Numbers that are no answer",
+        "headings": ["parameter", "value", "standard deviation", "95 % interval", "known", *truth],
+        "rows": _rows(answer),
+        "reasons": [_sentence(reason) for reason in estimate.message.split("; ") if reason],
+        "remarks": _remarks(estimate),
+        "motions": [animation(one, _machine(answer, one)) for one in moving],
+        "pictures": [one.embedded() for one in drawn],
+    }
+
+
+def verdict(estimate: Estimate) -> str:
+    """The verdict and how closely the model follows the data."""
     advice = "" if estimate.verdict.trusted else " Do not use these numbers."
     fit = f"Overall, {follows(estimate)}, after {estimate.evaluations} simulations."
-    return f"Verdict: {estimate.verdict}{reason}.{advice} {fit}"
+    return f"Verdict: {estimate.verdict}.{advice} {fit}"
+
+
+def shown(value: Value) -> tuple[str, str, str, str]:
+    """Value, standard deviation, 95 % interval and whether it is known, to two digits of the uncertainty."""
+    if not value.identifiable:
+        return f"{value.value:.3g}", "–", "–", "at bound" if value.at_bound else "no"
+    unit = value.std if value.std > 0 else 1e-6 * abs(value.value)
+    interval = f"{rounded(value.lower, unit)} to {rounded(value.upper, unit)}"
+    return rounded(value.value, unit), f"{value.std:.2g}", interval, "yes"
+
+
+def provenance(estimate: Estimate) -> list[tuple[str, str]]:
+    """Where the numbers come from and what they cost."""
+    model = dict(estimate.model)
+    if stages := model.pop("selection", None):
+        # What was chosen took the place of what the scene states.
+        model = {"scene": model["scene"], "chosen": stages[-1]["model"]}
+    return [
+        ("data", estimate.data),
+        ("method", f"{estimate.method}{f' ({estimate.choice})' if estimate.choice else ''}, seed {estimate.seed}"),
+        ("engine", estimate.engine),
+        ("model", ", ".join(f"{name} = {value}" for name, value in model.items())),
+        ("fitness", f"{estimate.fitness:.6g}"),
+        ("effort", f"{estimate.evaluations} simulations in {estimate.wall_s:.2f} s"),
+        ("scene", ", ".join(scene.fingerprint for scene in estimate.scenes.values())),
+        ("versions", software()),
+    ]
 
 
 def _rows(answer: Answer) -> list[list[str]]:
     estimate, rows = answer.estimate, []
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
-        known = "yes" if value.identifiable else "at bound" if value.at_bound else "no"
-        interval = f"{value.lower:.6g} to {value.upper:.6g}" if value.identifiable else "–"
-        row = [name, f"{value.value:.8g}", f"{value.std:.2g}" if value.identifiable else "–", interval, known]
-        truth = [f"{estimate.truth[name]:.8g}" if name in estimate.truth else ""] if estimate.truth else []
-        rows.append(row + truth)
+        label = units.parameter(answer.problem, name) if name in estimate.parameters else name
+        truth = [f"{estimate.truth[name]:.6g}" if name in estimate.truth else ""] if estimate.truth else []
+        rows.append([label, *shown(value), *truth])
     return rows
 
 
-def _remarks(answer: Answer) -> list[str]:
-    estimate = answer.estimate
+def _remarks(estimate: Estimate) -> list[str]:
     tests = (f"Residuals, {sentence}." for sentence in estimate.residual_tests.sentences())
-    remarks = [*(f"Next: {step}." for step in estimate.advice), *estimate.combinations, *estimate.notes, *tests]
+    sentences = (_sentence(text) for text in (*estimate.combinations, *estimate.notes))
+    remarks = [*(f"Next: {step}." for step in estimate.advice), *sentences, *tests]
     if estimate.model_error_rms is not None:
-        remarks.append(
-            f"The mesh of the model is off by {estimate.model_error_rms:.1e} m (RMS); the intervals include it."
-        )
+        error = length(estimate.model_error_rms)
+        remarks.append(f"The mesh of the model is off by {error} (RMS); the intervals include it.")
+    remarks += [
+        f"Model for {length(stage['tolerance'])}: {stage['model']}, off by about {length(stage['error'])}; "
+        f"{stage['evaluations']} simulations."
+        for stage in estimate.model.get("selection", ())
+    ]
+    if estimate.bootstrap is not None:
+        for name in estimate.parameters:
+            low, high = estimate.bootstrap.interval(name)
+            draws = len(estimate.bootstrap.draws)
+            remarks.append(f"Bootstrap of {name}, {draws} draws: 95 % between {low:.6g} and {high:.6g}.")
     for other in sorted(estimate.minima, key=lambda minimum: minimum["fitness"])[:_ENDS]:
         values = ", ".join(f"{name} {value:.4g}" for name, value in other.items())
         remarks.append(f"Another search ended at {values}.")
     return remarks
 
 
-def _moving(answer: Answer, found: Motion) -> dict[str, Any]:
-    span = float(found.times[-1] - found.times[0])
-    speed = min(_SPEEDS.values(), key=lambda factor: abs(span / factor - _SHOWN))
-    if abs(span - _SHOWN) <= abs(span / speed - _SHOWN):
-        speed = 1.0
-    bodies = ", ".join(found.outlines)
-    # "</" would end the script element.
-    data = json.dumps(plain_motion(found), allow_nan=False).replace("</", "<\\/")
-    return {
-        "name": found.recording,
-        "speed": speed,
-        "alt": f"Animation of {bodies} over the measured places, {span:.3g} s. A picture below shows poses of it.",
-        "caption": f"{found.recording}: the identified machine (blue) with its markers (red) over the measured places "
-        "(black circles) and directions (orange).",
-        "data": Markup(data),
-    }
+def _machine(answer: Answer, one: Motion) -> str:
+    machine = "identified machine" if answer.estimate.verdict.trusted else "fitted machine"
+    return f"Recording {one.name}: the {machine}" if len(answer.estimate.scenes) > 1 else f"The {machine}"
 
 
-def _provenance(answer: Answer) -> list[tuple[str, str]]:
-    estimate = answer.estimate
-    found = ", ".join(f"{package} {number}" for package, number in versions(("shoal", "numpy", "numba")).items())
-    return [
-        ("data", estimate.data),
-        ("method", f"{estimate.method}{f' ({estimate.choice})' if estimate.choice else ''}, seed {estimate.seed}"),
-        ("engine", estimate.engine),
-        ("model", ", ".join(f"{name} = {value}" for name, value in estimate.model.items())),
-        ("fitness", f"{estimate.fitness:.6g}"),
-        ("effort", f"{estimate.evaluations} simulations in {estimate.wall_s:.2f} s"),
-        ("scene", ", ".join(scene.fingerprint for scene in estimate.scenes.values())),
-        ("versions", found),
-    ]
+def _sentence(text: str) -> str:
+    """A clause with its capital and its full stop; an identifier at its beginning keeps its case."""
+    first, _, rest = text.partition(" ")
+    return f"{first.capitalize() if first.isalpha() and first.islower() else first} {rest}".strip().rstrip(".") + "."

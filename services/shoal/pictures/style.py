@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import wraps
 from io import BytesIO
 from textwrap import fill
-from typing import Any, ParamSpec
+from typing import Any, ParamSpec, TypeVar
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 P = ParamSpec("P")
+R = TypeVar("R")
 
 # Okabe and Ito (2008), Color Universal Design.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#767676"
 
+_PATH, _BEYOND = re.compile(rb' d="[^"]*"'), re.compile(rb"(\.\d\d)\d+")
+"""Data of a path in SVG, and its digits beyond a hundredth."""
 _WIDTH = 64
 """Characters in a line of a title."""
 
 METHODS: dict[str, dict[str, Any]] = {
-    "auto": {"color": BLACK, "marker": "o"},
+    "auto": {"color": PURPLE, "marker": "X", "linestyle": (0, (5, 1))},
     "least-squares": {"color": BLACK, "marker": "o"},
     "iafsa": {"color": BLUE, "marker": "s"},
     "iafsa-unseeded": {"color": SKY, "marker": "D", "linestyle": "--"},
@@ -37,6 +41,15 @@ ENGINES: dict[str, dict[str, Any]] = {
     "exudyn-ge": {"color": PURPLE, "linestyle": "-."},
 }
 OTHER: dict[str, Any] = {"color": PURPLE, "linestyle": "-"}
+LINES: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "linestyle": "-"},
+    {"color": ORANGE, "linestyle": "--"},
+    {"color": GREEN, "linestyle": "-."},
+    {"color": VERMILION, "linestyle": ":"},
+    {"color": PURPLE, "linestyle": (0, (5, 1))},
+    {"color": SKY, "linestyle": (0, (1, 1))},
+)
+"""Looks of lines that have no fixed meaning."""
 
 _RC: Any = {
     "font.family": "DejaVu Sans",
@@ -57,11 +70,11 @@ _RC: Any = {
 }
 
 
-def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
     """Let a function draw in this look."""
 
     @wraps(draw)
-    def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> R:
         with rc_context(_RC):
             return draw(*args, **kwargs)
 
@@ -90,12 +103,15 @@ def png(figure: Figure) -> bytes:
 
 
 def svg(figure: Figure) -> bytes:
-    """The picture as SVG, the same bytes for the same numbers."""
-    return _saved(figure, format="svg", metadata={"Date": None})
+    """The picture as SVG, the same bytes for the same numbers; paths to a hundredth of a point."""
+    drawn = _saved(figure, format="svg", metadata={"Date": None})
+    return _PATH.sub(lambda path: _BEYOND.sub(rb"\1", path[0]), drawn)
 
 
 def _saved(figure: Figure, **options: Any) -> bytes:
     stream = BytesIO()
     with rc_context(_RC):
         figure.savefig(stream, **options)
+    # What is laid out once stays so, which halves the work of the next format.
+    figure.set_layout_engine("none")
     return stream.getvalue()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from shoal.identification import Problem
+from shoal.identification import Estimate, Problem
+from shoal.pictures.signals import UNITS
 
 _UNITS = {
     "angle": "rad",
@@ -31,6 +32,15 @@ def labelled(path: str | None, name: str = "") -> str:
     leaves = [part for part in (path or "").split(".") if not part.isdigit()]
     unit = _UNITS.get(leaves[-1] if leaves else "", "")
     return f"{name or path}{f' [{unit}]' if unit else ''}"
+
+
+def fitness_unit(estimate: Estimate) -> str:
+    """Of a mean square over all channels."""
+    units = {UNITS[channel.quantity] for r in estimate.measurement.recordings.values() for channel in r.channels}
+    if len(units) > 1:
+        return "SI units"
+    (unit,) = units
+    return f"({unit})²" if "/" in unit else f"{unit}²"
 
 
 def parameter(problem: Problem, name: str) -> str:

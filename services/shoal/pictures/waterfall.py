@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from shoal.identification import Estimate
 from shoal.pictures.style import BLUE, GREY, VERMILION, canvas, headline, log_ticks, styled
+from shoal.pictures.units import fitness_unit
 
 
 @styled
@@ -25,8 +26,8 @@ def waterfall(estimate: Estimate) -> Figure:
     axes.set_xlim(0.5, max(len(values), 2) + 0.5)
     headline(figure, _says(estimate.problem, values))
     axes.set_xlabel("place where a search ended, best first")
-    axes.set_ylabel("fitness (mean square)")
-    axes.legend()
+    axes.set_ylabel(f"fitness (mean square) [{fitness_unit(estimate)}]")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=2)
     return figure
 
 

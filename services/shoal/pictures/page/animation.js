@@ -64,7 +64,7 @@ function animate(figure) {
     context.lineCap = context.lineJoin = "round";
     for (const p of run.ground.map(to)) {
       context.fillStyle = GREY;
-      context.fillRect(p[0] - 6, p[1] - 6, 12, 12);
+      context.fillRect(p[0] - 5, p[1] - 5, 10, 10);
     }
     for (const path of Object.values(run.markers)) line(path.slice(0, frame + 1).map(to), "#F0B48C", 1.5);
     for (const outline of Object.values(run.outlines)) {
@@ -75,11 +75,13 @@ function animate(figure) {
       const p = to(run.markers[name][frame]), a = angles[frame];
       if (a !== null) line([p, [p[0] + 34 * Math.cos(a), p[1] - 34 * Math.sin(a)]], ORANGE, 3);
     }
+    const labels = {};
     for (const [name, path] of Object.entries(run.markers)) {
       const p = to(path[frame]);
       circle(p, 3.5, VERMILION, true);
-      text(name, p[0] + 11, p[1] - 9, BLACK, "bold");
+      (labels[p.map(Math.round)] ||= { p, names: [] }).names.push(name);
     }
+    for (const { p, names } of Object.values(labels)) text(names.join(", "), p[0] + 11, p[1] - 9, BLACK, "bold");
     for (const path of Object.values(run.measured)) {
       if (path[frame][0] !== null && path[frame][1] !== null) circle(to(path[frame]), 7, BLACK, false);
     }

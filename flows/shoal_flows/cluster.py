@@ -1,0 +1,56 @@
+"""Where computations run if not in processes of this one: Dask, on this machine or elsewhere, by one setting.
+
+SHOAL_CLUSTER: empty for worker processes without Dask; `local` or `local:N` for a Dask cluster of N processes on
+this machine; the address of a scheduler, such as tcp://host:8786, for any other.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+from functools import cache
+from typing import Any
+
+from shoal.errors import ComputationError, InputError
+
+_PATIENCE = 30.0
+PRELOAD = "shoal_flows.preload"
+
+
+def setting() -> str:
+    """Which cluster is asked for; empty for none."""
+    return os.environ.get("SHOAL_CLUSTER", "").strip()
+
+
+@cache
+def client() -> Any:
+    """The client of the cluster, which ends with this process. Raises InputError, ComputationError."""
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        raise InputError("SHOAL_CLUSTER: Dask is not installed; install shoal with its extra 'scale'") from None
+    wanted = setting()
+    address = _local(wanted) if wanted.split(":")[0] == "local" else wanted
+    try:
+        found = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        reason = str(error).splitlines()[0]
+        raise ComputationError(f"SHOAL_CLUSTER: no scheduler at {wanted}: {reason}") from None
+    atexit.register(found.close)
+    return found
+
+
+def cores() -> int:
+    """Computations that the cluster runs at a time; at least one, as workers may still be on their way."""
+    return max(1, int(sum(client().nthreads().values())))
+
+
+def _local(wanted: str) -> Any:
+    from distributed import LocalCluster
+
+    number = wanted.partition(":")[2] or str(os.cpu_count() or 1)
+    if not (number.isdigit() and int(number) > 0):
+        raise InputError(f"SHOAL_CLUSTER: {wanted!r} is not local, local:N or the address of a scheduler")
+    made = LocalCluster(n_workers=int(number), threads_per_worker=1, dashboard_address=None, preload=[PRELOAD])
+    atexit.register(made.close)
+    return made

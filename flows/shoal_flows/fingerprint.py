@@ -1,0 +1,49 @@
+"""What a result depends on, as one short text: the question, the data, the sources and the versions."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import shoal
+from shoal.home import processor
+from shoal.identification import Measurement, load_problem
+from shoal.scene import load_scene
+
+from shoal_flows import provenance
+from shoal_flows.jobs import Cell
+
+_SOURCES = (".py", ".yaml", ".j2")
+
+
+@cache
+def of_code() -> str:
+    """Of every source file of the library and the flows, the versions of what they use, and the processor."""
+    digest = hashlib.sha256()
+    for folder in (Path(shoal.__file__).parent, Path(__file__).parent):
+        for file in sorted(path for path in folder.rglob("*") if path.suffix in _SOURCES):
+            digest.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes() + b"\0")
+    digest.update(repr((provenance.versions(), processor())).encode())
+    return digest.hexdigest()
+
+
+def of_cell(cell: Cell, measurement: Measurement) -> str:
+    """Of one optimisation. Raises InputError."""
+    problem = load_problem(cell.problem)
+    digest = hashlib.sha256(repr((cell, problem.load_scene(cell.values).fingerprint)).encode())
+    digest.update(problem.model_dump_json().encode() + measurement.origin.encode())
+    for name, recording in measurement.recordings.items():
+        digest.update(name.encode() + recording.times.tobytes() + recording.values.tobytes())
+    return _with_code("fit", digest.hexdigest())
+
+
+def of_simulations(what: str, scene: str, values: Mapping[str, Any], *settings: Sequence[Any] | Any) -> str:
+    """Of runs of one scene. Raises InputError."""
+    return _with_code(what, repr((load_scene(scene).with_values(values).fingerprint, settings)))
+
+
+def _with_code(what: str, text: str) -> str:
+    return f"{what}-{hashlib.sha256(f'{text} {of_code()}'.encode()).hexdigest()[:32]}"

@@ -1,0 +1,70 @@
+"""Flow: the night. Every problem on every engine, against its reference and the nights before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from prefect import flow
+from shoal_validation.nightly import history
+from shoal_validation.nightly.page import headline, render
+from shoal_validation.nightly.plan import Line, plan
+from shoal_validation.nightly.result import Night
+from shoal_validation.nightly.run import machine, run
+
+from shoal_flows.flows.parameters import ALL, Only
+from shoal_flows.flows.shown import Bar, progress, show_result
+from shoal_flows.flows.tables import table
+from shoal_flows.tracking.night import log_night
+
+
+@dataclass(frozen=True)
+class Validated:
+    """A night with the id of its run."""
+
+    night: Night
+    run_id: str
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every line is as it should be."""
+        return self.night.passed
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run nightly --json` prints."""
+        return {**self.night.to_json(), "run_id": self.run_id}
+
+
+@flow(name="nightly", flow_run_name="nightly validation", retries=1, retry_delay_seconds=60, timeout_seconds=3600)
+def nightly(only: Only = ALL, quick: bool = False) -> Validated:
+    """Run what `shoal validate` runs, keep it beside the nights before, and log its lines.
+
+    Args:
+        only: One problem, or all.
+        quick: A part that takes about a minute.
+    """
+    problem = None if only == ALL else only
+    lines, where = plan(problem, quick), history.folder()
+    before, _ = history.load(where, machine())
+    with progress(len(lines), "lines of the night") as bar:
+        night = run(lines, before, quick=quick, only=problem, progress=_note(bar))
+    history.save(night, where)
+    page = render(night, before)
+    history.write_whole(where / "index.html", page)
+    run_id = log_night(night, page)
+    show_result(headline(night), _table(night), run_id)
+    return Validated(night, run_id)
+
+
+def _note(bar: Bar) -> Any:
+    def note(done: int, line: Line) -> None:
+        bar.stand_at(done)
+
+    return note
+
+
+def _table(night: Night) -> str:
+    """What is not as it should be first."""
+    lines = sorted(night.lines, key=lambda line: line.verdict.fine)
+    rows = ((line.verdict, line.problem, line.engine, line.method, line.expected, line.found) for line in lines)
+    return table(("verdict", "problem", "engine", "method", "expected", "found"), rows)

@@ -1,0 +1,57 @@
+"""The types of the flows' parameters, with the choices that Prefect's form offers.
+
+The choices are advice to the form, and its server refuses others; what is called in Python may also be a
+file, or an engine elsewhere, and is checked by who uses it. What a parameter means stands in the docstring of
+its flow, from where Prefect takes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, Field
+from shoal.engines import ENGINES
+from shoal.identification.methods import METHODS
+from shoal.identification.problem import problem_names
+from shoal.scene.load import scene_names
+from shoal_validation.nightly.plan import IDENTIFICATION
+from shoal_validation.problems import PROBLEMS
+
+
+def _one_of(names: Iterable[str]) -> Any:
+    return Field(json_schema_extra={"enum": list(names)})
+
+
+SceneName = Annotated[str, _one_of(scene_names())]
+ProblemName = Annotated[str, _one_of(problem_names())]
+EngineName = Annotated[str, _one_of(ENGINES)]
+Engines = Annotated[list[EngineName], Field(min_length=1)]
+Methods = Annotated[list[Annotated[str, _one_of(METHODS)]], Field(min_length=1)]
+Seeds = Annotated[list[int], Field(min_length=1)]
+Values = dict[str, Any]
+Instant = Annotated[float | None, Field(ge=0)]
+ALL = "all"
+Only = Annotated[str, _one_of((ALL, *PROBLEMS, *IDENTIFICATION))]
+
+
+class Axis(BaseModel):
+    """One value to vary, evenly from low to high."""
+
+    path: str = Field(title="field of the scene", description="Such as initial.OA.angle, in SI units.")
+    low: float = Field(title="from")
+    high: float = Field(title="to")
+    count: int = Field(title="how many", ge=1)
+
+
+def _axes(given: Any) -> Any:
+    """Axes as {path: [low, high, count]}, the short form of the command line, as the list of the form."""
+    if not isinstance(given, Mapping):
+        return given
+    for path, span in given.items():
+        if not (isinstance(span, list | tuple) and len(span) == 3):
+            raise ValueError(f"{path}: needs [low, high, count], found {span!r}")
+    return [{"path": path, "low": low, "high": high, "count": count} for path, (low, high, count) in given.items()]
+
+
+Axes = Annotated[list[Axis], BeforeValidator(_axes), Field(min_length=1)]

@@ -1,0 +1,70 @@
+"""What Prefect's pages show of a flow: its result as a table, the way to its run in MLflow, how far it is."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from prefect.artifacts import (
+    create_link_artifact,
+    create_markdown_artifact,
+    create_progress_artifact,
+    update_progress_artifact,
+)
+
+from shoal_flows import settings
+from shoal_flows.tracking.record import LOCAL
+from shoal_flows.tracking.store import connect
+
+
+def show_result(title: str, table: str, run_id: str) -> None:
+    """The table (Markdown) of a flow that runs, and a link to its run in MLflow."""
+    create_markdown_artifact(f"## {title}\n\n{table}\n\n{_where(run_id)}\n", key="result", description=title)
+    if address := run_address(run_id):
+        create_link_artifact(address, link_text="The run in MLflow", key="mlflow-run", description=title)
+
+
+def run_address(run_id: str) -> str | None:
+    """The page of a run; None if the runs are in a database without a server, or the run is still in the outbox.
+
+    SHOAL_MLFLOW_URL is the server's address as a browser sees it, where that is not the address that tasks use.
+    """
+    server = os.environ.get("SHOAL_MLFLOW_URL") or settings.tracking_server()
+    if not server or run_id.startswith(LOCAL):
+        return None
+    experiment = connect().get_run(run_id).info.experiment_id
+    return f"{server.rstrip('/')}/#/experiments/{experiment}/runs/{run_id}"
+
+
+def _where(run_id: str) -> str:
+    if run_id.startswith(LOCAL):
+        return "MLflow does not answer: the run is kept in the outbox; `shoal upload` sends it."
+    address = run_address(run_id)
+    return f"[Run {run_id} in MLflow]({address})" if address else f"Run `{run_id}` in MLflow; `shoal ui` shows it."
+
+
+class Bar:
+    """A progress artifact of the flow that runs."""
+
+    def __init__(self, total: int, description: str) -> None:
+        self._total, self._done = total, 0
+        self._artifact: Any = create_progress_artifact(0.0, key="progress", description=description)
+
+    def advance(self) -> None:
+        """One more is done."""
+        self.stand_at(self._done + 1)
+
+    def stand_at(self, done: int) -> None:
+        """So many are done."""
+        self._done = done
+        update_progress_artifact(self._artifact, 100.0 * done / self._total)
+
+
+@contextmanager
+def progress(total: int, description: str) -> Iterator[Bar]:
+    """A bar that stands at the end when the block is left without an exception."""
+    bar = Bar(total, description)
+    yield bar
+    bar.stand_at(total)

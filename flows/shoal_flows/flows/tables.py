@@ -1,0 +1,46 @@
+"""Results as tables in Markdown, for Prefect's pages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from shoal.engines.compare import Comparison
+from shoal.engines.sweep import Sweep
+from shoal.trajectory import Trajectory
+
+_ROWS = 50
+
+
+def of_motion(motion: Trajectory) -> str:
+    """Where the markers end, and the evidence."""
+    ends = [(name, *motion.marker(name)[-1]) for name in motion.markers]
+    evidence = f"{motion.status[0]}; energy drift {motion.energy_drift[0]:.1e}, constraint drift "
+    evidence += f"{motion.constraint_drift[0]:.1e} m, {motion.steps} steps, {motion.wall_s:.3f} s"
+    return table(("marker", "x [m]", "y [m]"), ends) + f"\n\n{evidence}"
+
+
+def of_comparison(comparison: Comparison) -> str:
+    """How far each pair of engines is apart."""
+    rows = [("-".join(row["engines"]), row["marker"], row["largest"], row["final"]) for row in comparison.differences()]
+    rows += [(engine, "refused", reason, "") for engine, reason in comparison.refused.items()]
+    return table(("engines", "marker", "largest distance [m]", "distance at the end [m]"), rows)
+
+
+def of_sweep(result: Sweep) -> str:
+    """The points, at most as many as a page can show."""
+    rows = result.rows()
+    shown = table(list(rows[0]), (row.values() for row in rows[:_ROWS]))
+    return shown if len(rows) <= _ROWS else f"{shown}\n\nThe first {_ROWS} of {len(rows)} points; all are in sweep.csv."
+
+
+def table(headings: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """A table of numbers and words."""
+    lines = [headings, ["---"] * len(headings), *([_cell(value) for value in row] for row in rows)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.9g}"
+    return "" if value is None else str(value).replace("|", "\\|").replace("\n", " ")

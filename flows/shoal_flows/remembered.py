@@ -1,0 +1,74 @@
+"""Results by what they depend on: a study that was broken off, or is asked for again, computes what is missing."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+from shoal.home import home
+
+from shoal_flows import workers
+
+P = ParamSpec("P")
+T = TypeVar("T")
+_reused: list[str] = []
+_fresh = False
+
+
+def run(key: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    """The result kept under this key, else that of `workers.run`, which is kept from now on.
+
+    With SHOAL_FRESH set, everything is computed anew.
+    """
+    file = folder() / key
+    if not (_fresh or os.environ.get("SHOAL_FRESH")) and (found := _read(file)) is not None:
+        _reused.append(key)
+        result: T = found[0]
+        return result
+    result = workers.run(function, *args, **kwargs)
+    _write(file, result)
+    return result
+
+
+def reused() -> int:
+    """How many results of this process were computed before."""
+    return len(_reused)
+
+
+@contextmanager
+def anew() -> Iterator[None]:
+    """Compute everything within the block."""
+    global _fresh
+    before, _fresh = _fresh, True
+    try:
+        yield
+    finally:
+        _fresh = before
+
+
+def folder() -> Path:
+    """Where results are kept, made on demand; whoever can write here can have code run. Raises InputError."""
+    found = home() / "results"
+    found.mkdir(mode=0o700, exist_ok=True)
+    return found
+
+
+def _read(file: Path) -> tuple[Any] | None:
+    try:
+        return (pickle.loads(file.read_bytes()),)
+    except Exception:
+        # There is none, or nobody can read it any more: it is computed again.
+        return None
+
+
+def _write(file: Path, result: Any) -> None:
+    """At once: a process that is killed leaves a whole file or none."""
+    handle, name = tempfile.mkstemp(dir=file.parent, prefix=".new-")
+    with os.fdopen(handle, "wb") as stream:
+        pickle.dump(result, stream)
+    os.replace(name, file)

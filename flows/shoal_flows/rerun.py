@@ -1,0 +1,131 @@
+"""`shoal rerun`: repeat a study from its run in MLflow alone, and say whether the figures agree."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from shoal.errors import ComputationError, InputError
+
+from shoal_flows import provenance, remembered, run, settings
+from shoal_flows.terminal import notice
+from shoal_flows.tracking import origin, outbox
+from shoal_flows.tracking.record import LOCAL
+
+AGREEMENT = 1e-6
+"""Relative difference below which two figures are the same: what another processor may do to a converged answer."""
+_TIMES = ("wall_s", "seconds")
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """Figures of two runs: name -> (before, now), both with those of their parts; versions that differ, likewise."""
+
+    before: str
+    now: str
+    figures: dict[str, tuple[float, float]]
+    versions: dict[str, tuple[str, str]]
+
+    @property
+    def agree(self) -> bool:
+        """Whether there are figures and all of them agree."""
+        return bool(self.figures) and not self.different
+
+    @property
+    def different(self) -> dict[str, tuple[float, float]]:
+        """Figures that do not agree; one that only one of the runs has is NaN in the other."""
+        return {
+            name: (old, new)
+            for name, (old, new) in self.figures.items()
+            if not math.isclose(old, new, rel_tol=AGREEMENT, abs_tol=1e-15)
+        }
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal rerun --json` prints."""
+        return {
+            "status": "ok" if self.agree else "failed",
+            "before": self.before,
+            "now": self.now,
+            "figures": len(self.figures),
+            "different": self.different,
+            "versions": self.versions,
+        }
+
+
+def rerun(run_id: str) -> Repeated:
+    """Repeat the flow of a run with what it was given. Raises InputError, ComputationError."""
+    settings.apply()
+    from shoal_flows.tracking.store import connect
+
+    client, known = connect(), outbox.address(run_id)
+    with TemporaryDirectory() as folder:
+        flow, parameters = _origin(client, known, Path(folder))
+        with remembered.anew():
+            now = str(run.run_flow(flow, parameters).run_id)
+    if now.startswith(LOCAL):
+        notice()
+        raise ComputationError("rerun: MLflow stopped answering, so that the figures cannot be compared yet")
+    old, new = dict(_figures(client, known)), dict(_figures(client, now))
+    figures = {name: (old.get(name, math.nan), new.get(name, math.nan)) for name in {**old, **new}}
+    tags = [client.get_run(one).data.tags for one in (known, now)]
+    names = (*(f"version.{package}" for package in provenance.PACKAGES), "source.revision", "platform")
+    versions = {n: (tags[0].get(n, "?"), tags[1].get(n, "?")) for n in names if tags[0].get(n) != tags[1].get(n)}
+    return Repeated(known, now, figures, versions)
+
+
+def main(run_id: str, as_json: bool) -> bool:
+    """Print what `rerun` found; returns whether all figures agree."""
+    from rich.console import Console
+
+    from shoal_flows.jsontext import as_json_text
+
+    repeated = rerun(run_id)
+    if as_json:
+        print(as_json_text(repeated.to_json()))  # noqa: T201 - this is the output
+        return repeated.agree
+    console = Console(highlight=False)
+    console.print(f"run {repeated.now} repeats {repeated.before}", soft_wrap=True)
+    for name, (old, new) in repeated.versions.items():
+        console.print(f"  {name}: {old}, now {new}", soft_wrap=True)
+    for name, (before, after) in repeated.different.items():
+        console.print(f"  {name}: {before:.9g}, now {after:.9g}", soft_wrap=True)
+    agree = len(repeated.figures) - len(repeated.different)
+    console.print(f"{agree} of {len(repeated.figures)} figures agree within {AGREEMENT:g}")
+    return repeated.agree
+
+
+def _origin(client: Any, run_id: str, folder: Path) -> tuple[str, dict[str, Any]]:
+    from mlflow.exceptions import MlflowException
+
+    try:
+        tags = client.get_run(run_id).data.tags
+    except MlflowException:
+        raise InputError(f"run: MLflow knows no run {run_id!r}; `shoal ui` shows those it knows") from None
+    if parent := tags.get("mlflow.parentRunId"):
+        raise InputError(f"run: {run_id} is part of a study; repeat the study: {parent}")
+    there = {item.path for item in client.list_artifacts(run_id)}
+    if origin.CALL not in there:
+        raise InputError(f"run: {run_id} does not say what it was asked for; it was not made by a flow")
+    for path in there & {origin.CALL, origin.INPUTS}:
+        client.download_artifacts(run_id, path, str(folder))
+    flow, parameters = origin.restored(folder)
+    if flow == "demo":
+        raise InputError(f"run: {run_id} is part of the demo, which is repeated as a whole: shoal demo")
+    return flow, parameters
+
+
+def _figures(client: Any, run_id: str) -> Iterator[tuple[str, float]]:
+    """The results of a study and of its parts that a repetition should give again, which times are not."""
+    whole = client.get_run(run_id)
+    parts = client.search_runs([whole.info.experiment_id], f"tags.`mlflow.parentRunId` = '{run_id}'")
+    for one in (whole, *parts):
+        prefix = "" if one is whole else f"{one.info.run_name}: "
+        for name, value in one.data.metrics.items():
+            head, _, tail = name.partition("/")
+            timed = head in _TIMES or tail in _TIMES
+            if head in ("final", "error", "difference", "interval", "study") and not timed:
+                yield prefix + name, value

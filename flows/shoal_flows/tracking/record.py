@@ -1,0 +1,100 @@
+"""All there is to say about one run, before MLflow has heard of it, and its form in a folder."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Self
+from uuid import uuid4
+
+LOCAL = "outbox-"
+"""How the id of a run begins that MLflow has not given one yet."""
+_TEXT = "record.json"
+_FILES = "files"
+
+
+@dataclass
+class Run:
+    """A run that is being filled; what is added is sent when it ends.
+
+    run_id: MLflow's, or one of our own as long as MLflow cannot be reached; name, description in words; parent: the
+    run_id of the study; params never change; metrics: (name, value, time [ms], step); files: artifacts by path;
+    started, ended [ms]
+    """
+
+    experiment: str
+    name: str
+    tags: dict[str, str]
+    parent: str | None = None
+    run_id: str = field(default_factory=lambda: f"{LOCAL}{uuid4().hex}")
+    status: str = "RUNNING"
+    started: int = field(default_factory=lambda: _now())
+    ended: int = 0
+    kept_params: dict[str, str] = field(default_factory=dict)
+    metrics: list[tuple[str, float, int, int]] = field(default_factory=list)
+    files: dict[str, bytes] = field(default_factory=dict)
+
+    @property
+    def known(self) -> bool:
+        """Whether MLflow has made this run."""
+        return not self.run_id.startswith(LOCAL)
+
+    def params(self, values: Mapping[str, Any]) -> None:
+        """Settings, which never change; what is too long for MLflow is cut."""
+        self.kept_params |= {name: str(value)[:6000] for name, value in values.items()}
+
+    def metric(self, name: str, value: float, step: int = 0) -> None:
+        """One number; what is not finite is left out."""
+        if math.isfinite(value):
+            self.metrics.append((re.sub(r"[^\w\-. /]", "_", name), float(value), _now(), step))
+
+    def series(self, name: str, values: Iterable[tuple[int, float]]) -> None:
+        """Numbers by step."""
+        for step, value in values:
+            self.metric(name, value, step)
+
+    def text(self, content: str, path: str) -> None:
+        """A text artifact at `path`."""
+        self.files[path] = content.encode()
+
+    def picture(self, content: bytes, path: str) -> None:
+        """A picture at `path`."""
+        self.files[path] = content
+
+    def end(self, status: str) -> None:
+        """FINISHED or FAILED."""
+        self.status, self.ended = status, _now()
+
+    def write_files(self, folder: Path) -> None:
+        """The artifacts, each at its path."""
+        for path, content in self.files.items():
+            target = folder / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(content)
+
+    def save(self, folder: Path) -> None:
+        """Write everything to a new folder, which is there as a whole or not at all."""
+        fresh = folder.with_name(f".{folder.name}")
+        fresh.mkdir(parents=True)
+        self.write_files(fresh / _FILES)
+        (fresh / _TEXT).write_text(json.dumps({**asdict(self), "files": None}), encoding="utf-8")
+        fresh.rename(folder)
+
+    @classmethod
+    def load(cls, folder: Path) -> Self:
+        """What `save` wrote. Raises OSError, ValueError."""
+        data = json.loads((folder / _TEXT).read_text(encoding="utf-8"))
+        data["metrics"] = [(name, value, when, step) for name, value, when, step in data["metrics"]]
+        where = folder / _FILES
+        found = [path for path in where.rglob("*") if path.is_file()]
+        data["files"] = {path.relative_to(where).as_posix(): path.read_bytes() for path in found}
+        return cls(**data)
+
+
+def _now() -> int:
+    return int(time.time() * 1000)

@@ -1,0 +1,16 @@
+"""`shoal upload`: tell MLflow of the runs that it could not be told of when they ended."""
+
+from __future__ import annotations
+
+from shoal_flows import settings
+from shoal_flows.tracking import outbox
+
+
+def upload() -> int:
+    """Send everything that waits; returns how many runs. Raises ComputationError if MLflow does not answer."""
+    settings.apply()
+    if not outbox.pending():
+        return 0
+    from shoal_flows.tracking import store
+
+    return store.upload()

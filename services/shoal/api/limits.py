@@ -1,0 +1,54 @@
+"""How much a request may ask for, before anything is computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from shoal.api.settings import Settings
+from shoal.errors import InputError
+from shoal.mechanics.swarm_motion import asked_for
+from shoal.scene import Scene
+
+
+class TooMuch(InputError):  # noqa: N818 - a refusal, not a failure
+    """The request is right, and larger than this service computes."""
+
+
+def check_scene(scene: Scene, settings: Settings, times: Sequence[float] | None = None, lanes: int = 1) -> None:
+    """Whether a scene may be simulated in so many lanes. times [s]: of the samples. Raises TooMuch."""
+    solver = scene.solver
+    elements = sum(getattr(body, "elements", 1) for body in scene.bodies.values())
+    if elements > settings.max_elements:
+        raise TooMuch(f"scene.bodies: {elements} elements; this service computes {settings.max_elements}")
+    samples = solver.samples if times is None else len(times)
+    values = samples * len(scene.markers) * lanes
+    if values > settings.max_values:
+        size = f"{samples} samples of {len(scene.markers)} markers in {lanes} lanes"
+        raise TooMuch(f"times: {size}; this service returns {settings.max_values} values")
+    end = solver.duration if times is None else max(times, default=0.0)
+    search = solver.swarm_size * solver.swarm_iterations if asked_for(scene) else 1
+    work = math.ceil(min(end / solver.step, 1e18)) * elements * lanes * search
+    if work > settings.max_work:
+        raise TooMuch(
+            f"solver.step: {end / solver.step:.3g} steps of {elements} elements in {lanes} lanes"
+            f"{f', each searched {search} times' if search > 1 else ''}; "
+            f"this service computes {settings.max_work:.3g} in all"
+        )
+
+
+def check_lanes(
+    scene: Scene, settings: Settings, times: Sequence[float] | None, lanes: Mapping[str, Sequence[float]]
+) -> None:
+    """Whether a scene may be simulated with these numbers, one per lane. Raises InputError."""
+    if not lanes or not all(lanes.values()):
+        raise InputError("lanes: needs at least one path, and one number or more for each")
+    count = max(len(column) for column in lanes.values())
+    check_scene(scene, settings, times, count)
+    # What the work depends on may itself differ from lane to lane.
+    costly = {
+        path: column for path, column in lanes.items() if path.startswith("solver.") or path.endswith(".elements")
+    }
+    for lane in range(count) if costly else ():
+        numbers = {path: column[min(lane, len(column) - 1)] for path, column in costly.items()}
+        check_scene(scene.with_values(numbers), settings, times, count)

@@ -1,0 +1,73 @@
+"""The program of one service: put together here, nowhere else."""
+
+from __future__ import annotations
+
+import hmac
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import Annotated
+
+from fastapi import Depends, FastAPI, Request, Security
+from fastapi.exceptions import RequestValidationError
+from fastapi.security import APIKeyHeader
+from starlette.exceptions import HTTPException
+
+from shoal.api import routes, umbridge
+from shoal.api.jobs import Jobs
+from shoal.api.pool import Pool
+from shoal.api.refusal import Refusal, on_failure, on_refusal
+from shoal.api.settings import Settings
+from shoal.api.worker import MakeEngine, Worker
+from shoal.engines import get_engine
+from shoal.versions import versions
+
+_header = APIKeyHeader(name="X-API-Key", auto_error=False)
+
+
+def require_key(request: Request, given: Annotated[str | None, Security(_header)] = None) -> None:
+    """Raises Refusal where keys are asked for and none of them is given."""
+    keys: tuple[bytes, ...] = request.app.state.keys
+    # Every key is compared, each in constant time, so that the time tells nothing.
+    matches = [hmac.compare_digest((given or "").encode(), key) for key in keys]
+    if not any(matches):
+        raise Refusal("unauthorized", "X-API-Key: the key is missing or not known", "X-API-Key")
+
+
+def create_program(engine: str, settings: Settings | None = None, make_engine: MakeEngine | None = None) -> FastAPI:
+    """The program that serves an engine. Raises InputError.
+
+    settings: else those of the environment; make_engine: called in every worker, else the engine of that name is made
+    """
+    settings = settings or Settings.read()
+    worker = partial(Worker, make_engine or partial(get_engine, engine), settings)
+
+    @asynccontextmanager
+    async def lifespan(program: FastAPI) -> AsyncIterator[None]:
+        calls = Pool(worker, settings.workers, settings.queue)
+        job_pool = Pool(worker, settings.job_workers, settings.job_queue + settings.job_workers)
+        program.state.calls, program.state.job_pool = calls, job_pool
+        program.state.jobs = Jobs(job_pool, settings)
+        calls.start()
+        job_pool.start()
+        yield
+        await calls.stop()
+        await job_pool.stop()
+
+    program = FastAPI(
+        title=f"Shoal: {engine}",
+        version=versions(["shoal"])["shoal"],
+        description="Simulates and identifies planar rigid-flexible machines. Errors are problem documents (RFC 9457).",
+        lifespan=lifespan,
+        docs_url=None,  # pages that load scripts from elsewhere
+        redoc_url=None,
+    )
+    program.state.settings, program.state.keys = settings, settings.keys()
+    guard = [Depends(require_key)] if program.state.keys else []
+    program.include_router(routes.health)
+    for router in (routes.v1, routes.identifications, umbridge.router):
+        program.include_router(router, dependencies=guard)
+    for kind in (Refusal, RequestValidationError, HTTPException):
+        program.add_exception_handler(kind, on_refusal)
+    program.add_exception_handler(Exception, on_failure)
+    return program

@@ -1,0 +1,152 @@
+"""The endpoints of Shoal's own interface."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Path, Request, Response
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+
+from shoal.api.jobs import Jobs
+from shoal.api.pool import Pool
+from shoal.api.refusal import Refusal, documented
+from shoal.api.schemas import (
+    EngineDocument,
+    Health,
+    IdentifyRequest,
+    JobStatus,
+    Library,
+    Motion,
+    SimulateRequest,
+    VersionDocument,
+)
+from shoal.api.strict import StrictRoute
+
+COMPUTING = ("input", "too-much", "body-too-large", "too-slow", "busy", "crashed", "not-ready", "timeout")
+
+health = APIRouter(tags=["health"])
+v1 = APIRouter(prefix="/v1", route_class=StrictRoute)
+identifications = APIRouter(prefix="/v1/identifications", route_class=StrictRoute, tags=["identifications"])
+
+
+def require_ready(request: Request) -> None:
+    """Raises Refusal until workers are up."""
+    calls, jobs = request.app.state.calls, request.app.state.job_pool
+    if not (calls.about and jobs.about):
+        raise Refusal("not-ready", "no worker is up yet; see /ready", headers={"Retry-After": "5"})
+
+
+def _calls(request: Request) -> Pool:
+    pool: Pool = request.app.state.calls
+    return pool
+
+
+def _jobs(request: Request) -> Jobs:
+    jobs: Jobs = request.app.state.jobs
+    return jobs
+
+
+Ready = Depends(require_ready)
+Calls = Annotated[Pool, Depends(_calls)]
+AllJobs = Annotated[Jobs, Depends(_jobs)]
+JobId = Annotated[str, Path(max_length=64)]
+
+
+@health.get("/health")
+async def live() -> Health:
+    """Whether the program lives."""
+    return Health(status="ok")
+
+
+@health.get("/ready", responses=documented("not-ready"))
+async def ready(request: Request) -> Health:
+    """Whether workers are up, with warm kernels."""
+    if not (request.app.state.calls.ready and request.app.state.job_pool.ready):
+        raise Refusal("not-ready", "workers are starting", headers={"Retry-After": "5"})
+    return Health(status="ok")
+
+
+@v1.get("/version", dependencies=[Ready], responses=documented("not-ready"))
+async def version(calls: Calls) -> VersionDocument:
+    """Versions of what computes here."""
+    return VersionDocument(**calls.about["version"])
+
+
+@v1.get("/capabilities", dependencies=[Ready], responses=documented("not-ready"))
+async def capabilities(calls: Calls) -> EngineDocument:
+    """What the engine can simulate."""
+    return EngineDocument(**calls.about["capabilities"])
+
+
+@v1.get("/library", dependencies=[Ready], responses=documented("not-ready"))
+async def library(calls: Calls) -> Library:
+    """Names of the built-in scenes and problems."""
+    return Library(**calls.about["library"])
+
+
+@v1.get("/schemas/{kind}", dependencies=[Ready], responses=documented("not-ready", "input"))
+async def schema(kind: Literal["scene", "problem"], calls: Calls) -> dict[str, Any]:
+    """The JSON schema of a scene or a problem."""
+    found: dict[str, Any] = calls.about["schemas"][kind]
+    return found
+
+
+@v1.post("/simulate", dependencies=[Ready], response_model=Motion, responses=documented(*COMPUTING))
+async def simulate(asked: SimulateRequest, request: Request, calls: Calls) -> Response:
+    """Simulate a scene, or one per lane. A run that failed carries its status."""
+    answer = await calls.run("simulate", asked, request.app.state.settings.wall_seconds)
+    return Response(answer, media_type="application/json")
+
+
+@identifications.post("", status_code=202, dependencies=[Ready], responses=documented(*COMPUTING))
+async def identify(
+    asked: IdentifyRequest, request: Request, response: Response, calls: Calls, jobs: AllJobs
+) -> JobStatus:
+    """Check a request, and identify in the background; `Location` says where to ask."""
+    await calls.run("check", asked, request.app.state.settings.wall_seconds)
+    job = jobs.submit(asked)
+    response.headers["Location"] = f"/v1/identifications/{job.id}"
+    return job.status
+
+
+@identifications.get("/{id}", responses=documented("not-found", "input"))
+async def status(id: JobId, jobs: AllJobs) -> JobStatus:
+    """How an identification goes."""
+    return jobs.get(id).status
+
+
+@identifications.delete("/{id}", status_code=204, responses=documented("not-found", "input"))
+async def cancel(id: JobId, jobs: AllJobs) -> None:
+    """Stop an identification; one that has ended stays as it is."""
+    jobs.cancel(id)
+
+
+@identifications.get(
+    "/{id}/result", response_model=dict[str, Any], responses=documented("not-found", "conflict", *COMPUTING)
+)
+async def result(id: JobId, jobs: AllJobs) -> Response:
+    """The object that `shoal identify --json` prints."""
+    job = jobs.get(id)
+    if job.refusal is not None:
+        raise job.refusal
+    if job.state != "done":
+        raise Refusal("conflict", f"the identification is {job.state}", "id")
+    return Response(job.result, media_type="application/json")
+
+
+def known_job(id: JobId, jobs: AllJobs) -> None:
+    """Refuse an unknown job before a stream has begun."""
+    jobs.get(id)
+
+
+@identifications.get(
+    "/{id}/events",
+    response_class=EventSourceResponse,
+    dependencies=[Depends(known_job)],
+    responses=documented("not-found", "input"),
+)
+async def events(id: JobId, jobs: AllJobs) -> AsyncIterator[ServerSentEvent]:
+    """Server-sent events: the status of an identification whenever it changes, until it ends."""
+    async for news in jobs.get(id).news():
+        yield ServerSentEvent(event="status", data=news)

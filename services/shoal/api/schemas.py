@@ -1,0 +1,160 @@
+"""What a service is asked and what it answers. Quantities are in SI units, angles in radians."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from shoal.trajectory import Status
+
+BuiltIn = Annotated[str, Field(min_length=1, max_length=100)]
+Path = Annotated[str, Field(min_length=1, max_length=200)]
+Column = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_ ./()-]{0,99}$")]
+RecordingName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,99}$")]
+Fields = dict[Path, Any]
+Number = float | None
+"""null is what is not finite."""
+
+
+class Asked(BaseModel):
+    """Base of requests: unknown fields and non-finite numbers are refused."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class SimulateRequest(Asked):
+    """A scene (a built-in name, or an object as /v1/schemas/scene describes it), and when to look at it.
+
+    values: fields of the scene to set, by path; times: sampling instants [s], else the scene's own
+    lanes: path -> one number per lane; then one scene per lane is simulated
+    """
+
+    scene: BuiltIn | dict[str, Any]
+    values: Fields = {}
+    times: list[float] | None = None
+    lanes: dict[Path, list[float]] | None = None
+
+
+class Motion(BaseModel):
+    """Motion of one scene per lane.
+
+    times [s]: (samples,); points: marker positions [m], (samples, markers, 2, lanes); angles [rad]: (samples, markers,
+    lanes); velocities [m/s] and rates [rad/s] likewise, null where the engine does not tell them
+    status, energy_drift, constraint_drift: one per lane; steps: time steps; wall_s: of the computation
+    Numbers that are not finite are null.
+    """
+
+    engine: str
+    times: list[float]
+    markers: list[str]
+    points: list[list[list[list[Number]]]]
+    angles: list[list[list[Number]]]
+    velocities: list[list[list[list[Number]]]] | None
+    rates: list[list[list[Number]]] | None
+    status: list[Status]
+    energy_drift: list[Number]
+    constraint_drift: list[Number]
+    steps: int
+    wall_s: float
+    message: str
+    model: dict[str, Any]
+
+
+class Table(Asked):
+    """A recording. columns: name -> numbers, all of one length, null where nothing was measured."""
+
+    columns: Annotated[dict[Column, list[Number]], Field(min_length=1, max_length=100)]
+
+
+class IdentifyRequest(Asked):
+    """A problem (a built-in name, or an object as /v1/schemas/problem describes it), and how to solve it.
+
+    The `scene` of a problem is a built-in name, or an object. recordings: by the problem's names, `recording` where it
+    has but one source. The other fields are those of `shoal identify`; time_limit in s.
+    """
+
+    problem: BuiltIn | dict[str, Any]
+    recordings: dict[RecordingName, Table] = {}
+    values: Fields = {}
+    method: BuiltIn | None = None
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+    tolerance: Annotated[float, Field(gt=0)] | None = None
+    time_limit: Annotated[float, Field(gt=0)] | None = None
+    profiles: bool = False
+    bootstrap: Annotated[int, Field(ge=0, le=10_000)] = 0
+
+
+class Progress(BaseModel):
+    """How a search goes. best: fitness; mean: of the last iteration; evaluations: simulations so far."""
+
+    iteration: int
+    best: Number
+    mean: Number
+    evaluations: int
+
+
+class JobStatus(BaseModel):
+    """An identification. problem: why it failed, as a problem document."""
+
+    id: str
+    status: Literal["queued", "running", "done", "failed", "cancelled"]
+    progress: Progress | None = None
+    problem: dict[str, Any] | None = None
+
+
+class EngineDocument(BaseModel):
+    """What the engine can simulate; see `shoal.engines.Capabilities`."""
+
+    engine: str
+    elements: list[str]
+    joints: list[str]
+    loads: list[str]
+    features: list[str]
+    lanes: bool
+
+
+class Library(BaseModel):
+    """Built-in names."""
+
+    scenes: list[str]
+    problems: list[str]
+
+
+class VersionDocument(BaseModel):
+    """Versions of the packages that compute."""
+
+    engine: str
+    versions: dict[str, str]
+
+
+class Health(BaseModel):
+    """Whether the program lives, or is ready to compute."""
+
+    status: str
+
+
+MODELS = ("tip-motion", "misfit")
+"""Names of UM-Bridge's models; see `models`."""
+Operation = Literal["InputSizes", "OutputSizes", "Evaluate", "Gradient", "ApplyJacobian"]
+
+
+class ModelCall(BaseModel):
+    """A call of UM-Bridge 1.0; which fields count depends on the endpoint."""
+
+    model_config = ConfigDict(allow_inf_nan=False, frozen=True)
+
+    name: BuiltIn
+    config: dict[str, Any] = {}
+    input: list[list[float]] = []
+    outWrt: int = 0
+    inWrt: int = 0
+    sens: list[float] = []
+    vec: list[float] = []
+
+
+class ModelTask(NamedTuple):
+    """A call of a model, and what is asked of it."""
+
+    operation: Operation
+    call: ModelCall

@@ -1,0 +1,79 @@
+"""Bodies of bounded size, depth and duration, read as strict JSON: no NaN, no infinities, no other format."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import orjson
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from shoal.api.refusal import Refusal
+from shoal.api.settings import Settings
+
+
+class StrictRequest(Request):
+    """A request whose body is read within the limits of the service."""
+
+    async def body(self) -> bytes:
+        """The body. Raises Refusal if it is too large or too slow."""
+        if not hasattr(self, "_body"):
+            settings: Settings = self.app.state.settings
+            try:
+                async with asyncio.timeout(settings.receive_seconds):
+                    self._body = await self._receive_all(settings.body_bytes)
+            except TimeoutError:
+                text = f"the body did not arrive within {settings.receive_seconds:g} s"
+                raise Refusal("too-slow", text, headers={"Connection": "close"}) from None
+        return self._body
+
+    async def _receive_all(self, limit: int) -> bytes:
+        stated = self.headers.get("content-length", "0")
+        if not stated.isdecimal() or len(stated) > 18 or int(stated) > limit:
+            raise _too_large(limit)
+        chunks, size = [], 0
+        async for chunk in self.stream():
+            size += len(chunk)
+            if size > limit:
+                raise _too_large(limit)
+            chunks.append(chunk)
+        return b"".join(chunks)
+
+    async def json(self) -> Any:
+        """The body as plain data. Raises Refusal."""
+        try:
+            data = orjson.loads(await self.body())
+        except orjson.JSONDecodeError as error:
+            raise Refusal("malformed", f"not JSON: {error}", "body") from None
+        check_depth(data, self.app.state.settings.json_depth)
+        return data
+
+
+class StrictRoute(APIRoute):
+    """A route whose requests are strict ones."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The handler that FastAPI calls."""
+        inner = super().get_route_handler()
+
+        async def handler(request: Request) -> Response:
+            return await inner(StrictRequest(request.scope, request.receive))
+
+        return handler
+
+
+def check_depth(data: Any, limit: int) -> None:
+    """Raises Refusal where objects and lists are nested deeper than the limit."""
+    level = [data] if isinstance(data, dict | list) else []
+    for _ in range(limit):
+        entries = (entry for box in level for entry in (box.values() if isinstance(box, dict) else box))
+        level = [entry for entry in entries if isinstance(entry, dict | list)]
+        if not level:
+            return
+    raise Refusal("malformed", f"JSON is nested deeper than {limit}", "body")
+
+
+def _too_large(limit: int) -> Refusal:
+    return Refusal("body-too-large", f"the body may have {limit} bytes", "body", {"Connection": "close"})

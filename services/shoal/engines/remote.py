@@ -1,0 +1,127 @@
+"""An engine behind a service: whatever takes an engine's name also takes the address of one.
+
+Doubles cross as JSON in their shortest form, which gives back every bit; what is not finite comes back as nan.
+"""
+
+from __future__ import annotations
+
+import os
+import weakref
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import httpx
+import numpy as np
+import orjson
+from httpx_retries import Retry, RetryTransport
+
+from shoal.engines.contract import Capabilities
+from shoal.errors import ComputationError, InputError
+from shoal.scene import Scene
+from shoal.trajectory import Array, Status, Trajectory
+
+RETRIES = 6
+"""After a connection that failed, a full queue, a proxy without a service: 0.25 s, 0.5 s, ... up to 8 s apart."""
+SECONDS = 600.0
+"""A service that is silent for longer is given up."""
+_KINDS = ("elements", "joints", "loads", "features")
+_ARRAYS = ("times", "points", "angles", "energy_drift", "constraint_drift")
+
+
+class RemoteEngine:
+    """The engine of the service at an http or https address. The key, if it asks for one, is SHOAL_API_KEY."""
+
+    def __init__(self, url: str, transport: httpx.BaseTransport | None = None) -> None:
+        """transport: instead of the network's."""
+        self.name = url.rstrip("/")
+        retry = Retry(
+            total=RETRIES,
+            allowed_methods=["GET", "POST"],
+            status_forcelist=[429, 502, 503],
+            retry_on_exceptions=[httpx.NetworkError, httpx.RemoteProtocolError, httpx.ConnectTimeout],
+            backoff_factor=0.25,
+            backoff_jitter=0.5,
+            max_backoff_wait=8.0,
+        )
+        key = os.environ.get("SHOAL_API_KEY")
+        self._client = httpx.Client(
+            base_url=_address(self.name),
+            headers={"X-API-Key": key} if key else {},
+            timeout=httpx.Timeout(SECONDS, connect=5.0),
+            transport=RetryTransport(transport or httpx.HTTPTransport(), retry=retry),
+        )
+        weakref.finalize(self, self._client.close)
+
+    @cached_property
+    def capabilities(self) -> Capabilities:
+        """What the engine there can simulate. Raises InputError, ComputationError."""
+        found = self._ask("GET", "/v1/capabilities")
+        return Capabilities(**{kind: frozenset(found[kind]) for kind in _KINDS}, lanes=found["lanes"])
+
+    def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
+        """Run one scene; see `Engine`. Raises ComputationError if the service cannot be had."""
+        return self._simulate(scene, None, times)
+
+    def simulate_many(
+        self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
+    ) -> Trajectory:
+        """Run one scene per lane; see `Engine`. Raises ComputationError if the service cannot be had."""
+        lanes = {path: np.ravel(np.asarray(column, dtype=float)).tolist() for path, column in values.items()}
+        return self._simulate(scene, lanes, times)
+
+    def _simulate(
+        self, scene: Scene, lanes: dict[str, list[float]] | None, times: Sequence[float] | Array | None
+    ) -> Trajectory:
+        request = {
+            "scene": scene.model_dump(mode="json"),
+            "times": None if times is None else np.asarray(times, dtype=float).tolist(),
+            "lanes": lanes,
+        }
+        return _trajectory(self._ask("POST", "/v1/simulate", orjson.dumps(request)))
+
+    def _ask(self, method: str, path: str, content: bytes | None = None) -> Any:
+        """The answer to a request. Raises InputError where it is refused, ComputationError where there is none."""
+        try:
+            response = self._client.request(method, path, content=content, headers={"Content-Type": "application/json"})
+        except httpx.HTTPError as error:
+            raise ComputationError(
+                f"engine: {self.name} does not answer: {str(error) or type(error).__name__}"
+            ) from None
+        try:
+            found = orjson.loads(response.content)
+        except orjson.JSONDecodeError:
+            found = None
+        if response.is_success and found is not None:
+            return found
+        raise self._refused(response.status_code, found)
+
+    def _refused(self, status: int, found: Any) -> InputError | ComputationError:
+        if not isinstance(found, dict) or not str(found.get("type", "")).startswith("urn:shoal:"):
+            return InputError(f"engine: {self.name} is not a service of Shoal (HTTP {status})")
+        detail = str(found.get("detail", ""))
+        if found["type"] == "urn:shoal:unauthorized":
+            return InputError(f"SHOAL_API_KEY: {self.name} asks for a key: {detail}")
+        if status in (413, 422):
+            return InputError(detail)
+        return ComputationError(f"engine: {self.name}: {detail}")
+
+
+def _address(url: str) -> httpx.URL:
+    """The address of a service. Raises InputError."""
+    try:
+        address = httpx.URL(url)
+    except httpx.InvalidURL as error:
+        raise InputError(f"engine: {url}: not an address: {error}") from None
+    if not address.host or (address.port or 0) > 65535:
+        raise InputError(f"engine: {url}: not an address; http://HOST:PORT is needed")
+    return address
+
+
+def _trajectory(found: dict[str, Any]) -> Trajectory:
+    plain: dict[str, Any] = {name: found[name] for name in ("engine", "steps", "wall_s", "message", "model")}
+    arrays: dict[str, Any] = {name: np.array(found[name], dtype=float) for name in _ARRAYS}
+    known = (name for name in ("velocities", "rates") if found[name] is not None)
+    optional: dict[str, Any] = {name: np.array(found[name], dtype=float) for name in known}
+    status = tuple(Status(one) for one in found["status"])
+    return Trajectory(**plain, **arrays, **optional, markers=tuple(found["markers"]), status=status)

@@ -1,0 +1,33 @@
+"""How a model was chosen, in words and as the rows of a table."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shoal.pictures.numbers import length
+
+if TYPE_CHECKING:
+    from shoal.selection import Selection
+
+
+def why(found: Selection) -> list[str]:
+    """The reasons of the choice, in sentences."""
+    reasons = [f"Of {len(found.rungs)} models, {found.chosen.name} was taken: {found.reason}."]
+    reasons += [f"{rod} stays rigid: {reason}." for rod, reason in found.rigid.items()]
+    if found.shear > found.tolerance:
+        reasons.append(f"Shear and rotary inertia, which the beams leave out, are worth about {length(found.shear)}.")
+    return reasons
+
+
+def rows(found: Selection) -> list[list[str]]:
+    """Every model that was run: name, unknowns, steps, time [ms], error [m], what came of it."""
+    table = []
+    for rung in found.rungs:
+        verdict = "chosen" if rung is found.chosen else "" if rung.ok else str(rung.trajectory.status[0])
+        name = rung.name if rung.flexible else f"{rung.name}, tolerance {rung.tolerance:g}"
+        error = f"{rung.error:.1e}" if np.isfinite(rung.error) else "–"
+        cost = f"{rung.trajectory.wall_s * 1e3:.1f}"
+        table.append([name, str(rung.trajectory.model["unknowns"]), str(rung.trajectory.steps), cost, error, verdict])
+    return table

@@ -1,0 +1,53 @@
+"""Which places of a scene make its bodies visible: points along rods, the joints of other bodies, fixed ground."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from shoal.scene import GROUND, Attachment, Rod, Scene
+from shoal.trajectory import Array
+
+_ALONG = 33
+"""Points along a rod, so that its bending shows."""
+_INSIDE = "outline"
+
+
+def outlined(scene: Scene) -> tuple[Scene, dict[str, list[str]]]:
+    """The scene with markers along its bodies, and their names by body."""
+    data = scene.model_dump(mode="json")
+    names: dict[str, list[str]] = {}
+    used = [*_sides(scene), *scene.markers.values()]
+    for name, body in scene.bodies.items():
+        # A body that is no rod is drawn as the line through the places that it is joined and observed at.
+        places = _along(body) if isinstance(body, Rod) else _joined(scene, name, used)
+        names[name] = [f"{_INSIDE}-{name}-{k}" for k in range(len(places))]
+        data["markers"] |= {n: {"body": name, "point": p} for n, p in zip(names[name], places, strict=True)}
+    return Scene.parse(data, scene.name), {body: found for body, found in names.items() if found}
+
+
+def ground(scene: Scene) -> Array:
+    """The places [m] where the machine is joined to what stands still, (places, 2)."""
+    still = (at for at in _sides(scene) if at.body == GROUND and not isinstance(at.point, str))
+    return np.array(list(dict.fromkeys(scene.location(at) for at in still))).reshape(-1, 2)
+
+
+def _sides(scene: Scene) -> list[Attachment]:
+    sides = (getattr(joint, side, None) for joint in scene.joints.values() for side in ("first", "second"))
+    return [side for side in sides if isinstance(side, Attachment)]
+
+
+def _joined(scene: Scene, body: str, used: list[Attachment]) -> list[Any]:
+    places = [scene.location(at) for at in used if at.body == body]
+    return [list(place) for place in dict.fromkeys(places or [(0.0, 0.0)])]
+
+
+def _along(rod: Rod) -> list[Any]:
+    """Places along a rod, as a marker names them."""
+    if rod.element != "rigid":
+        return [[float(s), 0.0] for s in np.linspace(0.0, rod.length, _ALONG)]
+    if not rod.curvature:
+        return ["start", "end"]
+    axis = [rod.axis(s) for s in np.linspace(0.0, rod.length, _ALONG)]
+    return [[float(place.real), float(place.imag)] for place in axis]

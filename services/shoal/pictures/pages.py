@@ -1,0 +1,67 @@
+"""What all pages share: the templates in `page`, the data of a motion, what a number was computed with."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from jinja2 import BaseLoader, ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from shoal.pictures.motion import Motion, plain_motion
+from shoal.versions import versions
+
+_SPEEDS = {
+    "five times real time": 5.0,
+    "real time": 1.0,
+    "a half": 0.5,
+    "a fifth": 0.2,
+    "a tenth": 0.1,
+    "a fiftieth": 0.02,
+    "a two-hundredth": 0.005,
+}
+_SHOWN = 5.0
+"""Seconds that a motion should take on the screen."""
+
+
+def environment(*more: BaseLoader) -> Environment:
+    """Jinja's environment with the parts of every page: base.html.j2, macros.html.j2; more: where other pages are."""
+    loader = ChoiceLoader([PackageLoader("shoal.pictures", "page"), *more])
+    return Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, loader=loader)
+
+
+def render(template: str, path: Path | None = None, **content: Any) -> str:
+    """A page as HTML without a reference to anything outside; written to `path` if given."""
+    text = environment().get_template(template).render(**content)
+    if path is not None:
+        path.write_text(text, encoding="utf-8")
+    return text
+
+
+def animation(found: Motion, what: str) -> dict[str, Any]:
+    """What the macro `animation` takes; what: the machine in words."""
+    shown = [f"{what} (blue) with its markers (red)"]
+    if found.measured:
+        shown.append("the measured places (black circles)")
+    if found.directions:
+        shown.append("the measured directions (orange)")
+    over = " over " + " and ".join(shown[1:]) if shown[1:] else ""
+    # "</" would end the script element.
+    data = json.dumps(plain_motion(found), allow_nan=False).replace("</", "<\\/")
+    return {
+        "name": found.name,
+        "aspect": round(found.aspect, 3),
+        "speeds": list(_SPEEDS.items()),
+        "speed": min(_SPEEDS.values(), key=lambda factor: abs(found.span / factor - _SHOWN)),
+        "alt": f"Animation of {', '.join(found.outlines)}, {found.span:.3g} s. A picture below shows poses of it.",
+        "caption": f"{shown[0]}{over}; grey squares stand on the ground. The arrow keys move the slider.",
+        "data": Markup(data),
+    }
+
+
+def software() -> str:
+    """Versions of what shapes the numbers."""
+    return ", ".join(
+        f"{package} {number}" for package, number in versions(("shoal", "numpy", "scipy", "numba")).items()
+    )

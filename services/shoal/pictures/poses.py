@@ -1,0 +1,58 @@
+"""A motion on paper: the machine at a few instants over each other."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from shoal.pictures.motion import Motion
+from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
+
+_POSES = 7
+
+
+@styled
+def poses(found: Motion, title: str) -> Figure:
+    """The machine at a few instants, the later the darker, the paths of its markers, and the measured places."""
+    figure, axes = canvas(1.4 + 5.6 * found.aspect)
+    chosen = np.linspace(0, len(found.times) - 1, _POSES).round().astype(int)
+    for number, k in enumerate(chosen):
+        strength = min(1.0, 0.2 + 0.8 * number / (_POSES - 1))
+        for outline in found.outlines.values():
+            axes.plot(*outline[k].T, "o-", markersize=2.5, markevery=[0, -1], color=BLUE, alpha=strength, linewidth=2.2)
+    axes.plot(*found.ground.T, "s", color=GREY, markersize=7, label="ground" if len(found.ground) else "", zorder=3)
+    for number, place in enumerate(found.measured.values()):
+        axes.plot(*place.T, "o", color=BLACK, markersize=4, fillstyle="none", label="" if number else "measured")
+    for number, path in enumerate(found.markers.values()):
+        axes.plot(*path.T, color=VERMILION, linewidth=1.2, label="" if number else "paths of the markers")
+    _names(axes, found)
+    _directions(axes, found, chosen)
+    axes.set_aspect("equal", adjustable="datalim")
+    headline(figure, title)
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=3)
+    return figure
+
+
+def _names(axes: Axes, found: Motion) -> None:
+    """The names of the markers where they end; those in one place stand in one line."""
+    low, high = found.box
+    places: dict[tuple[int, ...], list[str]] = {}
+    for name, path in found.markers.items():
+        places.setdefault(tuple(np.round(50 * (path[-1] - low) / np.max(high - low)).astype(int)), []).append(name)
+    for names in places.values():
+        place = found.markers[names[0]][-1]
+        axes.annotate(", ".join(names), place, (6, 4), textcoords="offset points", fontweight="bold")
+
+
+def _directions(axes: Axes, found: Motion, chosen: np.ndarray[tuple[int], np.dtype[np.int_]]) -> None:
+    """Measured angles as short lines from their markers."""
+    low, high = found.box
+    length = 0.08 * float(np.max(high - low))
+    for number, (marker, angle) in enumerate(found.directions.items()):
+        for k in chosen:
+            tip = found.markers[marker][k] + length * np.array([np.cos(angle[k]), np.sin(angle[k])])
+            label = "measured direction" if number == 0 and k == chosen[0] else ""
+            axes.plot(*np.stack([found.markers[marker][k], tip]).T, color=ORANGE, linewidth=2, label=label)

@@ -1,0 +1,104 @@
+"""One simulated motion as one page that moves: where the markers go, how far to trust it, why this model."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.pictures.choice import rows, why
+from shoal.pictures.drawn import Drawn
+from shoal.pictures.ladder import ladder
+from shoal.pictures.motion import Motion, scene_motion
+from shoal.pictures.numbers import length
+from shoal.pictures.pages import animation, render, software
+from shoal.pictures.paths import paths
+from shoal.pictures.poses import poses
+from shoal.scene import Scene
+from shoal.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from shoal.selection import Selection
+
+
+def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None = None) -> str:
+    """The page as HTML without a reference to anything outside. Raises InputError, ComputationError."""
+    moving = moved(trajectory, scene)
+    pictures = [_poses(scene, moving), _paths(scene, moving)]
+    if selection is not None:
+        tried, name = len(selection.rungs), selection.chosen.name
+        alt = f"Estimated error over the cost of a run for {tried} models; {name} is taken."
+        pictures.append(
+            Drawn("ladder", ladder(selection), alt, "Left is cheaper, below the dashed line is good enough.")
+        )
+    return render(
+        "simulation.html.j2",
+        title=scene.name,
+        trusted=trajectory.ok,
+        lead=_lead(trajectory, selection),
+        motion=animation(moving, "The machine"),
+        rows=[[name, *_end(trajectory, name)] for name in trajectory.markers],
+        remarks=[] if selection is None else why(selection),
+        pictures=[one.embedded() for one in pictures],
+        models=[] if selection is None else rows(selection),
+        provenance=_provenance(trajectory, scene),
+    )
+
+
+def moved(trajectory: Trajectory, scene: Scene) -> Motion:
+    """The same run with the outlines of its bodies. Raises InputError, ComputationError."""
+    return scene_motion(scene, get_engine(trajectory.engine), float(trajectory.times[-1]))
+
+
+def _lead(trajectory: Trajectory, selection: Selection | None) -> str:
+    if not trajectory.ok:
+        return f"Not to be trusted: {trajectory.message or trajectory.status[0]}."
+    verification = trajectory.model.get("verification") or {}
+    known = [verification.get(key) for key in ("time_error", "mesh_error")]
+    found = [f"{what} error {length(error)}" for what, error in zip(("time", "mesh"), known, strict=True) if error]
+    if selection is not None:
+        found.append(f"error {length(selection.chosen.error)}, for a tolerance of {length(selection.tolerance)}")
+    name = trajectory.markers[-1]
+    x, y = trajectory.marker(name)[-1]
+    trust = f" Estimated at the markers: {', '.join(found)}." if found else ""
+    return f"After {trajectory.times[-1]:g} s, {name} is at ({x:.4g}, {y:.4g}) m.{trust}"
+
+
+def _end(trajectory: Trajectory, name: str) -> tuple[str, str, str]:
+    x, y = trajectory.marker(name)[-1]
+    return f"{x:.6f}", f"{y:.6f}", f"{trajectory.angle(name)[-1]:.6f}"
+
+
+def _poses(scene: Scene, moving: Motion) -> Drawn:
+    until = f"until {moving.times[-1]:.3g} s"
+    alt = f"The bodies {', '.join(moving.outlines)} at several instants {until}, later ones darker."
+    title = f"{scene.name}: the machine {until}"
+    return Drawn(
+        "poses", poses(moving, title), alt, "The later, the darker; the thin lines are the paths of the markers."
+    )
+
+
+def _paths(scene: Scene, moving: Motion) -> Drawn:
+    reach = {name: float(np.max(np.ptp(path, axis=0))) for name, path in moving.markers.items()}
+    words = ", ".join(f"{name} moves within {length(size)}" for name, size in reach.items())
+    return Drawn(
+        "paths",
+        paths(moving, scene.name),
+        f"x and y of every marker against time: {words}.",
+        "Both coordinates of each marker.",
+    )
+
+
+def _provenance(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
+    model = {name: value for name, value in trajectory.model.items() if name not in ("verification", "selection")}
+    return [
+        ("engine", trajectory.engine),
+        ("model", ", ".join(f"{name} = {value}" for name, value in model.items())),
+        ("steps", str(trajectory.steps)),
+        ("energy", f"off by {trajectory.energy_drift[0]:.1e} of the largest kinetic and elastic energy"),
+        ("constraints", f"off by {trajectory.constraint_drift[0]:.1e}"),
+        ("time", f"{trajectory.wall_s * 1e3:.3g} ms"),
+        ("scene", scene.fingerprint),
+        ("versions", software()),
+    ]

@@ -1,0 +1,75 @@
+"""Two services: one with the native engine, one whose engine does as it is told."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from shoal.api.settings import Settings
+
+# The modules beside this one are imported by workers too, which are fresh processes with the path of this one.
+sys.path.insert(0, str(Path(__file__).parent))
+
+import engines_for_tests
+from running import serving
+
+
+@pytest.fixture(scope="session")
+def gauss() -> Iterator[httpx.Client]:
+    """A client of the native engine's service."""
+    with serving("gauss", Settings(workers=1)) as url, httpx.Client(base_url=url, timeout=30) as client:
+        yield client
+
+
+@pytest.fixture(scope="session")
+def obedient() -> Iterator[httpx.Client]:
+    """A client of a service with one worker, one place in the queue and little patience."""
+    settings = Settings(
+        workers=1, queue=1, job_queue=1, wall_seconds=1.0, job_seconds=20.0, body_bytes=2**20, max_memory_mb=2048
+    )
+    with (
+        serving(engines_for_tests.NAME, settings, engines_for_tests.obedient) as url,
+        httpx.Client(base_url=url, timeout=30) as client,
+    ):
+        yield client
+
+
+@pytest.fixture(scope="session")
+def machine() -> dict[str, object]:
+    """An inline scene: one rigid body."""
+    return {
+        "name": "pendulum",
+        "bodies": {
+            "OA": {
+                "kind": "rigid-body",
+                "mass": 1.0,
+                "inertia": 0.1,
+                "centre_of_mass": [0.5, 0.0],
+                "named_points": {"end": [1.0, 0.0]},
+            }
+        },
+        "joints": {
+            "O": {
+                "kind": "revolute",
+                "first": {"body": "ground", "point": [0, 0]},
+                "second": {"body": "OA", "point": "start"},
+            }
+        },
+        "markers": {"A": {"body": "OA", "point": "end"}},
+    }
+
+
+@pytest.fixture(scope="session")
+def problem(machine: dict[str, object]) -> dict[str, object]:
+    """An inline problem: the start of the body from the recorded path of its end."""
+    return {
+        "name": "start",
+        "scene": machine,
+        "parameters": {"theta": {"path": "initial.OA.angle", "lower": -1.0, "upper": 1.0}},
+        "channels": [{"marker": "A", "quantity": axis, "column": axis} for axis in ("x", "y")],
+        "source": {"kind": "file"},
+        "method": "least-squares",
+    }

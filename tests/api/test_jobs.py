@@ -1,0 +1,64 @@
+"""The book of jobs: what is kept, for how long, and what becomes of a job without a client."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+from shoal.api.jobs import Jobs
+from shoal.api.refusal import Refusal
+from shoal.api.schemas import IdentifyRequest
+from shoal.api.serve import PORTS
+from shoal.api.settings import Settings
+from shoal.cli import main
+from shoal.engines import ENGINES
+
+REQUEST = IdentifyRequest(problem="paper-case-1")
+
+
+class Instant:
+    """A pool whose tasks end at once."""
+
+    async def run(self, task: str, request: Any, seconds: float, note: Any, started: Any) -> bytes:
+        started()
+        return b"{}"
+
+
+def is_gone(jobs: Jobs, name: str) -> bool:
+    try:
+        jobs.get(name)
+    except Refusal as refusal:
+        return refusal.kind == "not-found"
+    return False
+
+
+def test_finished_jobs_are_bounded() -> None:
+    """The newest are kept, those that are too many or too old are forgotten."""
+
+    async def forgotten(settings: Settings) -> list[bool]:
+        jobs = Jobs(Instant(), settings)  # type: ignore[arg-type]
+        found = []
+        for _ in range(3):
+            found.append(jobs.submit(REQUEST))
+            await asyncio.sleep(0.01)
+        assert all(job.state == "done" for job in found)
+        return [is_gone(jobs, job.id) for job in found]
+
+    assert asyncio.run(forgotten(Settings(keep_jobs=2))) == [True, False, False]
+    assert asyncio.run(forgotten(Settings(keep_seconds=1e-9))) == [True, True, True]
+
+
+def test_too_many_jobs_are_refused() -> None:
+    async def submit() -> None:
+        jobs = Jobs(Instant(), Settings(job_workers=1, job_queue=1))  # type: ignore[arg-type]
+        for _ in range(3):  # nothing runs before this gives way
+            jobs.submit(REQUEST)
+
+    with pytest.raises(Refusal, match="2 identifications are running or waiting"):
+        asyncio.run(submit())
+
+
+def test_every_engine_can_be_served() -> None:
+    choice = next(one for one in main.commands["serve"].params if one.name == "engine")
+    assert set(choice.type.choices) == set(ENGINES) == set(PORTS)  # type: ignore[attr-defined]

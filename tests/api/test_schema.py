@@ -1,0 +1,55 @@
+"""Requests that are generated from the service's own OpenAPI description: none may break it or surprise its schema."""
+
+from __future__ import annotations
+
+import httpx
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, given, settings
+from schemathesis import GenerationMode
+from schemathesis.specs.openapi.checks import positive_data_acceptance
+
+# Right in form is not right in content: a name that is none of the library's is refused.
+EXCLUDED = [positive_data_acceptance]
+REPEATABLE = settings(
+    derandomize=True, deadline=None, suppress_health_check=list(HealthCheck), max_examples=8, database=None
+)
+
+
+@pytest.fixture(scope="session")
+def described(gauss: httpx.Client) -> schemathesis.BaseSchema:
+    return schemathesis.openapi.from_url(f"{gauss.base_url}/openapi.json")
+
+
+@pytest.mark.parametrize("mode", list(GenerationMode))
+def test_generated_requests(described: schemathesis.BaseSchema, mode: GenerationMode) -> None:
+    """Right and wrong ones: documented statuses and bodies, no server error, nothing wrong accepted."""
+    operations = [found.ok() for found in described.get_all_operations()]
+    assert len(operations) > 15
+    for operation in operations:
+        if mode is GenerationMode.NEGATIVE and not (operation.body or operation.path_parameters):
+            continue
+
+        @REPEATABLE
+        @given(case=operation.as_strategy(generation_mode=mode))
+        def answered(case: schemathesis.Case) -> None:
+            case.call_and_validate(excluded_checks=EXCLUDED)
+
+        answered()
+
+
+@pytest.mark.slow
+def test_generated_sequences(described: schemathesis.BaseSchema) -> None:
+    """Jobs made, asked for, cancelled in every order: at least 2000 requests."""
+    asked = 0
+
+    class Sequences(described.as_state_machine()):  # type: ignore[misc]
+        def after_call(self, response: object, case: object) -> None:
+            nonlocal asked
+            asked += 1
+
+        def validate_response(self, response: object, case: schemathesis.Case, **options: object) -> None:
+            case.validate_response(response, excluded_checks=EXCLUDED)
+
+    Sequences.run(settings=settings(REPEATABLE, max_examples=300, stateful_step_count=10))
+    assert asked >= 2000

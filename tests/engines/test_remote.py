@@ -1,0 +1,136 @@
+"""The remote engine: the same bits, the same refusals, and one clear line when the service is not to be had."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+from shoal.api.settings import Settings
+from shoal.engines import get_engine
+from shoal.engines.remote import RemoteEngine
+from shoal.engines.verification import verified
+from shoal.errors import ComputationError, InputError
+from shoal.scene import load_scene
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "api"))
+
+from running import serving
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    """A service of the native engine."""
+    with serving("gauss", Settings(workers=1, max_work=10_000_000)) as address:
+        yield address
+
+
+def test_bit_for_bit(url: str) -> None:
+    """A trajectory from afar is the one computed here."""
+    scene, times = load_scene("flexible-double-pendulum"), np.array([0.1, 0.1 + 0.2])
+    far, near = (get_engine(name).simulate(scene, times) for name in (url, "gauss"))
+    for name in ("times", "points", "angles", "velocities", "rates", "energy_drift", "constraint_drift"):
+        assert getattr(far, name).tobytes() == getattr(near, name).tobytes()
+    assert (far.engine, far.markers, far.status, far.steps, far.model) == (
+        near.engine, near.markers, near.status, near.steps, near.model,
+    )  # fmt: skip
+
+
+def test_lanes_bit_for_bit(url: str) -> None:
+    scene, angles = load_scene("rigid-double-pendulum"), {"initial.OA.angle": np.linspace(0.1, 0.3, 5)}
+    far, near = (get_engine(name).simulate_many(scene, angles, [0.2]) for name in (url, "gauss"))
+    assert far.points.tobytes() == near.points.tobytes()
+    assert far.lanes == 5
+
+
+def test_a_remote_run_is_verified_like_a_local_one(url: str) -> None:
+    scene = load_scene("rigid-double-pendulum")
+    far, near = (verified(get_engine(name), scene, [0.2]) for name in (url, "gauss"))
+    assert far.model == near.model
+
+
+def test_capabilities(url: str) -> None:
+    assert get_engine(url).capabilities == get_engine("gauss").capabilities
+
+
+def test_refusals_are_the_engines(url: str) -> None:
+    """Bad input reads the same from afar; so does a limit of the service."""
+    scene, lines = load_scene("single-pendulum"), []
+    for name in (url, "gauss"):
+        with pytest.raises(InputError) as caught:
+            get_engine(name).simulate(scene, [0.2, 0.1])
+        lines.append(str(caught.value))
+    assert lines[0] == lines[1]
+    with pytest.raises(InputError, match=r"solver\.step: .* this service computes"):
+        get_engine(url).simulate(scene.with_values({"solver.step": 1e-9}))
+
+
+def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shoal.engines.remote.RETRIES", 1)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        address = f"http://127.0.0.1:{taken.getsockname()[1]}"
+        with pytest.raises(ComputationError, match=f"engine: {address} does not answer"):
+            get_engine(address).simulate(load_scene("single-pendulum"))
+
+
+@pytest.mark.parametrize("first", [429, 502, 503, None])
+def test_comes_again(url: str, first: int | None) -> None:
+    """A full queue, a proxy without its service, a broken connection: the second attempt counts."""
+    asked = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        asked.append(request)
+        if len(asked) > 1:
+            return httpx.post(
+                f"{url}{request.url.path}", content=request.content, headers={"Content-Type": "application/json"}
+            )
+        if first is None:
+            raise httpx.ReadError("reset")
+        return httpx.Response(first, headers={"Retry-After": "0"})
+
+    engine = RemoteEngine(url, httpx.MockTransport(answer))
+    assert engine.simulate(load_scene("single-pendulum"), [0.1]).ok
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize(
+    ("status", "document", "error", "line"),
+    [
+        (401, {"type": "urn:shoal:unauthorized", "detail": "no"}, InputError, "SHOAL_API_KEY"),
+        (500, {"type": "urn:shoal:crashed", "detail": "the worker died"}, ComputationError, "the worker died"),
+        (504, {"type": "urn:shoal:timeout", "detail": "ended after 60 s"}, ComputationError, "ended after 60 s"),
+        (404, {"detail": "Not Found"}, InputError, "is not a service of Shoal"),
+        (200, None, InputError, "is not a service of Shoal"),
+    ],
+)
+def test_other_answers(status: int, document: object, error: type[Exception], line: str) -> None:
+    def answer(request: httpx.Request) -> httpx.Response:
+        return httpx.Response(status, text="<html>") if document is None else httpx.Response(status, json=document)
+
+    engine = RemoteEngine("http://127.0.0.1:9", httpx.MockTransport(answer))
+    with pytest.raises(error, match=line):
+        engine.simulate(load_scene("single-pendulum"))
+
+
+def test_the_key_goes_along(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        seen.append(request.headers["X-API-Key"])
+        return httpx.Response(404)
+
+    monkeypatch.setenv("SHOAL_API_KEY", "secret")
+    with pytest.raises(InputError):
+        RemoteEngine("http://127.0.0.1:9", httpx.MockTransport(answer)).simulate(load_scene("single-pendulum"))
+    assert seen == ["secret"]
+
+
+@pytest.mark.parametrize("url", ["http://", "http://[::1", "http://127.0.0.1:99999999/"])
+def test_not_an_address(url: str) -> None:
+    with pytest.raises(InputError, match="engine: "):
+        get_engine(url).simulate(load_scene("single-pendulum"))

@@ -1,0 +1,137 @@
+"""The compose file keeps its promises: nothing runs as root, unpinned, unbounded, unchecked or open to the network."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from shoal_flows import settings
+from shoal_flows.deployment import processes
+
+ROOT = Path(__file__).parents[2]
+COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text())
+SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
+OURS = sorted(set(SERVICES) - {"postgres"})
+
+
+def plain(line: str) -> list[str]:
+    """Words of a command with the default of every ${NAME:-default} and without settings before the program."""
+    words = shlex.split(re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", line))
+    while re.match(r"[A-Z_]+=", words[0]):
+        del words[0]
+    return words
+
+
+def procfile() -> dict[str, list[str]]:
+    lines = (line.partition(":") for line in (ROOT / "Procfile").read_text().splitlines())
+    return {name: plain(command) for name, _, command in lines}
+
+
+def local(word: str) -> str:
+    """A word with its host name replaced by that of this machine."""
+    return re.sub(r"^(tcp://)?(0\.0\.0\.0|dask-scheduler)(?=:|$)", r"\g<1>127.0.0.1", word)
+
+
+def test_every_command_is_the_line_of_the_procfile() -> None:
+    lines = procfile()
+    assert set(lines) == set(OURS)
+    assert {name: [local(str(word)) for word in SERVICES[name]["command"]] for name in OURS} == lines
+
+
+@pytest.mark.parametrize("name", sorted(SERVICES))
+def test_service_is_confined(name: str) -> None:
+    service = SERVICES[name]
+    assert service["cap_drop"] == ["ALL"]
+    assert "no-new-privileges:true" in service["security_opt"]
+    assert service["read_only"] is True
+    assert not service.get("privileged")
+    assert int(service["user"].split(":")[0]) > 0
+    limits = service["deploy"]["resources"]["limits"]
+    assert set(limits) == {"cpus", "memory", "pids"}
+    assert service["restart"] == ("on-failure:3" if name == "deploy" else "unless-stopped")
+
+
+@pytest.mark.parametrize("name", sorted(SERVICES))
+def test_service_is_pinned_checked_and_local(name: str) -> None:
+    service = SERVICES[name]
+    assert re.fullmatch(r"[a-z]+:\d+\.\d+[\w.-]*", service["image"])
+    assert service["healthcheck"]["test"][0] == "CMD"
+    assert len(service["healthcheck"]["test"]) > 2
+    assert all(port.startswith("127.0.0.1:") for port in service.get("ports", []))
+
+
+def test_services_wait_until_what_they_need_is_healthy() -> None:
+    needs = {name: service.get("depends_on", {}) for name, service in SERVICES.items()}
+    assert all(need == {"condition": "service_healthy"} for of in needs.values() for need in of.values())
+    assert set(needs["mlflow"]) == set(needs["prefect"]) == {"postgres"}
+    assert set(needs["worker"]) == set(needs["nightly"]) == {"mlflow", "prefect"}
+    assert set(needs["deploy"]) == {"worker"}
+
+
+def test_secrets_come_from_files_and_every_volume_is_named() -> None:
+    used = {secret for service in SERVICES.values() for secret in service.get("secrets", [])}
+    assert used == set(COMPOSE["secrets"])
+    assert all(set(secret) == {"file"} for secret in COMPOSE["secrets"].values())
+    made = re.findall(r"\b(\w+_password|api_keys)\b", (ROOT / "deploy/secrets.sh").read_text())
+    assert set(made) == used
+    for service in SERVICES.values():
+        for name, value in (service.get("environment") or {}).items():
+            assert "PASSWORD" not in name or name.endswith("_FILE"), name
+            assert not re.search(r"//[^/@]*:[^/@]*@", str(value)), f"{name} holds a password"
+        mounted = {str(volume).partition(":")[0] for volume in service.get("volumes", [])}
+        assert {source for source in mounted if not source.startswith("./")} <= set(COMPOSE["volumes"])
+
+
+def test_profiles_are_those_of_make_up() -> None:
+    profiles = {profile for service in SERVICES.values() for profile in service.get("profiles", [])}
+    of_compose = {p: {name for name, s in SERVICES.items() if p in s.get("profiles", [])} for p in profiles}
+    assert of_compose == {profile: set(names) for profile, names in processes.PROFILES.items()}
+    staged = {name for stage in processes.STAGES for name in stage}
+    assert staged | {"deploy"} == set(procfile())
+
+
+def test_servers_are_as_quiet_as_on_a_desk(tmp_path: Path) -> None:
+    quiet = settings.defaults(tmp_path)
+    stated = SERVICES["prefect"]["environment"]
+    for name in ("DO_NOT_TRACK", "PREFECT_SERVER_ANALYTICS_ENABLED", "MLFLOW_DISABLE_TELEMETRY"):
+        assert stated[name] == quiet[name]
+
+
+def test_dockerfile_has_the_versions_of_the_project() -> None:
+    text = (ROOT / "Dockerfile").read_text()
+    uv = re.search(r"UV_VERSION := (\S+)", (ROOT / "Makefile").read_text())
+    assert uv is not None
+    assert f"uv=={uv[1]}" in text
+    version = re.search(r'^version = "(.+)"', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+    assert version is not None
+    assert SERVICES["worker"]["image"] == f"shoal:{version[1]}"
+    assert re.search(r"^ARG PYTHON=3\.11\.\d+-slim", text, re.MULTILINE)
+    users = re.findall(r"^USER (.+)", text, re.MULTILINE)
+    assert users[-1] == SERVICES["worker"]["user"]
+
+
+def test_entrypoint_reads_the_password_from_its_file(tmp_path: Path) -> None:
+    (tmp_path / "password").write_text("from a file\n")
+    environment = {"PATH": "/usr/bin:/bin", "PGPASSWORD_FILE": str(tmp_path / "password")}
+    command = ["sh", str(ROOT / "deploy/entrypoint.sh"), "printenv", "PGPASSWORD"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "from a file\n"
+
+
+def test_secrets_are_made_once_and_kept_from_others(tmp_path: Path) -> None:
+    script = shutil.copy(ROOT / "deploy/secrets.sh", tmp_path)
+    made = []
+    for _ in range(2):
+        subprocess.run(["sh", script], check=True)
+        made.append({path.name: path.read_text() for path in (tmp_path / "secrets").iterdir()})
+    assert made[0] == made[1]
+    assert set(made[0]) == set(COMPOSE["secrets"])
+    assert all(len(text) == 48 for text in made[0].values())
+    assert len(set(made[0].values())) == len(made[0])
+    assert (tmp_path / "secrets").stat().st_mode & 0o077 == 0
