@@ -109,6 +109,8 @@ def check(at: dict[str, str]) -> None:
 def test_a_deployment_runs_on_sqlite(tmp_path: Path) -> None:
     with running(tmp_path, *(word for name in SERVICES for word in ("--without", name))) as at:
         check(at)
+    # Readable without the server as well, by `shoal ui` and `shoal rerun`.
+    assert list((tmp_path / "artifacts").rglob("trajectory.csv"))
 
 
 @pytest.mark.slow

@@ -239,7 +239,7 @@ def test_a_prior_needs_noise_to_weigh_against(tmp_path: Path) -> None:
 
 
 def test_a_video_of_the_textbook_motion_gives_its_angles_and_its_clock(tmp_path: Path) -> None:
-    """Pixels of 2 mm, y down, a tracked pivot, dropped frames, gaps, and a camera that takes 125 frames a second, not 100."""
+    """Pixels of 2 mm, y down, a tracked pivot, dropped frames, gaps; 125 frames a second, not the stated 100."""
     from shoal_validation.problems.double_pendulum import settle
 
     rng = np.random.default_rng(0)
