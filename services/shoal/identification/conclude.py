@@ -21,7 +21,7 @@ from shoal.identification.residual_tests import residual_tests
 from shoal.identification.sensitivity import sensitivity
 from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
 from shoal.mechanics.simulate import stable_step
-from shoal.scene import Rod, expression
+from shoal.scene import Rod, Scene, expression
 from shoal.trajectory import Array
 
 _STABLE = 0.9
@@ -112,7 +112,7 @@ def conclude(
         truth=dict(measurement.truth),
         data=measurement.origin,
         notes=[note for recording in measurement.recordings.values() for note in recording.notes],
-        model={"scene": model.scene.name, **model.problem.values, **_chosen(stages)},
+        model={"scene": model.scene.name, **model.problem.values, **_fitted(model.scene), **_chosen(stages)},
         scenes={name: model.scene_at(point, name) for name in measurement.recordings},
         predicted=predicted,
         measurement=measurement,
@@ -152,6 +152,17 @@ def _model_error(model: ForwardModel, point: Array, predicted: dict[str, Array])
     rows = np.concatenate(columns) * model.rows.weight
     priors = sum(entry.parameter.prior is not None for entry in model.parameters.entries.values())
     return np.append(rows, np.zeros(priors)) if np.all(np.isfinite(rows)) else None
+
+
+def _fitted(scene: Scene) -> dict[str, Any]:
+    """Mesh and steps of the scene that was fitted, by their paths."""
+    found: dict[str, Any] = {}
+    for name, body in scene.bodies.items():
+        if isinstance(body, Rod):
+            found[f"bodies.{name}.element"] = body.element
+            found |= {f"bodies.{name}.elements": body.elements} if body.element != "rigid" else {}
+            found |= {f"bodies.{name}.quadrature": body.quadrature} if body.element == "ancf-cable" else {}
+    return found | {f"solver.{name}": getattr(scene.solver, name) for name in ("integrator", "step")}
 
 
 def _chosen(stages: list[Stage]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from shoal.identification.residual_tests import ResidualTests
 from shoal.identification.suspects import Suspect
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Verdict(StrEnum):
@@ -52,7 +55,8 @@ class Value:
         """The value of a parameter that was sought by its logarithm."""
         value = float(np.exp(self.value))
         correction = None if self.correction is None else value * self.correction
-        lower, upper = float(np.exp(self.lower)), float(np.exp(self.upper))
+        with np.errstate(over="ignore"):
+            lower, upper = float(np.exp(self.lower)), float(np.exp(self.upper))
         return Value(value, value * self.std, lower, upper, self.identifiable, correction, self.at_bound)
 
 
@@ -112,6 +116,17 @@ class Estimate:
     def status(self) -> str:
         """`ok` if the answer can be used, else `failed`."""
         return "ok" if self.verdict.trusted else "failed"
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} {value.value:.6g} ± {value.std:.2g}" for name, value in self.parameters.items())
+        return f"Estimate({self.problem}: {self.verdict}; {values})"
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each parameter and quantity: value, std, lower, upper, identifiable, ..."""
+        import pandas as pd
+
+        rows = {name: vars(value) for name, value in {**self.parameters, **self.quantities}.items()}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
 
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal identify --json` prints."""

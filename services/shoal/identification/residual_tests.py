@@ -92,7 +92,7 @@ def residual_tests(
     # As many samples as the residual's own memory leaves independent, less the parameters.
     independent = sum(n.independent(len(b.rows)) for b, n in measured) - len(model.names)
     freedom = max(1.0, independent)
-    explained = max(float(np.hypot(seen, mesh)), 1e-300)
+    beyond = size / max(float(np.hypot(seen, mesh)), 1e-300)
     whiteness = [ljung_box(residual[block.rows]) for block, _ in measured]
     outlying = [_outlying(residual[block.rows]) for block, _ in measured]
     return ResidualTests(
@@ -101,7 +101,8 @@ def residual_tests(
         noise_stated=model.noise is not None,
         signal=signal(model),
         mesh=mesh,
-        chance_of_size=float(chi2.sf(freedom * (size / explained) ** 2, freedom)),
+        # A product overflows to infinity, which has chance zero; a power would raise OverflowError.
+        chance_of_size=float(chi2.sf(freedom * beyond * beyond, freedom)),
         chance_of_white=min(1.0, min(whiteness) * len(whiteness)),
         outliers=sum(outlying),
         rows=len(rows),
