@@ -13,10 +13,10 @@ SUITABLE := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_inf
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export DO_NOT_TRACK := true
 
-.PHONY: help setup demo test lint types imports bench charts up lock clean
+.PHONY: help setup demo test lint types imports containers bench charts up up-postgres secrets lock clean
 
 help:  ## this list
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 13
 
 setup: $(STAMP)  ## make .venv and install the locked packages
 
@@ -59,6 +59,10 @@ types: setup  ## static types
 imports: setup  ## imports go one way
 	@$(BIN)/lint-imports
 
+containers: setup  ## the compose file against its schema, the Dockerfile against good practice
+	@$(BIN)/check-jsonschema --builtin-schema vendor.compose-spec docker-compose.yml
+	@$(BIN)/hadolint Dockerfile
+
 bench: setup  ## speed and accuracy against the other engines
 	@$(BIN)/python -m shoal_validation.benchmarks
 
@@ -67,8 +71,14 @@ charts: setup  ## every chart and table of docs/ anew (an hour)
 	  echo "== $$part"; $(BIN)/python -m shoal_validation.$$part; \
 	done
 
-up: setup  ## browse the runs
-	@$(BIN)/shoal ui
+up: setup  ## MLflow, Prefect with a worker and the engines' services, until Ctrl-C (ARGS=--help)
+	@$(BIN)/python -m shoal_flows.deployment.up $(ARGS)
+
+up-postgres: setup  ## the same on a PostgreSQL server of its own
+	@$(BIN)/python -m shoal_flows.deployment.up --postgres $(ARGS)
+
+secrets:  ## passwords for docker-compose.yml, where there are none
+	@sh deploy/secrets.sh
 
 lock: setup  ## resolve pyproject.toml anew into requirements.lock
 	@$(BIN)/uv pip compile --quiet --upgrade --all-extras --no-emit-index-url --no-header --no-annotate -p 3.11 \

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -65,7 +66,9 @@ def rerun(run_id: str) -> Repeated:
     with TemporaryDirectory() as folder:
         flow, parameters = _origin(client, known, Path(folder))
         with remembered.anew():
-            now = str(run.run_flow(flow, parameters).run_id)
+            # A text in quotes: `run_flow` reads texts as YAML.
+            texts = {name: json.dumps(value) for name, value in parameters.items() if isinstance(value, str)}
+            now = str(run.run_flow(flow, {**parameters, **texts}).run_id)
     if now.startswith(LOCAL):
         notice()
         raise ComputationError("rerun: MLflow stopped answering, so that the figures cannot be compared yet")

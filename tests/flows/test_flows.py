@@ -120,3 +120,9 @@ def test_a_study_is_repeated_from_its_run_alone(tmp_path: Path) -> None:
     # As if the first had found something else.
     _client().log_metric(first.run_id, "final/x", 0.0)
     assert set(rerun(first.run_id).different) == {"final/x"}
+
+
+def test_an_identification_is_repeated_with_all_its_figures(study: Any) -> None:
+    again = rerun(study.run_id)
+    assert not again.different
+    assert any(name.endswith("final/theta1") for name in again.figures)

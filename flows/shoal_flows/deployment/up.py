@@ -77,6 +77,8 @@ def _environment(stores: Mapping[str, str]) -> dict[str, str]:
     kept = {
         "MLFLOW_BACKEND_STORE_URI": f"sqlite:///{folder / 'mlflow.db'}",
         "MLFLOW_ARTIFACTS_DESTINATION": settings.artifact_folder().as_uri(),
+        # Artifacts stay readable without the server: `shoal run` and `shoal ui` use the same database.
+        "MLFLOW_DEFAULT_ARTIFACT_ROOT": settings.artifact_folder().as_uri(),
     }
     return {**settings.defaults(folder), **kept, **os.environ, **stated, **stores}
 

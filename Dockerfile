@@ -1,0 +1,44 @@
+# One image for every service: the programs share their packages, and only the command differs.
+ARG PYTHON=3.11.14-slim-bookworm
+
+FROM python:${PYTHON} AS build
+ENV PIP_DISABLE_PIP_VERSION_CHECK=1 UV_LINK_MODE=copy UV_COMPILE_BYTECODE=1
+WORKDIR /build
+RUN pip install --no-cache-dir uv==0.13.8 && uv venv /opt/shoal/venv
+COPY requirements.lock pyproject.toml ./
+# The locked versions of what runs here; the tools of development stay outside.
+RUN VIRTUAL_ENV=/opt/shoal/venv uv pip install --no-cache --constraints requirements.lock --requirements pyproject.toml \
+    --extra engines --extra pipeline --extra services --extra deploy --extra scale
+COPY README.md LICENSE ./
+COPY services services
+COPY flows flows
+COPY validation validation
+RUN VIRTUAL_ENV=/opt/shoal/venv uv pip install --no-cache --no-deps --build-constraints requirements.lock .
+
+FROM python:${PYTHON} AS runtime
+# Exudyn is linked against a viewer, even where nothing is shown.
+# hadolint ignore=DL3008
+RUN apt-get update \
+    && apt-get install --no-install-recommends --yes libgl1 libx11-6 \
+    && rm -rf /var/lib/apt/lists/* \
+    && groupadd --gid 10001 shoal \
+    && useradd --uid 10001 --gid shoal --no-create-home --home-dir /var/lib/shoal --shell /usr/sbin/nologin shoal \
+    && install -d -o shoal -g shoal /var/lib/shoal /var/lib/mlflow
+COPY --from=build /opt/shoal/venv /opt/shoal/venv
+COPY --chmod=755 deploy/entrypoint.sh /opt/shoal/entrypoint.sh
+COPY prefect.yaml /opt/shoal/prefect.yaml
+ENV PATH=/opt/shoal/venv/bin:${PATH} \
+    PYTHONUNBUFFERED=1 \
+    PYTHONDONTWRITEBYTECODE=1 \
+    SHOAL_HOME=/var/lib/shoal \
+    NUMBA_CACHE_DIR=/tmp/kernels \
+    MPLCONFIGDIR=/tmp/matplotlib
+# Machine code for the processor that builds the image; on another kind each kernel is compiled when first used.
+RUN NUMBA_CACHE_DIR=/opt/shoal/kernels SHOAL_HOME=/tmp/home MPLCONFIGDIR=/tmp/home \
+    python -m shoal.mechanics.warm && rm -rf /tmp/home
+ARG REVISION=""
+ENV SHOAL_REVISION=${REVISION}
+WORKDIR /opt/shoal
+USER 10001:10001
+ENTRYPOINT ["/opt/shoal/entrypoint.sh"]
+CMD ["shoal", "--help"]
