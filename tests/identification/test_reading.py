@@ -61,8 +61,9 @@ def test_tables_come_back_as_they_were_written(
         text = text.replace(".", ",")
     path = tmp_path / "run.csv.gz"
     path.write_bytes(gzip.compress(text.encode()))
+    begin = 0.0 if times[-1] > 0 and times[0] <= 0.1 * (times[-1] - times[0]) else times[0]
     found = read(FileSource(), tuple(channels), path)
-    np.testing.assert_allclose(found.times, times - times[0], rtol=1e-12)
+    np.testing.assert_allclose(found.times, times - begin, rtol=1e-12, atol=1e-12)
     for k, channel in enumerate(channels):
         np.testing.assert_allclose(found.values[:, k], columns[channel.column] * SI[channel.unit or "m"], rtol=1e-12)
 

@@ -53,7 +53,7 @@ def judge(
         found = suspects(model, outcome.point, seen.residual, seen.jacobian)
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
-    rivals = rivals_of(model, outcome, at)
+    rivals = [rival for rival in rivals_of(model, outcome, at) if not _within(model, rival, parameters)]
     if rivals:
         kinds = {relation(model, outcome.point, rival) for rival in rivals}
         message = f"{1 + len(rivals)} parameter sets fit equally well ({', '.join(sorted(kinds))})"
@@ -136,6 +136,12 @@ def rivals_of(model: ForwardModel, outcome: Outcome, at: Linearisation) -> list[
 def apart(model: ForwardModel, one: Array, other: Array) -> bool:
     """Whether two points are different machines; angles that differ by whole turns are not."""
     return bool(np.any(_differing(model, one, other)))
+
+
+def _within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -> bool:
+    """Whether the answer's intervals include a point already."""
+    values = zip(model.names, model.parameters.to_values(point), strict=True)
+    return all(parameters[name].lower <= value <= parameters[name].upper for name, value in values)
 
 
 def relation(model: ForwardModel, one: Array, other: Array) -> str:

@@ -28,6 +28,8 @@ Mask = NDArray[np.bool_]
 LARGEST = 200_000_000
 """Bytes of a table, unpacked; more are refused."""
 YAML = (".yaml", ".yml")
+_ABOUT = 0.1
+"""Of a recording: where its times begin within that part after zero, zero is meant."""
 _FEWEST = 3
 """Samples, without which there is no motion."""
 _OUTLIER = 8.0
@@ -118,9 +120,11 @@ def read(source: FileSource, channels: tuple[Channel, ...]) -> Samples:
     for column in (source.time, *(c.column for c in channels))[bool(source.rate) :]:
         table.require(column)
     times = _times(source, table)
-    inside = _window(source, times, path)
+    begin = _begin(source, times)
+    inside = _window(source, times, begin, path)
     columns = {name: table.numbers(name) for c in channels for name in (c.column, c.origin) if name is not None}
-    notes = _mend(times, columns, channels) if source.swaps else []
+    notes = [f"the motion's time is zero at {begin:g} s, the first sample"] if source.start is None and begin else []
+    notes += _mend(times, columns, channels) if source.swaps else []
     signals = []
     for channel in channels:
         signal, note = _signal(source, channel, columns, times, inside)
@@ -133,7 +137,7 @@ def read(source: FileSource, channels: tuple[Channel, ...]) -> Samples:
     notes += _findings(times[inside], values[inside], channels)
     chosen = np.flatnonzero(inside)[:: source.every]
     origin = f"{path.name}, {_span(times[chosen])}, {len(chosen)} samples"
-    return Samples(times[chosen] - times[chosen[0]], channels, values[chosen], origin, tuple(notes))
+    return Samples(times[chosen] - begin, channels, values[chosen], origin, tuple(notes))
 
 
 def load_table(path: Path, columns: list[str] | None = None) -> Table:
@@ -223,14 +227,22 @@ def _times(source: FileSource, table: Table) -> Array:
     return times
 
 
-def _window(source: FileSource, times: Array, path: Path) -> Mask:
+def _begin(source: FileSource, times: Array) -> float:
+    """When the motion's time is zero, by the table's clock [s]."""
+    if source.start is not None:
+        return source.start
+    about = times[-1] > 0 and times[0] <= _ABOUT * (times[-1] - times[0])
+    return 0.0 if about else float(times[0])
+
+
+def _window(source: FileSource, times: Array, begin: float, path: Path) -> Mask:
     """Which rows are in the window, (rows,), bool. Raises InputError."""
-    stop = np.inf if source.duration is None else source.start + source.duration
-    inside: Mask = (times >= source.start - 1e-9) & (times <= stop + 1e-9)
+    stop = np.inf if source.duration is None else begin + source.duration
+    inside: Mask = (times >= begin - 1e-9) & (times <= stop + 1e-9)
     count = len(np.flatnonzero(inside)[:: source.every])
     if count < _FEWEST:
         raise InputError(
-            f"{path}: only {count} samples from {source.start:g} s to {stop:g} s (every {source.every}); at least "
+            f"{path}: only {count} samples from {begin:g} s to {stop:g} s (every {source.every}); at least "
             f"{_FEWEST} are needed; the recording covers {_span(times)}"
         )
     return inside
