@@ -13,7 +13,7 @@ SUITABLE := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_inf
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export DO_NOT_TRACK := true
 
-.PHONY: help setup demo test lint types imports containers bench charts up up-postgres secrets lock clean
+.PHONY: help setup demo test lint types imports containers bench charts docs up up-postgres secrets lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 13
@@ -70,6 +70,10 @@ charts: setup  ## every chart and table of docs/ anew (an hour)
 	@for part in work_precision stability ablation inverse_precision selection; do \
 	  echo "== $$part"; $(BIN)/python -m shoal_validation.$$part; \
 	done
+
+docs: setup  ## the documentation as pages, in site/
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "documentation: site/index.html"
 
 up: setup  ## MLflow, Prefect with a worker and the engines' services, until Ctrl-C (ARGS=--help)
 	@$(BIN)/python -m shoal_flows.deployment.up $(ARGS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,11 +14,15 @@ from typing import Any, Literal
 import click
 
 from shoal.errors import InputError, ShoalError
+from shoal.whole import whole
 
 EXIT_UNTRUSTED = 3
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""No room: on the disk, for this user, in this file."""
 EXTRAS = {
     "pipeline": ("prefect", "mlflow", "jinja2", "shoal_flows"),
     "services": ("fastapi", "starlette", "uvicorn", "pydantic_settings", "orjson"),
+    "fmu": ("pythonfmu",),
 }
 """Modules that only an extra of the package brings."""
 
@@ -27,7 +33,10 @@ class Program(click.Group):
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run the program and leave with its exit status."""
         try:
-            sys.exit(super().main(*args, **{**kwargs, "standalone_mode": False}))
+            try:
+                sys.exit(super().main(*args, **{**kwargs, "standalone_mode": False}))
+            finally:
+                sys.stdout.flush()  # here, where a full disk can still be told of
         except click.exceptions.NoArgsIsHelpError as error:
             click.echo(error.format_message())
             sys.exit(InputError.exit_status)
@@ -38,6 +47,12 @@ class Program(click.Group):
         except click.Abort:
             click.echo("shoal: stopped", err=True)
             sys.exit(130)
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+            click.echo(f"shoal: cannot write: {error.strerror}", err=True)
+            # What is still in the buffer of standard output would fail once more.
+            os._exit(EXIT_UNTRUSTED)
 
 
 def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, str]:
@@ -185,7 +200,8 @@ def simulate(
         with terminal.working(f"simulating {wanted.name} with {engine}"):
             trajectory = verified(chosen, wanted, times) if verify else chosen.simulate(wanted, times)
     if out is not None:
-        terminal.write_trajectory(trajectory, wanted, out, selection)
+        with whole(out) as path:
+            terminal.write_trajectory(trajectory, wanted, path, selection)
     report = trajectory.to_json() | ({} if selection is None else {"selection": selection.to_json()})
     terminal.show(report, as_json, lambda: terminal.trajectory_table(trajectory, wanted, selection))
     _finish(trajectory.ok, trajectory.message)
@@ -316,7 +332,8 @@ def identify(
             progress=progress,
         )
     if out is not None:
-        terminal.write_estimate(estimate, wanted, out)
+        with whole(out) as path:
+            terminal.write_estimate(estimate, wanted, path)
     terminal.show(estimate.to_json(), as_json, lambda: terminal.estimate_table(estimate))
     _finish(estimate.verdict.trusted, f"{estimate.verdict}: {estimate.message}")
 
@@ -346,7 +363,8 @@ def report(runs: tuple[str, ...], out: Path) -> None:
             found[Path(run).stem if Path(run).stem not in found else run] = archive.read(Path(run))
         else:
             found |= _pipeline("shoal_flows.report.stored").stored(run)
-    terminal.write_report(found, out)
+    with whole(out) as path:
+        terminal.write_report(found, path)
     click.echo(f"report: {out}")
     best = found[best_of({name: answer.estimate for name, answer in found.items()})].estimate
     _finish(best.verdict.trusted, f"{best.verdict}: {best.message}")
@@ -386,7 +404,8 @@ def design(
         else:
             found = design(wanted, values=values, **options)
     if out is not None:
-        terminal.write_design(found, out)
+        with whole(out) as path:
+            terminal.write_design(found, path)
     terminal.show(found.to_json(), as_json, lambda: terminal.design_table(found))
     _finish(found.ok, "no candidate tells every parameter; name one with --parameter")
 
@@ -420,7 +439,8 @@ def sweep(
     with terminal.working(f"sweeping {wanted.name}"):
         result = sweep(wanted, grid, get_engine(engine), time)
     if out is not None:
-        terminal.write_sweep(result, out)
+        with whole(out) as path:
+            terminal.write_sweep(result, path)
     terminal.show(result.to_json(), as_json, lambda: terminal.sweep_table(result))
     _finish(result.ok, "some points failed; their status is in the table")
 
@@ -450,7 +470,8 @@ def compare(
     with terminal.working(f"running {wanted.name} on {engines}"):
         comparison = compare(wanted, [name.strip() for name in engines.split(",")], times)
     if out is not None:
-        terminal.write_comparison(comparison, out)
+        with whole(out) as path:
+            terminal.write_comparison(comparison, path)
     terminal.show(comparison.to_json(), as_json, lambda: terminal.comparison_table(comparison))
     reasons = [*comparison.refused.values(), *(t.message for t in comparison.trajectories.values() if t.message)]
     _finish(comparison.ok, reasons[0] if reasons else "fewer than two engines ran")
@@ -495,6 +516,27 @@ def ui(host: str, port: int) -> None:
 def serve(engine: str, host: str, port: int | None) -> None:
     """Serve ENGINE over HTTP until Ctrl-C; SHOAL_API_* in the environment sets the limits."""
     _optional("shoal.api.serve", "services").serve(engine, host, port)
+
+
+@main.command("export-fmu")
+@click.argument("scene")
+@option_set
+@click.option(
+    "--parameter",
+    "parameters",
+    multiple=True,
+    metavar="PATH",
+    help="A number of the scene that a host may set (repeatable); else gravity and the initial angles.",
+)
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .fmu; else the scene's name.")
+def export_fmu(scene: str, values: dict[str, str], parameters: tuple[str, ...], out: Path | None) -> None:
+    """Write SCENE as an FMI 2.0 unit for co-simulation; a host needs this installation to run it."""
+    from shoal import terminal
+    from shoal.scene import load_scene
+
+    terminal.check_output(out, (".fmu",))
+    wanted = load_scene(scene).with_values(values)
+    click.echo(_optional("shoal.fmu.export", "fmu").export(wanted, parameters, out))
 
 
 @main.command()

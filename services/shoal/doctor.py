@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import socket
 import sys
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
+from urllib.error import URLError
+from urllib.request import urlopen
+
+import numpy as np
 
 from shoal.errors import ShoalError
 from shoal.home import home, kernel_cache
+
+_PACKAGES = {
+    "pipeline": ("prefect", "mlflow"),
+    "services": ("fastapi", "uvicorn", "orjson"),
+}
+"""What the extras bring that has no check of its own."""
+_PORTS = {5000: "MLflow", 4200: "Prefect", 8001: "gauss", 8002: "exudyn", 8003: "casadi"}
+"""Where `make up`, `shoal ui` and `shoal serve` listen unless told otherwise."""
+_PATIENCE = 3.0
+"""Seconds that a server has to answer."""
+_CLOSE = 1e-4
+"""Distance [m] from the native solver within which an engine is right on the pendulum."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +45,12 @@ def examine() -> list[Check]:
         _python(),
         _folder(),
         _native(),
+        _cache(),
         *(_engine(name) for name in ("exudyn", "casadi")),
-        *(_package(name) for name in ("prefect", "mlflow")),
-        _port(5000),
+        *(_package(name, extra) for extra, names in _PACKAGES.items() for name in names),
+        _server("Prefect", "PREFECT_API_URL", "a flow starts its own"),
+        _server("MLflow", "MLFLOW_TRACKING_URI", "runs go to a database in the state folder"),
+        *(_port(number, what) for number, what in _PORTS.items()),
     ]
 
 
@@ -60,25 +79,67 @@ def _native() -> Check:
     return Check("native solver", right, found, "" if right else "remove the folder .shoal/kernels-* and try again")
 
 
+def _cache() -> Check:
+    """The compiled kernels, and those of sources or processors that are no more."""
+    current = kernel_cache()
+    size = sum(file.stat().st_size for file in current.rglob("*") if file.is_file())
+    others = [folder for folder in current.parent.glob("kernels-*") if folder != current]
+    older = f"; {len(others)} older that may be removed" if others else ""
+    return Check("compile cache", True, f"{current.name}, {size / 1e6:.0f} MB{older}")
+
+
 def _engine(name: str) -> Check:
-    check = _package(name)
+    """Another engine on the pendulum, against our own."""
+    check = _package(name, "engines")
     if not check.ok:
         return check
+    from shoal.engines import get_engine
+    from shoal.scene import load_scene
+
+    scene = load_scene("single-pendulum")
     try:
-        import_module(name)
-    except ImportError as error:
-        return Check(name, False, f"{check.found} does not load: {error}", "reinstall it: make setup")
-    return check
+        run = get_engine(name).simulate(scene, [0.5])
+        gap = float(np.max(np.abs(run.points - get_engine("gauss").simulate(scene, [0.5]).points)))
+    except (ImportError, ShoalError) as error:
+        return Check(name, False, f"{check.found} does not run: {error}", "reinstall it: make setup")
+    if not gap < _CLOSE:
+        return Check(name, False, f"{check.found} is {gap:.0e} m off a pendulum", "reinstall it: make setup")
+    return Check(name, True, f"{check.found}, right within {gap:.0e} m")
 
 
-def _package(name: str) -> Check:
+def _package(name: str, extra: str) -> Check:
     try:
         return Check(name, True, version(name))
     except PackageNotFoundError:
-        return Check(name, False, "not installed", "run: make setup")
+        return Check(name, False, "not installed", f"run make setup, or install shoal with its extra '{extra}'")
 
 
-def _port(number: int) -> Check:
+def _server(name: str, variable: str, otherwise: str) -> Check:
+    """Whether a server that the user has named answers."""
+    address = os.environ.get(variable, "")
+    what = f"{name} server"
+    if not address.startswith(("http://", "https://")):
+        return Check(what, True, f"{variable} names none; {otherwise}")
+    if _answers(f"{address.rstrip('/')}/health"):
+        return Check(what, True, f"{address} answers")
+    return Check(what, False, f"{address} does not answer", f"start it (make up), or unset {variable}")
+
+
+def _port(number: int, what: str) -> Check:
     with socket.socket() as probe:
+        probe.settimeout(_PATIENCE)
         taken = probe.connect_ex(("127.0.0.1", number)) == 0
-    return Check(f"port {number}", True, "in use; shoal ui --port takes another" if taken else "free for shoal ui")
+    if not taken:
+        return Check(f"port {number}", True, f"free for {what}")
+    path = "api/health" if what == "Prefect" else "health"
+    healthy = _answers(f"http://127.0.0.1:{number}/{path}")
+    found = "a server answers there" if healthy else "another program has it; choose another with --port"
+    return Check(f"port {number}", True, f"in use where {what} would be: {found}")
+
+
+def _answers(url: str) -> bool:
+    try:
+        with urlopen(url, timeout=_PATIENCE) as answer:  # an address that the user or this file names
+            return bool(answer.status == 200)
+    except (URLError, OSError, ValueError):
+        return False

@@ -108,15 +108,16 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
         x, y = trajectory.marker(name)[-1]
         table.add_row(name, f"{x:.9f}", f"{y:.9f}")
     out.print(table)
-    out.print(
+    _say(
         f"status {trajectory.status[0]}; energy off by {trajectory.energy_drift[0]:.1e}, constraints by "
-        f"{trajectory.constraint_drift[0]:.1e}; {trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms"
+        f"{trajectory.constraint_drift[0]:.1e}"
     )
+    _say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms")
     if (verification := trajectory.model.get("verification")) is not None:
         errors = {"time": verification["time_error"], "mesh": verification["mesh_error"]}
         known = ", ".join(f"{name} {error:.1e} m" for name, error in errors.items() if error is not None)
         notes = (f"estimated error at the markers: {known}" if known else "", verification["note"])
-        out.print("; ".join(note for note in notes if note))
+        _say("; ".join(note for note in notes if note))
 
 
 def selection_table(selection: Selection) -> None:
@@ -130,11 +131,11 @@ def selection_table(selection: Selection) -> None:
         table.add_row(*row)
     out.print(table)
     for rod, reason in selection.rigid.items():
-        out.print(f"{rod} stays rigid: {reason}")
+        _say(f"{rod} stays rigid: {reason}")
     verdict = "met" if selection.met else "not met"
-    out.print(f"{verdict}: {chosen.name}, estimated error {chosen.error:.1e} m; {selection.reason}")
+    _say(f"{verdict}: {chosen.name}, estimated error {chosen.error:.1e} m; {selection.reason}")
     if selection.shear > selection.tolerance:
-        out.print(f"beyond the beams' theory: shear and rotary inertia, about {selection.shear:.0e} m")
+        _say(f"beyond the beams' theory: shear and rotary inertia, about {selection.shear:.0e} m")
     out.print()
 
 
@@ -148,7 +149,7 @@ def equilibrium_table(equilibrium: Equilibrium) -> None:
     if equilibrium.reactions is not None:
         reactions_table([equilibrium.reactions])
     lowest = equilibrium.eigenvalues[:1].real
-    out.print(
+    _say(
         f"status {equilibrium.status}{f' ({equilibrium.message})' if equilibrium.message else ''}; "
         f"unbalanced {equilibrium.residual:.1e} of all forces, joints gape by {equilibrium.gap:.1e}"
         + "".join(f"; lowest eigenvalue {value:.4g} rad^2/s^2" for value in lowest)
@@ -166,7 +167,7 @@ def reactions_table(found: list[Reactions]) -> None:
             table.add_row(name, joint.kind, *numbers, "yes" if joint.unique else "no")
         out.print(table)
         if reactions.redundancy:
-            out.print(
+            _say(
                 f"{reactions.redundancy} more than needed: least forces are shown; "
                 f"redundant: {', '.join(reactions.constraints) or 'none away from this position'}"
             )
@@ -181,7 +182,7 @@ def modes_table(modes: Modes) -> None:
         table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind)
     out.print(table)
     if not modes.balanced:
-        out.print("the forces do not balance there; these are motions relative to its fall")
+        _say("the forces do not balance there; these are motions relative to its fall")
 
 
 def estimate_table(estimate: Estimate) -> None:
@@ -249,8 +250,8 @@ def _effort(estimate: Estimate) -> None:
 
 
 def _say(text: str, style: str = "") -> None:
-    """A line of text, folded at 80 columns; what looks like markup is none."""
-    out.print(escape(text), style=style, width=min(80, out.width), soft_wrap=False)
+    """A line of text, on a terminal folded at 80 columns, in a log file whole; what looks like markup is none."""
+    out.print(escape(text), style=style, width=min(80, out.width), soft_wrap=not out.is_terminal)
 
 
 def design_table(found: Design) -> None:
@@ -277,9 +278,9 @@ def design_table(found: Design) -> None:
     out.print(table)
     angle = "" if found.angle_noise is None else f", {found.angle_noise:g} rad"
     values = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
-    out.print(f"noise {found.noise:g} m{angle}; about {values}")
-    out.print("A, D: root mean square and geometric mean of the standard deviations over the ranges of the parameters")
-    out.print(f"sensitivities by two steps differ by {found.doubt:.0e}")
+    _say(f"noise {found.noise:g} m{angle}; about {values}")
+    _say("A, D: root mean square and geometric mean of the standard deviations over the ranges of the parameters")
+    _say(f"sensitivities by two steps differ by {found.doubt:.0e}")
 
 
 def sweep_table(sweep: Sweep) -> None:
@@ -312,9 +313,9 @@ def comparison_table(comparison: Comparison) -> None:
         table.add_row(
             name, f"{x:.7f}", f"{y:.7f}", f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0])
         )
-    for name, reason in comparison.refused.items():
-        table.add_row(name, "-", "-", "-", "-", reason)
     out.print(table)
+    for name, reason in comparison.refused.items():
+        _say(f"{name} refused: {reason}")
     table = _table("distances over all samples", "engines", "marker", "largest [m]", "final [m]")
     for row in comparison.differences():
         distances = ("-" if row[key] is None else f"{row[key]:.2e}" for key in ("largest", "final"))

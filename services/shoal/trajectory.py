@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+
+from shoal.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 Array = npt.NDArray[np.float64]
 
@@ -69,6 +75,10 @@ class Trajectory:
         """Whether every lane may be believed."""
         return all(status is Status.OK for status in self.status)
 
+    def __repr__(self) -> str:
+        what = f"{self.lanes} lanes" if self.lanes > 1 else str(self.status[0])
+        return f"Trajectory({', '.join(self.markers)}; {len(self.times)} samples, {self.engine}, {what})"
+
     def marker(self, name: str, lane: int = 0) -> Array:
         """Path of one marker [m], (samples, 2)."""
         return self.points[:, self.markers.index(name), :, lane]
@@ -80,6 +90,28 @@ class Trajectory:
     def distance(self, other: Trajectory) -> float:
         """Largest distance of a marker from where it is in another run of the same scene, over all times [m]."""
         return float(np.max(np.linalg.norm(self.points - other.points, axis=2)))
+
+    def to_pandas(self, lane: int = 0) -> pd.DataFrame:
+        """One lane as a table: index `t` [s], columns NAME.x, NAME.y [m] and NAME.angle [rad] for every marker."""
+        import pandas as pd
+
+        columns: dict[str, Array] = {}
+        for name in self.markers:
+            x, y = self.marker(name, lane).T
+            columns |= {f"{name}.x": x, f"{name}.y": y, f"{name}.angle": self.angle(name, lane)}
+        return pd.DataFrame(columns, index=pd.Index(self.times, name="t"))
+
+    def to_xarray(self) -> xr.Dataset:
+        """All lanes: x, y [m] and angle [rad] over time [s], marker and lane. Raises InputError without xarray."""
+        try:
+            import xarray as xr
+        except ModuleNotFoundError:
+            raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
+        dims = ("time", "marker", "lane")
+        x, y = self.points[:, :, 0], self.points[:, :, 1]
+        status = ("lane", [str(status) for status in self.status])
+        coordinates = {"time": self.times, "marker": list(self.markers), "status": status}
+        return xr.Dataset({"x": (dims, x), "y": (dims, y), "angle": (dims, self.angles)}, coordinates)
 
     def to_json(self, lane: int = 0) -> dict[str, Any]:
         """One lane as plain data, which `shoal simulate --json` prints; null where nothing finite is known."""

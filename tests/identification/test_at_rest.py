@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from shoal.errors import InputError
-from shoal.identification import Measurement, Problem, identify, measure
+from shoal.identification import Measurement, Problem, Verdict, identify, measure
 from shoal.trajectory import Array
 
 TIMES = np.arange(1, 41) / 40
@@ -33,6 +33,9 @@ def test_a_noise_free_recording_at_rest(offset: float) -> None:
     problem, points = hanging()
     estimate = identify(problem, measurement=Measurement.single(TIMES, tuple(problem.channels), points + offset, ""))
     assert 0.0 <= estimate.residual_tests.chance_of_size <= 1.0
+    # What is left at rest is round-off of the solver, which refutes nothing; a nanometre is more than that.
+    assert estimate.residual_tests.wrong_model is (offset > 0)
+    assert (estimate.verdict is Verdict.IDENTIFIED) is (offset == 0)
     assert estimate.parameters["theta"].value == pytest.approx(-np.pi / 2, abs=10 * offset + 1e-6)
 
 

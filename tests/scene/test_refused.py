@@ -141,7 +141,7 @@ markers:
         pytest.param("1: x\n", "required", id="a-key-that-is-a-number"),
         pytest.param("date: 2020-99-99\n", "month must be", id="an-impossible-date"),
         pytest.param("<<: 3\n", "line 1: ", id="a-merge-of-nothing"),
-        pytest.param("a: " + "[" * 3000, "recursion", id="deep-nesting"),
+        pytest.param("a: " + "[" * 3000, "nested deeper", id="deep-nesting"),
     ],
 )
 def test_a_bad_file_is_refused_in_one_line_that_names_it(text: str, why: str, tmp_path: Path) -> None:

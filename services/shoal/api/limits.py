@@ -7,8 +7,13 @@ from collections.abc import Mapping, Sequence
 
 from shoal.api.settings import Settings
 from shoal.errors import InputError
+from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.mechanics.swarm_motion import asked_for
 from shoal.scene import Scene
+from shoal.trajectory import Trajectory
+
+STAGES = 12
+"""What an adaptive step costs in terms of a fixed one: dop853 looks at the forces so often, radau5 does as much."""
 
 
 class TooMuch(InputError):  # noqa: N818 - a refusal, not a failure
@@ -18,7 +23,7 @@ class TooMuch(InputError):  # noqa: N818 - a refusal, not a failure
 def check_scene(scene: Scene, settings: Settings, times: Sequence[float] | None = None, lanes: int = 1) -> None:
     """Whether a scene may be simulated in so many lanes. times [s]: of the samples. Raises TooMuch."""
     solver = scene.solver
-    elements = sum(getattr(body, "elements", 1) for body in scene.bodies.values())
+    elements = _elements(scene)
     if elements > settings.max_elements:
         raise TooMuch(f"scene.bodies: {elements} elements; this service computes {settings.max_elements}")
     samples = solver.samples if times is None else len(times)
@@ -28,13 +33,40 @@ def check_scene(scene: Scene, settings: Settings, times: Sequence[float] | None 
         raise TooMuch(f"times: {size}; this service returns {settings.max_values} values")
     end = solver.duration if times is None else max(times, default=0.0)
     search = solver.swarm_size * solver.swarm_iterations if asked_for(scene) else 1
-    work = math.ceil(min(end / solver.step, 1e18)) * elements * lanes * search
+    field, step = ("max_step", (solver.max_step or math.inf) / STAGES) if _adaptive(scene) else ("step", solver.step)
+    work = math.ceil(min(end / step, 1e18)) * elements * lanes * search
     if work > settings.max_work:
         raise TooMuch(
-            f"solver.step: {end / solver.step:.3g} steps of {elements} elements in {lanes} lanes"
+            f"solver.{field}: {end / step:.3g} steps of {elements} elements in {lanes} lanes"
             f"{f', each searched {search} times' if search > 1 else ''}; "
             f"this service computes {settings.max_work:.3g} in all"
         )
+
+
+def within(scene: Scene, settings: Settings, lanes: int = 1) -> Scene:
+    """The scene, whose integrator, if it chooses its own steps, takes no more of them than the service computes."""
+    allowed = max(1, settings.max_work // (STAGES * _elements(scene) * lanes))
+    return scene.with_values({"solver.max_steps": allowed}) if allowed < scene.solver.max_steps else scene
+
+
+def check_end(motion: Trajectory, scene: Scene) -> None:
+    """Whether a motion came to its end in the steps that `within` left it. Raises TooMuch."""
+    reached = motion.steps < scene.solver.max_steps or not _adaptive(scene, motion.model.get("integrator"))
+    if not (motion.ok or reached):
+        raise TooMuch(
+            f"solver.relative_tolerance: {motion.message.partition(';')[0]}; with {_elements(scene)} elements in "
+            f"{motion.lanes} lanes this service computes no more"
+        )
+
+
+def _elements(scene: Scene) -> int:
+    return sum(getattr(body, "elements", 1) for body in scene.bodies.values())
+
+
+def _adaptive(scene: Scene, integrator: str | None = None) -> bool:
+    """Whether an integrator, else the one that a scene names, chooses its steps; of `auto` only the model tells."""
+    name = integrator or scene.solver.integrator
+    return name in INTEGRATORS and facts(name).adaptive
 
 
 def check_lanes(

@@ -10,7 +10,7 @@ import numpy as np
 import orjson
 
 from shoal.api.content import problem_of, scene_of, written
-from shoal.api.limits import check_lanes, check_scene
+from shoal.api.limits import check_end, check_lanes, check_scene, within
 from shoal.api.schemas import IdentifyRequest, SimulateRequest
 from shoal.api.settings import Settings
 from shoal.engines import Engine
@@ -35,13 +35,19 @@ class Bench:
 
 def simulate(bench: Bench, request: SimulateRequest, note: Note) -> bytes:
     """The motion of a scene, or of one per lane. Raises InputError."""
-    scene = scene_of(request.scene, request.values)
+    scene, settings, times = scene_of(request.scene, request.values), bench.settings, request.times
     if request.lanes is None:
-        check_scene(scene, bench.settings, request.times)
-        return motion(bench.engine.simulate(scene, request.times))
-    check_lanes(scene, bench.settings, request.times, request.lanes)
-    values = {path: np.array(numbers) for path, numbers in request.lanes.items()}
-    return motion(bench.engine.simulate_many(scene, values, request.times))
+        check_scene(scene, settings, times)
+        bounded = within(scene, settings)
+        found = bench.engine.simulate(bounded, times)
+    else:
+        check_lanes(scene, settings, times, request.lanes)
+        values = {path: np.array(numbers) for path, numbers in request.lanes.items()}
+        bounded = within(scene, settings, max(len(column) for column in values.values()))
+        found = bench.engine.simulate_many(bounded, values, times)
+    if bounded is not scene:
+        check_end(found, bounded)
+    return motion(found)
 
 
 def check(bench: Bench, request: IdentifyRequest, note: Note) -> bytes:

@@ -52,6 +52,7 @@ class RemoteEngine:
             transport=RetryTransport(transport or httpx.HTTPTransport(), retry=retry),
         )
         weakref.finalize(self, self._client.close)
+        self._answered = False
 
     @cached_property
     def capabilities(self) -> Capabilities:
@@ -93,15 +94,19 @@ class RemoteEngine:
         except orjson.JSONDecodeError:
             found = None
         if response.is_success and found is not None:
+            self._answered = True
             return found
         raise self._refused(response.status_code, found)
 
     def _refused(self, status: int, found: Any) -> InputError | ComputationError:
+        # A service that has answered before is the right one: then this is a fault, and not the refusal of a scene,
+        # which an identification would count as a point that cannot be.
+        wrong = ComputationError if self._answered else InputError
         if not isinstance(found, dict) or not str(found.get("type", "")).startswith("urn:shoal:"):
-            return InputError(f"engine: {self.name} is not a service of Shoal (HTTP {status})")
+            return wrong(f"engine: {self.name} is not a service of Shoal (HTTP {status})")
         detail = str(found.get("detail", ""))
         if found["type"] == "urn:shoal:unauthorized":
-            return InputError(f"SHOAL_API_KEY: {self.name} asks for a key: {detail}")
+            return wrong(f"SHOAL_API_KEY: {self.name} asks for a key: {detail}")
         if status in (413, 422):
             return InputError(detail)
         return ComputationError(f"engine: {self.name}: {detail}")

@@ -177,8 +177,10 @@ class ForwardModel:
             if instants[0] < 0:
                 continue
             inputs = {path: numbers[lanes] for path, numbers in values.items()}
+            shared = {path: float(x[0]) for path, x in inputs.items() if _same_in_all(path, x)}
+            inputs = {path: x for path, x in inputs.items() if path not in shared}
             view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
-            seen[lanes] = self._simulate(scene, inputs, instants, view, name)
+            seen[lanes] = self._simulate(scene.with_values(shared), inputs, instants, view, name)
         return seen
 
     def _simulate(self, scene: Scene, values: dict[str, Array], times: Array, view: Camera, name: str) -> Array:
@@ -275,6 +277,11 @@ class ForwardModel:
         priors = [(k, entry.parameter.prior) for k, entry in enumerate(self.parameters.entries.values())]
         rows = [(values[:, k] - prior.mean) / prior.std for k, prior in priors if prior is not None]
         return (self.noise or 1.0) * np.array(rows).reshape(len(rows), len(points)).T
+
+
+def _same_in_all(path: str, numbers: Array) -> bool:
+    """Whether a field other than a start is that of every lane: such lanes share one model, which is kept."""
+    return len(numbers) > 1 and not path.startswith("initial.") and bool(np.all(numbers == numbers[0]))
 
 
 def _accepts(scene: Scene, path: str, value: float) -> bool:

@@ -70,7 +70,9 @@ class Measurement:
     ) -> Measurement:
         """One recording without a name. noise: standard deviation of its channels, if known. Raises InputError."""
         if noise is not None and not (np.isfinite(noise) and noise > 0):
-            raise InputError(f"noise: a standard deviation above 0, or None if it is not known, is needed, found {noise:g}")
+            raise InputError(
+                f"noise: a standard deviation above 0, or None if it is not known, is needed, found {noise:g}"
+            )
         sizes = np.full(len(channels), np.nan if noise is None else noise)
         return cls({"recording": Recording(times, channels, values, origin, sizes)}, truth or {})
 
@@ -113,7 +115,9 @@ def measure(problem: Problem, scene: Scene, data: str | Mapping[str, str] | None
             continue
         path = files.get(name) or source.path
         if path is None:
-            raise InputError(f"data: {where} needs a recording; give one as data=FILE (on the command line: --data FILE)")
+            raise InputError(
+                f"data: {where} needs a recording; give one as data=FILE (on the command line: --data FILE)"
+            )
         recordings[name] = _recorded(problem, scene, source, Path(path))
     return Measurement(recordings, truth)
 

@@ -97,8 +97,8 @@ class EngineSource(Clocked):
 class FileSource(Clocked):
     """Data from a CSV (gzip allowed) or Parquet file: `duration` s from `start` s on, every `every`-th sample.
 
-    start: when the motion's time is zero, by the table's clock [s]; left out, 0 where the table begins about there, else
-    its first sample
+    start: when the motion's time is zero, by the table's clock [s]; left out, 0 where the table begins about there,
+    else its first sample
     path: beside the YAML file that names it; may itself be the YAML of a FileSource, whose fields then hold instead
     columns: names, where the file has no header line
     time: the column of time, in `time_scale` s; or rate: samples per second, for files without one

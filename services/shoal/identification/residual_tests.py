@@ -19,6 +19,8 @@ _SURE = 1e-6
 _NO_FIT = 0.05
 """Of the signal: a systematic residual above this is a wrong model, one below it an imperfect one."""
 _OUTLIER = 5.0
+_DIGITS = 1e-12
+"""Of the data: no deviation below is held against a model, as a motion is computed to this tolerance by default."""
 _MAD = 1.4826
 """Standard deviation over the median absolute deviation of a normal distribution."""
 
@@ -131,7 +133,9 @@ def signal(model: ForwardModel) -> float:
 
 
 def _without_model(model: ForwardModel) -> float:
-    sizes = [noise_of(recording) for recording in model.measurement.recordings.values()]
+    """The noise that the data show, and at least what is beyond the digits of the solver."""
+    recordings = model.measurement.recordings.values()
+    sizes = [np.maximum(noise_of(r), _DIGITS * np.max(np.abs(np.nan_to_num(r.values)), axis=0)) for r in recordings]
     squares = [sizes[r][c] ** 2 for r, c in zip(model.rows.recording, model.rows.channel, strict=True)]
     return float(np.sqrt(np.mean(squares * model.rows.weight**2)))
 

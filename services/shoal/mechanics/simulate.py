@@ -154,14 +154,17 @@ def _limit(scene_json: str, horizon: float, integrator: Facts) -> float:
 
 
 def _model_and_choice(scene: Scene, values: Mapping[str, Array], lanes: int, end: float) -> tuple[Model, Choice]:
-    """The model of all lanes, and the integrator, whose stability limit is the smallest at the scene's own start."""
+    """The model of all lanes, and the integrator, whose stability limit is the smallest at the scene's own start.
+
+    Where nothing moves (end [s] is 0) no step is limited.
+    """
     if all(path.startswith("initial.") for path in values):
         key = _key(scene, end)
         model = _model(*key)
-        choice = pick(scene.solver, model, lambda _, integrator: _limit(*key, integrator))
+        choice = pick(scene.solver, model, lambda _, integrator: _limit(*key, integrator) if end > 0 else np.inf)
         return (with_start(model, scene.with_lanes(values), lanes) if values else model), choice
     model = build(scene.with_lanes(values), lanes, max(end, scene.solver.duration))
-    return model, pick(scene.solver, model, stability.step_limit)
+    return model, pick(scene.solver, model, stability.step_limit if end > 0 else lambda *_: np.inf)
 
 
 def _check_step(scene: Scene, choice: Choice) -> None:

@@ -23,6 +23,9 @@ _DENSE = 60
 _ACCURACY = 1e-6
 """Relative, of an eigenvalue by Lanczos's method, whose last digits are no better known along the motion."""
 
+_SAME = 1e-5
+"""Relative difference of the matrices of two lanes that count as one."""
+
 
 def highest_frequency(model: Model) -> float:
     """Highest eigenfrequency over all lanes [rad/s]; 0 if nothing is elastic."""
@@ -61,9 +64,21 @@ def _largest_eigenvalue(model: Model, damping: bool) -> float:
         if damping:
             values = stiffness_at(tile, arrays, tangent, room, 1.0) - values
         matrix, mass = unpack(values, part, tile), unpack(tangent.mass, part, tile)
-        for lane in range(matrix.shape[1]):
+        for lane in _different(matrix, mass):
             largest = max(largest, _top(tangent.pattern, matrix[:, lane], mass[:, lane]))
     return largest
+
+
+def _different(matrix: Array, mass: Array) -> list[int]:
+    """The lanes without those that are another one's neighbours, as those of finite differences are."""
+    both = np.concatenate(
+        [matrix / np.max(np.abs(matrix), initial=1e-300), mass / np.max(np.abs(mass), initial=1e-300)]
+    )
+    found: list[int] = []
+    for lane in range(both.shape[1]):
+        if all(np.max(np.abs(both[:, lane] - both[:, other])) > _SAME for other in found):
+            found.append(lane)
+    return found
 
 
 def _top(pattern: Pattern, matrix: Array, mass: Array) -> float:

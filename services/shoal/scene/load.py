@@ -15,20 +15,82 @@ from shoal.errors import InputError
 from shoal.scene.parametric import EXAMPLES, parametric
 from shoal.scene.scene import Scene
 
+LARGEST = 2**20
+"""Bytes of a file; a table of the most rows that a function of time may have takes half of it."""
+_MOST = 100_000
+"""Values in a file, each as often as an alias repeats it."""
+_DEEPEST = 50
+_LONGEST_NUMBER = 400
 
-class _StrictLoader(yaml.SafeLoader):
-    """Plain data only; a key that stands twice is refused instead of silently lost."""
+
+if yaml.__with_libyaml__:
+
+    class _Loader(yaml.composer.Composer, yaml.CSafeLoader):
+        """libyaml's parser, put together node by node: its own time grows with the square of the depth."""
+
+        def __init__(self, text: str) -> None:
+            yaml.composer.Composer.__init__(self)
+            yaml.CSafeLoader.__init__(self, text)
+
+else:
+    _Loader = yaml.SafeLoader  # type: ignore[assignment, misc, unused-ignore]
+
+
+class _StrictLoader(_Loader):
+    """Plain data of bounded size; a key that stands twice is refused instead of silently lost.
+
+    What aliases repeat is counted before it is made: a few lines of aliases of aliases are data without end.
+    """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth, self._count = 0, 0
+        self._sizes: dict[int, int] = {}
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
+        event: Any = self.peek_event()
+        before = self._count
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise _refused(f"nested deeper than {_DEEPEST}", event.start_mark)
+        node = super().compose_node(parent, index)
+        assert node is not None
+        self._depth -= 1
+        if isinstance(event, yaml.AliasEvent):
+            if id(node) not in self._sizes:
+                raise _refused(f"*{event.anchor} stands within what it repeats", event.start_mark)
+            self._count += self._sizes[id(node)]
+        else:
+            self._count += 1
+            self._sizes[id(node)] = self._count - before
+        if self._count > _MOST:
+            raise _refused(f"more than {_MOST} values, with what aliases repeat", event.start_mark)
+        return node
+
+    def construct_scalar(self, node: Any) -> Any:
+        if node.tag.endswith((":int", ":float")) and len(node.value) > _LONGEST_NUMBER:
+            raise _refused(f"a number of {len(node.value)} characters", node.start_mark)
+        return super().construct_scalar(node)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise yaml.constructor.ConstructorError(None, None, f"the key {key!r} stands twice", node.start_mark)
-        return super().construct_mapping(node, deep)
+        seen = set()
+        for name, _ in node.value:
+            key = self.construct_object(name, deep=True)
+            if isinstance(key, Hashable) and key in seen:
+                raise _refused(f"the key {key!r} stands twice", node.start_mark)
+            seen.add(key if isinstance(key, Hashable) else id(name))
+        mapping: dict[Hashable, Any] = super().construct_mapping(node, deep)
+        return mapping
+
+
+def _refused(problem: str, mark: Any) -> yaml.constructor.ConstructorError:
+    return yaml.constructor.ConstructorError(None, None, problem, mark)
 
 
 def read_yaml(text: str, source: str) -> Any:
-    """Parse YAML. Raises InputError with the line."""
+    """Parse YAML of bounded size. Raises InputError with the line."""
+    if len(text) > LARGEST:
+        raise _too_large(source)
     try:
         return yaml.load(text, _StrictLoader)  # noqa: S506 - a SafeLoader
     except yaml.MarkedYAMLError as error:
@@ -36,23 +98,40 @@ def read_yaml(text: str, source: str) -> Any:
         raise InputError(f"{source}: line {line}: {error.problem or 'not YAML'}") from None
     except yaml.YAMLError as error:
         raise InputError(f"{source}: not YAML: {str(error).splitlines()[0]}") from None
-    except (ValueError, RecursionError) as error:  # an impossible date; brackets nested without end
+    except ValueError as error:  # an impossible date
         raise InputError(f"{source}: not YAML: {error}") from None
+
+
+def _too_large(source: str) -> InputError:
+    return InputError(
+        f"{source}: larger than the {LARGEST} bytes that are read; measured motion belongs into a recording"
+    )
 
 
 def read_named(name: str, folder: Traversable, what: str) -> Any:
     """Data of a YAML file given by path, or of a built-in one given by name. Raises InputError."""
     path = Path(name)
     if path.suffix in (".yaml", ".yml"):
-        try:
-            return read_yaml(path.read_text(encoding="utf-8"), name)
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-            raise InputError(f"{name}: cannot be read: {reason}") from None
+        return read_yaml(_text(path), name)
     if name not in names(folder):
         known = ", ".join(names(folder))
         raise InputError(f"{name}: no such {what}; give a .yaml file or one of {known}")
     return read_yaml((folder / f"{name}.yaml").read_text(encoding="utf-8"), name)
+
+
+def _text(path: Path) -> str:
+    """The text of a file that is not too large. Raises InputError."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path}: cannot be read: not a file")
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise _too_large(str(path))
+        return content.decode("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise InputError(f"{path}: cannot be read: {reason}") from None
 
 
 def names(folder: Traversable) -> list[str]:

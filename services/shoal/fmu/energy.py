@@ -1,0 +1,60 @@
+"""The energy of a scene along its motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shoal.mechanics import forces, stability
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.build import build
+from shoal.mechanics.dynamics import derived_rows, work_space
+from shoal.mechanics.integrators import choose, facts, pick
+from shoal.mechanics.march import SAMPLED, march
+from shoal.mechanics.model import Model
+from shoal.mechanics.tangent import ready
+from shoal.mechanics.tile import SINGLE
+from shoal.scene import Scene
+from shoal.trajectory import Array
+
+_LANE = slice(0, 1)
+
+
+def energies(scene: Scene, times: Array) -> Array:
+    """Kinetic, elastic and gravitational energy [J] at increasing times >= 0 [s], (times,).
+
+    Springs count as elastic; what applied loads could still do does not count. For a scene that `simulate` accepts.
+    """
+    model = build(scene, horizon=max(float(times[-1]), scene.solver.duration))
+    instants = times
+    if model.forces.size:
+        # Turns of torsion springs are counted from sample to sample, which must be less than half a turn apart.
+        instants = np.union1d(times, np.arange(0.0, times[-1], scene.solver.step))
+    q, v = _states(model, instants)
+    evaluator, wanted, found = Evaluator(model), set(times.tolist()), []
+    for k, time in enumerate(instants.tolist()):
+        evaluator.remember(q[k])
+        if time in wanted:
+            seen = evaluator.at(q[k], v[k], time)
+            found.append(seen.kinetic + seen.strain + seen.gravity)
+    return np.array(found)
+
+
+def _states(model: Model, times: Array) -> tuple[Array, Array]:
+    """Coordinates and rates at the times, (times, unknowns) each: the time loop with pairs of unknowns as markers."""
+    solver, n = model.scene.solver, model.unknowns
+    choice = pick(solver, model, stability.step_limit)
+    arrays = model.tile(SINGLE, _LANE)
+    room = work_space(SINGLE, arrays)
+    arrays = ready(SINGLE, arrays, room)
+    room.z[:n], room.zdot[:n] = model.q0[:, 0], model.v0[:, 0]
+    derived_rows(SINGLE, arrays, room)
+    room.memory[:] = forces.initial_memory(SINGLE, arrays.forces, room.z, model.start_angles[:, 0])
+    scheme = choose(solver, model, SINGLE, _LANE, choice.name)
+    steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
+    first = np.arange(0, n, 2)
+    second = np.minimum(first + 1, n - 1)
+    rows = np.column_stack([first, second, first, second]).ravel()
+    record = march(SINGLE, scheme, arrays, room, solver.step, steps, times, rows, solver.rank_tolerance)
+    samples = record.samples.reshape(len(times), len(first), SAMPLED)
+    q, v = (samples[:, :, columns].reshape(len(times), -1)[:, :n] for columns in ([0, 1], [5, 6]))
+    return q, v

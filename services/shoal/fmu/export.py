@@ -1,0 +1,66 @@
+"""A scene as a file that FMI 2.0 hosts load."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from pythonfmu.builder import FmuBuilder
+
+from shoal.errors import InputError
+from shoal.fmu import machine
+from shoal.fmu.unit import CONTENT, identifier
+from shoal.mechanics.swarm_motion import asked_for
+from shoal.scene import Scene
+from shoal.scene.function import Function
+from shoal.whole import whole
+
+
+def export(scene: Scene, paths: Sequence[str] = (), out: Path | None = None) -> Path:
+    """Write a unit; returns its file. Raises InputError, and ComputationError if it cannot be written.
+
+    paths: fields of the scene that are its parameters, by default gravity and the initial angles; out: by default the
+    scene's name in the working folder
+    """
+    if asked_for(scene):
+        raise InputError(f"solver.acceleration: {scene.solver.acceleration!r} is for studies; a unit needs a solver")
+    chosen = list(dict.fromkeys(paths)) or ["gravity.0", "gravity.1", *(f"initial.{b}.angle" for b in scene.bodies)]
+    content = {
+        "scene": scene.model_dump(mode="json"),
+        "parameters": {path: number(scene, path) for path in chosen},
+    }
+    target = out or Path(f"{identifier(scene)}.fmu")
+    with tempfile.TemporaryDirectory() as folder, _paths_as_they_were(), whole(target) as unit:
+        script, data = Path(folder) / "machine.py", Path(folder) / CONTENT
+        shutil.copy(str(machine.__file__), script)
+        data.write_text(json.dumps(content), encoding="utf-8")
+        FmuBuilder.build_FMU(script, unit, [data])
+    return target
+
+
+def number(scene: Scene, path: str) -> float:
+    """The real number at a path of a scene. Raises InputError."""
+    value = scene.value(path)
+    if isinstance(value, Function):
+        value = value.number
+    if not isinstance(value, float):
+        raise InputError(f"parameter: {path} is not a real number that stands in the scene")
+    scene.with_values({path: value})
+    return value
+
+
+@contextmanager
+def _paths_as_they_were() -> Iterator[None]:
+    """Undo what the builder leaves behind of the script it has imported."""
+    before, known = list(sys.path), set(sys.modules)
+    try:
+        yield
+    finally:
+        sys.path[:] = before
+        if "machine" not in known:
+            sys.modules.pop("machine", None)

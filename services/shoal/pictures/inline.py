@@ -1,0 +1,136 @@
+"""What a notebook shows of a scene, a motion or an answer: one sentence, one table, one picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from shoal.engines import get_engine
+from shoal.engines.compare import Comparison
+from shoal.engines.sweep import Sweep
+from shoal.errors import InputError
+from shoal.identification import Estimate
+from shoal.pictures.drawn import Drawn
+from shoal.pictures.engines import engines
+from shoal.pictures.motion import Motion, scene_motion
+from shoal.pictures.overlay import overlay
+from shoal.pictures.pages import render
+from shoal.pictures.paths import paths
+from shoal.pictures.poses import poses
+from shoal.pictures.report import shown, verdict
+from shoal.pictures.style import png
+from shoal.pictures.sweep import sweep
+from shoal.pictures.titles import agrees
+from shoal.scene import Rod, Scene
+from shoal.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure that a notebook shows by itself; `figure` is matplotlib's, to change it."""
+
+    figure: Figure
+
+    def _repr_png_(self) -> bytes:
+        return png(self.figure)
+
+    def save(self, path: Path | str) -> None:
+        """Write it in the format that the ending names: png, svg, pdf."""
+        self.figure.savefig(path)
+
+
+@singledispatch
+def plot(result: Any) -> Picture:
+    """The picture of a scene (its motion), a trajectory, an estimate, a sweep or a comparison. Raises InputError."""
+    raise InputError(f"plot: there is no picture of a {type(result).__name__}")
+
+
+@plot.register
+def _(scene: Scene) -> Picture:
+    until = scene.solver.duration
+    return Picture(poses(scene_motion(scene, get_engine("gauss"), until), f"{scene.name} until {until:.3g} s"))
+
+
+@plot.register
+def _(trajectory: Trajectory) -> Picture:
+    return Picture(_paths(trajectory))
+
+
+@plot.register
+def _(estimate: Estimate) -> Picture:
+    return Picture(overlay(estimate))
+
+
+@plot.register
+def _(result: Sweep) -> Picture:
+    return Picture(sweep(result, list(result.positions)[-1]))
+
+
+@plot.register
+def _(comparison: Comparison) -> Picture:
+    last = list(comparison.scene.markers)[-1]
+    return Picture(engines(comparison, last, agrees(comparison, last)))
+
+
+@singledispatch
+def html(result: Any) -> str:
+    """A scene, a trajectory or an estimate as a piece of HTML."""
+    raise InputError(f"there is no page of a {type(result).__name__}")
+
+
+@html.register
+def _(scene: Scene) -> str:
+    """The bodies, each with its start and the joints that hold it."""
+    rows = []
+    for name, body in scene.bodies.items():
+        kind = f"{body.elements} {body.element}" if isinstance(body, Rod) and body.element != "rigid" else body.kind
+        start = scene.start(name)
+        rows.append([name, kind, f"{start.angle:.6g}", f"{start.rate:.6g}"])
+    lead = f"{scene.description} Simulated for {scene.solver.duration:g} s unless told otherwise."
+    headings = ["body", "kind", "angle [rad]", "rate [rad/s]"]
+    return _html(scene.name, lead, "Bodies at the start", headings, rows)
+
+
+@html.register
+def _(trajectory: Trajectory) -> str:
+    """Where the markers end, and whether that can be trusted; of several lanes the first."""
+    end, trust = float(trajectory.times[-1]), f"status {trajectory.status[0]}"
+    several = f"the first of {trajectory.lanes} lanes, " if trajectory.lanes > 1 else ""
+    message = f" ({trajectory.message})" if trajectory.message else ""
+    rows = [[name, *(f"{x:.6f}" for x in trajectory.marker(name)[-1])] for name in trajectory.markers]
+    reach = ", ".join(trajectory.markers)
+    picture = Drawn(
+        "paths", _paths(trajectory), f"x and y of {reach} against time.", "Both coordinates of each marker."
+    )
+    lead = f"{several}{trust}{message}."
+    return _html(f"Motion by {trajectory.engine}", lead, f"At {end:g} s", ["marker", "x [m]", "y [m]"], rows, picture)
+
+
+@html.register
+def _(estimate: Estimate) -> str:
+    """The verdict, the values with their intervals, and the model over the data."""
+    values = {**estimate.parameters, **estimate.quantities}
+    headings = ["parameter", "value", "standard deviation", "95 % interval", "known"]
+    rows = [[name, *shown(value)] for name, value in values.items()]
+    picture = Drawn("overlay", overlay(estimate), "Measured values with the fitted model.", "The model over the data.")
+    return _html(estimate.problem, verdict(estimate), estimate.method, headings, rows, picture)
+
+
+def _html(
+    title: str, lead: str, caption: str, headings: list[str], rows: list[list[str]], picture: Drawn | None = None
+) -> str:
+    drawn = None if picture is None else picture.embedded()
+    return render(
+        "inline.html.j2", title=title, lead=lead, caption=caption, headings=headings, rows=rows, picture=drawn
+    )
+
+
+def _paths(trajectory: Trajectory) -> Figure:
+    markers = {name: trajectory.marker(name) for name in trajectory.markers}
+    trust = "" if trajectory.ok else f" ({trajectory.status[0]}: not to be trusted)"
+    return paths(Motion("", trajectory.times, np.empty((0, 2)), {}, markers), f"{trajectory.engine}{trust}")

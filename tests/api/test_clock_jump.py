@@ -1,0 +1,23 @@
+"""The time that a computation may take is not measured by the clock on the wall."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from typing import Any
+
+import httpx
+import pytest
+
+
+def test_limits_do_not_follow_the_wall(
+    obedient: httpx.Client, machine: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a clock that jumps by days whenever somebody looks: a call in time ends well, one that hangs is ended."""
+    now, jumps = time.time(), itertools.cycle((2e5, -2e5))
+    monkeypatch.setattr(time, "time", lambda: now + next(jumps))
+    ask = {"times": [0.1]}
+    assert obedient.post("/v1/simulate", json={"scene": machine | {"name": "short"}, **ask}).status_code == 200
+    begin = time.monotonic()
+    assert obedient.post("/v1/simulate", json={"scene": machine | {"name": "hang"}, **ask}).status_code == 504
+    assert 0.9 < time.monotonic() - begin < 10

@@ -1,0 +1,98 @@
+"""No room for a result: one clear line, exit status 3, and the file that was there before stays whole."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from shoal.cli import main
+from shoal.errors import ComputationError
+from shoal.whole import whole
+
+# Files may grow to so many bytes, which every process may decide for itself; a full disk says it with another word.
+ROOM = 2000
+PROGRAM = f"""
+import resource, sys
+from shoal.cli import main
+resource.setrlimit(resource.RLIMIT_FSIZE, ({ROOM}, {ROOM}))
+main(sys.argv[1:])
+"""
+
+
+@contextmanager
+def little_room() -> Iterator[None]:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def limited(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", PROGRAM, *arguments], capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("ending", ["csv", "html"])
+def test_a_result_is_written_whole_or_not_at_all(ending: str, tmp_path: Path) -> None:
+    out = tmp_path / f"result.{ending}"
+    out.write_text("yesterday's")
+    with little_room():
+        ended = CliRunner().invoke(main, ["simulate", "flexible-double-pendulum", "--no-verify", "--out", str(out)])
+    assert (ended.exit_code, ended.stdout) == (3, "")
+    assert ended.stderr == f"shoal: out: {out} cannot be written: File too large\n"
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(out.name, "yesterday's")]
+
+
+def test_a_unit_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    out = tmp_path / "result.fmu"
+    with little_room():
+        ended = CliRunner().invoke(main, ["export-fmu", "single-pendulum", "--out", str(out)])
+    assert (ended.exit_code, ended.stdout) == (3, ""), ended.exception
+    assert len(ended.stderr.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_standard_output_on_a_full_disk() -> None:
+    command = [sys.executable, "-c", "from shoal.cli import main; main()", "scenes", "single-pendulum"]
+    with Path("/dev/full").open("w") as full:
+        ended = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (3, "shoal: cannot write: No space left on device\n")
+
+
+@pytest.mark.slow
+def test_a_checkpoint_on_a_full_disk(tmp_path: Path) -> None:
+    """The run ends with a line; what is kept so far is read again."""
+    kept = tmp_path / "kept"
+    command = ("identify", "paper-case-1", "--method", "least-squares", "--checkpoint", str(kept))
+    ended = limited(*command)
+    assert (ended.returncode, ended.stdout) == (3, "")
+    assert ended.stderr == "shoal: cannot write: File too large\n"
+    assert kept.stat().st_size <= ROOM
+    again = limited(*command)
+    assert again.stderr.splitlines()[-1] == "shoal: cannot write: File too large"
+
+
+def test_what_fails_otherwise_leaves_nothing(tmp_path: Path) -> None:
+    target = tmp_path / "a.txt"
+
+    def fails() -> None:
+        with whole(target) as path:
+            path.write_text("half")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fails()
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(ComputationError, match=r"out: .* cannot be written"), whole(target / "b.txt") as path:
+        path.write_text("x")
+    with whole(target) as path:
+        path.write_text("all")
+    assert target.read_text() == "all"

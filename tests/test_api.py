@@ -1,0 +1,109 @@
+"""`import shoal`: light, the same answers as the command line, results that convert and show themselves."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import shoal
+from shoal.errors import InputError
+from shoal.identification import Estimate
+
+TIMES = [0.1, 0.2, 0.5]
+
+
+@pytest.fixture(scope="module")
+def motion() -> shoal.Trajectory:
+    return shoal.simulate("single-pendulum", TIMES)
+
+
+@pytest.fixture(scope="module")
+def problem() -> shoal.Problem:
+    """The angle of a pendulum, from a table that the user holds."""
+    return shoal.Problem.parse(
+        {
+            "name": "mine",
+            "scene": "single-pendulum",
+            "parameters": {"angle": {"path": "initial.OA.angle", "lower": -1.0, "upper": 1.0}},
+            "channels": [
+                {"marker": "A", "quantity": "x", "column": "x", "unit": "cm"},
+                {"marker": "A", "quantity": "y", "column": "y", "unit": "cm"},
+            ],
+            "source": {"kind": "file"},
+        },
+        "mine",
+    )
+
+
+@pytest.fixture(scope="module")
+def estimate(problem: shoal.Problem) -> Estimate:
+    run = shoal.simulate("single-pendulum", np.linspace(0, 1, 21), values={"initial.OA.angle": 0.3}, verify=False)
+    x, y = run.marker("A").T
+    return shoal.identify(problem, pd.DataFrame({"t": run.times, "x": 100 * x, "y": 100 * y}))
+
+
+def test_import_loads_nothing_until_a_name_is_used() -> None:
+    program = "import sys, shoal; print([m for m in ('numpy', 'numba', 'pydantic', 'matplotlib') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.stdout.strip(), done.stderr) == ("[]", "")
+
+
+def test_every_name_is_there() -> None:
+    assert {name for name in shoal.__all__ if getattr(shoal, name, None) is None} == set()
+    with pytest.raises(AttributeError, match="magic"):
+        shoal.magic  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_simulate_verifies_sets_values_and_takes_scenes(motion: shoal.Trajectory) -> None:
+    assert motion.model["verification"]["time_error"] < 1e-6
+    scene = shoal.load_scene("single-pendulum").with_values({"initial.OA.angle": 0.3})
+    by_scene = shoal.simulate(scene, TIMES)
+    by_values = shoal.simulate("single-pendulum", TIMES, values={"initial.OA.angle": 0.3})
+    np.testing.assert_array_equal(by_scene.points, by_values.points)
+    with pytest.raises(InputError, match="gauss only"):
+        shoal.simulate(scene, engine="exudyn", tolerance=1e-3)
+
+
+def test_motion_converts_without_loss(motion: shoal.Trajectory) -> None:
+    table, cube = motion.to_pandas(), motion.to_xarray()
+    assert table.index.tolist() == TIMES
+    np.testing.assert_array_equal(table[["A.x", "A.y"]].to_numpy(), motion.marker("A"))
+    np.testing.assert_array_equal(cube["angle"].sel(marker="A").isel(lane=0), motion.angle("A"))
+    assert cube["status"].item() == "ok"
+
+
+def test_a_table_is_a_recording(estimate: Estimate) -> None:
+    assert estimate.verdict.trusted, estimate.message
+    assert estimate.to_pandas().loc["angle", "value"] == pytest.approx(0.3, abs=1e-6)
+    assert estimate.data.startswith("table.csv, 0 s to 1 s")
+
+
+def test_reprs_are_short_and_say_what_counts(motion: shoal.Trajectory, estimate: Estimate) -> None:
+    scene = shoal.load_scene("single-pendulum")
+    assert repr(scene) == "Scene(single-pendulum: bodies OA; joints O; markers A)"
+    assert repr(motion) == "Trajectory(A; 3 samples, gauss, ok)"
+    assert repr(estimate).startswith("Estimate(mine: identified; angle 0.3 ±")
+
+
+def test_notebooks_show_a_table_and_a_picture(motion: shoal.Trajectory, estimate: Estimate) -> None:
+    scene = shoal.load_scene("single-pendulum")
+    for shown, word in ((scene, "Bodies at the start"), (motion, "status ok"), (estimate, "Verdict: identified")):
+        html = shown._repr_html_()  # type: ignore[union-attr]
+        assert word in html
+        assert "<table>" in html
+        assert html.count("data:image/") == (0 if shown is scene else 1)
+
+
+def test_each_kind_of_result_has_a_picture(motion: shoal.Trajectory, estimate: Estimate, tmp_path: Path) -> None:
+    scene = shoal.load_scene("single-pendulum")
+    swept = shoal.sweep(scene, {"initial.OA.angle": [0.0, 0.5, 1.0]}, 0.5)
+    compared = shoal.compare(scene, ["gauss", "casadi"], TIMES)
+    for k, result in enumerate((scene, motion, estimate, swept, compared)):
+        shoal.plot(result).save(tmp_path / f"{k}.png")
+        assert (tmp_path / f"{k}.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(InputError, match="no picture of a int"):
+        shoal.plot(3)

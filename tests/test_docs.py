@@ -1,0 +1,117 @@
+"""The documentation builds without a warning; its worked examples run as they stand."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from shoal.cli import main
+from shoal.engines import ENGINES
+from shoal.identification import METHODS
+
+DOCS = Path(__file__).parents[1] / "docs"
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page: str, language: str = "python") -> list[str]:
+    """The pieces of code of a page."""
+    return [code for name, code in BLOCK.findall((DOCS / page).read_text(encoding="utf-8")) if name == language]
+
+
+def run(page: str) -> dict[str, Any]:
+    """The names that the code of a page leaves behind."""
+    found: dict[str, Any] = {"__name__": "page"}
+    for code in blocks(page):
+        exec(compile(code, page, "exec", dont_inherit=True), found)
+    return found
+
+
+@pytest.mark.slow  # Reads every docstring of the reference; `make docs` is the same.
+def test_site_builds_without_a_warning_and_names_no_address_to_load(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
+    done = subprocess.run(command, cwd=DOCS.parent, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    loaded = re.compile(r'<(?:script|img|link)[^>]*(?:src|rel="stylesheet" href)="?https?:')
+    assert [page.name for page in tmp_path.rglob("*.html") if loaded.search(page.read_text(encoding="utf-8"))] == []
+    assert "shoal identify" in (tmp_path / "reference" / "commands.html").read_text(encoding="utf-8")
+
+
+def test_every_file_that_the_readme_names_is_there() -> None:
+    links = re.findall(r"\]\(([^):]+)\)", (DOCS.parent / "README.md").read_text(encoding="utf-8"))
+    assert len(links) > 10
+    assert [link for link in links if not (DOCS.parent / link).exists()] == []
+
+
+def test_notebook_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("notebook.md")["estimate"].parameters["angle"].value == pytest.approx(0.3, abs=1e-6)
+
+
+def test_tutorial_finds_the_angle_that_it_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its own machine, recording and problem, as the page says, from an angle that the problem does not know."""
+    monkeypatch.chdir(tmp_path)
+    (problem,) = blocks("tutorial.md", "yaml")
+    Path("find.yaml").write_text(problem)
+    runner = CliRunner()
+    Path("mine.yaml").write_text(runner.invoke(main, ["scenes", "single-pendulum"]).stdout)
+    command = re.search(r"shoal (simulate mine.yaml .*run.csv)", (DOCS / "tutorial.md").read_text(encoding="utf-8"))
+    assert command
+    assert runner.invoke(main, [*command[1].split(), "--set", "initial.OA.angle=0.4"]).exit_code == 0
+    result = runner.invoke(main, ["identify", "find.yaml", "--json"])
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["parameters"]["angle"]["value"] == pytest.approx(0.4, abs=1e-6)
+
+
+def test_engine_of_its_page_agrees_with_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(ENGINES, "pendulum", ENGINES["gauss"])
+    assert run("extend/engine.md")["largest"] < 1e-8
+
+
+def test_optimiser_of_its_page_finds_the_angles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(METHODS, "nelder-mead", METHODS["auto"])
+    found = run("extend/optimiser.md")
+    assert found["estimate"].verdict.trusted, found["estimate"].message
+    assert found["error"] < 1e-5
+
+
+@pytest.fixture(scope="module")
+def extended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What the pages leave behind that change the mechanics: on a copy of the package, with all their changes in it."""
+    folder = tmp_path_factory.mktemp("copy")
+    shutil.copytree(DOCS.parent / "services", folder / "services", ignore=shutil.ignore_patterns("__pycache__"))
+    uses = []
+    for page in ("extend/element.md", "extend/joint.md", "extend/integrator.md"):
+        *files, use = blocks(page)
+        names = re.findall(r"`(mechanics/\S+\.py)`:$", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE)
+        for name, text in zip(names, files, strict=True):
+            (folder / "services" / "shoal" / name).write_text(text)
+        for change in blocks(page, "diff"):
+            subprocess.run(["git", "apply", "-"], cwd=folder, input=change, text=True, check=True)
+        uses.append(use)
+    wanted = "gaps=gaps, gap=float(gap), balanced=balanced, order=float(order)"
+    program = "\n".join([*uses, f"import json\nprint(json.dumps(dict({wanted})))"])
+    place = {"PYTHONPATH": str(folder / "services"), "SHOAL_HOME": str(folder / "home"), "NUMBA_CACHE_DIR": ""}
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=os.environ | place, cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+@pytest.mark.slow  # Compiles the copy.
+def test_pages_of_the_mechanics_do_what_they_say(extended: dict[str, Any]) -> None:
+    first, second, third = extended["gaps"]
+    assert 3 < first / second < 5, "the element's mass is of second order"
+    assert 3 < second / third < 5
+    assert extended["gap"] < 1e-8, "the joint holds what a slider holds"
+    assert extended["balanced"]
+    assert extended["order"] == pytest.approx(2.0, abs=0.1)

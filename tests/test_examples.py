@@ -1,0 +1,47 @@
+"""The examples of the documentation run as they stand, and each keeps the number that it is there for."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+RECORDING = ROOT.parent / "shared" / "data" / "multiarm_kaheman" / "single_1kHz.csv.gz"
+
+
+@pytest.fixture
+def example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Run an example in a folder of its own, where it writes its pictures; returns its names."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(name: str, *arguments: str) -> dict[str, Any]:
+        monkeypatch.setattr(sys, "argv", [name, *arguments])
+        return runpy.run_path(str(ROOT / "docs" / "examples" / name))
+
+    return run
+
+
+def test_paper_finds_the_angles_to_the_error_of_its_mesh(example: Any, tmp_path: Path) -> None:
+    found = example("paper.py")
+    # 0.035 degrees: what a mesh of 4/8 elements is off by, as docs/validation.md says.
+    assert abs(found["error"]) == pytest.approx(6.2e-4, rel=0.1)
+    assert (tmp_path / "paper.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow  # Kernels for the other ways to an acceleration.
+def test_slider_crank_passes_where_others_end(example: Any) -> None:
+    found = example("singular.py")
+    assert found["passes"] == 22
+    assert found["error"] < 1e-8
+    assert not any(run.ok for run in found["others"].values())
+
+
+@pytest.mark.slow  # Fits two seconds of a recording at a thousand samples a second.
+@pytest.mark.skipif(not RECORDING.exists(), reason="the recording of Kaheman et al. is not on this machine")
+def test_recording_tells_the_ratio_of_weight_to_inertia(example: Any) -> None:
+    # The authors' own estimate from the whole recording: 0.14758 * 0.14775 * 9.81 / (1.0912e-4 + 0.14758 * 0.14775^2).
+    assert example("recording.py", str(RECORDING))["ratio"] == pytest.approx(64.22, rel=5e-3)
