@@ -139,7 +139,9 @@ def apart(model: ForwardModel, one: Array, other: Array) -> bool:
 
 
 def _within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -> bool:
-    """Whether the answer's intervals include a point already."""
+    """Whether intervals that are wide for the mesh's own error, more than for noise, include a point already."""
+    if not any(value.correction is not None and abs(value.correction) > value.std for value in parameters.values()):
+        return False
     values = zip(model.names, model.parameters.to_values(point), strict=True)
     return all(parameters[name].lower <= value <= parameters[name].upper for name, value in values)
 
