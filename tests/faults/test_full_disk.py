@@ -20,6 +20,7 @@ ROOM = 2000
 PROGRAM = f"""
 import resource, sys
 from shoal.cli import main
+sys.dont_write_bytecode = True
 resource.setrlimit(resource.RLIMIT_FSIZE, ({ROOM}, {ROOM}))
 main(sys.argv[1:])
 """
@@ -27,12 +28,15 @@ main(sys.argv[1:])
 
 @contextmanager
 def little_room() -> Iterator[None]:
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before, written = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
+    # Python would cut its compiled modules off as well, and fail on them ever after.
+    sys.dont_write_bytecode = True
     resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, before[1]))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        sys.dont_write_bytecode = written
 
 
 def limited(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from shoal.engines import Engine, get_engine
 from shoal.errors import InputError
 from shoal.identification.checkpoint import Memory
-from shoal.identification.loss import flatten, noise_of
+from shoal.identification.loss import flatten, noise_of, steepness
 from shoal.identification.measurement import Measurement
 from shoal.identification.observation import Camera, observe
 from shoal.identification.parametrization import Parametrization
@@ -271,6 +271,14 @@ class ForwardModel:
         return np.array([sizes[r][c] for r, c in zip(self.rows.recording, self.rows.channel, strict=True)]) * (
             self.rows.weight
         )
+
+    def steepness(self, residual: Array) -> Array:
+        """What a Gauss-Newton step multiplies the rows of the Jacobian by, and divides the residual by, (rows,)."""
+        if self.problem.loss == "squares":
+            return np.ones_like(residual)
+        data = len(self.rows.time)
+        of_data = steepness(residual[:data], self.problem.loss, self.loss_scale)
+        return np.append(of_data, np.ones(len(residual) - data))
 
     def _prior_rows(self, points: Array) -> Array:
         values = self.parameters.to_values(points)

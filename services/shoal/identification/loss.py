@@ -11,6 +11,7 @@ from shoal.trajectory import Array
 _TUNING = {"huber": 1.345, "soft-l1": 1.345, "cauchy": 2.385}
 """Of the noise, where a deviation begins to weigh less: 95 % efficiency for normal noise (Huber 1981; Zhang 1997)."""
 _ORDER = 4
+_SMALL = 1e-12
 
 
 def flatten(residuals: Array, loss: str, noise: Array) -> Array:
@@ -29,6 +30,26 @@ def flatten(residuals: Array, loss: str, noise: Array) -> Array:
             rho = np.log1p(z)
     flat: Array = np.sign(residuals) * scale * np.sqrt(rho)
     return flat
+
+
+def steepness(flat: Array, loss: str, noise: Array) -> Array:
+    """By what rows of the Jacobian of flattened residuals are too small for a Gauss-Newton step, in their shape.
+
+    The square root of a loss that grows more slowly than a square bends back, so that Gauss-Newton on it goes up to
+    twice too far. With the Jacobian times this and the residual by it, gradients stay and the curvature is that of
+    iteratively reweighted least squares (Holland and Welsch 1977), which does not. flat: as `flatten` gives them
+    """
+    rho = (flat / (_TUNING[loss] * noise)) ** 2
+    match loss:
+        case "huber":
+            beyond = np.maximum(rho, 1.0)
+            found = np.sqrt(2.0 * beyond / (1.0 + beyond))
+        case "soft-l1":
+            found = np.sqrt((1.0 + rho / 2.0) / (1.0 + rho / 4.0))
+        case _:
+            found = np.sqrt(np.maximum(rho, _SMALL) / -np.expm1(-np.maximum(rho, _SMALL)))
+    steeper: Array = found
+    return steeper
 
 
 def noise_of(recording: Recording) -> Array:

@@ -195,9 +195,10 @@ class _Search:
         """
         downhill = -self.jacobian.T @ self.residual
         held = (self.point <= self.model.lower) & (downhill < 0) | (self.point >= self.model.upper) & (downhill > 0)
-        jacobian = np.where(held, 0.0, self.jacobian / self.scale)
+        steeper = self.model.steepness(self.residual)
+        jacobian = np.where(held, 0.0, steeper[:, None] * self.jacobian / self.scale)
         stacked = np.concatenate([jacobian, np.sqrt(self.damping) * np.eye(len(self.scale))])
-        wanted = np.concatenate([-self.residual, np.zeros(len(self.scale))])
+        wanted = np.concatenate([-self.residual / steeper, np.zeros(len(self.scale))])
         return np.asarray(np.linalg.lstsq(stacked, wanted, rcond=None)[0] / self.scale)
 
 
