@@ -109,15 +109,16 @@ class Scene(Record):
 
     def _placed(self) -> set[str]:
         """Bodies whose start the joints tell, from the ground or from a body that says its position."""
+        joined: dict[str, set[str]] = {}
+        for joint in self.joints.values():
+            ends = {side.body for side in joint_types.places(joint)}
+            for end in ends:
+                joined.setdefault(end, set()).update(ends)
         reached = {GROUND, *(name for name, start in self.initial.items() if start.position is not None)}
         frontier = list(reached)
         while frontier:
-            here = frontier.pop()
-            for joint in self.joints.values():
-                ends = {side.body for side in joint_types.places(joint)}
-                if here in ends:
-                    frontier += (new := ends - reached)
-                    reached |= new
+            frontier += (new := joined.get(frontier.pop(), set()) - reached)
+            reached |= new
         return reached
 
     @classmethod
