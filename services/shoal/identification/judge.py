@@ -68,9 +68,9 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
     if found:
         reason += f"; {found[0]}"
         # A clock and gravity, for instance, have the same effect on a free swing.
-        equals = [other.name for other in found[1:] if other.after < 1.5 * found[0].after]
+        equals = [other.words for other in found[1:] if other.after < 1.5 * found[0].after]
         reason += f" (as would {', '.join(equals)})" if equals else ""
-        advice.append(f"check the {' or the '.join(s.name for s in found)}, or seek it as a parameter")
+        advice.append(f"check the {' or the '.join(s.words for s in found)}, or seek it as a parameter")
     if (exchange := exchanged(model)) is not None:
         reason += f"; {exchange}"
         advice.append("check which column is which marker")

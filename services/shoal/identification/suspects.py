@@ -43,12 +43,17 @@ class Suspect:
         """Whether freeing it lowers the misfit severalfold."""
         return self.after * SEVERAL <= self.before
 
+    @property
+    def words(self) -> str:
+        """Its name as a sentence has it."""
+        return f"offset in {self.name}" if self.name in ("x", "y") else self.name
+
     def __str__(self) -> str:
         """In words, as a message names it."""
         changes = f"a value of {self.value:.4g} instead of {self.stated:g}"
         if self.name in ("clock", "scale", "gravity"):
             changes = f"a factor of {self.value / self.stated:.4g}"
-        return f"the {self.name}: {changes} would lower the misfit from {self.before:.2g} to {self.after:.2g}"
+        return f"the {self.words}: {changes} would lower the misfit from {self.before:.2g} to {self.after:.2g}"
 
 
 def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array) -> list[Suspect]:
