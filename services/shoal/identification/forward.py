@@ -265,6 +265,15 @@ class ForwardModel:
         return np.where(np.isfinite(rows), rows, np.inf)
 
     @cached_property
+    def spread(self) -> float:
+        """Standard deviation of the weighted data about the mean of each channel."""
+        parts = []
+        for recording in self.measurement.recordings.values():
+            deviation = recording.values - np.nanmean(recording.values, axis=0)
+            parts.append(deviation[np.isfinite(recording.values)])
+        return float(np.sqrt(np.mean((np.concatenate(parts) * self.rows.weight) ** 2)))
+
+    @cached_property
     def loss_scale(self) -> Array:
         """Size of a residual from which on it counts as an outlier, (rows,): by the noise, stated or estimated."""
         sizes = [noise_of(recording) for recording in self.measurement.recordings.values()]

@@ -101,7 +101,7 @@ def residual_tests(
         size=size,
         noise=seen,
         noise_stated=model.noise is not None,
-        signal=signal(model),
+        signal=model.spread,
         mesh=mesh,
         # A product overflows to infinity, which has chance zero; a power would raise OverflowError.
         chance_of_size=float(chi2.sf(freedom * beyond * beyond, freedom)),
@@ -121,15 +121,6 @@ def ljung_box(signal: Array, lags: int = 10) -> float:
         return 1.0
     rho = np.array([signal[lag:] @ signal[:-lag] for lag in range(1, lags + 1)]) / power
     return float(chi2.sf(count * (count + 2) * np.sum(rho**2 / (count - np.arange(1, lags + 1))), lags))
-
-
-def signal(model: ForwardModel) -> float:
-    """Standard deviation of the (weighted) data about the mean of each channel."""
-    parts = []
-    for recording in model.measurement.recordings.values():
-        deviation = recording.values - np.nanmean(recording.values, axis=0)
-        parts.append(deviation[np.isfinite(recording.values)])
-    return float(np.sqrt(np.mean((np.concatenate(parts) * model.rows.weight) ** 2)))
 
 
 def _without_model(model: ForwardModel) -> float:

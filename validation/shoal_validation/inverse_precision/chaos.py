@@ -15,17 +15,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem, identify, measure
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import descend_many
-from shoal.scene import Rod
 from shoal.trajectory import Array
 
 from shoal_validation.document import rewrite, table
 from shoal_validation.inverse_precision.cases import RATE, rigid_problem
-from shoal_validation.problems.one_angle import TOLERANCE, G
+from shoal_validation.problems.double_pendulum import lagrange
 
 CHAOTIC = (3 * np.pi / 4 - np.pi / 2, 2.6 - np.pi / 2)
 """Absolute angles [rad]; from the downward vertical 3 pi/4 and 2.6."""
@@ -58,34 +56,12 @@ def record(
 ) -> Measurement:
     """Positions of the problem's markers by Lagrange's equations, with white noise; start: absolute angles [rad]."""
     times = np.arange(1, round(horizon * rate) + 1) / rate
-    places = motion(problem, start, times)
+    places = dict(zip("AB", lagrange(start, times), strict=True))
     columns = [places[c.marker][:, "xy".index(c.quantity)] for c in problem.channels]
     values = np.stack(columns, axis=1)
     values = values + NOISE * np.random.default_rng(seed).standard_normal(values.shape)
     truth = dict(zip(problem.parameters, start, strict=False))
     return Measurement.single(times, tuple(problem.channels), values, f"Lagrange's equations, noise {NOISE:g} m", truth)
-
-
-def motion(problem: Problem, start: tuple[float, float], times: Array) -> dict[str, Array]:
-    """Elbow A and tip B of two uniform rods released from rest, (samples, 2) each, by Lagrange's equations."""
-    rods = [body for body in problem.load_scene().bodies.values() if isinstance(body, Rod)]
-    (m1, l1), (m2, l2) = ((rod.mass, rod.length) for rod in rods)
-
-    def rate(_: float, y: Array) -> Array:
-        a, b, u, w = y
-        c, s = np.cos(a - b), np.sin(a - b)
-        mass = np.array([[(m1 / 3 + m2) * l1**2, m2 * l1 * l2 / 2 * c], [m2 * l1 * l2 / 2 * c, m2 * l2**2 / 3]])
-        load = np.array(
-            [
-                -m2 * l1 * l2 / 2 * s * w * w - (m1 / 2 + m2) * G * l1 * np.cos(a),
-                m2 * l1 * l2 / 2 * s * u * u - m2 * G * l2 / 2 * np.cos(b),
-            ]
-        )
-        return np.concatenate([[u, w], np.linalg.solve(mass, load)])
-
-    run = solve_ivp(rate, (0.0, times[-1]), [*start, 0.0, 0.0], "DOP853", t_eval=times, rtol=TOLERANCE, atol=TOLERANCE)
-    elbow = l1 * np.stack([np.cos(run.y[0]), np.sin(run.y[0])], axis=1)
-    return {"A": elbow, "B": elbow + l2 * np.stack([np.cos(run.y[1]), np.sin(run.y[1])], axis=1)}
 
 
 def two_markers() -> Problem:

@@ -14,9 +14,14 @@ from shoal_validation.problems.one_angle import TOLERANCE, G
 def settle(times: Array) -> Reference:
     """Tip of the scene `rigid-double-pendulum` from Lagrange's equations in two absolute angles."""
     scene = load_scene("rigid-double-pendulum")
-    rods = [body for body in scene.bodies.values() if isinstance(body, Rod)]
+    start = (scene.initial["OA"].angle, scene.initial["AB"].angle)
+    return Reference(lagrange(start, times)[1], "Lagrange's equations in two angles, scipy DOP853", 1e-9)
+
+
+def lagrange(start: tuple[float, float], times: Array) -> tuple[Array, Array]:
+    """Elbow and tip of that machine, (samples, 2) each, released from rest at other absolute angles [rad]."""
+    rods = [body for body in load_scene("rigid-double-pendulum").bodies.values() if isinstance(body, Rod)]
     (m1, l1), (m2, l2) = ((rod.mass, rod.length) for rod in rods)
-    start = [scene.initial[name].angle for name in scene.bodies]
 
     def rate(_: float, y: Array) -> Array:
         a, b, u, w = y
@@ -32,5 +37,5 @@ def settle(times: Array) -> Reference:
 
     run = solve_ivp(rate, (0.0, times[-1]), [*start, 0.0, 0.0], "DOP853", t_eval=times, rtol=TOLERANCE, atol=TOLERANCE)
     a, b = run.y[:2]
-    points = np.stack([l1 * np.cos(a) + l2 * np.cos(b), l1 * np.sin(a) + l2 * np.sin(b)], axis=1)
-    return Reference(points, "Lagrange's equations in two angles, scipy DOP853", 1e-9)
+    elbow = l1 * np.stack([np.cos(a), np.sin(a)], axis=1)
+    return elbow, elbow + l2 * np.stack([np.cos(b), np.sin(b)], axis=1)

@@ -10,7 +10,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.loss import noise_of
-from shoal.identification.methods.growth import growth, spread_of_data, swings
+from shoal.identification.methods.growth import growth, swings
 from shoal.identification.methods.lanes import descend_many, distinct, linearise_many
 from shoal.identification.methods.least_squares import from_starts, linearise
 from shoal.identification.methods.multiple_shooting import multiple_shooting
@@ -89,7 +89,7 @@ def explains(model: ForwardModel, outcome: Outcome) -> bool:
     if model.noise is not None:
         return bool(left <= _NOISES * model.noise)
     noise = np.nanmax([np.nanmax(noise_of(recording)) for recording in model.measurement.recordings.values()])
-    return bool(left <= max(_UNEXPLAINED * spread_of_data(model), _NOISES * noise))
+    return bool(left <= max(_UNEXPLAINED * model.spread, _NOISES * noise))
 
 
 def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]:

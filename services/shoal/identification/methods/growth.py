@@ -33,15 +33,6 @@ def growth(model: ForwardModel, jacobian: Array) -> float:
     return max(largest)
 
 
-def spread_of_data(model: ForwardModel) -> float:
-    """Standard deviation of the weighted data about the mean of each channel."""
-    parts = []
-    for recording in model.measurement.recordings.values():
-        deviation = recording.values - np.nanmean(recording.values, axis=0)
-        parts.append(deviation[np.isfinite(recording.values)])
-    return float(np.sqrt(np.mean((np.concatenate(parts) * model.rows.weight) ** 2)))
-
-
 def swings(model: ForwardModel) -> int:
     """How often a channel passes its mean, the most of all."""
     signals = [signal[np.isfinite(signal)] for r in model.measurement.recordings.values() for signal in r.values.T]

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.growth import spread_of_data
 from shoal.identification.methods.lanes import descend_many, distinct, history
 from shoal.identification.methods.least_squares import linearise
 from shoal.identification.methods.outcome import Outcome
@@ -123,7 +122,7 @@ def _reach(model: ForwardModel, branch: Branch, horizon: float) -> float:
     """The next horizon [s] of a branch: where its prediction leaves the data."""
     part = model.until(min(_MOST * horizon, model.measurement.end))
     residual = part.residuals(branch.point[None])[0, : len(part.rows.time)]
-    allowed = max(_PREDICTED * spread_of_data(model), _NOTICED * float(np.sqrt(branch.fitness)))
+    allowed = max(_PREDICTED * model.spread, _NOTICED * float(np.sqrt(branch.fitness)))
     off = part.rows.time[np.abs(residual) > allowed]
     off = off[off > horizon]
     reached = float(np.min(off)) if off.size else part.measurement.end
