@@ -86,6 +86,12 @@ def test_a_rigid_model_of_a_flexible_machine_is_not_passed_off_as_exact() -> Non
     assert estimate.fitness > 1e-4
 
 
+@pytest.mark.parametrize("method", ["auto", "least-squares", "iafsa"])
+def test_a_step_that_no_lane_can_take_is_refused_with_its_limit(method: str) -> None:
+    with pytest.raises(InputError, match="solver.step: 0.01 s is beyond the stability limit"):
+        run("paper-case-1", method, values={"solver.step": 0.01})
+
+
 def test_unknown_method_is_refused() -> None:
     with pytest.raises(InputError, match="no method 'magic'"):
         run("paper-case-1", "magic")

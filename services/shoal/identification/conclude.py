@@ -68,7 +68,7 @@ def conclude(
     parameters = _parameters(model, point, at, correction)
     profiled = profiles(model, point, at) if wishes.profiles and possible else {}
     parameters |= {n: replace(parameters[n], identifiable=False) for n, p in profiled.items() if p.open}
-    unknown = combinations(model, point, at)
+    unknown = combinations(model, point, at) if possible else []
     tests = residual_tests(model, seen.residual, blocks, at.noise, mesh or 0.0)
     if possible:
         judgement = judge(model, outcome, seen, at, tests, parameters, unknown)
@@ -99,7 +99,7 @@ def conclude(
         wall_s=wall,
         history=searched.counter.history,
         iterations=outcome.iterations,
-        minima=[{**_values_of(model, p), "fitness": f} for p, f in outcome.minima],
+        minima=[{**_values_of(model, p), "fitness": f} for p, f in outcome.minima if np.isfinite(f)],
         residual_autocorrelation=correlation,
         residual_tests=tests,
         suspects=judgement.suspects,

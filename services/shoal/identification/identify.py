@@ -93,7 +93,7 @@ def _search(
     except TimeIsUp:
         outcome = _best_so_far(model, time_limit or 0.0)
     model.deadline = None
-    if model.refusal and model.counter.failures == model.counter.evaluations:
+    if model.refusal and not np.isfinite(outcome.fitness):
         raise InputError(model.refusal)
     return model, outcome, stages
 

@@ -1,8 +1,8 @@
 """Where a model does not fit: which property of the measurement, taken as known, would explain it.
 
-A wrong clock or scale is a fault that no fit of the machine shows. Each property is freed in turn. The residual is
-first regressed on its effect and some of its values are tried; the most promising properties are then fitted together
-with the parameters.
+A wrong clock or scale is a fault that no fit of the machine shows. Each property is freed in turn and the residual is
+regressed on its effect; the most promising properties are then fitted together with the parameters. Where none of them
+explains the misfit, values of each are tried over its whole range.
 """
 
 from __future__ import annotations
@@ -56,21 +56,41 @@ class Suspect:
         return f"the {self.words}: {changes} would lower the misfit from {self.before:.2g} to {self.after:.2g}"
 
 
+@dataclass(frozen=True)
+class _Freed:
+    """A model with one more parameter at the end: the answer with what was taken as known, where to fit from, and
+    the misfit over the present one that this promises.
+    """
+
+    name: str
+    model: ForwardModel
+    start: Array
+    begin: Array
+    promise: float = 1.0
+
+
 def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array) -> list[Suspect]:
     """The properties that explain the residual at an answer, the best first. Runs are not counted."""
     before = float(np.sqrt(np.mean(residual**2)))
-    freed = []
-    for name, free, start in _freed(model, point):
-        begin, scanned = _scan(free, start)
-        promise = min(_gain(free, start, residual, jacobian), scanned / before)
-        freed.append((promise, name, free, start, begin))
-    freed.sort(key=lambda entry: entry[0])
-    found = [_fitted(name, free, start, begin, before) for _, name, free, start, begin in freed[:_CONFIRMED]]
+    freed = list(_freed(model, point))
+    near = [replace(free, promise=_gain(free.model, free.start, residual, jacobian)) for free in freed]
+    found = _confirmed([free for free in near if free.promise < 1.0], before)
+    if not found:
+        # A wrong clock can lead the fit so far astray that nothing near the answer points to it.
+        poses = starting_points(model)
+        found = _confirmed([_scan(free, np.vstack([point, poses]), before) for free in freed], before)
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
-    return sorted((s for s in found if s.explains), key=lambda s: (float(f"{s.after:.1e}"), s.name))
+    return sorted(found, key=lambda s: (float(f"{s.after:.1e}"), s.name))
 
 
-def _freed(model: ForwardModel, point: Array) -> Iterator[tuple[str, ForwardModel, Array]]:
+def _confirmed(freed: list[_Freed], before: float) -> list[Suspect]:
+    """Those of the most promising that explain the misfit when they are fitted with the parameters."""
+    promising = sorted(freed, key=lambda free: free.promise)
+    found = (_fitted(free, before) for free in promising[:_CONFIRMED])
+    return [suspect for suspect in found if suspect.explains]
+
+
+def _freed(model: ForwardModel, point: Array) -> Iterator[_Freed]:
     """Models with one more parameter at the end, with the point extended by what was taken as known."""
     sought = {entry.parameter.path for entry in model.parameters.entries.values()} | set(model.problem.ties)
     for name, path, stated, parameter in _candidates(model):
@@ -79,7 +99,8 @@ def _freed(model: ForwardModel, point: Array) -> Iterator[tuple[str, ForwardMode
         key = f"suspect-{name}"
         problem = model.problem.model_copy(update={"parameters": {**model.problem.parameters, key: parameter}})
         free = replace(model, problem=problem, memory=None, whole=None, deadline=None)
-        yield name, free, np.append(point, np.log(stated) if parameter.scale == "log" else stated)
+        start = np.append(point, np.log(stated) if parameter.scale == "log" else stated)
+        yield _Freed(name, free, start, start)
 
 
 def _candidates(model: ForwardModel) -> Iterator[tuple[str, str, float, Parameter]]:
@@ -126,23 +147,21 @@ def _gain(free: ForwardModel, start: Array, residual: Array, jacobian: Array) ->
     return float(np.sqrt(max(0.0, 1.0 - explained / float(residual @ residual))))
 
 
-def _scan(free: ForwardModel, start: Array) -> tuple[Array, float]:
-    """The best of a scan of its values, at the answer and at the poses of the first samples, and the misfit there.
-
-    A wrong clock can lead the fit so far astray that nothing near the answer points to it.
-    """
-    poses = starting_points(free)
+def _scan(freed: _Freed, places: Array, before: float) -> _Freed:
+    """To be fitted from the best of a scan of its values, at each of the places (points, parameters)."""
+    free, start = freed.model, freed.start
     values = np.concatenate([[start[-1]], np.linspace(free.lower[-1], free.upper[-1], _SCAN)[1:-1]])
-    points = np.concatenate([np.column_stack([np.tile(p[:-1], (len(values), 1)), values]) for p in (start, *poses)])
+    points = np.column_stack([np.repeat(places, len(values), axis=0), np.tile(values, len(places))])
     points = np.clip(points, free.lower, free.upper)
     residuals = free.uncounted(points)
     best = int(np.argmin(free.cost(residuals)))
-    return points[best], float(np.sqrt(np.mean(residuals[best] ** 2)))
+    return replace(freed, begin=points[best], promise=float(np.sqrt(np.mean(residuals[best] ** 2))) / before)
 
 
-def _fitted(name: str, free: ForwardModel, start: Array, begin: Array, before: float) -> Suspect:
-    """Fit it with the parameters, from the best of the scan."""
-    best = descend(free, begin, lambda *_: None)
-    value, stated = free.parameters.to_values(best.point)[-1], free.parameters.to_values(start)[-1]
+def _fitted(freed: _Freed, before: float) -> Suspect:
+    """Fit it with the parameters."""
+    free = freed.model
+    best = descend(free, freed.begin, lambda *_: None)
+    value, stated = (float(free.parameters.to_values(end)[-1]) for end in (best.point, freed.start))
     after = float(np.sqrt(np.mean(best.residual**2))) if np.isfinite(best.fitness) else np.inf
-    return Suspect(name, float(stated), float(value), before, after)
+    return Suspect(freed.name, stated, value, before, after)
