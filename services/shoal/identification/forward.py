@@ -192,8 +192,8 @@ class ForwardModel:
                 self.engine.simulate_many(scene, values, times) if values else self.engine.simulate(scene, times)
             )
         except InputError as error:
-            whole = self.whole or self
-            self.refusal = whole.refusal = whole.refusal or str(error)
+            asked = self.whole or self
+            self.refusal = asked.refusal = asked.refusal or str(error)
             nothing = np.full((1, len(times), len(channels)), np.nan)
             if lanes == 1:
                 return nothing

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import chdtri
 
 from shoal.identification.estimate import Value, Verdict
 from shoal.identification.forward import ForwardModel
@@ -119,11 +120,9 @@ def _identifiable(
 
 def rivals_of(model: ForwardModel, outcome: Outcome, at: Linearisation) -> list[Array]:
     """Other minima that fit as well as the noise can tell, without repetitions, (parameters,) each."""
-    from scipy.stats import chi2  # slow to import
-
     # Of the sum of squares; correlated noise makes larger differences by chance.
     chance = max(seen.variance / seen.independent(1) for seen in at.noise)
-    doubt = float(chi2.ppf(LEVEL, len(outcome.point))) * chance / model.samples
+    doubt = float(chdtri(len(outcome.point), 1.0 - LEVEL)) * chance / model.samples
     least = max(outcome.fitness, model.things * (model.noise or 0.0) ** 2)
     limit = outcome.fitness + min(doubt, 0.5 * least) + 1e-18
     found: list[Array] = []

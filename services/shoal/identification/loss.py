@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from shoal.identification.measurement import Recording
 from shoal.trajectory import Array
@@ -69,5 +69,5 @@ def differences(signal: Array) -> float:
         return float("nan")
     jumps = np.diff(known, _ORDER)
     # Of white noise of variance one: the sum of the squared binomial coefficients 1 4 6 4 1.
-    size = float(np.median(np.abs(jumps)) / norm.ppf(0.75) / np.sqrt(70.0))
+    size = float(np.median(np.abs(jumps)) / ndtri(0.75) / np.sqrt(70.0))
     return max(size, 1e-12 * float(np.ptp(known)), 1e-300)

@@ -81,10 +81,8 @@ def _at_rest(model: ForwardModel, name: str) -> bool:
 
 def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pose: Array) -> Array:
     """Distinct minimisers of the pose error over the angles, best first, (points, parameters)."""
-    from scipy.stats import qmc  # slow to import
-
-    count = _CANDIDATES * 2 ** (len(angles) - 1).bit_length()
-    scatter = qmc.Sobol(len(angles), seed=0).random(count)
+    count = _CANDIDATES * len(angles)
+    scatter = _scatter(count, len(angles))
     points = np.repeat(middle[None], count, axis=0)
     points[:, angles] = model.lower[angles] + scatter * (model.upper - model.lower)[angles]
     damping = np.full(count, 1e-3)
@@ -108,6 +106,17 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
         if not going.size:
             break
     return _distinct(model, points, cost, angles)
+
+
+def _scatter(count: int, dimensions: int) -> Array:
+    """Points that fill the unit cube evenly, (count, dimensions): Kronecker's sequence of the generalised golden ratio.
+
+    Roberts (2018). scipy's qmc has other ones, and takes a second to import.
+    """
+    ratio = 2.0
+    for _ in range(_ITERATIONS):
+        ratio = (1.0 + ratio) ** (1.0 / (dimensions + 1))
+    return np.asarray((0.5 + np.outer(np.arange(1, count + 1), ratio ** -np.arange(1.0, dimensions + 1))) % 1.0)
 
 
 def _damped_step(error: Array, jacobian: Array, damping: Array) -> Array:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from shoal.identification.covariance import Block, Noise, correlate, estimate_noise
 from shoal.trajectory import Array
@@ -77,13 +78,11 @@ def spread(function: Callable[[Array], float], point: Array, at: Linearisation) 
 
 def quantile(shares: Array, noise: tuple[Noise, ...]) -> float:
     """Student's t for a variance whose shares (blocks,) are known with the freedom of each (Welch 1947)."""
-    from scipy.stats import t  # slow to import
-
     total = float(np.sum(shares))
     if total <= 0.0:
         return 0.0
     doubt = float(np.sum([(share / total) ** 2 / seen.freedom for share, seen in zip(shares, noise, strict=True)]))
-    return float(t.ppf(0.5 + LEVEL / 2, 1.0 / max(doubt, 1e-9)))
+    return float(stdtrit(1.0 / max(doubt, 1e-9), 0.5 + LEVEL / 2))
 
 
 def autocorrelation(residual: Array, blocks: list[Block]) -> float:
