@@ -15,6 +15,7 @@ import pytest
 from shoal.errors import InputError
 from shoal.identification import Estimate, Verdict, identify
 from shoal.identification.checkpoint import Memory
+from shoal.identification.forward import ForwardModel, TimeIsUp
 from shoal_validation.inverse_precision.cases import rigid_problem, textbook
 
 METHOD = "iafsa-unseeded"
@@ -131,3 +132,18 @@ def test_a_time_limit_gives_the_best_so_far_and_says_so() -> None:
     assert "stopped after 0.05 s" in estimate.message
     assert 0 < estimate.evaluations < 4040
     assert np.isfinite(estimate.fitness)
+
+
+def test_a_time_limit_on_the_fine_model_leaves_what_the_coarse_one_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_time_left(model: ForwardModel, *_: object) -> None:
+        raise TimeIsUp(model)
+
+    monkeypatch.setattr("shoal.identification.adapt.descend", no_time_left)
+    problem = rigid_problem()
+    limited = identify(
+        problem, method="least-squares", measurement=textbook(problem, 1.0), tolerance=1e-3, time_limit=60.0
+    )
+    assert limited.verdict is Verdict.FAILED
+    assert "stopped after 60 s" in limited.message
+    for name, true in limited.truth.items():
+        assert limited.parameters[name].value == pytest.approx(true, abs=1e-3)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.identification.forward import ForwardModel, Progress
+from shoal.identification.forward import ForwardModel, Progress, TimeIsUp
 from shoal.identification.methods import Method, Outcome
 from shoal.identification.methods.auto import explains
 from shoal.identification.methods.least_squares import descend
@@ -50,7 +50,10 @@ def coarse_to_fine(
     outcome = search(coarse, rng, progress)
     stages.append(_stage(chosen, coarse.counter.evaluations))
     fine, chosen = _chosen(coarse, outcome.point, tolerance)
-    descent = descend(fine, outcome.point, progress)
+    try:
+        descent = descend(fine, outcome.point, progress)
+    except TimeIsUp:
+        raise TimeIsUp(fine if np.isfinite(fine.counter.best_value) else coarse) from None
     point, fitness, rows = descent.point, descent.fitness, descent.rows
     # The coarse model may have led to the wrong minimum.
     if np.sqrt(fitness) > _OFF * tolerance and not explains(fine, replace(outcome, fitness=fitness)):

@@ -26,7 +26,11 @@ Progress = Callable[[int, float, float], None]
 
 
 class TimeIsUp(Exception):  # noqa: N818 - an end that is expected, not an error
-    """The time allowed for an identification has passed; the best so far stands."""
+    """The time allowed for an identification has passed; the best so far of the model that was running stands."""
+
+    def __init__(self, model: ForwardModel) -> None:
+        super().__init__()
+        self.model = model
 
 
 @dataclass(frozen=True)
@@ -234,7 +238,7 @@ class ForwardModel:
 
     def _residuals(self, points: Array) -> Array:
         if self.deadline is not None and time.monotonic() > self.deadline:
-            raise TimeIsUp
+            raise TimeIsUp(self.whole or self)
         found = self._remembered(points) if self.memory is not None else self._simulated_residuals(points)
         self.work += len(points)
         if self.whole is not None:

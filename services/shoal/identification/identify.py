@@ -90,7 +90,8 @@ def _search(
             outcome = search(model, rng, progress)
         else:
             model, outcome, stages = coarse_to_fine(model, search, tolerance, rng, progress)
-    except TimeIsUp:
+    except TimeIsUp as end:
+        model = end.model
         outcome = _best_so_far(model, time_limit or 0.0)
     model.deadline = None
     if model.refusal and not np.isfinite(outcome.fitness):
