@@ -6,7 +6,7 @@ import os
 import pickle
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -18,6 +18,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 _reused: list[str] = []
 _fresh = False
+_NEW, _DAY = ".new-", 86400.0
 
 
 def run(key: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
@@ -68,7 +69,16 @@ def _read(file: Path) -> tuple[Any] | None:
 
 def _write(file: Path, result: Any) -> None:
     """At once: a process that is killed leaves a whole file or none."""
-    handle, name = tempfile.mkstemp(dir=file.parent, prefix=".new-")
+    handle, name = tempfile.mkstemp(dir=file.parent, prefix=_NEW)
     with os.fdopen(handle, "wb") as stream:
+        _clear(file.parent, os.fstat(handle).st_mtime)
         pickle.dump(result, stream)
     os.replace(name, file)
+
+
+def _clear(where: Path, now: float) -> None:
+    """Remove what processes left that were killed while they wrote: what is older than a day; now [s]: the folder's."""
+    for path in where.glob(f"{_NEW}*"):
+        with suppress(FileNotFoundError):
+            if now - path.stat().st_mtime > _DAY:
+                path.unlink()

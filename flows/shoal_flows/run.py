@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
+import os
 from collections.abc import Callable, Mapping
 from typing import Any, get_origin, get_type_hints
 
 import yaml
-from shoal.errors import InputError
+from shoal.errors import ComputationError, InputError, ShoalError
 
 from shoal_flows import events, server, workers
 from shoal_flows.terminal import following, notice, show
@@ -14,6 +16,8 @@ from shoal_flows.terminal import following, notice, show
 
 def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> bool:
     """Run a flow with its progress on standard error, print its answer; returns whether it can be trusted."""
+    # Records that Prefect could not be sent: it would print each of them.
+    logging.raiseExceptions = False
     with following(f"flow {name}") as listener, events.listening(listener):
         result = run_flow(name, parameters)
     notice()
@@ -31,6 +35,7 @@ def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
     server.start()
     # What follows takes seconds to import; meanwhile the server and the workers start.
     ready = workers.warm_up()
+    from prefect.context import get_settings_context, use_profile
     from prefect.exceptions import ParameterTypeError
 
     from shoal_flows.flows import FLOWS
@@ -43,9 +48,19 @@ def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
         ready.result()
     server.wait()
     try:
-        return flow(**wanted)
+        # Who imported Prefect before has let it read the settings too early.
+        with use_profile(get_settings_context().profile, include_current_context=False):
+            return flow(**wanted)
     except ParameterTypeError as error:
         raise InputError(f"{name}: {' '.join(str(error).split())}") from None
+    except ShoalError:
+        raise
+    except Exception as error:
+        if server.answers():
+            raise
+        where = os.environ["PREFECT_API_URL"]
+        text = f"the Prefect server at {where} is gone; what was computed is kept: the same command goes on from there"
+        raise ComputationError(text) from error
 
 
 def _parsed(flow: str, function: Callable[..., Any], parameters: Mapping[str, Any]) -> dict[str, Any]:

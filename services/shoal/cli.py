@@ -42,6 +42,8 @@ class Program(click.Group):
             sys.exit(InputError.exit_status)
         except (ShoalError, click.ClickException) as error:
             message = error.format_message() if isinstance(error, click.ClickException) else str(error)
+            if isinstance(error, click.UsageError) and error.ctx is not None:
+                message = f"{message.rstrip('.')} (see `{error.ctx.command_path} --help`)"
             click.echo(f"shoal: {message}", err=True)
             sys.exit(getattr(error, "exit_status", InputError.exit_status))
         except click.Abort:
@@ -513,9 +515,11 @@ def ui(host: str, port: int) -> None:
 @click.argument("engine", type=click.Choice(["gauss", "exudyn", "exudyn-ge", "casadi"]))
 @click.option("--host", default="127.0.0.1", show_default=True)
 @click.option("--port", type=click.IntRange(1, 65535), metavar="PORT", help="8001 gauss, 8002 exudyn, 8003 casadi.")
-def serve(engine: str, host: str, port: int | None) -> None:
+@click.option("--certificate", type=click.Path(path_type=Path), help="Serve https with this certificate (PEM).")
+@click.option("--key", type=click.Path(path_type=Path), help="The certificate's private key (PEM).")
+def serve(engine: str, host: str, port: int | None, certificate: Path | None, key: Path | None) -> None:
     """Serve ENGINE over HTTP until Ctrl-C; SHOAL_API_* in the environment sets the limits."""
-    _optional("shoal.api.serve", "services").serve(engine, host, port)
+    _optional("shoal.api.serve", "services").serve(engine, host, port, certificate, key)
 
 
 @main.command("export-fmu")

@@ -125,3 +125,13 @@ def test_problems_open_nothing(gauss: httpx.Client, problem: Machine, changes: d
 def test_names_of_recordings(gauss: httpx.Client, problem: Machine, name: str) -> None:
     request = {"problem": problem, "recordings": {name: {"columns": {"t": [0.0]}}}}
     assert refused(gauss, "/v1/identifications", json=request)[0] == 422
+
+
+def test_joints_of_many_places(gauss: httpx.Client, machine: Machine) -> None:
+    """What a joint of n places joins is found in a time that grows with n, not with its square."""
+    body = machine["bodies"]["OA"]
+    bodies = {f"b{k}": body for k in range(4000)}
+    terms = [{"at": {"body": name}, "axis": "x"} for name in bodies]
+    joints = {f"c{k}": {"kind": "coupling", "terms": terms} for k in range(3)}
+    scene = machine | {"bodies": bodies, "joints": joints, "markers": {"A": {"body": "b0", "point": "end"}}}
+    assert "no chain of joints connects it to the ground" in refused(gauss, "/v1/simulate", json={"scene": scene})[2]

@@ -266,8 +266,24 @@ def test_newton_failure_is_a_status_and_standard_output_stays_clean(capfd):
 def test_weakly_stable_index_3_run_is_not_believed():
     # Spectral radius 1 with position constraints: the multipliers grow until Newton fails; the default does not.
     scene = load_scene("rigid-double-pendulum").with_values({"solver.duration": 10.0})
-    assert not ExudynEngine(integrator="generalized-alpha").simulate(scene).ok
+    weak = ExudynEngine().simulate(scene.with_values({"solver.integrator": "generalized-alpha"}))
+    assert not weak.ok
+    assert weak.message.endswith("only weakly stable at solver.spectral_radius 1, use 0.9")
     assert ExudynEngine().simulate(scene).ok
+
+
+@pytest.mark.parametrize("asked", ["auto", "generalized-alpha", "rk4"])
+def test_a_result_names_the_integrator_that_made_it(asked):
+    """A scene's generalized-alpha is Exudyn's, with its radius; an integrator that Exudyn has not is not claimed."""
+    scene = load_scene("rigid-double-pendulum").with_values(
+        {"solver.integrator": asked, "solver.spectral_radius": 0.8, "solver.step": 0.005, "solver.energy_tolerance": 1}
+    )
+    made = "generalized-alpha" if asked == "generalized-alpha" else "trapezoidal"
+    run = ExudynEngine().simulate(scene)
+    assert (run.model["integrator"], run.model["spectral_radius"]) == (made, 0.8 if made == asked else 1.0)
+    assert run.points.tobytes() == ExudynEngine(integrator=made).simulate(scene).points.tobytes()
+    other = "trapezoidal" if made == "generalized-alpha" else "generalized-alpha"
+    assert run.distance(ExudynEngine(integrator=other).simulate(scene)) > 1e-5
 
 
 def test_numerical_damping_and_drift_are_caught():

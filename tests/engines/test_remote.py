@@ -6,12 +6,14 @@ import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
 import pytest
 from shoal.api.settings import Settings
 from shoal.engines import get_engine
+from shoal.engines.gauss import GaussEngine
 from shoal.engines.remote import RemoteEngine
 from shoal.engines.verification import verified
 from shoal.errors import ComputationError, InputError
@@ -47,10 +49,41 @@ def test_lanes_bit_for_bit(url: str) -> None:
     assert far.lanes == 5
 
 
-def test_a_remote_run_is_verified_like_a_local_one(url: str) -> None:
-    scene = load_scene("rigid-double-pendulum")
-    far, near = (verified(get_engine(name), scene, [0.2]) for name in (url, "gauss"))
-    assert far.model == near.model
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("rigid-double-pendulum", {}),
+        ("flexible-double-pendulum", {"solver.duration": 0.2}),
+        ("rigid-double-pendulum", {"solver.integrator": "energy-momentum", "solver.step": 0.1}),
+    ],
+)
+def test_a_remote_run_is_verified_like_a_local_one(
+    url: str, name: str, values: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same verdict from the same numbers, a wrong run's too; every run is the service's, none is made here."""
+    scene = load_scene(name).with_values(values)
+    near = verified(get_engine("gauss"), scene)
+    monkeypatch.delattr(GaussEngine, "simulate")
+    far = verified(get_engine(url), scene)
+    assert (far.status, far.message, far.model) == (near.status, near.message, near.model)
+    assert far.points.tobytes() == near.points.tobytes()
+    assert far.model["verification"]["time_error"] > 0
+
+
+def test_a_service_without_a_second_run_leaves_the_first(url: str) -> None:
+    """What a service refuses of the second run is said; the first one is not lost."""
+    asked = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        asked.append(request)
+        if len(asked) > 1:
+            return httpx.Response(504, json={"type": "urn:shoal:timeout", "detail": "ended after 60 s"})
+        return httpx.post(url + request.url.path, content=request.content, headers=request.headers, timeout=30)
+
+    run = verified(RemoteEngine(url, httpx.MockTransport(answer)), load_scene("single-pendulum"))
+    assert run.ok
+    assert run.model["verification"]["time_error"] is None
+    assert "time error not estimated: engine: " in run.model["verification"]["note"]
 
 
 def test_capabilities(url: str) -> None:

@@ -73,15 +73,16 @@ def test_standard_output_on_a_full_disk() -> None:
 
 @pytest.mark.slow
 def test_a_checkpoint_on_a_full_disk(tmp_path: Path) -> None:
-    """The run ends with a line; what is kept so far is read again."""
+    """The run ends with a line that names the file; what is kept so far is read again."""
     kept = tmp_path / "kept"
     command = ("identify", "paper-case-1", "--method", "least-squares", "--checkpoint", str(kept))
     ended = limited(*command)
     assert (ended.returncode, ended.stdout) == (3, "")
-    assert ended.stderr == "shoal: cannot write: File too large\n"
+    line = f"shoal: checkpoint: {kept} cannot be written: File too large"
+    assert ended.stderr == f"{line}\n"
     assert kept.stat().st_size <= ROOM
     again = limited(*command)
-    assert again.stderr.splitlines()[-1] == "shoal: cannot write: File too large"
+    assert again.stderr.splitlines()[-1] == line
 
 
 def test_what_fails_otherwise_leaves_nothing(tmp_path: Path) -> None:

@@ -92,6 +92,16 @@ def test_neither_a_pipe_nor_a_device_is_read(tmp_path: Path) -> None:
         assert "not a file" in result.stderr
 
 
+@pytest.mark.parametrize("what", ["pipe", "zero", "folder"])
+def test_a_recording_that_is_no_file_is_not_read(what: str, tmp_path: Path) -> None:
+    """The description of a recording too: nobody writes into the pipe."""
+    path = tmp_path / f"{what}.yaml"
+    {"pipe": os.mkfifo, "zero": lambda p: p.symlink_to("/dev/zero"), "folder": Path.mkdir}[what](path)
+    result = CliRunner().invoke(main, ["identify", "kaheman-single", "--data", str(path)])
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr == f"shoal: {path}: cannot be read: not a file\n"
+
+
 def test_what_is_just_not_too_much_is_read(tmp_path: Path) -> None:
     """A table of the most rows, a scene that uses aliases, and a file of the largest size."""
     rows = ", ".join(f"[{k / 1000:.3f}, {k % 7}.25]" for k in range(20_000))

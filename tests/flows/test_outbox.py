@@ -16,10 +16,13 @@ import pytest
 from shoal.engines.compare import Comparison
 from shoal.errors import ComputationError, InputError
 from shoal_flows.rerun import rerun
-from shoal_flows.server import free_port
 from shoal_flows.tracking import outbox, record, store
 from shoal_flows.tracking.engines import log_comparison
 from shoal_flows.tracking.record import LOCAL, Run
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from deployed import free_port
 
 
 def use(monkeypatch: pytest.MonkeyPatch, address: str) -> None:

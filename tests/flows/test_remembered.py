@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -93,3 +95,13 @@ def test_a_file_that_nobody_can_read_is_computed_again(computed: list[Any]) -> N
     assert remembered.run("broken", len, "abc") == 3
     assert remembered.run("broken", len, "abc") == 3
     assert computed == ["abc"]
+
+
+def test_halves_of_files_do_not_pile_up(computed: list[Any]) -> None:
+    """A process that is killed while it writes leaves one; the folder does not grow with the number of kills."""
+    for name, age in (("old", 2 * 86400), ("recent", 60)):
+        half = remembered.folder() / f".new-{name}"
+        half.write_bytes(b"half")
+        os.utime(half, (time.time() - age,) * 2)
+    assert remembered.run("whole", len, "abc") == 3
+    assert {path.name for path in remembered.folder().iterdir()} == {"whole", ".new-recent"}

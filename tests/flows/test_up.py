@@ -1,131 +1,160 @@
-"""`make up` and `make up-postgres`: a real deployment run through Prefect's API, and nothing left behind."""
+"""`make up` and `make up-postgres`: real deployments, whatever dies meanwhile, and nothing left behind."""
 
 from __future__ import annotations
 
-import json
-import os
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
-from urllib.request import Request, urlopen
+from urllib.request import urlopen
 
 import pytest
-from shoal_flows.server import free_port
+from shoal.identification import Measurement
+from shoal_flows import jobs
+from shoal_flows.jobs import Cell, Fit
+from shoal_flows.tracking import outbox, store
 
-PORTS = ("MLFLOW", "PREFECT", "WORKER", "GAUSS", "EXUDYN", "CASADI", "POSTGRES")
-SERVICES = ("gauss", "exudyn", "casadi")
-PATIENCE = 120.0
+sys.path.insert(0, str(Path(__file__).parent))
 
+from deployed import (
+    PATIENCE,
+    SERVICES,
+    artifacts_of,
+    begin,
+    call,
+    ended,
+    kill,
+    metrics,
+    mlflow_run,
+    parts,
+    run_deployment,
+    running,
+)
 
-def call(address: str, data: dict[str, Any] | None = None) -> Any:
-    body = None if data is None else json.dumps(data).encode()
-    request = Request(address, body, {"Content-Type": "application/json"})
-    with urlopen(request, timeout=30) as answer:
-        return json.load(answer)
-
-
-def of_home(home: Path) -> set[int]:
-    """Every process of this machine that was told this home, whoever is its parent."""
-    wanted = f"SHOAL_HOME={home}".encode()
-    found = set()
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            if wanted in (entry / "environ").read_bytes().split(b"\0"):
-                found.add(int(entry.name))
-        except OSError:
-            continue
-    return found
-
-
-@contextmanager
-def running(home: Path, *options: str) -> Iterator[dict[str, str]]:
-    """`make up`, with its addresses; stopped with SIGTERM as a service manager does, which has to succeed."""
-    ports = {name: str(free_port()) for name in PORTS}
-    environment = {
-        **{name: value for name, value in os.environ.items() if not name.startswith(("PREFECT_", "MLFLOW_"))},
-        **{f"SHOAL_{name}_PORT": port for name, port in ports.items()},
-        "SHOAL_HOME": str(home),
-    }
-    command = [sys.executable, "-m", "shoal_flows.deployment.up", *options]
-    log = home / "up.log"
-    with log.open("wb") as out:
-        process = subprocess.Popen(command, env=environment, stdout=out, stderr=subprocess.STDOUT)
-    try:
-        deadline = time.monotonic() + PATIENCE
-        while "(Ctrl-C stops everything)" not in log.read_text(errors="replace"):
-            assert process.poll() is None, log.read_text(errors="replace")[-4000:]
-            assert time.monotonic() < deadline, log.read_text(errors="replace")[-4000:]
-            time.sleep(0.2)
-        yield {name: f"http://127.0.0.1:{port}" for name, port in ports.items()}
-    finally:
-        process.send_signal(signal.SIGTERM)
-        ended = process.wait(60)
-        sys.stdout.write(log.read_text(errors="replace")[-6000:])  # shown where the test fails
-    assert ended == 0
-    time.sleep(0.5)
-    assert of_home(home) == set()
+WITHOUT = [word for name in SERVICES for word in ("--without", name)]
+METHODS = ("least-squares", "iafsa")
+STUDY = {"problem": "paper-case-1", "methods": METHODS, "seeds": [0]}
+installed = pytest.mark.skipif(
+    not (shutil.which("initdb") or list(Path("/usr/lib/postgresql").glob("*/bin/initdb"))),
+    reason="PostgreSQL is not installed",
+)
 
 
-def run_deployment(prefect: str, name: str, parameters: dict[str, Any]) -> dict[str, Any]:
-    """A run of a deployment, after it has ended."""
-    deployment = call(f"{prefect}/api/deployments/name/{name}")["id"]
-    run = call(f"{prefect}/api/deployments/{deployment}/create_flow_run", {"parameters": parameters})
-    deadline = time.monotonic() + PATIENCE
-    while run["state_type"] in ("SCHEDULED", "PENDING", "RUNNING"):
-        assert time.monotonic() < deadline, run
-        time.sleep(0.5)
-        run = call(f"{prefect}/api/flow_runs/{run['id']}")
-    return dict(run)
+@pytest.fixture(scope="module")
+def undisturbed(measurement: Measurement) -> dict[str, Fit]:
+    """The study as it is computed here, by method."""
+    return {method: jobs.fit(Cell("paper-case-1", method), measurement) for method in METHODS}
 
 
-def artifacts_of(prefect: str, run: dict[str, Any]) -> dict[str, Any]:
-    found = call(f"{prefect}/api/artifacts/filter", {"artifacts": {"flow_run_id": {"any_": [run["id"]]}}})
-    return {one["key"]: one["data"] for one in found}
-
-
-def check(at: dict[str, str]) -> None:
+def check(at: Mapping[str, str]) -> None:
     """A deployment runs, shows its table, its end and its run in MLflow, and what MLflow has of it."""
     run = run_deployment(at["PREFECT"], "forward/forward", {"scene": "single-pendulum"})
     assert run["state_type"] == "COMPLETED"
     shown = artifacts_of(at["PREFECT"], run)
     assert shown["progress"] == 100.0
     assert "| marker | x [m] | y [m] |" in shown["result"]
-    link = shown["mlflow-run"]
-    run_id = link[link.index("(") + 1 : link.index(")")].rpartition("/")[2] if "(" in link else link.rpartition("/")[2]
-    tracked = call(f"{at['MLFLOW']}/api/2.0/mlflow/runs/get?run_id={run_id}")["run"]
+    tracked = mlflow_run(at, run)
     assert tracked["info"]["status"] == "FINISHED"
     assert {"key": "scene", "value": "single-pendulum"} in tracked["data"]["params"]
-    files = call(f"{at['MLFLOW']}/api/2.0/mlflow/artifacts/list?run_id={run_id}")["files"]
+    files = call(f"{at['MLFLOW']}/api/2.0/mlflow/artifacts/list?run_id={tracked['info']['run_id']}")["files"]
     assert "trajectory.csv" in {file["path"] for file in files}
 
 
-def test_a_deployment_runs_on_sqlite(tmp_path: Path) -> None:
-    with running(tmp_path, *(word for name in SERVICES for word in ("--without", name))) as at:
+def begun(home: Path, at: Mapping[str, str]) -> dict[str, object]:
+    """A study of which one result is kept and another is being computed."""
+    run = begin(at["PREFECT"], "identify/identify", STUDY)
+    deadline = time.monotonic() + PATIENCE
+    while not [path for path in home.glob("results/*") if not path.name.startswith(".")]:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    return run
+
+
+@contextmanager
+def uploading(home: Path, at: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What `shoal upload` does there."""
+    caches = (store.connect, store._experiment)
+    with monkeypatch.context() as settings, ExitStack() as after:
+        settings.setenv("SHOAL_HOME", str(home))
+        settings.setenv("MLFLOW_TRACKING_URI", at["MLFLOW"])
+        for cached in caches:
+            cached.cache_clear()
+            after.callback(cached.cache_clear)
+        yield
+
+
+def check_study(at: Mapping[str, str], run: dict[str, object], undisturbed: Mapping[str, Fit]) -> None:
+    """The study has come to its end, and MLflow has the figures of an undisturbed one, to the last bit."""
+    assert ended(at["PREFECT"], run)["state_type"] == "COMPLETED"
+    study = mlflow_run(at, run)
+    assert study["info"]["status"] == "FINISHED"
+    found = {next(p["value"] for p in one["data"]["params"] if p["key"] == "method"): one for one in parts(at, study)}
+    assert set(found) == set(METHODS)
+    for method, fit in undisturbed.items():
+        assert found[method]["info"]["status"] == "FINISHED"
+        figures = metrics(found[method])
+        assert figures["final/fitness"] == fit.estimate.fitness
+        assert figures["final/evaluations"] == fit.estimate.evaluations
+        for name, value in fit.estimate.parameters.items():
+            assert figures[f"final/{name}"] == value.value
+
+
+def test_a_study_outlives_prefects_server(tmp_path: Path, undisturbed: Mapping[str, Fit]) -> None:
+    """On SQLite; kill -9 in the middle: it is started again, and the worker's flow goes on as if it had been slow."""
+    with running(tmp_path, *WITHOUT) as at:
         check(at)
-    # Readable without the server as well, by `shoal ui` and `shoal rerun`.
-    assert list((tmp_path / "artifacts").rglob("trajectory.csv"))
+        # Readable without the server as well, by `shoal ui` and `shoal rerun`.
+        assert list((tmp_path / "artifacts").rglob("trajectory.csv"))
+        run = begun(tmp_path, at)
+        assert kill(tmp_path, "prefect", "server", "start") >= 1
+        check_study(at, run, undisturbed)
+        assert "prefect ended by itself: it is started again" in (tmp_path / "up.log").read_text()
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(
-    not (shutil.which("initdb") or list(Path("/usr/lib/postgresql").glob("*/bin/initdb"))),
-    reason="PostgreSQL is not installed",
-)
-def test_a_deployment_runs_on_postgresql() -> None:
+def test_nights_that_nobody_ran_are_not_made_up_for(tmp_path: Path) -> None:
+    """Thirty wait for the worker: one runs, the others are cancelled at once."""
+    short = {"only": "four-bar-2", "quick": True}
+    with running(tmp_path, "--with", "nightly", *WITHOUT) as at:
+        waiting = [begin(at["PREFECT"], "nightly/validation", short) for _ in range(30)]
+        states = Counter(ended(at["PREFECT"], run)["state_type"] for run in waiting)
+    assert states == {"COMPLETED": 1, "CANCELLED": 29}
+    assert len(list((tmp_path / "validation").glob("night-*.json"))) == 1
+
+
+@installed
+def test_a_study_outlives_postgresql(undisturbed: Mapping[str, Fit], monkeypatch: pytest.MonkeyPatch) -> None:
+    """kill -9 of all its processes in the middle: it is started again, and Prefect and MLflow find it."""
     # Not below pytest's own folder, which keeps out the user that the database runs as.
     with tempfile.TemporaryDirectory() as name:
         home = Path(name)
         home.chmod(0o755)
-        for _ in range(2):  # the second time on what the first has left
+        with running(home, "--postgres", *WITHOUT) as at:
+            run = begun(home, at)
+            assert kill(home, "postgres") >= 1
+            assert ended(at["PREFECT"], run)["state_type"] == "COMPLETED"
+            assert "postgres ended by itself: it is started again" in (home / "up.log").read_text()
+            # What MLflow could not be told of in between.
+            with uploading(home, at, monkeypatch):
+                store.upload()
+                assert outbox.pending() == []
+            check_study(at, run, undisturbed)
+        assert not (home / "mlflow.db").exists()
+        assert not (home / "prefect" / "prefect.db").exists()
+
+
+@pytest.mark.slow
+@installed
+def test_everything_starts_again_on_what_is_there() -> None:
+    """With the engines' services, twice."""
+    with tempfile.TemporaryDirectory() as name:
+        home = Path(name)
+        home.chmod(0o755)
+        for _ in range(2):
             with running(home, "--postgres") as at:
                 assert all(urlopen(f"{at[name.upper()]}/ready", timeout=5).status == 200 for name in SERVICES)
                 check(at)
-        assert not (home / "mlflow.db").exists()
-        assert not (home / "prefect" / "prefect.db").exists()

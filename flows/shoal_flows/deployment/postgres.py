@@ -7,8 +7,8 @@ import pwd
 import secrets
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,25 +18,44 @@ DATABASES = ("prefect", "mlflow")
 _ROLE = "shoal"
 
 
-@contextmanager
-def running(folder: Path, port: int) -> Iterator[dict[str, str]]:
-    """A server while the block runs; gives the settings by which Prefect and MLflow find their databases.
+class Postgres:
+    """The server, as a part of the whole.
 
     folder: of its data, made if need be. Raises InputError where PostgreSQL is not installed, ComputationError.
     """
-    password = _prepare(folder)
-    options = f"-p {port} -c listen_addresses=127.0.0.1 -c unix_socket_directories="
-    log = folder / "server.log"
-    _run("pg_ctl", "start", "-w", "-D", str(folder / "data"), "-l", str(log), "-o", options)
-    try:
-        _make_databases(port, password)
-        yield {
-            "PGPASSWORD": password,
-            "MLFLOW_BACKEND_STORE_URI": f"postgresql+psycopg2://{_ROLE}@127.0.0.1:{port}/mlflow",
-            "PREFECT_SERVER_DATABASE_CONNECTION_URL": f"postgresql+asyncpg://{_ROLE}@127.0.0.1:{port}/prefect",
+
+    name = "postgres"
+
+    def __init__(self, folder: Path, port: int) -> None:
+        self._data, self._log, self._port = folder / "data", folder / "server.log", port
+        self._password = _prepare(folder)
+
+    @property
+    def stores(self) -> dict[str, str]:
+        """The settings by which Prefect and MLflow find their databases."""
+        return {
+            "PGPASSWORD": self._password,
+            "MLFLOW_BACKEND_STORE_URI": f"postgresql+psycopg2://{_ROLE}@127.0.0.1:{self._port}/mlflow",
+            "PREFECT_SERVER_DATABASE_CONNECTION_URL": f"postgresql+asyncpg://{_ROLE}@127.0.0.1:{self._port}/prefect",
         }
-    finally:
-        _run("pg_ctl", "stop", "-w", "-m", "fast", "-D", str(folder / "data"))
+
+    def start(self) -> None:
+        """Start it and wait until it answers; what a server that was killed left undone is put right first."""
+        options = f"-p {self._port} -c listen_addresses=127.0.0.1 -c unix_socket_directories="
+        _run("pg_ctl", "start", "-w", "-D", str(self._data), "-l", str(self._log), "-o", options)
+        _make_databases(self._port, self._password)
+
+    def ended(self) -> bool:
+        """Whether its first process is gone."""
+        with suppress(OSError, ValueError, IndexError):
+            os.kill(int((self._data / "postmaster.pid").read_text().split()[0]), 0)
+            return False
+        return True
+
+    def stop(self) -> None:
+        """End it, whatever is connected."""
+        if not self.ended():
+            _run("pg_ctl", "stop", "-w", "-m", "fast", "-D", str(self._data))
 
 
 def _prepare(folder: Path) -> str:

@@ -6,9 +6,8 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -17,11 +16,9 @@ from shoal.errors import ComputationError, ShoalError
 from shoal.home import home
 
 from shoal_flows import settings
-from shoal_flows.deployment import postgres as database
 from shoal_flows.deployment import processes
-
-_PATIENCE = 180.0
-_GRACE = 20.0
+from shoal_flows.deployment.parts import Line, honcho, look_after
+from shoal_flows.deployment.postgres import Postgres
 
 
 @click.command()
@@ -39,9 +36,9 @@ def main(postgres: bool, profiles: tuple[str, ...], without: tuple[str, ...]) ->
 
 
 def run(stages: Sequence[Sequence[str]], *, postgres: bool = False) -> None:
-    """Start stage after stage, apply the deployments, wait; stop in the reverse order.
+    """Start stage after stage, apply the deployments, start again what dies; stop in the reverse order.
 
-    Raises InputError, and ComputationError if a process does not start or ends by itself.
+    Raises InputError, and ComputationError if a process does not start, or not any more.
     """
     console = Console(stderr=True, highlight=False)
     for name in (name for stage in stages for name in stage):
@@ -49,17 +46,18 @@ def run(stages: Sequence[Sequence[str]], *, postgres: bool = False) -> None:
     # A service manager asks with SIGTERM for what a person does with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     port = int(os.environ.get("SHOAL_POSTGRES_PORT") or 5433)
-    keeping = database.running(home() / "postgres", port) if postgres else nullcontext(dict[str, str]())
+    keeping = [Postgres(home() / "postgres", port)] if postgres else []
     try:
         with ExitStack() as stack:
-            environment = _environment(stack.enter_context(keeping))
-            started = [stack.enter_context(_stage(stage, environment, console)) for stage in stages]
+            for database in keeping:
+                stack.callback(database.stop)
+                database.start()
+            environment = _environment(keeping[0].stores if keeping else {})
+            started = [line for stage in stages for line in _stage(stage, environment, stack, console)]
             if any("worker" in stage for stage in stages):
                 _deploy(environment)
             _announce(console)
-            while all(process.poll() is None for process in started):
-                time.sleep(0.3)
-            raise ComputationError("a process ended by itself; its last lines are above")
+            look_after([*keeping, *started], console)
     except KeyboardInterrupt:
         console.print("stopped")
 
@@ -79,47 +77,29 @@ def _environment(stores: Mapping[str, str]) -> dict[str, str]:
         "MLFLOW_ARTIFACTS_DESTINATION": settings.artifact_folder().as_uri(),
         # Artifacts stay readable without the server: `shoal run` and `shoal ui` use the same database.
         "MLFLOW_DEFAULT_ARTIFACT_ROOT": settings.artifact_folder().as_uri(),
+        # Results are in MLflow; Prefect's entries are of use for a while (90 days).
+        "PREFECT_SERVER_SERVICES_DB_VACUUM_ENABLED": "events,flow_runs",
     }
     return {**settings.defaults(folder), **kept, **os.environ, **stated, **stores}
 
 
-@contextmanager
-def _stage(names: Sequence[str], environment: Mapping[str, str], console: Console) -> Iterator[subprocess.Popen[bytes]]:
-    """These lines of the Procfile, ready when the block begins, ended when it is left."""
-    process = subprocess.Popen(
-        # Its own session, so that Ctrl-C is for this process alone; a pipe, so that they end with it whatever happens.
-        [sys.executable, "-m", "shoal_flows.attached", *_honcho(names)],
-        env=dict(environment),
-        stdin=subprocess.PIPE,
-        start_new_session=True,
-    )
-    try:
-        deadline = time.monotonic() + _PATIENCE
-        for name in names:
-            while not processes.is_ready(name):
-                if process.poll() is not None or time.monotonic() > deadline:
-                    raise ComputationError(f"{name} did not start; its last lines are above")
-                time.sleep(0.2)
-            console.print(f"{name} is ready")
-        yield process
-    finally:
-        process.terminate()
-        try:
-            process.wait(_GRACE)
-        except subprocess.TimeoutExpired:
-            process.kill()
+def _stage(names: Sequence[str], environment: Mapping[str, str], stack: ExitStack, console: Console) -> list[Line]:
+    """These lines of the Procfile, side by side, when all are ready; they end with the stack."""
+    lines = [Line(name, environment) for name in names]
+    for line in lines:
+        stack.callback(line.stop)
+        line.begin()
+    for line in lines:
+        line.ready()
+        console.print(f"{line.name} is ready")
+    return lines
 
 
 def _deploy(environment: Mapping[str, str]) -> None:
-    command = [sys.executable, "-m", *_honcho(["deploy"])]
+    command = [sys.executable, "-m", *honcho("deploy")]
     done = subprocess.run(command, env=dict(environment), stdin=subprocess.DEVNULL, cwd=processes.FOLDER, check=False)
     if done.returncode:
         raise ComputationError("the deployments could not be applied; the lines above say why")
-
-
-def _honcho(names: Sequence[str]) -> list[str]:
-    folder = processes.FOLDER
-    return ["honcho", "-f", str(folder / "Procfile"), "-d", str(folder), "-e", os.devnull, "start", *names]
 
 
 def _announce(console: Console) -> None:

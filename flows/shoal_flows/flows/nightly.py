@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from prefect import flow
-from shoal_validation.nightly import history
-from shoal_validation.nightly.page import headline, render
+from shoal_validation.nightly.hold import hold
+from shoal_validation.nightly.page import headline
 from shoal_validation.nightly.plan import Line, plan
 from shoal_validation.nightly.result import Night
-from shoal_validation.nightly.run import machine, run
 
 from shoal_flows.flows.parameters import ALL, Only
 from shoal_flows.flows.shown import Bar, progress, show_result
@@ -44,14 +43,11 @@ def nightly(only: Only = ALL, quick: bool = False) -> Validated:
         quick: A part that takes about a minute.
     """
     problem = None if only == ALL else only
-    lines, where = plan(problem, quick), history.folder()
-    before, _ = history.load(where, machine())
+    lines = plan(problem, quick)
     with progress(len(lines), "lines of the night") as bar:
-        night = run(lines, before, quick=quick, only=problem, progress=_note(bar))
-    history.save(night, where)
-    page = render(night, before)
-    history.write_whole(where / "index.html", page)
-    run_id = log_night(night, page)
+        held = hold(lines, quick=quick, only=problem, progress=_note(bar))
+    night = held.night
+    run_id = log_night(night, held.text)
     show_result(headline(night), _table(night), run_id)
     return Validated(night, run_id)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,14 @@ _MACHINE = "machine.yaml"
 
 def scene_of(given: str | dict[str, Any], values: Mapping[str, Any] | None = None) -> Scene:
     """The scene of a request. Raises InputError."""
-    scene = Scene.parse(given, "scene") if isinstance(given, dict) else load_scene(_built_in(given))
+    scene = Scene.parse(given, "scene") if isinstance(given, dict) else _loaded(given)
     return scene.with_values(values) if values else scene
+
+
+@lru_cache(maxsize=64)
+def _loaded(name: str) -> Scene:
+    """The built-in scene of that name; looking it up takes longer than a short run. Raises InputError."""
+    return load_scene(_built_in(name))
 
 
 def _built_in(name: str) -> str:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -16,16 +17,20 @@ LONGEST_PAUSE = 30.0
 log = logging.getLogger("shoal.api")
 
 
+async def _never() -> bool:
+    return False
+
+
 class Pool:
-    """So many workers, made by `make`; at most `queue` tasks wait for one."""
+    """So many workers, made by `make`; at most `queue` tasks wait for one, first come, first served."""
 
     def __init__(self, make: Callable[[], Worker], count: int, queue: int) -> None:
         self._make, self._count, self._queue = make, count, queue
         self._threads = ThreadPoolExecutor(count, "shoal-pool")
-        self._idle = asyncio.LifoQueue[Worker]()
+        self._idle: list[Worker] = []
+        self._line = deque[asyncio.Future[Worker]]()
         self._workers = set[Worker]()
         self._starting = set[asyncio.Task[None]]()
-        self._waiting = 0
         self._open = True
         self.about: dict[str, Any] = {}
         """What a worker tells of itself, once one has started."""
@@ -56,13 +61,14 @@ class Pool:
         seconds: float,
         note: Note = lambda _: None,
         started: Callable[[], None] = lambda: None,
+        gone: Callable[[], Awaitable[bool]] = _never,
     ) -> bytes:
         """What the task gives, within so many seconds of computing. Raises Refusal.
 
-        note: told how it goes; started: called when a worker has been found. Where this is cancelled, the worker that
-        computes is killed.
+        note: told how it goes; started: called when a worker has been found; gone: whether, after the wait for one,
+        nobody asks any longer. Where this is cancelled, the worker that computes is killed.
         """
-        worker = await self._free()
+        worker = await self._free(gone)
         started()
         loop = asyncio.get_running_loop()
 
@@ -75,23 +81,44 @@ class Pool:
             worker.kill()
             raise
         finally:
-            if worker.up:
-                self._idle.put_nowait(worker)
-            else:
-                self._replace(worker)
+            self._release(worker)
 
-    async def _free(self) -> Worker:
-        if self._idle.empty() and self._waiting >= self._queue:
-            text = f"{self._count} computing, {self._waiting} waiting; come again"
+    async def _free(self, gone: Callable[[], Awaitable[bool]]) -> Worker:
+        while self._idle:
+            if (worker := self._idle.pop()).up:
+                return worker
+            self._replace(worker)  # it died while it was idle
+        if len(self._line) >= self._queue:
+            text = f"{self._count} computing, {len(self._line)} waiting; come again"
             raise Refusal("busy", text, headers={"Retry-After": "1"})
-        self._waiting += 1
+        turn: asyncio.Future[Worker] = asyncio.get_running_loop().create_future()
+        self._line.append(turn)
         try:
-            # One may have died while it was idle.
-            while not (worker := await self._idle.get()).up:
-                self._replace(worker)
-            return worker
-        finally:
-            self._waiting -= 1
+            worker = await asyncio.shield(turn)
+            left = await gone()
+        except BaseException:
+            self._leave(turn)
+            raise
+        if left:
+            self._release(worker)
+            raise Refusal("busy", "nobody waits for the answer any longer")
+        return worker
+
+    def _leave(self, turn: asyncio.Future[Worker]) -> None:
+        """Give up a place in the line, or the worker that came with the turn."""
+        if turn.done():
+            self._release(turn.result())
+        else:
+            self._line.remove(turn)
+
+    def _release(self, worker: Worker) -> None:
+        """Hand a worker to whoever waits longest: nobody who comes later takes it before."""
+        if not worker.up:
+            self._replace(worker)
+        elif self._line:
+            self._line.popleft().set_result(worker)
+        else:
+            self._idle.append(worker)
 
     def _replace(self, worker: Worker | None = None) -> None:
         """Bring a fresh worker up in the background, in the place of one that is gone."""
@@ -120,5 +147,5 @@ class Pool:
                 pause = min(2 * pause, LONGEST_PAUSE)
                 continue
             self.about = worker.about
-            self._idle.put_nowait(worker)
+            self._release(worker)
             return

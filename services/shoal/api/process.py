@@ -37,7 +37,7 @@ log = logging.getLogger("shoal.api")
 def main(pipe: Connection, make_engine: Callable[[], Engine], settings: Settings, folder: str) -> None:
     """The process: make the engine, warm it up, then one task after the other until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(folder,), daemon=True).start()
     resource.setrlimit(resource.RLIMIT_DATA, (settings.max_memory_mb * 2**20, resource.RLIM_INFINITY))
     engine = _made(pipe, make_engine)
     if engine is None:
@@ -48,7 +48,7 @@ def main(pipe: Connection, make_engine: Callable[[], Engine], settings: Settings
         try:
             task, request = pipe.recv()
         except (EOFError, OSError):
-            return
+            return _end_with_parent(folder)
         pipe.send(_result(bench, task, request, lambda content: pipe.send(("note", content))))
         _empty(Path(folder))
 
@@ -96,10 +96,12 @@ def _result(bench: Bench, task: str, request: Any, note: Note) -> tuple[str, Any
         return "internal", "the computation failed by a defect of the service; its log tells why"
 
 
-def _end_with_parent() -> None:
+def _end_with_parent(folder: str) -> None:
+    """A service that is killed cannot clean up; its workers end and take its temporary files with them."""
     parent = mp.parent_process()
     if parent is not None:
         parent.join()
+        shutil.rmtree(Path(folder).parent, ignore_errors=True)
         os._exit(1)
 
 

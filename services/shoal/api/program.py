@@ -25,7 +25,7 @@ from shoal.versions import versions
 _header = APIKeyHeader(name="X-API-Key", auto_error=False)
 
 
-def require_key(request: Request, given: Annotated[str | None, Security(_header)] = None) -> None:
+async def require_key(request: Request, given: Annotated[str | None, Security(_header)] = None) -> None:
     """Raises Refusal where keys are asked for and none of them is given."""
     keys: tuple[bytes, ...] = request.app.state.keys
     # Every key is compared, each in constant time, so that the time tells nothing.

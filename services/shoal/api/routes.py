@@ -30,19 +30,19 @@ v1 = APIRouter(prefix="/v1", route_class=StrictRoute)
 identifications = APIRouter(prefix="/v1/identifications", route_class=StrictRoute, tags=["identifications"])
 
 
-def require_ready(request: Request) -> None:
+async def require_ready(request: Request) -> None:
     """Raises Refusal until workers are up."""
     calls, jobs = request.app.state.calls, request.app.state.job_pool
     if not (calls.about and jobs.about):
         raise Refusal("not-ready", "no worker is up yet; see /ready", headers={"Retry-After": "5"})
 
 
-def _calls(request: Request) -> Pool:
+async def _calls(request: Request) -> Pool:
     pool: Pool = request.app.state.calls
     return pool
 
 
-def _jobs(request: Request) -> Jobs:
+async def _jobs(request: Request) -> Jobs:
     jobs: Jobs = request.app.state.jobs
     return jobs
 
@@ -95,7 +95,8 @@ async def schema(kind: Literal["scene", "problem"], calls: Calls) -> dict[str, A
 @v1.post("/simulate", dependencies=[Ready], response_model=Motion, responses=documented(*COMPUTING))
 async def simulate(asked: SimulateRequest, request: Request, calls: Calls) -> Response:
     """Simulate a scene, or one per lane. A run that failed carries its status."""
-    answer = await calls.run("simulate", asked, request.app.state.settings.wall_seconds)
+    seconds = request.app.state.settings.wall_seconds
+    answer = await calls.run("simulate", asked, seconds, gone=request.is_disconnected)
     return Response(answer, media_type="application/json")
 
 
@@ -104,7 +105,7 @@ async def identify(
     asked: IdentifyRequest, request: Request, response: Response, calls: Calls, jobs: AllJobs
 ) -> JobStatus:
     """Check a request, and identify in the background; `Location` says where to ask."""
-    await calls.run("check", asked, request.app.state.settings.wall_seconds)
+    await calls.run("check", asked, request.app.state.settings.wall_seconds, gone=request.is_disconnected)
     job = jobs.submit(asked)
     response.headers["Location"] = f"/v1/identifications/{job.id}"
     return job.status
@@ -135,7 +136,7 @@ async def result(id: JobId, jobs: AllJobs) -> Response:
     return Response(job.result, media_type="application/json")
 
 
-def known_job(id: JobId, jobs: AllJobs) -> None:
+async def known_job(id: JobId, jobs: AllJobs) -> None:
     """Refuse an unknown job before a stream has begun."""
     jobs.get(id)
 

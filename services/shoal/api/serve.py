@@ -2,24 +2,62 @@
 
 from __future__ import annotations
 
+import logging
+import socket
+import ssl
+from pathlib import Path
+
 import uvicorn
 
 from shoal.api.program import create_program
 from shoal.api.settings import Settings
+from shoal.engines.remote import loopback
+from shoal.errors import InputError
 
 PORTS = {"gauss": 8001, "exudyn": 8002, "exudyn-ge": 8002, "casadi": 8003}
 """Where an engine is served unless somebody says otherwise."""
+log = logging.getLogger("shoal.api")
 
 
-def serve(engine: str, host: str, port: int | None) -> None:
-    """Serve an engine. Raises InputError."""
+def serve(engine: str, host: str, port: int | None, certificate: Path | None = None, key: Path | None = None) -> None:
+    """Serve an engine, over TLS with a certificate and its key (PEM). Raises InputError."""
     settings = Settings.read()
+    program = create_program(engine, settings)
+    if certificate or key:
+        _check_pair(certificate, key)
+    elif program.state.keys and not loopback(host):
+        log.warning("API keys cross the network readable: give --certificate and --key, or put a proxy with TLS ahead")
+    check_free(host, port or PORTS[engine])
     uvicorn.run(
-        create_program(engine, settings),
+        program,
         host=host,
         port=port or PORTS[engine],
+        ssl_certfile=certificate,
+        ssl_keyfile=key,
         limit_concurrency=settings.connections,
         timeout_graceful_shutdown=5,
         access_log=False,
         server_header=False,
     )
+
+
+def check_free(host: str, port: int) -> None:
+    """Refuse a place where no server can listen, before one is started. Raises InputError."""
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            reason = f"port: cannot listen on {host}:{port}: {error.strerror or error}; choose another with --port"
+            raise InputError(reason) from None
+
+
+def _check_pair(certificate: Path | None, key: Path | None) -> None:
+    """Refuse what is no certificate with its key."""
+    if certificate is None or key is None:
+        raise InputError("certificate: TLS needs both --certificate and --key")
+    try:
+        ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(certificate, key)
+    except OSError as error:  # as ssl.SSLError is
+        reason = getattr(error, "reason", None) or error.strerror or error
+        raise InputError(f"certificate: {certificate} with the key {key} cannot be used: {reason}") from None

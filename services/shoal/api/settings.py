@@ -37,7 +37,7 @@ class Settings(BaseSettings):
     keys_file: Path | None = None
     workers: Count = 2
     job_workers: Count = 1
-    queue: Annotated[int, Field(ge=0)] = 8
+    queue: Annotated[int, Field(ge=0)] = 64
     job_queue: Annotated[int, Field(ge=0)] = 8
     connections: Count = 256
     body_bytes: Count = 8 * 2**20

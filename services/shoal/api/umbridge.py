@@ -65,7 +65,7 @@ async def info() -> dict[str, Any]:
     return {"protocolVersion": 1.0, "models": list(MODELS)}
 
 
-def known(call: ModelCall) -> ModelCall:
+async def known(call: ModelCall) -> ModelCall:
     """The call, if its model exists. Raises Refusal."""
     if call.name not in MODELS:
         raise Refusal("not-found", f"no model {call.name!r}; there are {', '.join(MODELS)}")
@@ -95,7 +95,8 @@ def _computed(operation: Operation) -> Callable[[ModelCall, Request], Coroutine[
 
     async def endpoint(call: Call, request: Request) -> Response:
         pool, settings = request.app.state.calls, request.app.state.settings
-        answer = await pool.run("model", ModelTask(operation, call), settings.wall_seconds)
+        task = ModelTask(operation, call)
+        answer = await pool.run("model", task, settings.wall_seconds, gone=request.is_disconnected)
         return Response(answer, media_type="application/json")
 
     return endpoint

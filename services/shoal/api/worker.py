@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.context import ForkServerProcess
+from multiprocessing.util import get_temp_dir
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -25,6 +26,11 @@ START_SECONDS = 1800.0
 """Kernels that are not compiled yet take minutes."""
 
 
+def _folder() -> TemporaryDirectory[str]:
+    """In that of this process's other temporary files, which a worker removes if the service is killed."""
+    return TemporaryDirectory(prefix="shoal-worker-", dir=get_temp_dir(), ignore_cleanup_errors=True)
+
+
 @dataclass(eq=False)
 class Worker:
     """The service's end of one process. `start` and `run` block; they belong into a thread."""
@@ -34,6 +40,7 @@ class Worker:
     about: dict[str, Any] = field(default_factory=dict, init=False)
     """What the process tells of itself once it has started; see `process.about`."""
     _process: ForkServerProcess | None = field(default=None, init=False)
+    _folder: TemporaryDirectory[str] = field(default_factory=_folder, init=False)
 
     @property
     def up(self) -> bool:
@@ -42,7 +49,6 @@ class Worker:
 
     def start(self) -> None:
         """Start the process and wait until its kernels are warm. Raises Refusal."""
-        self._folder = TemporaryDirectory(prefix="shoal-worker-", ignore_cleanup_errors=True)
         context = mp.get_context("forkserver")
         context.set_forkserver_preload(["shoal.api.process"])
         self._pipe, theirs = context.Pipe()
@@ -90,4 +96,4 @@ class Worker:
         if self._process is not None:
             self._process.kill()
             self._process.join()
-            self._folder.cleanup()
+        self._folder.cleanup()

@@ -19,6 +19,7 @@ from shoal.errors import InputError
 from shoal.scene import Rod, Scene
 from shoal.trajectory import Array, Status, Trajectory
 
+WEAK = "; generalized-alpha is only weakly stable at solver.spectral_radius 1, use 0.9"
 DENSE_LIMIT = 60
 """Unknowns beyond which the sparse linear solver is the faster one."""
 
@@ -31,8 +32,9 @@ class ExudynEngine:
         scene's quadrature, or its three-node geometrically exact beam (with shear and rotary inertia)
     integrator: `trapezoidal` (no numerical damping, constraints on the velocities, positions drift with the
         square of the step), or `generalized-alpha` with the scene's spectral radius and constraints on the
-        positions, which needs a radius below 1 on long runs: at 1 it is only weakly stable. The scene's
-        `solver.integrator` belongs to the native solver and is ignored
+        positions, which needs a radius below 1 on long runs: at 1 it is only weakly stable. By default
+        generalized-alpha where the scene's `solver.integrator` is that, else trapezoidal: the others are the native
+        solver's
     modified_newton: keep the Jacobian while the iteration contracts: three times faster; positions of the
         flexible double pendulum then differ by 1e-9 m
 
@@ -42,7 +44,7 @@ class ExudynEngine:
     """
 
     beam: Beam = "ancf-cable"
-    integrator: Literal["generalized-alpha", "trapezoidal"] = "trapezoidal"
+    integrator: Literal["generalized-alpha", "trapezoidal"] | None = None
     modified_newton: bool = False
 
     @property
@@ -65,6 +67,7 @@ class ExudynEngine:
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns)
         record = Record(steps, machine.reference)
         verdict = judge(machine, record, self._run(exu, machine, record))
+        weak = self._damped(scene) and scene.solver.spectral_radius == 1.0 and verdict.message
         return Trajectory(
             engine=self.name,
             times=wanted,
@@ -76,7 +79,7 @@ class ExudynEngine:
             constraint_drift=np.array([verdict.gap]),
             steps=steps.count,
             wall_s=time.perf_counter() - started,
-            message=verdict.message,
+            message=f"{verdict.message}{WEAK}" if weak else verdict.message,
             model=self._model(exu, machine, steps),
         )
 
@@ -134,13 +137,18 @@ class ExudynEngine:
         integration.verboseMode = 0
         integration.newton.useModifiedNewton = self.modified_newton
         integration.newton.absoluteTolerance = machine.scene.solver.newton_tolerance
-        alpha = exu.DynamicSolverType.GeneralizedAlpha
-        trapezoidal = exu.DynamicSolverType.TrapezoidalIndex2
-        integration.solverType = alpha if self.integrator == "generalized-alpha" else trapezoidal
+        solvers = exu.DynamicSolverType
+        damped = self._damped(machine.scene)
+        integration.solverType = solvers.GeneralizedAlpha if damped else solvers.TrapezoidalIndex2
         integration.generalizedAlpha.spectralRadius = machine.scene.solver.spectral_radius
         return settings
 
+    def _damped(self, scene: Scene) -> bool:
+        """Whether a scene is integrated by generalized-alpha."""
+        return (self.integrator or scene.solver.integrator) == "generalized-alpha"
+
     def _model(self, exu: Any, machine: Machine, steps: Steps) -> dict[str, Any]:
+        damped = self._damped(machine.scene)
         rods = [body for body in machine.scene.bodies.values() if isinstance(body, Rod) and body.element != "rigid"]
         return {
             "exudyn": exu.__version__,
@@ -148,8 +156,8 @@ class ExudynEngine:
             "constraints": machine.constraints,
             "elements": sum(rod.elements for rod in rods),
             "beam": self.beam,
-            "integrator": self.integrator,
-            "spectral_radius": 1.0 if self.integrator == "trapezoidal" else machine.scene.solver.spectral_radius,
+            "integrator": "generalized-alpha" if damped else "trapezoidal",
+            "spectral_radius": machine.scene.solver.spectral_radius if damped else 1.0,
             "newton": "modified" if self.modified_newton else "full",
             "step": steps.size,
             "energy_check": "none: motion is prescribed" if machine.driven else "kinetic, elastic, springs, loads",

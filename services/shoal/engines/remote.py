@@ -5,6 +5,8 @@ Doubles cross as JSON in their shortest form, which gives back every bit; what i
 
 from __future__ import annotations
 
+import ipaddress
+import logging
 import os
 import weakref
 from collections.abc import Mapping, Sequence
@@ -25,12 +27,16 @@ RETRIES = 6
 """After a connection that failed, a full queue, a proxy without a service: 0.25 s, 0.5 s, ... up to 8 s apart."""
 SECONDS = 600.0
 """A service that is silent for longer is given up."""
+log = logging.getLogger(__name__)
 _KINDS = ("elements", "joints", "loads", "features")
 _ARRAYS = ("times", "points", "angles", "energy_drift", "constraint_drift")
 
 
 class RemoteEngine:
-    """The engine of the service at an http or https address. The key, if it asks for one, is SHOAL_API_KEY."""
+    """The engine of the service at an http or https address. The key, if it asks for one, is SHOAL_API_KEY.
+
+    A certificate is checked against the file that SSL_CERT_FILE names, else against the usual authorities.
+    """
 
     def __init__(self, url: str, transport: httpx.BaseTransport | None = None) -> None:
         """transport: instead of the network's."""
@@ -44,9 +50,11 @@ class RemoteEngine:
             backoff_jitter=0.5,
             max_backoff_wait=8.0,
         )
-        key = os.environ.get("SHOAL_API_KEY")
+        key, address = os.environ.get("SHOAL_API_KEY"), _address(self.name)
+        if key and address.scheme == "http" and not loopback(address.host):
+            log.warning("SHOAL_API_KEY crosses the network to %s readable; https would hide it", address.host)
         self._client = httpx.Client(
-            base_url=_address(self.name),
+            base_url=address,
             headers={"X-API-Key": key} if key else {},
             timeout=httpx.Timeout(SECONDS, connect=5.0),
             transport=RetryTransport(transport or httpx.HTTPTransport(), retry=retry),
@@ -87,7 +95,8 @@ class RemoteEngine:
             response = self._client.request(method, path, content=content, headers={"Content-Type": "application/json"})
         except httpx.HTTPError as error:
             raise ComputationError(
-                f"engine: {self.name} does not answer: {str(error) or type(error).__name__}"
+                f"engine: {self.name} does not answer: {str(error) or type(error).__name__}; "
+                "start it with `shoal serve`, or leave --engine out"
             ) from None
         try:
             found = orjson.loads(response.content)
@@ -121,6 +130,14 @@ def _address(url: str) -> httpx.URL:
     if not address.host or (address.port or 0) > 65535:
         raise InputError(f"engine: {url}: not an address; http://HOST:PORT is needed")
     return address
+
+
+def loopback(host: str) -> bool:
+    """Whether a host's name or address is that of this machine only."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def _trajectory(found: dict[str, Any]) -> Trajectory:

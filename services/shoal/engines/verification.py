@@ -3,19 +3,20 @@
 Energy and drift cannot see everything: an energy-conserving step may be far too long, a chaotic motion loses every
 digit in time, a coarse mesh of a thin rod locks. So the run is held against the native solver with half the step (or
 another tolerance, if its integrator is adaptive), the usual treatment of constraints and singular positions, and then
-against twice as many elements.
+against twice as many elements. A service of the native solver makes these runs too; those of other engines' are local.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.engines.gauss import GaussEngine
-from shoal.errors import InputError
+from shoal.errors import ShoalError
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.simulate import STEP_MARGIN, stable_step
 from shoal.scene import GROUND, Rod, Scene, Solver
@@ -39,6 +40,9 @@ PATIENCE = 10.0
 """No second run is made that would take longer than so many seconds."""
 COST = 2e-8
 """Seconds per unknown and evaluation, roughly; a measured time would make the answer depend on the machine's load."""
+
+Second = Callable[[str, Callable[[], Scene], int], tuple[Trajectory | None, str]]
+"""Makes a second run of a scene; see `_second`."""
 
 
 @dataclass(frozen=True)
@@ -75,38 +79,41 @@ def verified(engine: Engine, scene: Scene, times: Sequence[float] | Array | None
     trajectory = engine.simulate(scene, times)
     if not trajectory.ok:
         return trajectory
-    verification = verify(trajectory, scene)
+    verification = verify(trajectory, scene, engine if trajectory.engine == GaussEngine().name else None)
     model = {**trajectory.model, "verification": dict(plain(asdict(verification)))}
     if verification.complaint:
         return replace(trajectory, model=model, status=(Status.FAILED,), message=verification.complaint)
     return replace(trajectory, model=model)
 
 
-def verify(trajectory: Trajectory, scene: Scene) -> Verification:
-    """Estimate the errors of a run of a scene by more careful ones."""
+def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -> Verification:
+    """Estimate the errors of a run of a scene by more careful ones. native: the native solver, else the one here."""
     scale = _scale(trajectory, scene)
-    careful, note = _second("time", lambda: _careful(scene, trajectory), 1, trajectory)
+    second = partial(_second, native or GaussEngine(), trajectory)
+    careful, note = second("time", lambda: _careful(scene, trajectory), 1)
     if careful is None:
         notes, time_error, rejected = [note], None, ""
     elif careful.status[0] in UNTRUSTED:
         return Verification(None, None, scale, rejected=careful.message)
     else:
-        notes, time_error, rejected = [], _time_error(trajectory, careful, scene, scale), ""
+        notes, time_error, rejected = [], _time_error(trajectory, careful, scene, scale, second), ""
     if not any(_flexible(scene)):
         return Verification(time_error, None, scale, "; ".join(notes), rejected)
-    finer, note = _second("mesh", lambda: _finer(scene, 2), 2, trajectory)
+    finer, note = second("mesh", lambda: _finer(scene, 2), 2)
     if finer is None or not finer.ok:
         note = note or "mesh error not estimated: the run on twice as many elements is rejected"
         return Verification(time_error, None, scale, "; ".join([*notes, note]))
     mesh_error = trajectory.distance(finer)
     if COARSE * scale < mesh_error:
-        finest, _ = _second("mesh", lambda: _finer(scene, 4), 4, trajectory)
+        finest, _ = second("mesh", lambda: _finer(scene, 4), 4)
         if finest is not None and finest.ok:
             mesh_error = max(mesh_error, trajectory.distance(finest))
     return Verification(time_error, mesh_error, scale, "; ".join(notes))
 
 
-def _second(what: str, make: Callable[[], Scene], times: int, trajectory: Trajectory) -> tuple[Trajectory | None, str]:
+def _second(
+    native: Engine, trajectory: Trajectory, what: str, make: Callable[[], Scene], times: int
+) -> tuple[Trajectory | None, str]:
     """A second run on so many times the unknowns, or None and why it could not be had."""
     try:
         scene = make()
@@ -115,15 +122,15 @@ def _second(what: str, make: Callable[[], Scene], times: int, trajectory: Trajec
         expected = COST * times * trajectory.model["unknowns"] * evaluations
         if expected > PATIENCE:
             return None, f"{what} error not estimated: that would take about {expected:.0f} s"
-        second = GaussEngine().simulate(scene, trajectory.times)
-    except InputError as error:
+        second = native.simulate(scene, trajectory.times)
+    except ShoalError as error:
         return None, f"{what} error not estimated: {error}"
     if second.status[0] is Status.FAILED:
         return None, f"{what} error not estimated: {second.message}"
     return second, ""
 
 
-def _time_error(trajectory: Trajectory, careful: Trajectory, scene: Scene, scale: float) -> float:
+def _time_error(trajectory: Trajectory, careful: Trajectory, scene: Scene, scale: float, second: Second) -> float:
     """The distance of the two runs as an error of the first."""
     away = trajectory.distance(careful)
     if not _adaptive(trajectory):
@@ -133,7 +140,7 @@ def _time_error(trajectory: Trajectory, careful: Trajectory, scene: Scene, scale
     if away <= WRONG * scale:
         return float(away / np.sqrt(SPAN))
     # A chaotic motion may be lost to the looser run and not yet to this one, which a tighter one tells.
-    tighter, _ = _second("time", lambda: _careful(scene, trajectory, TIGHTER), 1, trajectory)
+    tighter, _ = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)
     return away if tighter is None else min(away, trajectory.distance(tighter))
 
 

@@ -6,11 +6,12 @@ import hashlib
 import io
 import struct
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from shoal.errors import InputError
+from shoal.errors import ComputationError, InputError
 from shoal.trajectory import Array
 
 _MAGIC = b"shoal-checkpoint-2\n"
@@ -53,16 +54,20 @@ class Memory:
         return found
 
     def keep(self, model: object, points: Array, residuals: Array) -> None:
-        """Note the residuals of a batch."""
+        """Note the residuals of a batch. Raises ComputationError where they cannot be written, as on a full disk."""
         buffer = io.BytesIO()
         np.save(buffer, residuals, allow_pickle=False)
         body = buffer.getvalue()
-        self._file.write(_HEAD.pack(_key(model, points), len(body), zlib.crc32(body)) + body)
-        self._file.flush()
+        try:
+            self._file.write(_HEAD.pack(_key(model, points), len(body), zlib.crc32(body)) + body)
+            self._file.flush()
+        except OSError as error:
+            raise ComputationError(f"checkpoint: {self.path} cannot be written: {error.strerror}") from None
 
     def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        """Close the file; what could not be written was said before."""
+        with suppress(OSError):
+            self._file.close()
 
     def _load(self, begin: bytes) -> int:
         """Read what is whole; returns where it ends."""

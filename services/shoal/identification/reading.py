@@ -98,6 +98,8 @@ def described(fields: Mapping[str, Any], path: Path) -> dict[str, Any]:
     """
     if path.suffix not in YAML:
         return {**fields, "path": str(path)}
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: cannot be read: not a file")
     try:
         own = read_yaml(path.read_text(encoding="utf-8"), str(path))
     except (OSError, UnicodeDecodeError) as error:

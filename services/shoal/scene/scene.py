@@ -20,6 +20,8 @@ from shoal.scene.loads import DistributedForce, Load
 from shoal.scene.record import Angle, Record, Vector, one_line
 from shoal.scene.solver import Solver
 
+_FEW = 4
+"""So many names are listed."""
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
 
 
@@ -51,6 +53,13 @@ class Scene(Record):
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
     initial: dict[str, InitialState] = {}
     solver: Solver = Solver()
+
+    def __repr__(self) -> str:
+        parts = [_counted("body", "bodies", self.bodies), _counted("joint", "joints", self.joints)]
+        if elements := sum(body.elements for body in self.bodies.values() if body.element != "rigid"):
+            parts[0] += f" of {elements} element{'s' * (elements != 1)}"
+        parts += [_counted("load", "loads", self.loads), _counted("marker", "markers", self.markers)]
+        return f"Scene({self.name}: {'; '.join(part for part in parts if part)})"
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -111,9 +120,10 @@ class Scene(Record):
         """Bodies whose start the joints tell, from the ground or from a body that says its position."""
         joined: dict[str, set[str]] = {}
         for joint in self.joints.values():
-            ends = {side.body for side in joint_types.places(joint)}
-            for end in ends:
-                joined.setdefault(end, set()).update(ends)
+            first, *others = (side.body for side in joint_types.places(joint))
+            for other in others:
+                joined.setdefault(first, set()).add(other)
+                joined.setdefault(other, set()).add(first)
         reached = {GROUND, *(name for name, start in self.initial.items() if start.position is not None)}
         frontier = list(reached)
         while frontier:
@@ -188,6 +198,14 @@ class Scene(Record):
         """Twelve hexadecimal digits that change when any field does, not with the order of the fields."""
         text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _counted(one: str, many: str, names: Mapping[str, Any]) -> str:
+    """How many there are, and their names where they are few; empty for none."""
+    if not names:
+        return ""
+    listed = f" {', '.join(names)}" if len(names) <= _FEW else ""
+    return f"{len(names)} {one if len(names) == 1 else many}{listed}"
 
 
 def _replace(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any:

@@ -14,12 +14,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from shoal.home import prepare_kernel_cache
 
-from shoal_validation.nightly import history
-from shoal_validation.nightly.page import headline, render, time_text
+from shoal_validation.nightly.hold import hold
+from shoal_validation.nightly.page import headline, time_text
 from shoal_validation.nightly.plan import Line, plan
 from shoal_validation.nightly.result import Night, Verdict
 from shoal_validation.nightly.run import Progress as Note
-from shoal_validation.nightly.run import machine, run
 
 
 def main(only: str | None, quick: bool, as_json: bool) -> bool:
@@ -32,19 +31,15 @@ def main(only: str | None, quick: bool, as_json: bool) -> bool:
 def carry_out(lines: Sequence[Line], only: str | None, quick: bool, as_json: bool) -> bool:
     """The same for any plan."""
     err = Console(stderr=True, highlight=False)
-    where = history.folder()
-    before, unread = history.load(where, machine())
-    for file in unread:
-        err.print(f"{file} is left out: not a night of this version", soft_wrap=True)
     with _following(err, len(lines)) as note:
-        night = run(lines, before, quick=quick, only=only, progress=note)
-    stored = history.save(night, where)
-    page = where / "index.html"
-    history.write_whole(page, render(night, before))
+        held = hold(lines, quick=quick, only=only, progress=note)
+    night = held.night
+    for file in held.unread:
+        err.print(f"{file} is left out: not a night of this version", soft_wrap=True)
     if as_json:
-        print(json.dumps(night.to_json() | {"file": str(stored), "page": str(page)}, allow_nan=False))  # noqa: T201
+        print(json.dumps(night.to_json() | {"file": str(held.file), "page": str(held.page)}, allow_nan=False))  # noqa: T201
     else:
-        _show(Console(highlight=False), night, page)
+        _show(Console(highlight=False), night, held.page)
     for line in night.lines:
         if not line.verdict.fine:
             err.print(line.complaint, soft_wrap=True, markup=False)

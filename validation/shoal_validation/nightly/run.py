@@ -34,9 +34,10 @@ def run(
     only: str | None = None,
     progress: Progress = lambda *_: None,
     timeout: float = TIMEOUT,
+    now: datetime | None = None,
 ) -> Night:
-    """Measure all lines. `before`: earlier nights of this machine."""
-    started, begin = datetime.now(UTC), time.perf_counter()
+    """Measure all lines. before: earlier nights of this machine; now: what the clock shows, if not that of this one."""
+    started, begin = (now or datetime.now(UTC)).astimezone(UTC), time.perf_counter()
     found = []
     with Worker() as worker:
         for done, line in enumerate(lines):

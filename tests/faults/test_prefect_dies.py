@@ -1,0 +1,82 @@
+"""Prefect's server dies in the middle of a study: the study goes on to its end, and to the same figures."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from shoal.errors import ComputationError
+from shoal_flows import events, remembered, run, server
+
+STUDY = {"problem": "paper-case-1", "methods": ["least-squares"], "seeds": [0, 1]}
+FIRST = "paper-case-1, least-squares · seed 0"
+
+
+@pytest.fixture
+def nothing_kept() -> Iterator[None]:
+    with remembered.anew():
+        yield
+
+
+@contextmanager
+def struck(when: str, blow: Callable[[], None]) -> Iterator[list[str]]:
+    """Something happens while this work starts; gives what is told from then on."""
+    told: list[str] = []
+
+    def listen(name: str, what: str) -> None:
+        if not told and (name, what) == (when, "started"):
+            blow()
+            told.append("struck")
+        elif told:
+            told.append(f"{what}: {name}")
+
+    with events.listening(listen):
+        yield told
+
+
+def kill() -> None:
+    os.kill(server._started[0]._process.pid, signal.SIGKILL)
+
+
+def figures(study: Any) -> list[Any]:
+    return [(fit.cell, fit.estimate.fitness, fit.estimate.parameters, fit.motion.points.tolist()) for fit in study.fits]
+
+
+@pytest.mark.usefixtures("nothing_kept")
+def test_a_study_outlives_its_server() -> None:
+    """kill -9: another takes its place, and knows of the whole study; the figures are those of an undisturbed one."""
+    undisturbed = run.run_flow("identify", STUDY)
+    before = server._started[0]._process.pid
+    with struck(FIRST, kill) as told:
+        found = run.run_flow("identify", STUDY)
+    assert figures(found) == figures(undisturbed)
+    assert not found.failures
+    assert "done: Prefect's server, which ended with signal 9, started again" in told
+    assert server._started[0]._process.pid != before
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("nothing_kept")
+def test_a_server_that_stays_away_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was computed is kept; the same study, asked for again, computes the rest."""
+    undisturbed = run.run_flow("identify", STUDY)
+    monkeypatch.setattr(server._Kept, "_again", lambda *_: False)
+    monkeypatch.setenv("PREFECT_CLIENT_MAX_RETRIES", "1")
+    with struck(FIRST, kill), pytest.raises(ComputationError, match="the same command goes on from there") as end:
+        run.run_flow("identify", STUDY)
+    assert "\n" not in str(end.value)
+    monkeypatch.undo()
+    assert figures(run.run_flow("identify", STUDY)) == figures(undisturbed)
+
+
+def test_a_server_that_is_not_there_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "_started", [])
+    monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
+    with pytest.raises(
+        ComputationError, match=r"PREFECT_API_URL: no server answers at http://127\.0\.0\.1:9/api; unset"
+    ):
+        run.run_flow("identify", STUDY)
