@@ -74,6 +74,24 @@ def test_motion_converts_without_loss(motion: shoal.Trajectory) -> None:
     np.testing.assert_array_equal(table[["A.x", "A.y"]].to_numpy(), motion.marker("A"))
     np.testing.assert_array_equal(cube["angle"].sel(marker="A").isel(lane=0), motion.angle("A"))
     assert cube["status"].item() == "ok"
+    assert [cube[name].attrs["units"] for name in ("time", "x", "y", "angle")] == ["s", "m", "m", "rad"]
+
+
+def test_estimate_converts_with_its_units(estimate: Estimate) -> None:
+    cube = estimate.to_xarray()
+    assert cube["value"].sel(parameter="angle").item() == estimate.parameters["angle"].value
+    assert (cube["unit"].item(), cube["value"].attrs["units"], cube["covariance"].attrs["units"]) == (
+        "rad",
+        "rad",
+        "rad²",
+    )
+    assert cube["covariance"].item() == pytest.approx(cube["std"].item() ** 2, rel=1e-6)
+    recording = estimate.measurement.first
+    np.testing.assert_array_equal(cube["measured_x"].sel(marker="A"), recording.values[:, 0])
+    np.testing.assert_allclose(cube["residual_y"], cube["predicted_y"] - cube["measured_y"], atol=1e-15)
+    assert (cube["residual_y"].attrs["units"], cube["time"].attrs["units"]) == ("m", "s")
+    with pytest.raises(InputError, match="there is no 'high'; there are recording"):
+        estimate.to_xarray("high")
 
 
 def test_a_table_is_a_recording(estimate: Estimate) -> None:
@@ -84,7 +102,10 @@ def test_a_table_is_a_recording(estimate: Estimate) -> None:
 
 def test_reprs_are_short_and_say_what_counts(motion: shoal.Trajectory, estimate: Estimate) -> None:
     scene = shoal.load_scene("single-pendulum")
-    assert repr(scene) == "Scene(single-pendulum: bodies OA; joints O; markers A)"
+    assert repr(scene) == "Scene(single-pendulum: 1 body OA; 1 joint O; 1 marker A)"
+    flexible, large = shoal.load_scene("flexible-double-pendulum"), shoal.load_scene("n-four-bar-40")
+    assert "2 bodies OA, AB of 6 elements; 2 joints O, A; 2 markers A, B" in repr(flexible)
+    assert repr(large) == "Scene(n-four-bar-40: 81 bodies; 121 joints; 1 marker B0)"
     assert repr(motion) == "Trajectory(A; 3 samples, gauss, ok)"
     assert repr(estimate).startswith("Estimate(mine: identified; angle 0.3 ±")
 

@@ -22,6 +22,7 @@ from shoal.pictures.overlay import follows, overlay
 from shoal.pictures.pages import animation
 from shoal.pictures.remainders import remainders
 from shoal.pictures.report import report
+from shoal.pictures.study import study
 from shoal.pictures.style import png, svg
 
 from shoal_flows.jobs import Cell, Fit, fit
@@ -52,6 +53,11 @@ def album(found: Fit) -> Album:
     drawn = gallery(answer, moving)
     pictures = {f"{one.name}.png": png(one.figure) for one in drawn}
     return Album({**pictures, "motion.gif": moving_picture(answer)}, report(answer, moving, drawn), archived(answer))
+
+
+def page(fits: Sequence[Fit]) -> str:
+    """The page of a study, as `shoal report` makes it."""
+    return study({found.cell.name: Answer(load_problem(found.cell.problem), found.estimate) for found in fits})
 
 
 def draw_trajectory(fits: Sequence[Fit], name: str) -> Picture:

@@ -67,7 +67,7 @@ def show(result: Any) -> None:
     elif isinstance(result, Swept):
         console.print(f"{len(result.sweep.status)} points in {result.sweep.wall_s:.2f} s")
     if not isinstance(result, DemoResult) and not result.run_id.startswith(LOCAL):
-        console.print(f"logged to MLflow as run {result.run_id}; browse it with `shoal ui`", soft_wrap=True)
+        console.print(f"MLflow run {result.run_id}; browse it with `shoal ui`", soft_wrap=True)
 
 
 def notice() -> None:
@@ -82,7 +82,7 @@ def notice() -> None:
 
 def demo_tables(console: Console, result: DemoResult) -> None:
     """The identifications, then the engines."""
-    table = _table("Identified from the tip's motion, data from Exudyn on 16/32 elements")
+    table = _table("Angles [rad] identified from the tip's motion, data from Exudyn on 16/32 elements")
     for column in ("case", "method", "theta1", "theta2", "error°", "fitness", "runs", "s"):
         table.add_column(column, justify="left" if column in ("case", "method") else "right", no_wrap=True)
     for case, study in result.studies.items():

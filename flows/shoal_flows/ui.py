@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ from urllib.request import urlopen
 
 from rich.console import Console
 from shoal.errors import ComputationError, InputError
+from shoal.ports import check_free
 
 from shoal_flows import settings
 
@@ -28,7 +28,7 @@ def ui(host: str, port: int, *, prefect: bool = False) -> None:
     console = Console(stderr=True, highlight=False)
     ports = [port, port + 1] if prefect else [port]
     for wanted in ports:
-        _check_free(host, wanted)
+        check_free(host, wanted)
     commands = [_mlflow(host, port), *([_prefect(host, port + 1)] if prefect else [])]
     # A service manager asks with SIGTERM for what a person does with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -55,7 +55,7 @@ def _mlflow(host: str, port: int) -> list[str]:
     store = ["--backend-store-uri", os.environ["MLFLOW_TRACKING_URI"]]
     store += ["--artifacts-destination", settings.artifact_folder().as_uri()]
     address = ["--host", host, "--port", str(port), "--workers", "1"]
-    return [sys.executable, "-m", "mlflow", "server", *address, *store]
+    return [sys.executable, "-m", "mlflow", "server", "--app-name", "shoal", *address, *store]
 
 
 def _prefect(host: str, port: int) -> list[str]:
@@ -77,16 +77,6 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
         process.wait(10)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
-
-
-def _check_free(host: str, port: int) -> None:
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise InputError(f"port: cannot listen on {host}:{port}: {reason}; choose another with --port") from None
 
 
 def _wait(process: subprocess.Popen[bytes], host: str, port: int) -> None:

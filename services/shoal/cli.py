@@ -134,7 +134,7 @@ def main() -> None:
 @main.command()
 @click.argument("name", required=False)
 def scenes(name: str | None) -> None:
-    """List the built-in scenes and problems, or print one as YAML to start your own from."""
+    """List the built-in scenes and problems, or print one as YAML."""
     from shoal import terminal
     from shoal.identification.problem import load_problem, problem_library, problem_names
     from shoal.scene.load import load_scene, scene_library, scene_names
@@ -180,7 +180,7 @@ def simulate(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Simulate SCENE and report where its markers go, and how far that can be trusted."""
+    """Say where the markers of SCENE go, and how far to trust it."""
     from shoal import terminal
     from shoal.engines import get_engine
     from shoal.engines.verification import verified
@@ -215,7 +215,7 @@ def simulate(
 @option_set
 @option_json
 def statics(scene: str, time: float, values: dict[str, str], as_json: bool) -> None:
-    """Find where SCENE comes to rest, and whether it is stable there."""
+    """Find where SCENE comes to rest, and if it is stable there."""
     from shoal import terminal
     from shoal.mechanics.analysis.statics import statics
     from shoal.scene import load_scene
@@ -236,7 +236,7 @@ def statics(scene: str, time: float, values: dict[str, str], as_json: bool) -> N
 def modes(
     scene: str, count: int, about: Literal["equilibrium", "start"], values: dict[str, str], as_json: bool
 ) -> None:
-    """Eigenfrequencies and shapes of SCENE about its equilibrium or its start."""
+    """Eigenfrequencies and mode shapes of SCENE. About its equilibrium, or its start."""
     from shoal import terminal
     from shoal.mechanics.analysis.modes import modes
     from shoal.scene import load_scene
@@ -312,7 +312,7 @@ def identify(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Find the parameters of PROBLEM from measured motion, with intervals and a verdict."""
+    """Find the parameters of PROBLEM from measured motion. With intervals and a verdict."""
     from shoal import terminal
     from shoal.identification import identify, load_problem
     from shoal.identification.conclude import Wishes
@@ -393,7 +393,7 @@ def design(
     out: Path | None,
     **options: Any,
 ) -> None:
-    """Which marker, how long and how often: what to measure to know the parameters of PROBLEM best."""
+    """Say what to measure to know the parameters of PROBLEM best. Which marker, how long and how often."""
     from shoal import terminal
     from shoal.identification import load_problem
     from shoal.identification.design import about_answer, design, has_data
@@ -429,7 +429,7 @@ def sweep(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Marker positions of SCENE at one instant over a grid of values (the paper's Figure 4)."""
+    """Marker positions of SCENE over a grid of values. At one instant; the paper's Figure 4, for example."""
     from shoal import terminal
     from shoal.engines import get_engine
     from shoal.engines.sweep import sweep
@@ -462,7 +462,7 @@ def compare(
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Run SCENE on several engines and show how far apart they come out."""
+    """Run SCENE on several engines and show how far apart they are."""
     from shoal import terminal
     from shoal.engines.compare import compare
     from shoal.scene import load_scene
@@ -484,7 +484,7 @@ def compare(
 @click.option("--param", "parameters", multiple=True, metavar="K=V", callback=key_value, help="JSON or plain text.")
 @option_json
 def run(flow: str, parameters: dict[str, str], as_json: bool) -> None:
-    """Run a Prefect FLOW (forward, identify, compare, sweep, nightly) and log it to MLflow."""
+    """Run a Prefect FLOW and log it to MLflow. It is forward, identify, compare, sweep or nightly."""
     _finish(bool(_pipeline("shoal_flows.run").main(flow, parameters, as_json)), "the flow did not end well")
 
 
@@ -492,13 +492,13 @@ def run(flow: str, parameters: dict[str, str], as_json: bool) -> None:
 @click.argument("run_id")
 @option_json
 def rerun(run_id: str, as_json: bool) -> None:
-    """Repeat the study of an MLflow run from what the run says, and compare the figures."""
+    """Repeat a study from its MLflow run, and compare the figures."""
     _finish(bool(_pipeline("shoal_flows.rerun").main(run_id, as_json)), "the figures do not agree")
 
 
 @main.command()
 def upload() -> None:
-    """Send the runs to MLflow that it could not be told of when they ended."""
+    """Send MLflow the runs that it could not be told of. They wait in the outbox."""
     count = _pipeline("shoal_flows.tracking.upload").upload()
     click.echo(f"{count} runs uploaded")
 
@@ -518,7 +518,7 @@ def ui(host: str, port: int) -> None:
 @click.option("--certificate", type=click.Path(path_type=Path), help="Serve https with this certificate (PEM).")
 @click.option("--key", type=click.Path(path_type=Path), help="The certificate's private key (PEM).")
 def serve(engine: str, host: str, port: int | None, certificate: Path | None, key: Path | None) -> None:
-    """Serve ENGINE over HTTP until Ctrl-C; SHOAL_API_* in the environment sets the limits."""
+    """Serve ENGINE over HTTP until Ctrl-C. SHOAL_API_* in the environment sets the limits."""
     _optional("shoal.api.serve", "services").serve(engine, host, port, certificate, key)
 
 
@@ -534,7 +534,7 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None, ke
 )
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .fmu; else the scene's name.")
 def export_fmu(scene: str, values: dict[str, str], parameters: tuple[str, ...], out: Path | None) -> None:
-    """Write SCENE as an FMI 2.0 unit for co-simulation; a host needs this installation to run it."""
+    """Write SCENE as an FMI 2.0 unit for co-simulation. A host needs this installation to run it."""
     from shoal import terminal
     from shoal.scene import load_scene
 
@@ -545,7 +545,7 @@ def export_fmu(scene: str, values: dict[str, str], parameters: tuple[str, ...], 
 
 @main.command()
 def demo() -> None:
-    """The main job: identify both cases of the paper, compare the engines, write one report."""
+    """The main job: both cases of the paper on every engine. One table, one report."""
     sys.exit(_pipeline("shoal_flows.demo").main())
 
 
@@ -554,7 +554,7 @@ def demo() -> None:
 @click.option("--quick", is_flag=True, help="A part that takes less than three minutes.")
 @option_json
 def validate(only: str | None, quick: bool, as_json: bool) -> None:
-    """Run the problem library over all engines, against its references and the nights before; write one page."""
+    """Run the problem library over all engines, and write a page. Against its references and the nights before."""
     good = _pipeline("shoal_validation.nightly.main").main(only, quick, as_json)
     _finish(bool(good), "not every line is as it should be; the page and the lines above name them")
 
@@ -562,7 +562,7 @@ def validate(only: str | None, quick: bool, as_json: bool) -> None:
 @main.command()
 @option_json
 def doctor(as_json: bool) -> None:
-    """Check the installation: engines, compiled kernels, pipeline, folders; say what is wrong."""
+    """Check the installation and say what is wrong. Engines, compiled kernels, pipeline, folders."""
     from shoal import doctor, terminal
 
     checks = doctor.examine()

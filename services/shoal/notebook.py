@@ -30,10 +30,6 @@ Values = Mapping[str, Any]
 Times = Sequence[float] | npt.NDArray[np.float64]
 
 
-_FEW = 4
-"""So many names are listed."""
-
-
 def simulate(
     scene: Scene | str,
     times: Times | None = None,
@@ -143,23 +139,7 @@ def _html(result: Any) -> str:
     return html(result)
 
 
-def _text(scene: Scene) -> str:
-    """A scene in one line."""
-    parts = {
-        "bodies": list(scene.bodies),
-        "joints": list(scene.joints),
-        "loads": list(scene.loads),
-        "markers": list(scene.markers),
-    }
-    named = (f"{what} {_named(names)}" for what, names in parts.items() if names)
-    return f"Scene({scene.name}: {'; '.join(named)})"
-
-
-def _named(names: list[str]) -> str:
-    return ", ".join(names) if len(names) <= _FEW else f"{names[0]} ... {names[-1]} ({len(names)})"
-
-
 _HTML = "_repr_html_"
 # The classes themselves know nothing of pictures and notebooks.
-for _kind, _method, _function in ((Scene, _HTML, _html), (Trajectory, _HTML, _html), (Scene, "__repr__", _text)):
-    setattr(_kind, _method, _function)
+for _kind in (Scene, Trajectory):
+    setattr(_kind, _HTML, _html)

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from shoal.selection import Selection
     from shoal.trajectory import Trajectory
 
+_NOTHING = 1e-12
+"""Of the largest force: a force below it is the rounding of the arithmetic, and shown as zero."""
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
 
@@ -106,7 +108,7 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
     table = _table(f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s", "marker", "x [m]", "y [m]")
     for name in trajectory.markers:
         x, y = trajectory.marker(name)[-1]
-        table.add_row(name, f"{x:.9f}", f"{y:.9f}")
+        table.add_row(name, f"{x:z.9f}", f"{y:z.9f}")
     out.print(table)
     _say(
         f"status {trajectory.status[0]}; energy off by {trajectory.energy_drift[0]:.1e}, constraints by "
@@ -144,7 +146,7 @@ def equilibrium_table(equilibrium: Equilibrium) -> None:
     table = _table(f"{equilibrium.scene.name} at rest", "marker", "x [m]", "y [m]", "angle [rad]")
     for name in equilibrium.markers:
         x, y = equilibrium.marker(name)
-        table.add_row(name, f"{x:.9f}", f"{y:.9f}", f"{equilibrium.angle(name):.9f}")
+        table.add_row(name, f"{x:z.9f}", f"{y:z.9f}", f"{equilibrium.angle(name):z.9f}")
     out.print(table)
     if equilibrium.reactions is not None:
         reactions_table([equilibrium.reactions])
@@ -162,8 +164,10 @@ def reactions_table(found: list[Reactions]) -> None:
     for reactions in found:
         title = f"joint forces on the second body at t = {reactions.time:g} s"
         table = _table(title, "joint", "kind", "fx [N]", "fy [N]", "torque [N m]", "unique")
-        for name, joint in reactions.joints.items():
-            numbers = (f"{value:.6g}" for value in (*joint.force, joint.torque))
+        every = [(*joint.force, joint.torque) for joint in reactions.joints.values()]
+        rounding = _NOTHING * float(np.max(np.abs(every), initial=0.0))
+        for (name, joint), values in zip(reactions.joints.items(), every, strict=True):
+            numbers = (f"{0.0 if abs(value) < rounding else value:.6g}" for value in values)
             table.add_row(name, joint.kind, *numbers, "yes" if joint.unique else "no")
         out.print(table)
         if reactions.redundancy:
@@ -196,7 +200,8 @@ def estimate_table(estimate: Estimate) -> None:
         # Two digits of the uncertainty; a value that is not known has none that mean anything.
         unit = value.std if value.identifiable and value.std > 0 else abs(value.value) * 1e-2
         interval = f"{rounded(value.lower, unit)} to {rounded(value.upper, unit)}" if value.identifiable else "-"
-        table.add_row(name, rounded(value.value, unit), interval, known)
+        label = f"{name} [{value.unit}]" if value.unit else name
+        table.add_row(escape(label), rounded(value.value, unit), interval, known)
     out.print(table)
     for sentence in estimate.combinations:
         _say(sentence)
@@ -220,22 +225,26 @@ def estimate_table(estimate: Estimate) -> None:
 
 def _minima(estimate: Estimate) -> None:
     """At most five other minima, the best first."""
+    from shoal.pictures.units import fitness_unit
+
     others = sorted(estimate.minima, key=lambda minimum: minimum["fitness"])
     for other in others[:5]:
         values = ", ".join(f"{name} {value:.4g}" for name, value in other.items() if name != "fitness")
-        _say(f"another minimum, fitness {other['fitness']:.3g}: {values}")
+        _say(f"another minimum, fitness {other['fitness']:.3g} {fitness_unit(estimate)}: {values}")
     if len(others) > 5:
         _say(f"and {len(others) - 5} more minima, all worse")
 
 
 def _effort(estimate: Estimate) -> None:
     """Where the data come from, what the search cost, and how the answer compares with a known truth."""
+    from shoal.pictures.units import fitness_unit, rms_unit
+
     _say(f"data: {estimate.data}")
     for note in estimate.notes:
         _say(f"note: {note}")
     _say(
-        f"fitness {estimate.fitness:.4e}, RMS {estimate.rms:.3e}; {estimate.evaluations} evaluations "
-        f"in {estimate.wall_s:.2f} s"
+        f"fitness {estimate.fitness:.4e} {fitness_unit(estimate)}, RMS {estimate.rms:.3e} {rms_unit(estimate)}; "
+        f"{estimate.evaluations} evaluations in {estimate.wall_s:.2f} s"
     )
     for stage in estimate.model.get("selection", ()):
         _say(
@@ -289,7 +298,7 @@ def sweep_table(sweep: Sweep) -> None:
     last = markers[-1]
     table = _table(
         f"{sweep.scene.name}: displacement of {last} after {sweep.time:g} s",
-        *sweep.grid,
+        *_short(list(sweep.grid)),
         f"{last}.dx [m]",
         f"{last}.dy [m]",
         "status",
@@ -299,6 +308,15 @@ def sweep_table(sweep: Sweep) -> None:
         moved = [row[f"{last}.dx"], row[f"{last}.dy"]]
         table.add_row(*numbers, *("-" if m is None else f"{m:.6f}" for m in moved), row["status"])
     out.print(table)
+
+
+def _short(paths: list[str]) -> list[str]:
+    """Paths with their units, by their last two names where those tell them apart: OA.angle [rad]."""
+    from shoal.identification.units import unit
+
+    ends = [".".join(path.split(".")[-2:]) for path in paths]
+    names = ends if len(set(ends)) == len(ends) else paths
+    return [f"{name} [{unit(path)}]" if unit(path) else name for name, path in zip(names, paths, strict=True)]
 
 
 def comparison_table(comparison: Comparison) -> None:

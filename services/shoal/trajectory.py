@@ -108,10 +108,11 @@ class Trajectory:
         except ModuleNotFoundError:
             raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
         dims = ("time", "marker", "lane")
-        x, y = self.points[:, :, 0], self.points[:, :, 1]
+        columns = {"x": (self.points[:, :, 0], "m"), "y": (self.points[:, :, 1], "m"), "angle": (self.angles, "rad")}
         status = ("lane", [str(status) for status in self.status])
-        coordinates = {"time": self.times, "marker": list(self.markers), "status": status}
-        return xr.Dataset({"x": (dims, x), "y": (dims, y), "angle": (dims, self.angles)}, coordinates)
+        time = ("time", self.times, {"units": "s"})
+        coordinates = {"time": time, "marker": list(self.markers), "status": status}
+        return xr.Dataset({name: (dims, x, {"units": unit}) for name, (x, unit) in columns.items()}, coordinates)
 
     def to_json(self, lane: int = 0) -> dict[str, Any]:
         """One lane as plain data, which `shoal simulate --json` prints; null where nothing finite is known."""

@@ -44,6 +44,7 @@ HOSTILE = {
     "base-sixty": ("a: " + "1:" * 400_000 + "1", "a number of"),
     "hexadecimal": (PENDULUM.replace("mass: 1.0", "mass: 0x" + "f" * 900_000), "a number of"),
     "a-tower-of-powers": (torque("9**9**9**9*t"), "finite"),
+    "too-fast": (torque("sin(1e12*t)"), "varies too fast"),
     "long-expression": (torque("+".join("t" * 300)), "longer than"),
     "code": (torque('__import__("os").system("id")'), "torque"),
     "attributes": (torque("t.__class__"), "torque"),

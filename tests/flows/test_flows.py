@@ -61,12 +61,39 @@ def test_artifacts_hold_the_full_trajectory_and_pictures(study: Any) -> None:
     assert any(name.endswith(".png") for name in names)
     assert "report.html" in names
     of_study = {Path(item.path).name for item in _client().list_artifacts(study.run_id)}
-    assert {"convergence.png", "residuals.png"} <= of_study
+    assert {"convergence.png", "residuals.png", "trajectory.png", "report.html", "model"} <= of_study
+
+
+def test_a_study_says_what_it_found_and_its_best_is_a_model(study: Any) -> None:
+    run = _client().get_run(study.run_id)
+    assert run.data.tags["verdict"] == "identified"
+    assert "| least-squares · seed 0 | theta1 = 0.786015" in run.data.tags["mlflow.note.content"]
+    (version,) = _client().search_model_versions(f"run_id = '{study.run_id}'")
+    assert version.name == "paper-case-1"
+    assert version.tags["champion"] == "passed"
+    assert version.tags["second engine"].startswith("exudyn confirms the motion")
+
+
+def test_an_identification_without_any_answer_is_one_line_and_a_failed_run() -> None:
+    with pytest.raises(InputError, match=r"solver\.step: 0\.01 s is beyond") as refusal:
+        run.run_flow("identify", {"methods": "least-squares", "values": "{solver.step: 0.01}"})
+    assert "\n" not in str(refusal.value)
+    experiment = _client().get_experiment_by_name("Identification")
+    (latest,) = _client().search_runs([experiment.experiment_id], "tags.kind = 'study'", max_results=1)
+    assert latest.info.status == "FAILED"
+    assert latest.data.metrics["study/failed"] == 1
 
 
 def test_the_answer_is_plain_json(study: Any) -> None:
     found = json.loads(json.dumps(study.to_json(), allow_nan=False, default=str))
     assert found["status"] == "ok"
+
+
+def test_a_result_that_is_not_to_be_trusted_comes_back_as_it_is() -> None:
+    """Prefect shows a state of that name; who called the flow gets the result."""
+    found = run.run_flow("compare", {"scene": "n-four-bar-2", "engines": "gauss,casadi"})
+    assert not found.trusted
+    assert list(found.comparison.refused) == ["casadi"]
 
 
 def test_forward_sweep_and_compare_are_logged() -> None:
@@ -99,6 +126,8 @@ def test_a_night_is_a_run_with_a_metric_per_line() -> None:
         ("sweep", {"scene": "single-pendulum", "vary": "{initial.OA.angle: [0, 1]}"}, "vary"),
         ("sweep", {"vary": "7"}, "vary"),
         ("identify", {"methods": "[guess]"}, "guess"),
+        ("compare", {"scene": "single-pendulum", "engines": "gauss"}, "engines"),
+        ("compare", {"scene": "single-pendulum", "engines": "[gauss, gauss]"}, "two different"),
     ],
 )
 def test_bad_parameters_are_refused_in_one_line(flow: str, parameters: dict[str, str], word: str) -> None:

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import csv
+import json
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from shoal.pictures.signals import signals
 from shoal_flows import pictures
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.report.stored import stored
+from shoal_flows.tracking import store
 from shoal_flows.tracking.engines import log_comparison, log_sweep
 from shoal_flows.tracking.identification import log_fit, log_outcome, open_study
 from shoal_flows.tracking.store import connect
@@ -109,3 +112,40 @@ def test_experiments_explain_themselves(client: Any, fits: list[Fit]) -> None:
     assert experiment is not None
     assert "a child per method" in experiment.tags["mlflow.note.content"]
     assert experiment.artifact_location.endswith("/artifacts/identification")
+    # As MLflow's pages read a saved view: its state is a text in the text.
+    view = json.loads(experiment.tags["mlflow.sharedViewState.best-today"])
+    assert view["name"] == "Fits of the last 24 hours, best first"
+    state = json.loads(view["state"])
+    assert state["orderByKey"] == "metrics.`final/fitness`"
+    found = client.search_runs([experiment.experiment_id], state["searchFilter"], order_by=[state["orderByKey"]])
+    logged = {f"metrics.`{name}`" for run in found for name in run.data.metrics}
+    logged |= {f"params.`{name}`" for run in found for name in run.data.params} | {"tags.`verdict`"}
+    assert set(state["selectedColumns"]) <= logged
+
+
+def test_an_older_experiment_gets_the_views(client: Any) -> None:
+    experiment = client.get_experiment_by_name("Identification")
+    client.set_experiment_tag(experiment.experiment_id, "mlflow.sharedViewState.best", "old")
+    store._experiment.cache_clear()
+    store._experiment("Identification")
+    assert json.loads(client.get_experiment(experiment.experiment_id).tags["mlflow.sharedViewState.best"])
+
+
+def test_a_fit_lasts_as_long_as_its_optimisation(client: Any) -> None:
+    with store.open_run("Forward", "slow", took=60.0) as run:
+        pass
+    info = client.get_run(run.run_id).info
+    assert 60_000 <= info.end_time - info.start_time < 90_000
+
+
+@pytest.mark.usefixtures("client")
+def test_pages_are_told_to_open_on_runs_and_metrics() -> None:
+    """Before the program of the page begins, which reads it; `mlflow server --app-name shoal` finds it."""
+    from shoal_flows.tracking.dashboard import pages
+
+    browser = pages.test_client()
+    with browser.get("/") as answer:
+        page = answer.text
+    assert page.index("mlflow.workflowType_v1") < page.index("static-files/static/js/main")
+    assert "mlflow.workflowType_v1" not in browser.get("/version").text
+    assert entry_points(group="mlflow.app")["shoal"].value == "shoal_flows.tracking.dashboard:app"

@@ -36,6 +36,7 @@ def test_least_squares_on_casadi_data_of_the_same_mesh_is_exact(name: str) -> No
 def test_data_from_exudyns_fine_mesh_lie_within_the_intervals(name: str) -> None:
     estimate = run(name, "least-squares")
     assert estimate.verdict is Verdict.IDENTIFIED
+    assert "is what the fit leaves; --tolerance" in estimate.message
     for parameter, true in estimate.truth.items():
         found = estimate.parameters[parameter]
         assert found.value == pytest.approx(true, abs=1e-3)
@@ -84,6 +85,23 @@ def test_a_rigid_model_of_a_flexible_machine_is_not_passed_off_as_exact() -> Non
     wrong = max(abs(estimate.parameters[name].value - true) for name, true in estimate.truth.items())
     assert wrong > 0.02
     assert estimate.fitness > 1e-4
+
+
+def test_one_instant_tells_a_pose_but_not_how_certain_it_is(tmp_path: Path) -> None:
+    (tmp_path / "one.csv").write_text("t,x,y\n0.0,0.50,-0.866\n0.1,,\n0.2,,\n")
+    angle = {"path": "initial.OA.angle", "lower": -3.0, "upper": 3.0}
+    channels = [{"marker": "A", "quantity": "x", "column": "x"}, {"marker": "A", "quantity": "y", "column": "y"}]
+    source = {"kind": "file", "path": str(tmp_path / "one.csv")}
+    fields = {"name": "one", "scene": "single-pendulum", "parameters": {"angle": angle}, "channels": channels}
+    estimate = identify(Problem.model_validate({**fields, "source": source}))
+    assert estimate.verdict is Verdict.FAILED
+    assert "2 measured numbers for 1 unknown: too few" in estimate.message
+    assert not estimate.parameters["angle"].identifiable
+    assert estimate.parameters["angle"].value == pytest.approx(-np.pi / 3, abs=1e-3)
+    noisy = [{**channel, "noise": 1e-3} for channel in channels]
+    stated = identify(Problem.model_validate({**fields, "channels": noisy, "source": source}))
+    assert stated.verdict is Verdict.IDENTIFIED
+    assert 1e-4 < stated.parameters["angle"].std < 1e-2
 
 
 @pytest.mark.parametrize("method", ["auto", "least-squares", "iafsa"])

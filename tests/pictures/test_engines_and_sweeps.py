@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from shoal.engines import get_engine
 from shoal.engines.compare import compare
 from shoal.engines.sweep import sweep
@@ -14,6 +15,12 @@ from shoal.pictures import files
 from shoal.pictures.engines import engines
 from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import load_scene
+
+
+def said(figure: Figure) -> str:
+    """The title as one line."""
+    return " ".join(figure.get_suptitle().split())
+
 
 SCENE = load_scene("single-pendulum")
 
@@ -24,9 +31,10 @@ def test_sweeps(paths: list[str]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         figure = draw_sweep(result, "A")
-    title = figure.axes[0].get_title(loc="left")
-    assert "A" in title
-    assert "after 0.5 s" in title
+    title = said(figure)
+    size = np.linalg.norm(result.displacements["A"], axis=1)
+    assert f"after 0.5 s A has moved farthest, {size.max():.3g} m, from initial.OA.angle =" in title
+    assert f"{paths[-1]} = {result.grid[paths[-1]][size.argmax()]:.3g}" in title
     labels = {axes.get_xlabel() for axes in figure.axes} | {axes.get_ylabel() for axes in figure.axes}
     assert "initial.OA.angle [rad]" in labels
     assert len(paths) == 1 or "initial.OA.rate [rad/s]" in labels

@@ -17,6 +17,7 @@ from shoal.identification import Estimate
 from shoal.pictures import titles
 from shoal.pictures.convergence import convergence
 from shoal.pictures.mesh_error import mesh_error
+from shoal.pictures.numbers import length
 from shoal.pictures.remainders import remainders
 from shoal.pictures.style import png, svg
 from shoal.pictures.sweep import sweep as draw_sweep
@@ -58,4 +59,6 @@ def test_titles_say_what_the_numbers_say(estimates: Estimates) -> None:
     assert titles.leaves("Case", {"fine": fine}) == "Case: every method leaves the same remainder"
     comparison = compare(load_scene("single-pendulum"), ["gauss", "casadi"])
     largest = max(row["largest"] for row in comparison.differences())
-    assert titles.agrees(comparison, "A") == f"2 engines place A within {1e6 * largest:.2g} µm of each other"
+    assert titles.agrees(comparison, "A") == (
+        f"single-pendulum: 2 engines place A within {length(largest)} of each other"
+    )

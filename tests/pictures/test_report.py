@@ -83,7 +83,7 @@ def test_a_tolerance_shows_why_this_model() -> None:
     ladder = model_choice(answer)
     chosen = answer.estimate.model["selection"][-1]["model"]
     assert f"it was found with {chosen}" in ladder.caption
-    assert "within 10 mm" in ladder.figure.get_suptitle()
+    assert "within 10 mm" in " ".join(ladder.figure.get_suptitle().split())
     assert [axes.get_ylabel() for axes in ladder.figure.axes] == ["estimated error [m]"]
 
 

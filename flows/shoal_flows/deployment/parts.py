@@ -69,7 +69,7 @@ class Line:
 
         Raises ComputationError, and InputError if what is left of the one before still listens.
         """
-        processes.check_free(self.name)
+        processes.check_port(self.name)
         self.begin()
         self.ready()
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import socket
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from urllib.error import URLError
 from urllib.request import urlopen
 
 from shoal.errors import InputError
+from shoal.ports import check_free
 
 FOLDER = Path(__file__).parents[3]
 """Where Procfile and prefect.yaml lie: the folder of a checkout."""
@@ -56,11 +56,9 @@ def port(name: str) -> int:
     return int(text)
 
 
-def check_free(name: str) -> None:
-    """Raises InputError if somebody else listens on the port of a process."""
-    with socket.socket() as probe:
-        if probe.connect_ex(("127.0.0.1", port(name))) == 0:
-            raise InputError(f"{_READY[name][0]}: port {port(name)} is in use; choose another for {name}")
+def check_port(name: str) -> None:
+    """Raises InputError if a process cannot listen on its port."""
+    check_free("127.0.0.1", port(name), _READY[name][0])
 
 
 def is_ready(name: str) -> bool:

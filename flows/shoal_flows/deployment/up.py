@@ -42,7 +42,7 @@ def run(stages: Sequence[Sequence[str]], *, postgres: bool = False) -> None:
     """
     console = Console(stderr=True, highlight=False)
     for name in (name for stage in stages for name in stage):
-        processes.check_free(name)
+        processes.check_port(name)
     # A service manager asks with SIGTERM for what a person does with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     port = int(os.environ.get("SHOAL_POSTGRES_PORT") or 5433)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from prefect import flow
+from shoal.errors import InputError
 
 from shoal_flows.flows import tables
 from shoal_flows.flows.parameters import Engines, SceneName, Values
-from shoal_flows.flows.shown import progress, show_result
+from shoal_flows.flows.shown import ended, progress, show_result
 from shoal_flows.flows.tasks import run_engines
 from shoal_flows.results import Compared
 
@@ -24,7 +25,11 @@ def compare(
         engines: Who simulates, two or more; gauss is Shoal's own solver.
         values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
     """
+    if len(set(engines)) < 2:
+        raise InputError(f"engines: give two different ones or more, found {', '.join(engines)}")
     with progress(1, f"{scene} on {', '.join(engines)}"):
         comparison, picture, run_id = run_engines(scene, engines, values)
     show_result(f"{scene}: engines", tables.of_comparison(comparison), run_id)
-    return Compared(comparison, run_id, picture)
+    wrong = [f"{name}: {motion.message}" for name, motion in comparison.trajectories.items() if not motion.ok]
+    refused = [f"{name} refuses the scene: {reason}" for name, reason in comparison.refused.items()]
+    return ended(Compared(comparison, run_id, picture), [*refused, *wrong])

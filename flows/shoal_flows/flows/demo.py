@@ -43,7 +43,7 @@ def demo() -> DemoResult:
         for study, cell in sorted(queue, key=lambda item: SLOWEST_FIRST.index(item[1].method)):
             study.submit(cell)
         return DemoResult(
-            {case: _finish(study, **METHOD_PICTURES) for case, study in studies.items()},
+            {case: _published(study) for case, study in studies.items()},
             {case: _finish(study, mesh_error=draw_mesh_error) for case, study in meshes.items()},
             {case: _finish(study) for case, study in same.items()},
             {case: _compared(future.result()) for case, future in compared.items()},
@@ -52,6 +52,12 @@ def demo() -> DemoResult:
 
 def _finish(study: Running, **pictures: Draw) -> Study:
     return study.finish(TITLES[study.cells[0].problem], pictures)
+
+
+def _published(study: Running) -> Study:
+    found = _finish(study, **METHOD_PICTURES)
+    study.publish(found)
+    return found
 
 
 def _compared(result: tuple[Comparison, Picture, str]) -> Compared:

@@ -6,7 +6,7 @@ from prefect import flow
 
 from shoal_flows.flows import tables
 from shoal_flows.flows.parameters import EngineName, SceneName, Values
-from shoal_flows.flows.shown import progress, show_result
+from shoal_flows.flows.shown import ended, progress, show_result
 from shoal_flows.flows.tasks import simulate
 from shoal_flows.results import Simulated
 
@@ -27,4 +27,4 @@ def forward(
     with progress(1, f"{scene} on {engine}"):
         result = Simulated(*simulate(scene, engine, values))
     show_result(f"{scene} on {engine}", tables.of_motion(result.motion), result.run_id)
-    return result
+    return ended(result, [f"{result.motion.status[0]}: {result.motion.message}"])

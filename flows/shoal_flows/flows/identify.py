@@ -10,13 +10,13 @@ from shoal.identification.methods import get_method
 
 from shoal_flows.flows.parameters import EngineName, Methods, ProblemName, Seeds, Values
 from shoal_flows.flows.runner import side_by_side
-from shoal_flows.flows.shown import progress, show_result
+from shoal_flows.flows.shown import ended, progress, show_result
 from shoal_flows.flows.study import open_running
 from shoal_flows.flows.tasks import measure
 from shoal_flows.jobs import Cell
-from shoal_flows.pictures import draw_convergence, draw_residuals
+from shoal_flows.pictures import draw_convergence, draw_residuals, draw_trajectory
 from shoal_flows.results import Study
-from shoal_flows.tracking.identification import summary
+from shoal_flows.tracking.identification import answer, summary
 
 
 @flow(name="identify", flow_run_name="identify {problem}", task_runner=side_by_side())
@@ -43,7 +43,7 @@ def identify(
     load_problem(problem).load_scene(values)
     cells = [Cell(problem, method, seed, engine, values) for method, seed in product(methods, seeds)]
     measurement = measure(problem, data or None)
-    pictures = {"convergence": draw_convergence, "residuals": draw_residuals}
+    pictures = {"convergence": draw_convergence, "trajectory": draw_trajectory, "residuals": draw_residuals}
     with (
         progress(len(cells), f"{problem}: optimisations") as bar,
         open_running(f"{problem} · identify", cells, measurement) as study,
@@ -51,5 +51,9 @@ def identify(
         for cell in cells:
             study.submit(cell)
         found = study.finish(problem, pictures, ended=bar.advance)
-    show_result(problem, summary(found.fits, found.failures), found.run_id)
-    return found
+        study.publish(found)
+        show_result(problem, summary(found.fits, found.failures), found.run_id, answer(found.fits))
+        study.check_any()
+    doubtful = {f.cell.name: f.estimate for f in found.fits if not f.estimate.verdict.trusted}
+    doubts = [f"{name}: {estimate.verdict}: {estimate.message}" for name, estimate in doubtful.items()]
+    return ended(found, [*doubts, *(f"{name} failed: {reason}" for name, reason in found.failures.items())])

@@ -26,7 +26,7 @@ def _one_of(names: Iterable[str]) -> Any:
 SceneName = Annotated[str, _one_of(scene_names())]
 ProblemName = Annotated[str, _one_of(problem_names())]
 EngineName = Annotated[str, _one_of(ENGINES)]
-Engines = Annotated[list[EngineName], Field(min_length=1)]
+Engines = Annotated[list[EngineName], Field(min_length=2, json_schema_extra={"uniqueItems": True})]
 Methods = Annotated[list[Annotated[str, _one_of(METHODS)]], Field(min_length=1)]
 Seeds = Annotated[list[int], Field(min_length=1)]
 Values = dict[str, Any]

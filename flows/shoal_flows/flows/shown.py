@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol, TypeVar, cast
 
 from prefect.artifacts import (
     create_link_artifact,
@@ -13,15 +13,37 @@ from prefect.artifacts import (
     create_progress_artifact,
     update_progress_artifact,
 )
+from prefect.states import Completed
 
 from shoal_flows import settings
 from shoal_flows.tracking.record import LOCAL
 from shoal_flows.tracking.store import connect
 
 
-def show_result(title: str, table: str, run_id: str) -> None:
-    """The table (Markdown) of a flow that runs, and a link to its run in MLflow."""
-    create_markdown_artifact(f"## {title}\n\n{table}\n\n{_where(run_id)}\n", key="result", description=title)
+class Result(Protocol):
+    """What a flow returns."""
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it can be used."""
+        ...
+
+
+R = TypeVar("R", bound=Result)
+
+
+def ended(result: R, doubts: Iterable[str]) -> R:
+    """What a flow returns; one that cannot be trusted with a state of that name, and every reason in one line."""
+    if result.trusted:
+        return result
+    # Prefect takes the state, and whoever called the flow gets the result in it.
+    return cast(R, Completed(name="Not to be trusted", message="; ".join(doubts), data=result))
+
+
+def show_result(title: str, table: str, run_id: str, answer: str = "") -> None:
+    """The table (Markdown) of a flow that runs, and a link to its run in MLflow; answer: what a card has room for."""
+    text = f"## {title}\n\n{table}\n\n{_where(run_id)}\n"
+    create_markdown_artifact(text, key="result", description=answer or title)
     if address := run_address(run_id):
         create_link_artifact(address, link_text="The run in MLflow", key="mlflow-run", description=title)
 

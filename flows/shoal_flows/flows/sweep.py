@@ -6,7 +6,7 @@ from prefect import flow
 
 from shoal_flows.flows import tables
 from shoal_flows.flows.parameters import Axes, Axis, EngineName, Instant, SceneName
-from shoal_flows.flows.shown import progress, show_result
+from shoal_flows.flows.shown import ended, progress, show_result
 from shoal_flows.flows.tasks import run_grid
 from shoal_flows.results import Swept
 
@@ -29,4 +29,5 @@ def sweep(
     with progress(1, f"{scene} over {', '.join(axis.path for axis in vary)}"):
         result = Swept(*run_grid(scene, {axis.path: (axis.low, axis.high, axis.count) for axis in vary}, engine, time))
     show_result(f"{scene}: sweep", tables.of_sweep(result.sweep), result.run_id)
-    return result
+    wrong = [status for status in result.sweep.status if status != "ok"]
+    return ended(result, [f"{len(wrong)} of {len(result.sweep.status)} points: {', '.join(sorted(set(wrong)))}"])

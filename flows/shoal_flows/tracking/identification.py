@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
-from shoal.identification import Measurement
+from shoal.identification import Estimate, Measurement
 from shoal.pictures.signals import signals
+from shoal.pictures.study import best_of as best_name
 from shoal.scene import Rod
 
 from shoal_flows.jobs import Cell, Fit
@@ -36,11 +37,22 @@ def log_outcome(study: Run, fits: Sequence[Fit], failures: Mapping[str, str], pi
     study.metric("study/failed", len(failures))
     for name, picture in pictures.items():
         study.picture(picture, name)
-    study.text(summary(fits, failures), "summary.md")
-    if fits:
-        best = min((f.estimate for f in fits), key=lambda e: e.fitness)
-        study.metric("final/fitness", best.fitness)
-        study.metric("final/rms", best.rms)
+    table = summary(fits, failures)
+    study.text(table, "summary.md")
+    study.describe(f"{table}\n{study.tags['mlflow.note.content']}")
+    if best := best_of(fits):
+        study.tags["verdict"] = str(best.estimate.verdict)
+        study.params({"method": best.cell.name})
+        study.metric("final/fitness", best.estimate.fitness)
+        study.metric("final/rms", best.estimate.rms)
+        for name, value in best.estimate.parameters.items():
+            study.metric(f"final/{name}", value.value)
+
+
+def best_of(fits: Sequence[Fit]) -> Fit | None:
+    """The best of those that can be trusted, else of all; None if there are none."""
+    by_name = {fit.cell.name: fit for fit in fits}
+    return by_name[best_name({name: fit.estimate for name, fit in by_name.items()})] if by_name else None
 
 
 def summary(fits: Sequence[Fit], failures: Mapping[str, str]) -> str:
@@ -48,18 +60,32 @@ def summary(fits: Sequence[Fit], failures: Mapping[str, str]) -> str:
     lines = ["| method | values | fitness | RMS | evaluations | time [s] | verdict |", "|---|---|---|---|---|---|---|"]
     for fit in fits:
         e = fit.estimate
-        values = ", ".join(f"{name} = {value.value:.6f}" for name, value in e.parameters.items())
+        values = _values(e)
         numbers = f"{e.fitness:.4e} | {e.rms:.3e} | {e.evaluations} | {e.wall_s:.2f}"
         lines.append(f"| {fit.cell.name} | {values} | {numbers} | {e.verdict} |")
     lines += [f"| {name} | {reason} | | | | | failed |" for name, reason in failures.items()]
     return "\n".join(lines) + "\n"
 
 
+def answer(fits: Sequence[Fit]) -> str:
+    """The best fit in one line."""
+    best = best_of(fits)
+    if best is None:
+        return "no optimisation came to its end"
+    return f"{_values(best.estimate)}: {best.estimate.verdict} ({best.cell.name})"
+
+
+def _values(estimate: Estimate) -> str:
+    return ", ".join(f"{name} = {value.value:.6f}" for name, value in estimate.parameters.items())
+
+
 def log_fit(fit: Fit, album: Album, study: str) -> str:
     """A child of the run `study` with all there is to know about one fit; returns its id."""
     cell, estimate = fit.cell, fit.estimate
     tags = {"kind": "optimisation", "problem": cell.problem, "method": cell.method, "verdict": str(estimate.verdict)}
-    with open_run("Identification", cell.name, tags=tags, parent=study, description=estimate.message) as run:
+    with open_run(
+        "Identification", cell.name, tags=tags, parent=study, description=estimate.message, took=estimate.wall_s
+    ) as run:
         scene = estimate.scene
         mesh = {name: b.elements for name, b in scene.bodies.items() if isinstance(b, Rod) and b.element != "rigid"}
         run.params({"problem": cell.problem, "method": cell.method, "seed": cell.seed, "engine": cell.engine})

@@ -14,8 +14,25 @@ from uuid import uuid4
 
 LOCAL = "outbox-"
 """How the id of a run begins that MLflow has not given one yet."""
+MODEL = "model"
+"""The folder among the files of a run that holds its model."""
 _TEXT = "record.json"
 _FILES = "files"
+
+
+@dataclass(frozen=True)
+class Registration:
+    """The version as which the model of a run enters MLflow's registry.
+
+    name, about: of the registered model; description, tags: of the version
+    doubts: why it does not become the champion, in words
+    """
+
+    name: str
+    about: str
+    description: str
+    tags: dict[str, str]
+    doubts: list[str]
 
 
 @dataclass
@@ -24,7 +41,8 @@ class Run:
 
     run_id: MLflow's, or one of our own as long as MLflow cannot be reached; name, description in words; parent: the
     run_id of the study; params never change; metrics: (name, value, time [ms], step); files: artifacts by path;
-    started, ended [ms]
+    started, ended [ms]; took: work [s] that had ended before the start
+    registration: of the model below `model/` among the files, if there is one
     """
 
     experiment: str
@@ -35,14 +53,21 @@ class Run:
     status: str = "RUNNING"
     started: int = field(default_factory=lambda: _now())
     ended: int = 0
+    took: float = 0.0
     kept_params: dict[str, str] = field(default_factory=dict)
     metrics: list[tuple[str, float, int, int]] = field(default_factory=list)
     files: dict[str, bytes] = field(default_factory=dict)
+    registration: Registration | None = None
 
     @property
     def known(self) -> bool:
         """Whether MLflow has made this run."""
         return not self.run_id.startswith(LOCAL)
+
+    def describe(self, text: str) -> None:
+        """What MLflow shows as the run's description (Markdown)."""
+        if text:
+            self.tags["mlflow.note.content"] = text
 
     def params(self, values: Mapping[str, Any]) -> None:
         """Settings, which never change; what is too long for MLflow is cut."""
@@ -90,6 +115,8 @@ class Run:
         """What `save` wrote. Raises OSError, ValueError."""
         data = json.loads((folder / _TEXT).read_text(encoding="utf-8"))
         data["metrics"] = [(name, value, when, step) for name, value, when, step in data["metrics"]]
+        if stated := data.get("registration"):
+            data["registration"] = Registration(**stated)
         where = folder / _FILES
         found = [path for path in where.rglob("*") if path.is_file()]
         data["files"] = {path.relative_to(where).as_posix(): path.read_bytes() for path in found}

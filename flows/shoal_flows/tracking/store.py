@@ -15,7 +15,8 @@ from typing import Any
 from shoal.errors import ComputationError
 
 from shoal_flows import provenance, settings
-from shoal_flows.tracking import origin, outbox
+from shoal_flows.tracking import origin, outbox, views
+from shoal_flows.tracking.model import registry
 from shoal_flows.tracking.record import LOCAL, Run
 
 log = logging.getLogger(__name__)
@@ -41,14 +42,15 @@ def open_run(
     description: str = "",
     tags: Mapping[str, str] | None = None,
     parent: str | None = None,
+    took: float = 0.0,
 ) -> Iterator[Run]:
     """A run from its start to its end, failed if an exception leaves the block; parent: the id of a run.
 
+    took: how long [s] the work lasted that had ended before the block.
     Where MLflow does not answer, the run goes to the outbox: a result is never lost for that.
     """
-    run = Run(experiment, name, {**_common_tags(), **(tags or {})}, parent)
-    if description:
-        run.tags["mlflow.note.content"] = description
+    run = Run(experiment, name, {**_common_tags(), **(tags or {})}, parent, took=took)
+    run.describe(description)
     if parent is None and (call := origin.of_flow()) is not None:
         run.files |= call
     if not _waits(run):
@@ -104,15 +106,17 @@ def _make(run: Run) -> None:
     if run.parent:
         tags["mlflow.parentRunId"] = run.parent
     client = connect()
-    made = client.create_run(_experiment(run.experiment), start_time=run.started, tags=tags, run_name=run.name)
+    start = run.started - int(1000 * run.took)
+    made = client.create_run(_experiment(run.experiment), start_time=start, tags=tags, run_name=run.name)
     run.run_id = made.info.run_id
 
 
 def _send(run: Run) -> None:
     """All of a run, in calls of at most 1000 metrics and 100 settings; what MLflow already has is sent again."""
-    from mlflow.entities import Metric, Param
+    from mlflow.entities import Metric, Param, RunTag
 
     client = connect()
+    client.log_batch(run.run_id, tags=[RunTag(*tag) for tag in run.tags.items()])
     metrics = [Metric(*row) for row in run.metrics]
     params = [Param(*row) for row in run.kept_params.items()]
     for start in range(0, max(len(metrics), 10 * len(params)), _BATCH):
@@ -121,6 +125,7 @@ def _send(run: Run) -> None:
     with TemporaryDirectory() as folder:
         run.write_files(Path(folder))
         client.log_artifacts(run.run_id, folder)
+    registry.enter(client, run)
     client.set_terminated(run.run_id, run.status, run.ended)
 
 
@@ -150,7 +155,12 @@ def connect() -> Any:
 def _unreachable(error: Exception) -> ComputationError:
     if isinstance(error, ComputationError):
         return error
-    return ComputationError(f"MLflow at {os.environ['MLFLOW_TRACKING_URI']}: {str(error).splitlines()[0]}")
+    from requests import ConnectionError as NoConnection
+
+    # MLflow's own words for a server that is away are several lines long.
+    away = isinstance(error, NoConnection) or isinstance(error.__context__, NoConnection)
+    reason = "it does not answer; start it, or let MLFLOW_TRACKING_URI name another" if away else str(error)
+    return ComputationError(f"MLflow at {os.environ['MLFLOW_TRACKING_URI']}: {reason.splitlines()[0]}")
 
 
 @cache
@@ -160,12 +170,20 @@ def _experiment(name: str) -> str:
 
     client = connect()
     found = client.get_experiment_by_name(name)
+    tags = {
+        "mlflow.note.content": _EXPERIMENTS[name],
+        "project": "shoal",
+        "mlflow.experimentKind": _KIND,
+        **views.tags(name),
+    }
     if found is not None:
+        for key, value in tags.items():
+            if found.tags.get(key) != value:
+                client.set_experiment_tag(found.experiment_id, key, value)
         if found.lifecycle_stage == "deleted":
             client.restore_experiment(found.experiment_id)
         return str(found.experiment_id)
     location = None if settings.tracking_server() else (settings.artifact_folder() / name.lower()).as_uri()
-    tags = {"mlflow.note.content": _EXPERIMENTS[name], "project": "shoal", "mlflow.experimentKind": _KIND}
     try:
         return str(client.create_experiment(name, artifact_location=location, tags=tags))
     except MlflowException:

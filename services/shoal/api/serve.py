@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import socket
 import ssl
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from shoal.api.program import create_program
 from shoal.api.settings import Settings
 from shoal.engines.remote import loopback
 from shoal.errors import InputError
+from shoal.ports import check_free
 
 PORTS = {"gauss": 8001, "exudyn": 8002, "exudyn-ge": 8002, "casadi": 8003}
 """Where an engine is served unless somebody says otherwise."""
@@ -39,17 +39,6 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None = N
         access_log=False,
         server_header=False,
     )
-
-
-def check_free(host: str, port: int) -> None:
-    """Refuse a place where no server can listen, before one is started. Raises InputError."""
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            reason = f"port: cannot listen on {host}:{port}: {error.strerror or error}; choose another with --port"
-            raise InputError(reason) from None
 
 
 def _check_pair(certificate: Path | None, key: Path | None) -> None:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from shoal.mechanics import forces, stability
+from shoal.mechanics import stability
 from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.motion_state import LANE, at_start
 from shoal.mechanics.build import build
-from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.integrators import choose, facts, pick
 from shoal.mechanics.march import SAMPLED, march
 from shoal.mechanics.model import Model
-from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import SINGLE
 from shoal.scene import Scene
 from shoal.trajectory import Array
-
-_LANE = slice(0, 1)
 
 
 def energies(scene: Scene, times: Array) -> Array:
@@ -43,13 +40,8 @@ def _states(model: Model, times: Array) -> tuple[Array, Array]:
     """Coordinates and rates at the times, (times, unknowns) each: the time loop with pairs of unknowns as markers."""
     solver, n = model.scene.solver, model.unknowns
     choice = pick(solver, model, stability.step_limit)
-    arrays = model.tile(SINGLE, _LANE)
-    room = work_space(SINGLE, arrays)
-    arrays = ready(SINGLE, arrays, room)
-    room.z[:n], room.zdot[:n] = model.q0[:, 0], model.v0[:, 0]
-    derived_rows(SINGLE, arrays, room)
-    room.memory[:] = forces.initial_memory(SINGLE, arrays.forces, room.z, model.start_angles[:, 0])
-    scheme = choose(solver, model, SINGLE, _LANE, choice.name)
+    arrays, room = at_start(model)
+    scheme = choose(solver, model, SINGLE, LANE, choice.name)
     steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
     first = np.arange(0, n, 2)
     second = np.minimum(first + 1, n - 1)

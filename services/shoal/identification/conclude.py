@@ -13,17 +13,20 @@ from shoal.identification.bootstrap import bootstrap
 from shoal.identification.covariance import blocks_of
 from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge import Judgement, judge
+from shoal.identification.judge import Judgement, few, judge
 from shoal.identification.methods import Outcome
 from shoal.identification.profiles import Profile, profiles
 from shoal.identification.rank import combinations
-from shoal.identification.residual_tests import residual_tests
+from shoal.identification.residual_tests import ResidualTests, residual_tests
 from shoal.identification.sensitivity import sensitivity
 from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
+from shoal.identification.units import unit
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Rod, Scene, expression
 from shoal.trajectory import Array
 
+_ALIKE = 3.0
+"""A residual within this factor of the mesh error is explained by it."""
 _STABLE = 0.9
 """Of the stable step at the start: it varies by a few percent along the motion."""
 
@@ -78,7 +81,7 @@ def conclude(
     correlation = autocorrelation(seen.residual, blocks)
     draws = wishes.bootstrap if possible else 0
     rng = np.random.default_rng(seed)
-    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, mesh))
+    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, None if stages else mesh, tests))
     return Estimate(
         problem=model.problem.name,
         method=method,
@@ -116,6 +119,7 @@ def conclude(
         scenes={name: model.scene_at(point, name) for name in measurement.recordings},
         predicted=predicted,
         measurement=measurement,
+        covariance=_covariance(model, point, at),
     )
 
 
@@ -169,12 +173,17 @@ def _chosen(stages: list[Stage]) -> dict[str, Any]:
     return {"selection": [stage.to_json() for stage in stages]} if stages else {}
 
 
-def _coarse(model: ForwardModel, mesh: float | None) -> str:
-    """A word where the error of the model is larger than that of the measurement; empty if it is not."""
-    noise = model.noise
-    if mesh is None or noise is None or mesh <= noise:
+def _coarse(model: ForwardModel, mesh: float | None, tests: ResidualTests) -> str:
+    """A word where the mesh, and not the measurement, limits the answer; empty if it does not."""
+    if mesh is None:
         return ""
-    return f"the mesh error of {mesh:.1g} exceeds the noise of {noise:.1g}; --tolerance {noise / 3:.1g} chooses a mesh"
+    if model.noise is not None and mesh > model.noise:
+        excess, wanted = f"exceeds the noise of {tests.sized(model.noise)}", model.noise
+    elif model.noise is None and mesh / _ALIKE < tests.size < mesh * _ALIKE:
+        excess, wanted = "is what the fit leaves", mesh
+    else:
+        return ""
+    return f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted / 3:.1g} chooses a mesh"
 
 
 def _better(profiled: dict[str, Profile]) -> str:
@@ -189,9 +198,17 @@ def _parameters(model: ForwardModel, point: Array, at: Linearisation, correction
         span = model.upper[k] - model.lower[k]
         at_bound = bool(min(point[k] - model.lower[k], model.upper[k] - point[k]) < 1e-6 * span)
         shift = None if correction is None else float(correction[k])
-        known = _value(float(point[k]), about, about.fixed and not at_bound and about.std < span, shift, at_bound)
+        told = about.fixed and not at_bound and about.std < span and not few(model)
+        known = _value(float(point[k]), about, told, shift, at_bound)
+        known = replace(known, unit=unit(model.parameters.entries[name].parameter.path or ""))
         found[name] = known.exponential() if model.parameters.logarithmic[k] else known
     return found
+
+
+def _covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:
+    """Of the values, (parameters, parameters): d exp(p) = exp(p) dp for those that are sought by their logarithm."""
+    slope = np.where(model.parameters.logarithmic, model.parameters.to_values(point), 1.0)
+    return np.asarray(slope[:, None] * at.covariance * slope)
 
 
 def _quantities(model: ForwardModel, point: Array, at: Linearisation, correction: Array | None) -> dict[str, Value]:

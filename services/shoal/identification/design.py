@@ -365,7 +365,7 @@ def _today(
         found = (source.stop, source.count / source.stop)
     else:
         found = (source.duration or 0.0, (source.rate or 0.0) / source.every)
-    duration, rate = duration or found[0], rate or found[1]
+    duration, rate = found[0] if duration is None else duration, found[1] if rate is None else rate
     for what, size, unit in (("duration", duration, "s"), ("rate", rate, "samples per second")):
         if not (np.isfinite(size) and size > 0):
             raise InputError(f"{what}: needed, and positive [{unit}]; without a recording it cannot be guessed")

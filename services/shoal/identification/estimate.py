@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
 
 class Verdict(StrEnum):
@@ -41,6 +42,7 @@ class Value:
 
     correction: what a mesh twice as fine would add to the value, None if not computed; it is not added, but is in
     the interval
+    unit: of all of them, empty where there is none or none is known
     """
 
     value: float
@@ -50,6 +52,7 @@ class Value:
     identifiable: bool
     correction: float | None = None
     at_bound: bool = False
+    unit: str = ""
 
     def exponential(self) -> Value:
         """The value of a parameter that was sought by its logarithm."""
@@ -57,7 +60,7 @@ class Value:
         correction = None if self.correction is None else value * self.correction
         with np.errstate(over="ignore"):
             lower, upper = float(np.exp(self.lower)), float(np.exp(self.upper))
-        return Value(value, value * self.std, lower, upper, self.identifiable, correction, self.at_bound)
+        return replace(self, value=value, std=value * self.std, lower=lower, upper=upper, correction=correction)
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,7 @@ class Estimate:
     advice: what to do next; suspects: properties of the measurement that would explain the misfit
     sensitivity_doubt: relative difference of derivatives by two step sizes; profiles, bootstrap: where wished for
     scenes: the identified machine, by recording; predicted: its channels at the samples of each recording
+    covariance: of the parameters, in the products of their units, (parameters, parameters)
     """
 
     problem: str
@@ -106,6 +110,7 @@ class Estimate:
     scenes: dict[str, Scene]
     predicted: dict[str, Array]
     measurement: Measurement
+    covariance: Array | None = None
 
     @property
     def scene(self) -> Scene:
@@ -127,6 +132,15 @@ class Estimate:
 
         rows = {name: vars(value) for name, value in {**self.parameters, **self.quantities}.items()}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+
+    def to_xarray(self, recording: str | None = None) -> xr.Dataset:
+        """Parameters, their covariance, and data, model and residual of a recording (else the first), with units.
+
+        Raises InputError without xarray, and for a recording that there is not.
+        """
+        from shoal.identification.dataset import dataset
+
+        return dataset(self, recording)
 
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal identify --json` prints."""

@@ -22,6 +22,8 @@ _DECISIVE = 5.0
 """A property of the measurement that lowers even a small misfit by this factor refutes what was stated of it."""
 _NEGLIGIBLE = 1e-4
 """Of the signal: a misfit below it is not looked into."""
+_FEWEST = 3
+"""More numbers than parameters that have to be measured for what the fit leaves to tell the noise."""
 _APART = 1e-3
 """Of a parameter's range: points that differ by less are the same."""
 
@@ -49,6 +51,9 @@ def judge(
     if not outcome.ended:
         advice = ["allow more time, or start from a better place"]
         return Judgement(Verdict.FAILED, outcome.message or "the method did not come to its end", advice)
+    if few(model):
+        reason = f"{tests.rows} measured numbers for {len(parameters)} unknown: too few to tell how uncertain they are"
+        return Judgement(Verdict.FAILED, reason, ["measure more, or state the noise of the channels"])
     found: list[Suspect] = []
     if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
         found = suspects(model, outcome.point, seen.residual, seen.jacobian)
@@ -64,7 +69,7 @@ def judge(
 
 
 def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -> Judgement:
-    reason = f"the best fit is off by {tests.size:.2g}, {_against(tests)}"
+    reason = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
     advice = []
     if found:
         reason += f"; {found[0]}"
@@ -83,8 +88,13 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
 
 def _against(tests: ResidualTests) -> str:
     if tests.noise_stated:
-        return f"{tests.ratio:.0f} times the noise of {tests.noise:.2g}"
-    return f"and not by noise; the data vary by {tests.signal:.2g}"
+        return f"{tests.ratio:.0f} times the noise of {tests.sized(tests.noise)}"
+    return f"and not by noise; the data vary by {tests.sized(tests.signal)}"
+
+
+def few(model: ForwardModel) -> bool:
+    """Whether so little was measured that its noise, which is not stated, cannot be told: then no interval can."""
+    return model.noise is None and len(model.rows.time) < len(model.names) + _FEWEST
 
 
 def _identifiable(
@@ -112,7 +122,8 @@ def _identifiable(
         advice.append("shorten the motion, or tighten the solver's tolerances")
     if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
         share = 100 * tests.size / tests.signal
-        notes.append(f"a systematic residual of {tests.size:.2g} ({share:.2g} % of the signal) widens the intervals")
+        size = f"{tests.sized(tests.size)} ({share:.2g} % of the signal)"
+        notes.append(f"a systematic residual of {size} widens the intervals")
         notes += [str(found[0])] if found else []
     verdict = Verdict.COMBINATION if reasons else Verdict.IDENTIFIED
     return Judgement(verdict, "; ".join([*reasons, *notes]), advice, found)

@@ -6,10 +6,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtrc  # scipy.stats has it too, and takes a second to import
 
 from shoal.identification.covariance import Block, Noise
 from shoal.identification.forward import ForwardModel
 from shoal.identification.loss import noise_of
+from shoal.identification.units import of_channels
 from shoal.trajectory import Array, plain
 
 _LARGE = 3.0
@@ -33,6 +35,8 @@ class ResidualTests:
     mesh: the model's own error, 0 if unknown; chance_of_size: that noise of this size and correlation leaves such a
     residual (chi-square); chance_of_white: that white noise is so correlated (Ljung and Box 1978), by the worst channel
     outliers: beyond five robust standard deviations of their channel; rows: how many there are
+    unit: of the sizes; empty where channels of different units are taken together, whose sizes mean something only
+    against each other
     """
 
     size: float
@@ -44,6 +48,7 @@ class ResidualTests:
     chance_of_white: float
     outliers: int
     rows: int
+    unit: str = ""
 
     @property
     def ratio(self) -> float:
@@ -65,13 +70,19 @@ class ResidualTests:
         """Whether the model is refuted: systematic against a stated noise, or against a good part of the signal."""
         return self.systematic and (self.noise_stated or self.size > _NO_FIT * self.signal)
 
+    def sized(self, size: float) -> str:
+        """A size with its unit."""
+        return f"{size:.2g} {self.unit}".strip()
+
     def sentences(self) -> list[str]:
         """The tests in words."""
         kind = "the stated noise" if self.noise_stated else "the noise that the data show without a model"
-        share = self.size / max(self.signal, 1e-300)
-        found = [
-            f"size: {self.size:.2g}, {self.size / max(self.noise, 1e-300):.2g} times {kind}, {share:.1g} of signal"
-        ]
+        size = f"{self.sized(self.size)} (RMS), " if self.unit else ""
+        times = self.size / max(self.noise, 1e-300)
+        against = f"{_digits(times, 2)} times {kind}" if np.isfinite(times) else "against a noise that is not known"
+        found = [f"size: {size}{against}"]
+        if self.signal > 0:
+            found[0] += f", {_digits(100 * self.size / self.signal, 1)} % of the spread of the data"
         found.append("correlation: none, like white noise" if self.white else "correlation: not white noise")
         found.append(f"outliers: {self.outliers} of {self.rows} samples" if self.outliers else "outliers: none")
         return found
@@ -85,8 +96,6 @@ def residual_tests(
     model: ForwardModel, residual: Array, blocks: list[Block], noise: tuple[Noise, ...], mesh: float
 ) -> ResidualTests:
     """Test the residuals (rows,) of an answer; blocks, noise: as estimated with it; mesh: the model's own error."""
-    from scipy.stats import chi2  # slow to import
-
     measured = [(b, n) for b, n in zip(blocks, noise, strict=True) if not b.known]
     rows = np.concatenate([block.rows for block, _ in measured])
     size = float(np.sqrt(np.mean(residual[rows] ** 2)))
@@ -104,23 +113,22 @@ def residual_tests(
         signal=model.spread,
         mesh=mesh,
         # A product overflows to infinity, which has chance zero; a power would raise OverflowError.
-        chance_of_size=float(chi2.sf(freedom * beyond * beyond, freedom)),
+        chance_of_size=float(chdtrc(freedom, freedom * beyond * beyond)),
         chance_of_white=min(1.0, min(whiteness) * len(whiteness)),
         outliers=sum(outlying),
         rows=len(rows),
+        unit=of_channels(model.measurement),
     )
 
 
 def ljung_box(signal: Array, lags: int = 10) -> float:
     """Chance that white noise is as correlated as a signal (samples,) over its first lags."""
-    from scipy.stats import chi2  # slow to import
-
     count, power = len(signal), float(signal @ signal)
     lags = min(lags, count // 5)
     if lags < 1 or power == 0.0:
         return 1.0
     rho = np.array([signal[lag:] @ signal[:-lag] for lag in range(1, lags + 1)]) / power
-    return float(chi2.sf(count * (count + 2) * np.sum(rho**2 / (count - np.arange(1, lags + 1))), lags))
+    return float(chdtrc(lags, count * (count + 2) * np.sum(rho**2 / (count - np.arange(1, lags + 1)))))
 
 
 def _without_model(model: ForwardModel) -> float:
@@ -129,6 +137,11 @@ def _without_model(model: ForwardModel) -> float:
     sizes = [np.maximum(noise_of(r), _DIGITS * np.max(np.abs(np.nan_to_num(r.values)), axis=0)) for r in recordings]
     squares = [sizes[r][c] ** 2 for r, c in zip(model.rows.recording, model.rows.channel, strict=True)]
     return float(np.sqrt(np.mean(squares * model.rows.weight**2)))
+
+
+def _digits(number: float, digits: int) -> str:
+    """A number to a few digits, without a power of ten where it can be read without."""
+    return f"{float(f'{number:.{digits}g}'):g}"
 
 
 def _outlying(residual: Array) -> int:

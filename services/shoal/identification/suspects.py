@@ -16,6 +16,7 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.problem import RESERVED, Parameter
 from shoal.identification.starts import starting_points
+from shoal.identification.units import of_channels, unit
 from shoal.trajectory import Array
 
 SEVERAL = 2.0
@@ -30,13 +31,17 @@ _STEP = 1e-4
 
 @dataclass(frozen=True)
 class Suspect:
-    """A property of the measurement: its value taken as known, the fitted one, and the misfit (RMS) with either."""
+    """A property of the measurement: its value taken as known, the fitted one, and the misfit (RMS) with either.
+
+    unit: of the misfits, empty where channels of different units are taken together
+    """
 
     name: str
     stated: float
     value: float
     before: float
     after: float
+    unit: str = ""
 
     @property
     def explains(self) -> bool:
@@ -50,10 +55,11 @@ class Suspect:
 
     def __str__(self) -> str:
         """In words, as a message names it."""
-        changes = f"a value of {self.value:.4g} instead of {self.stated:g}"
+        changes = f"a value of {self.value:.4g} instead of {self.stated:g} {unit(self.name)}".rstrip()
         if self.name in ("clock", "scale", "gravity"):
             changes = f"a factor of {self.value / self.stated:.4g}"
-        return f"the {self.words}: {changes} would lower the misfit from {self.before:.2g} to {self.after:.2g}"
+        misfit = f"the misfit from {self.before:.2g} to {self.after:.2g} {self.unit}".rstrip()
+        return f"the {self.words}: {changes} would lower {misfit}"
 
 
 @dataclass(frozen=True)
@@ -164,4 +170,4 @@ def _fitted(freed: _Freed, before: float) -> Suspect:
     best = descend(free, freed.begin, lambda *_: None)
     value, stated = (float(free.parameters.to_values(end)[-1]) for end in (best.point, freed.start))
     after = float(np.sqrt(np.mean(best.residual**2))) if np.isfinite(best.fitness) else np.inf
-    return Suspect(freed.name, stated, value, before, after)
+    return Suspect(freed.name, stated, value, before, after, of_channels(freed.model.measurement))

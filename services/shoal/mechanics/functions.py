@@ -35,6 +35,10 @@ _CANCELLED, _SHORT = 1e-14, 1 / 16
 _MOST_PIECES = 2**17
 """Pieces looked at in all, of which about half are kept: a bound on time and memory."""
 
+_CROWD, _TRIED, _MOST_OF = 2**10, 64, 0.6
+"""From so many pieces on, so many of the shortest that the bound allows are tried before all the others; where they
+fail on that part of the range, halving the rest would go beyond the bound."""
+
 Extended = npt.NDArray[Any]
 
 
@@ -91,16 +95,10 @@ def fit(
         pieces += lower.size
         if pieces > _MOST_PIECES:
             raise InputError(f"function: varies too fast or jumps too often between {begin:g} and {horizon:g}")
-        middle, half = (lower + upper) / 2, (upper - lower) / 2
-        values = _sample(function, middle[:, None] + half[:, None] * _CHECKS)
-        digits = np.finfo(values.dtype).eps
-        series = values[:, 1::3] @ _TO_SERIES.T
-        error = np.abs(series @ _AT_CHECKS.T - values).max(axis=1)
-        size = np.abs(values).max(axis=1)
+        middle = (lower + upper) / 2
+        half = (upper - lower) / 2
+        series, error, size, noise, digits = _interpolated(function, lower, upper)
         scale = max(scale, size.max())
-        # A function's values cannot be better than its argument, which is rounded too.
-        steepest = np.abs(np.diff(values) / np.diff(_CHECKS)).max(axis=1) / half
-        noise = digits * np.maximum(np.abs(lower), np.abs(upper)) * steepest
         tolerance = 16.0 * digits * scale + 2.0 * noise
         # Terms that cancel leave their own round-off, which shorter pieces cannot lessen.
         cancelled = (error > tolerance) & (error <= _CANCELLED * scale) & (upper - lower <= _SHORT * (horizon - begin))
@@ -110,6 +108,13 @@ def fit(
             inside = slice(*np.searchsorted(probes, [lower[k], upper[k]]))
             found = np.polynomial.chebyshev.chebval((probes[inside] - middle[k]) / half[k], series[k])
             good[k] = np.abs(found - probed[inside]).max() <= tolerance[k]
+        if lower.size >= _CROWD and not good.all():
+            # A function that fails at most places in the shortest pieces that the bound allows will not be met.
+            few = lower[~good][:: max(1, np.count_nonzero(~good) // _TRIED)]
+            _, off, _, about, _ = _interpolated(function, few, few + 2 * (horizon - begin) / _MOST_PIECES)
+            failing = np.mean(off > np.maximum(16.0 * digits * scale + 2.0 * about, _CANCELLED * scale))
+            if failing * np.sum((upper - lower)[~good]) > _MOST_OF * (horizon - begin):
+                raise InputError(f"function: varies too fast or jumps too often between {begin:g} and {horizon:g}")
         smallest = upper - lower <= _SMALLEST * (horizon - begin)
         # What is only noise in the last coefficients would grow in the derivatives.
         tail = np.cumsum(np.abs(series[:, ::-1]), axis=1)[:, ::-1]
@@ -127,6 +132,24 @@ def fit(
     starts = np.concatenate([part for part, _ in done])
     order = np.argsort(starts)
     return Piecewise(np.append(starts[order], horizon), np.concatenate([part for _, part in done])[order])
+
+
+def _interpolated(
+    function: Callable[[Any], Any], lower: Array, upper: Array
+) -> tuple[Extended, Extended, Extended, Extended, Any]:
+    """Of each piece: Chebyshev series (pieces, ORDER - 1), its error, the largest value and its noise (pieces,).
+
+    The last is the relative precision of the values.
+    """
+    half = (upper - lower) / 2
+    values = _sample(function, ((lower + upper) / 2)[:, None] + half[:, None] * _CHECKS)
+    digits = np.finfo(values.dtype).eps
+    series = values[:, 1::3] @ _TO_SERIES.T
+    error = np.abs(series @ _AT_CHECKS.T - values).max(axis=1)
+    # A function's values cannot be better than its argument, which is rounded too.
+    steepest = np.abs(np.diff(values) / np.diff(_CHECKS)).max(axis=1) / half
+    noise = digits * np.maximum(np.abs(lower), np.abs(upper)) * steepest
+    return series, error, np.abs(values).max(axis=1), noise, digits
 
 
 def _sample(function: Callable[[Any], Any], points: Extended) -> Extended:

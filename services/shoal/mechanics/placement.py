@@ -98,11 +98,15 @@ def place(scene: Scene) -> Placement:
     points, turning = joint_points(scene), orientations(scene)
     for name, path in scene.ground_points.items():
         _place_driver(name, path.x, path.y, points, result)
+    touching: dict[str, list[JointPoint]] = {name: [] for name in scene.bodies}
+    for point in points:
+        for owner in {owner for owner, _ in point.places} & touching.keys():
+            touching[owner].append(point)
     waiting = list(scene.bodies)
     while waiting:
-        name = _next(scene, waiting, points, result)
+        name = _next(scene, waiting, touching, result)
         waiting.remove(name)
-        mine = [point for point in points if point.touches(name)]
+        mine = touching[name]
         pose = _pose(scene, name, mine, turning, result)
         result.poses[name] = pose
         body = scene.bodies[name]
@@ -140,12 +144,12 @@ def _value_and_rate(f: Function) -> tuple[float, float]:
     return before, (4 * now - 3 * before - after) / (2 * h)
 
 
-def _next(scene: Scene, waiting: list[str], points: list[JointPoint], result: Placement) -> str:
+def _next(scene: Scene, waiting: list[str], touching: dict[str, list[JointPoint]], result: Placement) -> str:
     """The next body whose start is known: by a joint point, by its own field, by a slider's line."""
     known: list[Callable[[str], bool]] = [
-        lambda name: any(point.touches(name) and point.where is not None for point in points),
+        lambda name: any(point.where is not None for point in touching[name]),
         lambda name: scene.start(name).position is not None,
-        lambda name: any(point.touches(name) and point.line for point in points),
+        lambda name: any(point.line for point in touching[name]),
         lambda name: _rail(scene, name, result) is not None,
     ]
     for is_known in known:

@@ -26,7 +26,7 @@ def rows(found: Selection) -> list[list[str]]:
     table = []
     for rung in found.rungs:
         verdict = "chosen" if rung is found.chosen else "" if rung.ok else str(rung.trajectory.status[0])
-        name = rung.name if rung.flexible else f"{rung.name}, tolerance {rung.tolerance:g}"
+        name = f"{rung.name}, tolerance {rung.tolerance:g}" if np.isfinite(rung.tolerance) else rung.name
         error = f"{rung.error:.1e}" if np.isfinite(rung.error) else "–"
         cost = f"{rung.trajectory.wall_s * 1e3:.1f}"
         table.append([name, str(rung.trajectory.model["unknowns"]), str(rung.trajectory.steps), cost, error, verdict])

@@ -42,6 +42,6 @@ def convergence(estimates: Mapping[str, Estimate], title: str) -> Figure:
     log_ticks(axes)
     headline(figure, title)
     axes.set_xlabel("model evaluations, every one counted")
-    axes.set_ylabel(f"best fitness so far (mean square) [{fitness_unit(next(iter(estimates.values())))}]")
+    axes.set_ylabel(f"best fitness so far [{fitness_unit(next(iter(estimates.values())))}]")
     figure.legend(title="method (evaluations)", loc="outside lower left", ncols=3)
     return figure

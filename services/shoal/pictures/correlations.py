@@ -8,6 +8,9 @@ from matplotlib.figure import Figure
 from shoal.pictures.answer import Answer
 from shoal.pictures.style import canvas, headline, styled
 
+_FEW = 6
+"""So many parameters leave room for large numbers."""
+
 
 @styled
 def correlations(answer: Answer) -> Figure:
@@ -22,10 +25,9 @@ def correlations(answer: Answer) -> Figure:
     axes.set_yticks(range(len(names)), names)
     for row, column in np.ndindex(found.shape):
         value = found[row, column]
-        text = f"{value:+.2f}" if np.isfinite(value) and row != column else ""
-        axes.text(
-            column, row, text, ha="center", va="center", fontsize=8, color="white" if abs(value) > 0.6 else "black"
-        )
+        text = _signed(float(value), 2) if np.isfinite(value) and row != column else ""
+        colour = "white" if abs(value) > 0.6 else "black"
+        axes.text(column, row, text, ha="center", va="center", fontsize=12 if len(names) <= _FEW else 8, color=colour)
     figure.colorbar(image, ax=axes, label="correlation", shrink=0.6)
     headline(figure, _says(answer))
     return figure
@@ -46,4 +48,9 @@ def _says(answer: Answer) -> str:
     names = answer.names
     if abs(value) < 0.5:
         return f"{answer.problem.name}: each parameter shows by itself (|r| < 0.5)"
-    return f"{answer.problem.name}: {names[one]}, {names[other]} are tied (r = {value:+.3f})"
+    return f"{answer.problem.name}: {names[one]}, {names[other]} are tied (r = {_signed(float(value), 3)})"
+
+
+def _signed(value: float, digits: int) -> str:
+    """With its sign, a minus and not a hyphen."""
+    return f"{value:+.{digits}f}".replace("-", "−")

@@ -62,7 +62,7 @@ def _durations(panel: Axes, found: Design) -> None:
     log_ticks(panel)
     panel.set_xlabel("duration of the measurement [s]")
     panel.set_ylabel(_score(found))
-    panel.legend(ncols=2, fontsize=9)
+    panel.legend(ncols=2, fontsize=10.5)
 
 
 def _score(found: Design) -> str:

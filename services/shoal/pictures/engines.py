@@ -12,6 +12,7 @@ from shoal.pictures.style import BLACK, ENGINES, GREY, OTHER, VERMILION, canvas,
 
 _WIDTHS = (5.0, 3.0, 1.8)
 _PAIRS = (BLACK, VERMILION, GREY)
+_LINES = ("-", "--", ":", "-.")
 
 
 @styled
@@ -28,7 +29,7 @@ def engines(comparison: Comparison, marker: str, title: str) -> Figure:
         above.annotate(axis, (times[-1], value), (6, 0), textcoords="offset points", va="center")
     for k, ((one, a), (other, b)) in enumerate(combinations(comparison.trajectories.items(), 2)):
         distance = np.linalg.norm(a.marker(marker) - b.marker(marker), axis=1)
-        style = {"color": _PAIRS[k % 3], "linestyle": "-" if k < 3 else "--"}
+        style = {"color": _PAIRS[k % 3], "linestyle": _LINES[k % 4]}
         below.plot(a.times, 1e6 * distance, label=f"{one}, {other}", **style)
     below.set_yscale("log")
     log_ticks(below)

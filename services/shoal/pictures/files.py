@@ -28,12 +28,13 @@ def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selectio
     from shoal.pictures.gif import gif
     from shoal.pictures.poses import poses
     from shoal.pictures.simulation import moved, simulation
+    from shoal.pictures.titles import ends
 
     if path.suffix == ".html":
         path.write_text(simulation(motion, scene, selection), encoding="utf-8")
         return
     moving, trust = moved(motion, scene), "" if motion.ok else f" ({motion.status[0]}: not to be trusted)"
-    title = f"{scene.name} until {moving.times[-1]:.3g} s{trust}"
+    title = f"{ends(scene.name, moving)}{trust}"
     if path.suffix == ".gif":
         path.write_bytes(gif(moving, title))
     else:
@@ -59,9 +60,11 @@ def moving_picture(answer: Answer) -> bytes:
     """The identified motion of the first recording as GIF."""
     from shoal.pictures.gif import gif
     from shoal.pictures.motion import motion
+    from shoal.pictures.overlay import follows
 
     found = answer.estimate
-    return gif(motion(answer, next(iter(found.measurement.recordings))), f"{found.problem}: {found.verdict}")
+    title = f"{found.problem}, {found.verdict}: {follows(found)}"
+    return gif(motion(answer, next(iter(found.measurement.recordings))), title)
 
 
 def design(found: Design, path: Path) -> None:
@@ -81,9 +84,10 @@ def sweep(result: Sweep, path: Path) -> None:
 def comparison(result: Comparison, path: Path) -> None:
     """The engines over each other at the last marker."""
     from shoal.pictures.engines import engines
+    from shoal.pictures.titles import agrees
 
     last = list(result.scene.markers)[-1]
-    _write(engines(result, last, f"{result.scene.name}: {last} by each engine"), path)
+    _write(engines(result, last, agrees(result, last)), path)
 
 
 def _write(figure: Figure, path: Path) -> None:

@@ -17,6 +17,7 @@ from shoal.pictures.overlay import follows, overlay
 from shoal.pictures.poses import poses
 from shoal.pictures.profiles import profiles
 from shoal.pictures.residuals import residuals, white
+from shoal.pictures.signals import gaps, signals
 from shoal.pictures.waterfall import waterfall
 from shoal.selection import select
 
@@ -82,16 +83,16 @@ def _around(answer: Answer) -> list[Drawn]:
 def _overlay(answer: Answer) -> Drawn:
     figure = overlay(answer.estimate)
     alt = f"Measured values as circles with the fitted model as a line. Overall, {follows(answer.estimate)}."
-    return Drawn("overlay", figure, alt, "The fitted model (red) over the data. Where nothing was measured it is grey.")
+    grey = " Where nothing was measured it is grey." if any(gaps(one) for one in signals(answer.estimate)) else ""
+    return Drawn("overlay", figure, alt, f"The fitted model (red) over the data.{grey}")
 
 
 def _poses(answer: Answer, found: Motion) -> Drawn:
     what = "identified" if answer.estimate.verdict.trusted else "fitted"
-    title = f"{answer.problem.name}: the {what} machine until {found.times[-1]:.3g} s"
+    title = titles.ends(f"{answer.problem.name}, {what}", found)
     alt = f"The bodies {', '.join(found.outlines)} at several instants, later ones darker, over the measured places."
-    return Drawn(
-        "poses", poses(found, title), alt, "The later, the darker; black circles and orange lines are measured."
-    )
+    lines = ", orange lines measured directions" if found.directions else ""
+    return Drawn("poses", poses(found, title), alt, f"The later, the darker; black circles are measured places{lines}.")
 
 
 def _convergence(answer: Answer) -> Drawn:

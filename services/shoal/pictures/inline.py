@@ -25,7 +25,7 @@ from shoal.pictures.poses import poses
 from shoal.pictures.report import shown, verdict
 from shoal.pictures.style import png
 from shoal.pictures.sweep import sweep
-from shoal.pictures.titles import agrees
+from shoal.pictures.titles import agrees, ends
 from shoal.scene import Rod, Scene
 from shoal.trajectory import Trajectory
 
@@ -53,7 +53,8 @@ def plot(result: Any) -> Picture:
 @plot.register
 def _(scene: Scene) -> Picture:
     until = scene.solver.duration
-    return Picture(poses(scene_motion(scene, get_engine("gauss"), until), f"{scene.name} until {until:.3g} s"))
+    moving = scene_motion(scene, get_engine("gauss"), until)
+    return Picture(poses(moving, ends(scene.name, moving)))
 
 
 @plot.register

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from shoal.pictures import units
 from shoal.pictures.answer import Answer
+from shoal.pictures.numbers import rounded
 from shoal.pictures.style import SKY, VERMILION, canvas, headline, styled
 from shoal.trajectory import Array
 
@@ -66,7 +68,8 @@ def landscape(answer: Answer, found: Landscape) -> Figure:
         level = np.log10(np.where(np.isfinite(found.fitness), np.maximum(found.fitness, 1e-300), np.nan))
     image = axes.contourf(first, second, level.T, levels=24, cmap="cividis")
     axes.grid(False)
-    figure.colorbar(image, ax=axes, label="log10 of the fitness (mean square)", format="%.2f")
+    label = f"log10 of the fitness [{units.fitness_unit(answer.estimate)}]"
+    figure.colorbar(image, ax=axes, label=label, ticks=MaxNLocator(7))
     _mark(axes, answer, found)
     for k, setter in zip(found.pair, (axes.set_xlabel, axes.set_ylabel), strict=True):
         setter(units.parameter(answer.problem, answer.names[k]))
@@ -125,14 +128,23 @@ def _ellipse(answer: Answer, pair: tuple[int, int]) -> Array:
 
 
 def _says(answer: Answer, found: Landscape) -> str:
-    where = f"{answer.problem.name}: {'around the answer' if found.zoomed else 'the whole box'}"
-    if len(answer.names) > 2:
-        others = len(answer.names) - 2
-        return f"{where}, the other {f'{others} parameters' if others > 1 else 'parameter'} fixed"
+    others = len(answer.names) - 2
+    fixed = f", the other {f'{others} parameters' if others > 1 else 'parameter'} fixed" if others else ""
     if found.zoomed:
-        return f"{where}, ± {_SIGMAS:g} standard deviations"
+        return f"{answer.problem.name}: {' and '.join(_known(answer, k) for k in found.pair)}{fixed}"
     count = _local_minima(found.fitness)
-    return f"{where}; {count} hollow{'' if count == 1 else 's'} on this grid"
+    return f"{answer.problem.name}: the whole box has {count} hollow{'' if count == 1 else 's'} on this grid{fixed}"
+
+
+def _known(answer: Answer, k: int) -> str:
+    """A parameter with half of its interval."""
+    name = answer.names[k]
+    value = answer.estimate.parameters[name]
+    if not value.identifiable:
+        return f"{name} is not known"
+    half = (value.upper - value.lower) / 2
+    verb = "is" if answer.estimate.verdict.trusted else "fits at"
+    return f"{name} {verb} {rounded(value.value, half)} ± {rounded(half, half)} {value.unit}".strip()
 
 
 def _local_minima(fitness: Array) -> int:

@@ -15,7 +15,7 @@ from shoal.pictures.style import BLUE, ORANGE, VERMILION, canvas, headline, log_
 def mesh_error(estimates: Mapping[str, Estimate], title: str) -> Figure:
     """Size of the true error of every parameter, of the error predicted from the mesh, and of the interval."""
     names = list(next(iter(estimates.values())).truth)
-    figure, axes = canvas(1.6 + 2.0 * len(names), nrows=len(names), sharex=True, sharey=True, squeeze=False)
+    figure, axes = canvas(2.0 + 2.0 * len(names), nrows=len(names), sharex=True, sharey=True, squeeze=False)
     places = np.arange(len(estimates))
     for panel, name in zip(axes[:, 0], names, strict=True):
         values = [e.parameters[name] for e in estimates.values()]
@@ -41,5 +41,5 @@ def mesh_error(estimates: Mapping[str, Estimate], title: str) -> Figure:
     axes[-1, 0].set_xlabel("elements on OA / AB, quadrature")
     axes[-1, 0].set_xlim(-0.5, len(estimates) - 0.5)
     headline(figure, title)
-    axes[0, 0].legend(loc="lower left")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
     return figure

@@ -19,10 +19,12 @@ def length(metres: float | None) -> str:
     """A length in the unit that needs no zeros."""
     if metres is None or not np.isfinite(metres):
         return "unknown"
+    if metres == 0:
+        return "0 m"
     for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
         if abs(metres) >= size:
             return f"{metres / size:.3g} {unit}"
-    return f"{metres / 1e-9:.3g} nm" if abs(metres) >= 1e-9 or metres == 0 else f"{metres:.1e} m"
+    return f"{metres / 1e-9:.3g} nm" if abs(metres) >= 1e-9 else f"{metres:.1e} m"
 
 
 def power(value: float | None, digits: int = 4) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ _SPEEDS = {
 }
 _SHOWN = 5.0
 """Seconds that a motion should take on the screen."""
+_FEW = 4
+"""So many names are listed."""
 
 
 def environment(*more: BaseLoader) -> Environment:
@@ -58,6 +61,22 @@ def animation(found: Motion, what: str) -> dict[str, Any]:
         "caption": f"{shown[0]}{over}; grey squares stand on the ground. The arrow keys move the slider.",
         "data": Markup(data),
     }
+
+
+def settings(model: Mapping[str, Any]) -> str:
+    """What a model was made with, in words; bodies that are made alike stand together."""
+    parts = [f"{name} = {_number(value)}" for name, value in model.items() if not isinstance(value, dict | None)]
+    alike: dict[str, list[str]] = {}
+    for name, body in model.get("bodies", {}).items():
+        made = ", ".join(_number(value) if key == "element" else f"{value} {key}" for key, value in body.items())
+        alike.setdefault(made, []).append(name)
+    for made, names in alike.items():
+        parts.append(f"{', '.join(names) if len(names) <= _FEW else f'{len(names)} bodies'}: {made}")
+    return "; ".join(parts)
+
+
+def _number(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def software() -> str:

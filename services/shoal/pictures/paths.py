@@ -2,26 +2,42 @@
 
 from __future__ import annotations
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from shoal.pictures.motion import Motion
 from shoal.pictures.style import LINES, canvas, headline, styled
+from shoal.pictures.titles import reaches
+from shoal.trajectory import Array
 
 _MOST = 6
 
 
 @styled
 def paths(found: Motion, name: str) -> Figure:
-    """x above, y below, a line for each of at most six markers."""
+    """x above, y below, a line for each of at most six paths."""
     figure, panels = canvas(5.0, nrows=2, sharex=True)
-    shown = list(found.markers.items())[:_MOST]
+    lines = _lines(found)
+    shown = lines[:_MOST]
     for panel, axis, k in zip(panels, "xy", (0, 1), strict=True):
-        for (marker, path), look in zip(shown, LINES, strict=False):
-            panel.plot(found.times, path[:, k], label=marker, **look)
+        for (names, path), look in zip(shown, LINES, strict=False):
+            panel.plot(found.times, path[:, k], label=names, **look)
         panel.set_ylabel(f"{axis} [m]")
     panels[-1].set_xlabel("time [s]")
-    more = f" ({len(found.markers)} markers, {_MOST} are shown)" if len(found.markers) > _MOST else ""
-    headline(figure, f"{name}: where the markers go until {found.times[-1]:.3g} s{more}")
+    more = f" ({_MOST} of {len(lines)} paths are shown)" if len(lines) > _MOST else ""
+    headline(figure, f"{reaches(name, found)}{more}")
     figure.align_ylabels()
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=len(shown))
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=min(4, len(shown)))
     return figure
+
+
+def _lines(found: Motion) -> list[tuple[str, Array]]:
+    """The paths of the markers by name; markers that are in one place all the time share a path."""
+    groups: list[tuple[list[str], Array]] = []
+    for marker, path in found.markers.items():
+        alike = next((names for names, other in groups if np.allclose(path, other, rtol=0.0, atol=1e-9)), None)
+        if alike is None:
+            groups.append(([marker], path))
+        else:
+            alike.append(marker)
+    return [(", ".join(names), path) for names, path in groups]

@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from shoal.pictures.motion import Motion
 from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
 
 _POSES = 7
+_FEW = 10
+"""So many places on the ground have large marks."""
+_HALO = [withStroke(linewidth=3, foreground="white")]
 
 
 @styled
@@ -21,7 +25,8 @@ def poses(found: Motion, title: str) -> Figure:
         strength = min(1.0, 0.2 + 0.8 * number / (_POSES - 1))
         for outline in found.outlines.values():
             axes.plot(*outline[k].T, "o-", markersize=2.5, markevery=[0, -1], color=BLUE, alpha=strength, linewidth=2.2)
-    axes.plot(*found.ground.T, "s", color=GREY, markersize=7, label="ground" if len(found.ground) else "", zorder=3)
+    size = 7 if len(found.ground) <= _FEW else 3
+    axes.plot(*found.ground.T, "s", color=GREY, markersize=size, label="ground" if len(found.ground) else "", zorder=3)
     for number, place in enumerate(found.measured.values()):
         axes.plot(*place.T, "o", color=BLACK, markersize=4, fillstyle="none", label="" if number else "measured")
     for number, path in enumerate(found.markers.values()):
@@ -44,7 +49,9 @@ def _names(axes: Axes, found: Motion) -> None:
         places.setdefault(tuple(np.round(50 * (path[-1] - low) / np.max(high - low)).astype(int)), []).append(name)
     for names in places.values():
         place = found.markers[names[0]][-1]
-        axes.annotate(", ".join(names), place, (6, 4), textcoords="offset points", fontweight="bold")
+        axes.annotate(
+            ", ".join(names), place, (6, 4), textcoords="offset points", fontweight="bold", path_effects=_HALO
+        )
 
 
 def _directions(axes: Axes, found: Motion, chosen: np.ndarray[tuple[int], np.dtype[np.int_]]) -> None:

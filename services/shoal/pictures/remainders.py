@@ -25,8 +25,9 @@ def remainders(estimates: Mapping[str, Estimate], title: str) -> Figure:
     figure, axes = canvas(2.2 + 2.0 * len(recordings), nrows=len(recordings), squeeze=False)
     for panel, (name, recording) in zip(axes[:, 0], recordings.items(), strict=True):
         lengths = all(channel.is_position for channel in recording.channels)
-        for key, estimate in estimates.items():
-            style = {**METHODS.get(estimate.method, OTHER), "markersize": 5, "markevery": 0.12}
+        for k, (key, estimate) in enumerate(estimates.items()):
+            # Marks of lines that coincide stand beside each other.
+            style = {**METHODS.get(estimate.method, OTHER), "markersize": 6, "markevery": (0.03 * k, 0.15)}
             off = residuals(estimate)[name]
             size = np.where(np.any(np.isfinite(off), axis=1), np.sqrt(np.nansum(off**2, axis=1)), np.nan)
             panel.plot(recording.times, 1e3 * size, label=key if several else estimate.method, **style)

@@ -11,9 +11,9 @@ from shoal.pictures.answer import Answer
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.gallery import gallery, motions
 from shoal.pictures.motion import Motion
-from shoal.pictures.numbers import length, rounded
+from shoal.pictures.numbers import length, power, rounded
 from shoal.pictures.overlay import follows
-from shoal.pictures.pages import animation, render, software
+from shoal.pictures.pages import animation, render, settings, software
 
 _ENDS = 5
 """Ends of other searches that are listed."""
@@ -74,8 +74,8 @@ def provenance(estimate: Estimate) -> list[tuple[str, str]]:
         ("data", estimate.data),
         ("method", f"{estimate.method}{f' ({estimate.choice})' if estimate.choice else ''}, seed {estimate.seed}"),
         ("engine", estimate.engine),
-        ("model", ", ".join(f"{name} = {value}" for name, value in model.items())),
-        ("fitness", f"{estimate.fitness:.6g}"),
+        ("model", settings(model)),
+        ("fitness", f"{power(estimate.fitness)} {units.fitness_unit(estimate)} (mean square)"),
         ("effort", f"{estimate.evaluations} simulations in {estimate.wall_s:.2f} s"),
         ("scene", ", ".join(scene.fingerprint for scene in estimate.scenes.values())),
         ("versions", software()),
@@ -109,8 +109,9 @@ def _remarks(estimate: Estimate) -> list[str]:
             draws = len(estimate.bootstrap.draws)
             remarks.append(f"Bootstrap of {name}, {draws} draws: 95 % between {low:.6g} and {high:.6g}.")
     for other in sorted(estimate.minima, key=lambda minimum: minimum["fitness"])[:_ENDS]:
-        values = ", ".join(f"{name} {value:.4g}" for name, value in other.items())
-        remarks.append(f"Another search ended at {values}.")
+        values = ", ".join(f"{name} {value:.4g}" for name, value in other.items() if name != "fitness")
+        fit = f"{power(other['fitness'], 2)} {units.fitness_unit(estimate)}"
+        remarks.append(f"Another search ended at {values}; fitness {fit}.")
     return remarks
 
 

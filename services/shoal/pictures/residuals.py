@@ -23,7 +23,7 @@ def residuals(estimate: Estimate) -> Figure:
     band that holds 95 % of the autocorrelations of white noise (Bartlett 1946). At most four channels, the worst.
     """
     shown = worst(signals(estimate), _PANELS)
-    figure, axes = canvas(1.2 + 1.8 * len(shown), ncols=2, nrows=len(shown), squeeze=False, width_ratios=[1.7, 1])
+    figure, axes = canvas(1.9 + 1.8 * len(shown), ncols=2, nrows=len(shown), squeeze=False, width_ratios=[1.7, 1])
     for (left, right), signal in zip(axes, shown, strict=True):
         _against_time(left, signal)
         _against_lag(right, signal)
@@ -31,8 +31,8 @@ def residuals(estimate: Estimate) -> Figure:
     axes[-1, 1].set_xlabel("lag [samples]")
     headline(figure, f"{estimate.problem}: {white(estimate)}")
     figure.align_ylabels()
-    axes[0, 0].legend(loc="upper left", fontsize=8, ncols=2)
-    axes[0, 1].legend(loc="lower right", fontsize=8)
+    bands = [band for panel in axes[0] for band in panel.get_legend_handles_labels()[0]]
+    figure.legend(handles=bands, loc="outside lower left", ncols=1)
     return figure
 
 
@@ -56,8 +56,8 @@ def white(estimate: Estimate) -> str:
     outside, lags = sum(o for o, _ in told), sum(n for _, n in told)
     share = outside / max(lags, 1)
     if share <= 0.1:
-        return f"residuals look like noise ({100 * share:.0f} % of lags outside)"
-    return f"residuals are no noise ({100 * share:.0f} % of lags outside)"
+        return f"residuals look like noise ({100 * share:.0f} % of lags outside the band)"
+    return f"residuals are no noise ({100 * share:.0f} % of lags outside the band)"
 
 
 def _outside(signal: Signal) -> tuple[int, int]:
@@ -75,7 +75,7 @@ def _against_time(panel: Axes, signal: Signal) -> None:
     if np.isfinite(signal.noise):
         half = factor * NORMAL_95 * signal.noise
         source = "stated" if signal.stated else "by differences"
-        panel.axhspan(-half, half, color=ORANGE, alpha=0.3, linewidth=0, label=f"95 % of noise, {source}")
+        panel.axhspan(-half, half, color=ORANGE, alpha=0.3, linewidth=0, label=f"left: 95 % of the noise, {source}")
     panel.plot(signal.times, factor * signal.residual, ".", color=BLACK, markersize=3)
     panel.axhline(0.0, color=BLACK, linewidth=0.8)
     panel.margins(y=0.25)
@@ -85,7 +85,9 @@ def _against_time(panel: Axes, signal: Signal) -> None:
 def _against_lag(panel: Axes, signal: Signal) -> None:
     found = autocorrelation(signal.residual)
     lags = np.arange(1, len(found))
-    panel.axhspan(-_band(signal), _band(signal), color=ORANGE, alpha=0.3, linewidth=0, label="95 % of white noise")
+    panel.axhspan(
+        -_band(signal), _band(signal), color=ORANGE, alpha=0.3, linewidth=0, label="right: 95 % of white noise"
+    )
     panel.vlines(lags, 0.0, found[1:], color=BLUE, linewidth=1.5)
     panel.plot(lags, found[1:], "o", color=BLUE, markersize=3)
     panel.axhline(0.0, color=BLACK, linewidth=0.8)

@@ -10,9 +10,8 @@ import numpy as np
 from shoal.identification import Estimate
 from shoal.identification.loss import noise_of
 from shoal.identification.recording import Channel
+from shoal.identification.units import QUANTITIES
 from shoal.trajectory import Array
-
-UNITS = {"x": "m", "y": "m", "angle": "rad", "rate": "rad/s"}
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class Signal:
     @property
     def unit(self) -> str:
         """Of the values."""
-        return UNITS[self.channel.quantity]
+        return QUANTITIES[self.channel.quantity]
 
     @property
     def misfit(self) -> float:

@@ -12,9 +12,10 @@ from shoal.pictures.drawn import Drawn
 from shoal.pictures.ladder import ladder
 from shoal.pictures.motion import Motion, scene_motion
 from shoal.pictures.numbers import length
-from shoal.pictures.pages import animation, render, software
+from shoal.pictures.pages import animation, render, settings, software
 from shoal.pictures.paths import paths
 from shoal.pictures.poses import poses
+from shoal.pictures.titles import ends
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
 
@@ -73,9 +74,11 @@ def _end(trajectory: Trajectory, name: str) -> tuple[str, str, str]:
 def _poses(scene: Scene, moving: Motion) -> Drawn:
     until = f"until {moving.times[-1]:.3g} s"
     alt = f"The bodies {', '.join(moving.outlines)} at several instants {until}, later ones darker."
-    title = f"{scene.name}: the machine {until}"
     return Drawn(
-        "poses", poses(moving, title), alt, "The later, the darker; the thin lines are the paths of the markers."
+        "poses",
+        poses(moving, ends(scene.name, moving)),
+        alt,
+        "The later, the darker; the thin lines are the paths of the markers.",
     )
 
 
@@ -94,11 +97,11 @@ def _provenance(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
     model = {name: value for name, value in trajectory.model.items() if name not in ("verification", "selection")}
     return [
         ("engine", trajectory.engine),
-        ("model", ", ".join(f"{name} = {value}" for name, value in model.items())),
+        ("model", settings(model)),
         ("steps", str(trajectory.steps)),
         ("energy", f"off by {trajectory.energy_drift[0]:.1e} of the largest kinetic and elastic energy"),
         ("constraints", f"off by {trajectory.constraint_drift[0]:.1e}"),
-        ("time", f"{trajectory.wall_s * 1e3:.3g} ms"),
+        ("time", f"{trajectory.wall_s:.3g} s"),
         ("scene", scene.fingerprint),
         ("versions", software()),
     ]

@@ -9,7 +9,7 @@ import numpy as np
 from shoal.engines.compare import Comparison, compare
 from shoal.errors import InputError
 from shoal.identification import Estimate
-from shoal.pictures import titles
+from shoal.pictures import titles, units
 from shoal.pictures.answer import Answer
 from shoal.pictures.convergence import convergence
 from shoal.pictures.drawn import Drawn
@@ -40,7 +40,7 @@ def study(answers: Mapping[str, Answer], title: str = "") -> str:
         trusted=chosen.estimate.verdict.trusted,
         lead=f"Best: {best}. {verdict(chosen.estimate)}",
         summary=_summary(estimates, best),
-        study_headings=["run", *chosen.estimate.parameters, "fitness", "RMS", "evaluations", "time [s]", "verdict"],
+        study_headings=_headings(chosen),
         study_rows=[_row(name, estimate) for name, estimate in estimates.items()],
         study_pictures=[one.embedded() for one in _pictures(estimates, chosen)],
         provenance=provenance(chosen.estimate),
@@ -53,6 +53,12 @@ def best_of(estimates: Mapping[str, Estimate]) -> str:
     trusted = {name: estimate for name, estimate in estimates.items() if estimate.verdict.trusted} or estimates
     found = titles.best(trusted)
     return next(name for name, estimate in trusted.items() if estimate is found)
+
+
+def _headings(chosen: Answer) -> list[str]:
+    parameters = (units.parameter(chosen.problem, name) for name in chosen.estimate.parameters)
+    fit = (f"fitness [{units.fitness_unit(chosen.estimate)}]", f"RMS [{units.rms_unit(chosen.estimate)}]")
+    return ["run", *parameters, *fit, "evaluations", "time [s]", "verdict"]
 
 
 def _row(name: str, estimate: Estimate) -> list[str]:

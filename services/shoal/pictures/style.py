@@ -9,9 +9,11 @@ from io import BytesIO
 from textwrap import fill
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -22,8 +24,12 @@ BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#767676"
 
 _PATH, _BEYOND = re.compile(rb' d="[^"]*"'), re.compile(rb"(\.\d\d)\d+")
 """Data of a path in SVG, and its digits beyond a hundredth."""
-_WIDTH = 64
+_WIDTH = 56
 """Characters in a line of a title."""
+_UNIT, _HARD = re.compile(r"(?<=\d) (?=[^\W\d]+\b|%)"), "\u00a0"
+"""The space between a number and its unit, and one at which no line ends."""
+_SHORT = 100.0
+"""A logarithmic axis whose ends are within this factor has too few powers of ten to label."""
 
 METHODS: dict[str, dict[str, Any]] = {
     "auto": {"color": PURPLE, "marker": "X", "linestyle": (0, (5, 1))},
@@ -53,8 +59,8 @@ LINES: tuple[dict[str, Any], ...] = (
 
 _RC: Any = {
     "font.family": "DejaVu Sans",
-    "font.size": 11,
-    "axes.titlesize": 11,
+    "font.size": 12.5,
+    "axes.titlesize": 12.5,
     "axes.titlelocation": "left",
     "axes.titleweight": "bold",
     "axes.spines.top": False,
@@ -63,7 +69,7 @@ _RC: Any = {
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.6,
     "legend.frameon": False,
-    "legend.fontsize": 10,
+    "legend.fontsize": 11.5,
     "lines.linewidth": 1.8,
     "figure.constrained_layout.use": True,
     "svg.hashsalt": "shoal",
@@ -89,12 +95,18 @@ def canvas(height: float = 4.2, **layout: Any) -> tuple[Figure, Any]:
 
 def headline(figure: Figure, text: str) -> None:
     """What a picture says, above all its axes; folded so that nothing is cut off."""
-    figure.suptitle(fill(text, _WIDTH), x=0.01, ha="left", fontsize=11, fontweight="bold")
+    figure.suptitle(fill(_UNIT.sub(_HARD, text), _WIDTH), x=0.01, ha="left", fontsize=12.5, fontweight="bold")
 
 
 def log_ticks(axes: Axes) -> None:
-    """Without the fine grid of a logarithmic axis."""
+    """Labels that do not run into each other: powers of ten, and 2 and 5 between them on a short axis; no fine grid."""
     axes.grid(False, which="minor")
+    for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        if axis.get_scale() == "log":
+            axis.set_minor_formatter(NullFormatter())
+            if high < _SHORT * low:
+                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf)))
 
 
 def png(figure: Figure) -> bytes:

@@ -7,9 +7,10 @@ from matplotlib.figure import Figure
 
 from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
-from shoal.pictures.style import BLUE, ORANGE, canvas, styled
+from shoal.pictures.numbers import length
+from shoal.pictures.style import BLUE, ORANGE, canvas, headline, styled
 from shoal.pictures.units import labelled
-from shoal.trajectory import Status
+from shoal.trajectory import Array, Status
 
 
 @styled
@@ -22,9 +23,19 @@ def sweep(result: Sweep, marker: str) -> Figure:
     raise InputError(f"vary: a sweep over {len(result.grid)} values has no picture; draw one over one or two")
 
 
-def _moved(result: Sweep, marker: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def _moved(result: Sweep, marker: str) -> Array:
     good = np.array([status is Status.OK for status in result.status])
     return np.where(good[:, None], result.displacements[marker], np.nan)
+
+
+def _says(result: Sweep, marker: str, moved: Array) -> str:
+    """From where a marker has moved farthest."""
+    size, after = np.linalg.norm(moved, axis=1), f"after {result.time:g} s"
+    if not np.any(np.isfinite(size)):
+        return f"{result.scene.name}: no point of the sweep can be trusted {after}"
+    most = int(np.nanargmax(size))
+    place = ", ".join(f"{path} = {values[most]:.3g}" for path, values in result.grid.items())
+    return f"{result.scene.name}: {after} {marker} has moved farthest, {length(float(size[most]))}, from {place}"
 
 
 def _lines(result: Sweep, marker: str) -> Figure:
@@ -32,7 +43,7 @@ def _lines(result: Sweep, marker: str) -> Figure:
     figure, axes = canvas()
     axes.plot(values, moved[:, 0], color=BLUE, label="horizontal")
     axes.plot(values, moved[:, 1], color=ORANGE, linestyle="--", label="vertical")
-    axes.set_title(f"{result.scene.name}: where {marker} has moved after {result.time:g} s")
+    headline(figure, _says(result, marker, moved))
     axes.set_xlabel(labelled(path))
     axes.set_ylabel(f"displacement of {marker} [m]")
     axes.legend()
@@ -49,6 +60,6 @@ def _maps(result: Sweep, marker: str) -> Figure:
         figure.colorbar(image, ax=panel, label=f"{direction} [m]")
         panel.set_ylabel(labelled(other))
         panel.grid(False)
-    axes[0].set_title(f"{result.scene.name}: displacement of {marker} after {result.time:g} s")
+    headline(figure, _says(result, marker, moved))
     axes[-1].set_xlabel(labelled(one))
     return figure

@@ -8,6 +8,8 @@ import numpy as np
 
 from shoal.engines.compare import Comparison
 from shoal.identification import Estimate
+from shoal.pictures.motion import Motion
+from shoal.pictures.numbers import length
 
 _AS_GOOD = 1.01
 """A fitness within this factor of the best is as good as the best."""
@@ -41,7 +43,23 @@ def refines(name: str, estimates: Mapping[str, Estimate]) -> str:
     """What the finest mesh gains on the coarsest."""
     labels = list(estimates)
     first, last = (_error(estimates[labels[k]]) for k in (0, -1))
-    return f"{name}: {labels[0]} is off by {first:.2g}°, {labels[-1]} by {last:.1g}°"
+    return f"{name}: {labels[0]} is off by {first:.2g}°, {labels[-1]} by {last:.2g}°"
+
+
+def ends(name: str, found: Motion) -> str:
+    """Where the last marker is at the end of a motion."""
+    marker, path = list(found.markers.items())[-1]
+    x, y = path[-1]
+    place = f"({x:.3g}, {y:.3g})".replace("-", "−")
+    return f"{name}: {marker} is at {place} m after {found.times[-1]:.3g} s"
+
+
+def reaches(name: str, found: Motion) -> str:
+    """How far the marker that moves most goes."""
+    spans = {marker: np.ptp(path, axis=0) for marker, path in found.markers.items()}
+    marker = max(spans, key=lambda one: float(np.max(spans[one])))
+    x, y = (length(float(span)) for span in spans[marker])
+    return f"{name}: {marker} moves within {x} in x and {y} in y in {found.span:.3g} s"
 
 
 def agrees(comparison: Comparison, marker: str) -> str:
@@ -49,7 +67,8 @@ def agrees(comparison: Comparison, marker: str) -> str:
     found = [row["largest"] for row in comparison.differences() if row["marker"] == marker]
     if not found or None in found:
         return f"{comparison.scene.name}: {marker} by each engine"
-    return f"{len(comparison.trajectories)} engines place {marker} within {1e6 * max(found):.2g} µm of each other"
+    apart = f"{len(comparison.trajectories)} engines place {marker} within {length(max(found))} of each other"
+    return f"{comparison.scene.name}: {apart}"
 
 
 def _error(estimate: Estimate) -> float:

@@ -1,46 +1,29 @@
-"""Units of a scene's fields, for the labels of axes."""
+"""Units on the axes of pictures."""
 
 from __future__ import annotations
 
 from shoal.identification import Estimate, Problem
-from shoal.pictures.signals import UNITS
+from shoal.identification.units import of_channels, squared, unit
 
-_UNITS = {
-    "angle": "rad",
-    "tilt": "rad",
-    "rate": "rad/s",
-    "length": "m",
-    "height": "m",
-    "width": "m",
-    "centre_of_mass": "m",
-    "position": "m",
-    "x": "m",
-    "y": "m",
-    "velocity": "m/s",
-    "gravity": "m/s²",
-    "density": "kg/m³",
-    "mass": "kg",
-    "inertia": "kg m²",
-    "youngs_modulus": "Pa",
-    "delay": "s",
-    "retardation": "s",
-}
+_MIXED = "SI units"
+"""Of numbers over channels of different units."""
 
 
 def labelled(path: str | None, name: str = "") -> str:
     """A path (or the name that stands for it) with its unit, where it is known."""
-    leaves = [part for part in (path or "").split(".") if not part.isdigit()]
-    unit = _UNITS.get(leaves[-1] if leaves else "", "")
-    return f"{name or path}{f' [{unit}]' if unit else ''}"
+    known = unit(path or "")
+    return f"{name or path}{f' [{known}]' if known else ''}"
+
+
+def rms_unit(estimate: Estimate) -> str:
+    """Of a root mean square over all channels."""
+    return of_channels(estimate.measurement) or _MIXED
 
 
 def fitness_unit(estimate: Estimate) -> str:
     """Of a mean square over all channels."""
-    units = {UNITS[channel.quantity] for r in estimate.measurement.recordings.values() for channel in r.channels}
-    if len(units) > 1:
-        return "SI units"
-    (unit,) = units
-    return f"({unit})²" if "/" in unit else f"{unit}²"
+    unit = rms_unit(estimate)
+    return unit if unit == _MIXED else squared(unit)
 
 
 def parameter(problem: Problem, name: str) -> str:

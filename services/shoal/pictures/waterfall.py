@@ -26,7 +26,7 @@ def waterfall(estimate: Estimate) -> Figure:
     axes.set_xlim(0.5, max(len(values), 2) + 0.5)
     headline(figure, _says(estimate.problem, values))
     axes.set_xlabel("place where a search ended, best first")
-    axes.set_ylabel(f"fitness (mean square) [{fitness_unit(estimate)}]")
+    axes.set_ylabel(f"fitness [{fitness_unit(estimate)}]")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=2)
     return figure
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,14 +35,18 @@ class Panel:
 
 def draw(panels: list[Panel], title: str, file: Path) -> None:
     """Combinations above, main effects below."""
-    figure = Figure(figsize=(6.0 * len(panels), 9.4), layout="constrained")
+    figure = Figure(figsize=(4.3 * len(panels), 9.4), layout="constrained")
     rows = figure.subplots(2, len(panels), squeeze=False, gridspec_kw={"height_ratios": [2.4, 1.0]})
-    for panel, above, below in zip(panels, rows[0], rows[1], strict=True):
+    for number, (panel, above, below) in enumerate(zip(panels, rows[0], rows[1], strict=True)):
         _combinations(above, panel)
         _effects(below, panel)
+        if number:  # the rows are those of the first column
+            above.set_ylabel("")
+            above.tick_params(labelleft=False)
+            below.tick_params(labelleft=False)
     handles, labels = rows[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=12, frameon=False)
-    figure.suptitle(title, fontsize=15)
+    figure.suptitle(fill(title, 80), fontsize=12.5, x=0.01, ha="left")
     figure.savefig(file, dpi=110)
 
 
@@ -61,7 +66,7 @@ def _combinations(axes: Axes, panel: Panel) -> None:
     axes.set_ylabel("parts that are on", fontsize=12)
     axes.grid(axis="x", alpha=0.3)
     axes.set_xlabel(panel.axis, fontsize=12)
-    axes.set_title(panel.title, fontsize=13)
+    axes.set_title(panel.title, fontsize=11)
 
 
 def _effects(axes: Axes, panel: Panel) -> None:
@@ -81,4 +86,4 @@ def _effects(axes: Axes, panel: Panel) -> None:
     axes.set_ylim(3.6, -0.6)
     axes.xaxis.set_major_locator(MaxNLocator(6))
     axes.grid(axis="x", alpha=0.3)
-    axes.set_xlabel(f"{panel.change}  (left: the part helps; * without T)", fontsize=11)
+    axes.set_xlabel(f"{panel.change}\n(left: the part helps; * without T)", fontsize=11)

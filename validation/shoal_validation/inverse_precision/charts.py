@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -31,6 +32,8 @@ STYLES = {
     "CMA-ES with restarts": ("#009E73", "-", "*"),
 }
 """Colour, line and marker: black local, orange the paper's swarms, blue scipy, green pycma."""
+_LINE = 95
+"""Characters in a line of a title."""
 SPARE = (("#CC79A7", line, mark) for line, mark in (("-", "h"), ("--", "H"), (":", "<"), ("-.", "8")))
 CLASSES = {
     Outcome.HOLDS: ("#DDEEFF", ""),
@@ -44,24 +47,24 @@ CLASSES = {
 
 def draw_case(case: Case, runs: list[Run], file: Path) -> None:
     """Median over the seeds of the error of the best point so far; bars at the end from the best to the worst seed."""
-    figure = Figure(figsize=(15.0, 6.6), layout="constrained")
+    figure = Figure(figsize=(8.6, 7.4), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
     for axis, spent, words in zip(axes, ("evaluations", "seconds"), ("counted evaluations", "time [s]"), strict=True):
         for method in dict.fromkeys(run.method for run in runs):
             _draw_method(axis, [run for run in runs if run.method == method and not run.refused], spent)
         axis.axhline(floor(runs), color="0.5", linewidth=1.0)
         axis.text(0.01, floor(runs), "error of the best fit", transform=axis.get_yaxis_transform(),
-                  va="bottom", color="0.35", fontsize=11)  # fmt: skip
+                  va="bottom", color="0.35", fontsize=10)  # fmt: skip
         axis.set_xscale("log")
         axis.set_yscale("log")
-        axis.set_xlabel(words, fontsize=13)
+        axis.set_xlabel(words, fontsize=12)
         axis.grid(alpha=0.3)
-        axis.tick_params(labelsize=12)
-    axes[0].set_ylabel("largest error of an angle [rad]", fontsize=13)
+        axis.tick_params(labelsize=11)
+    axes[0].set_ylabel("largest error of an angle [rad]", fontsize=12)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right center", fontsize=12, frameon=False)
-    figure.suptitle(f"{headline(runs)}\n{case.about}", fontsize=14)
-    figure.savefig(file, dpi=100)
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=11, frameon=False)
+    figure.suptitle(f"{fill(headline(runs), _LINE)}\n{fill(case.about, _LINE)}", fontsize=12, x=0.01, ha="left")
+    figure.savefig(file, dpi=110)
 
 
 def floor(runs: list[Run]) -> float:
@@ -124,19 +127,19 @@ def best_so_far(spent: Array, errors: Array, grid: Array) -> Array:
 
 def draw_map(panels: list[Panel], cells: list[Cell], file: Path) -> None:
     """A panel per method, a cell per horizon and noise, coloured and lettered by its worst class."""
-    columns = min(3, len(panels))
+    columns = min(2, len(panels))
     rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(5.4 * columns, 3.7 * rows + 1.0), layout="constrained")
+    figure = Figure(figsize=(8.6, 2.9 * rows + 1.2), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for axis, panel in zip(grid, panels, strict=False):
         _draw_panel(axis, panel, [cell for cell in cells if cell.panel == panel])
     for axis in grid[len(panels) :]:
         axis.set_axis_off()
     silent = sum(worst_of.outcome == Outcome.SILENT for worst_of in worst_cells(cells))
-    figure.suptitle(f"Rigid double pendulum, both angles from the tip: {silent} silently wrong cells", fontsize=15)
+    figure.suptitle(f"Rigid double pendulum, both angles from the tip: {silent} silently wrong cells", fontsize=12)
     words = ", ".join(f"{letter or 'blank'}: {outcome}" for outcome, (_, letter) in CLASSES.items())
-    figure.supxlabel(f"{words}; the number is the error [rad]", fontsize=12)
-    figure.savefig(file, dpi=100)
+    figure.supxlabel(fill(f"{words}; the number is the error [rad]", _LINE), fontsize=11)
+    figure.savefig(file, dpi=110)
 
 
 def worst_cells(cells: list[Cell]) -> list[Cell]:
@@ -157,11 +160,11 @@ def _draw_panel(axis: Axes, panel: Panel, cells: list[Cell]) -> None:
         outcome = Outcome(cell.outcome)
         codes[row, column] = order.index(outcome)
         error = f"{cell.error:.0e}" if np.isfinite(cell.error) else ""
-        axis.text(column, row, f"{CLASSES[outcome][1]}\n{error}".strip(), ha="center", va="center", fontsize=11)
+        axis.text(column, row, f"{CLASSES[outcome][1]}\n{error}".strip(), ha="center", va="center", fontsize=10)
     colours = ListedColormap([colour for colour, _ in CLASSES.values()])
     axis.imshow(codes, cmap=colours, vmin=-0.5, vmax=len(order) - 0.5, aspect="auto", origin="lower")
     axis.set_xticks(range(len(horizons)), [f"{horizon:g}" for horizon in horizons], fontsize=11)
     axis.set_yticks(range(len(noises)), [f"{noise:.0e}" for noise in noises], fontsize=11)
     axis.set_xlabel("horizon [s]", fontsize=12)
     axis.set_ylabel("noise [m]", fontsize=12)
-    axis.set_title(panel.title, fontsize=12)
+    axis.set_title(panel.title, fontsize=11)

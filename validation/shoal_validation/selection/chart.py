@@ -22,27 +22,27 @@ KINDS = (
 
 def draw_chart(cases: Sequence[Case], path: Path) -> None:
     """Two panels as PNG."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained", width_ratios=(3, 2))
+    figure, (above, below) = plt.subplots(2, 1, figsize=(8.6, 8.2), layout="constrained", height_ratios=(3, 2))
     for name, marker, colour in KINDS:
         chosen = [case for case in cases if _kind(case) == name and (case.known or not case.met)]
         ratios = [np.clip(case.error / case.tolerance, 1e-4, 1e3) for case in chosen]
-        left.scatter([c.stiffness for c in chosen], ratios, marker=marker, color=colour, label=name, s=26, alpha=0.8)
-    left.axhline(1.0, color="black", linewidth=1)
-    left.annotate("tolerance", (0.01, 1.0), xycoords=("axes fraction", "data"), va="bottom", fontsize=9)
-    left.set(
+        above.scatter([c.stiffness for c in chosen], ratios, marker=marker, color=colour, label=name, s=26, alpha=0.8)
+    above.axhline(1.0, color="black", linewidth=1)
+    above.annotate("tolerance", (0.01, 1.0), xycoords=("axes fraction", "data"), va="bottom")
+    above.set(
         xscale="log", yscale="log", xlabel="Young's modulus, mean of the rods [Pa]", ylabel="true error / tolerance"
     )
     met = [case for case in cases if case.met and case.known]
-    share = np.mean([case.error <= case.tolerance for case in met]) if met else 0.0
-    left.set_title(f"{share:.1%} of the {len(met)} models said to meet the tolerance do")
-    left.legend(loc="lower left", fontsize=9)
+    share = 100 * np.mean([case.error <= case.tolerance for case in met]) if met else 0.0
+    above.set_title(f"{share:.3g} % of the {len(met)} models said to meet the tolerance do", loc="left")
+    above.legend(loc="lower left")
     ratios = [case.work / case.least for case in met if np.isfinite(case.least) and case.least > 0]
-    right.hist(np.clip(ratios, 1.0, 4.0), bins=np.linspace(1.0, 4.0, 25).tolist(), color="#009E73")
-    right.axvline(2.0, color="black", linewidth=1)
-    right.set(xlabel="work / work of the cheapest model that would do", ylabel="machines of one or two rods")
-    below = np.mean(np.array(ratios) <= 2) if ratios else 0.0
-    right.set_title(f"{below:.0%} cost at most twice the cheapest")
-    figure.savefig(path, dpi=130)
+    below.hist(np.clip(ratios, 1.0, 4.0), bins=np.linspace(1.0, 4.0, 25).tolist(), color="#009E73")
+    below.axvline(2.0, color="black", linewidth=1)
+    below.set(xlabel="work / work of the cheapest model that would do", ylabel="machines of one or two rods")
+    cheap = np.mean(np.array(ratios) <= 2) if ratios else 0.0
+    below.set_title(f"{cheap:.0%} cost at most twice the cheapest", loc="left")
+    figure.savefig(path, dpi=110)
     plt.close(figure)
 
 

@@ -19,7 +19,7 @@ from shoal_validation.judge import Outcome
 from shoal_validation.stability import MAPS
 from shoal_validation.stability.charts import draw
 from shoal_validation.stability.page import section
-from shoal_validation.stability.survey import Result, survey
+from shoal_validation.stability.survey import Result, stored, survey
 
 DOCS = Path(__file__).parents[3] / "docs"
 
@@ -30,15 +30,20 @@ def main() -> None:
     parser.add_argument("--only", choices=MAPS, action="append", help="run this map only; may be repeated")
     parser.add_argument("--quick", action="store_true", help="three values of each axis; needs --out")
     parser.add_argument("--out", type=Path, default=DOCS / "charts", help="folder of charts and stability.json")
+    parser.add_argument("--redraw", action="store_true", help="charts from the cells that the folder holds")
     asked = parser.parse_args()
     if asked.quick and asked.out == DOCS / "charts":
         parser.error("--quick: name a folder by --out; the charts of docs/ come from complete maps")
     began = time.perf_counter()
     maps = [MAPS[name] for name in asked.only or MAPS]
-    results = [survey(one.reduced() if asked.quick else one, _note) for one in maps]
+    if asked.redraw:
+        kept = json.loads((asked.out / "stability.json").read_text(encoding="utf-8"))
+        results = [stored(one, kept[one.name]) for one in maps]
+    else:
+        results = [survey(one.reduced() if asked.quick else one, _note) for one in maps]
     for result in results:
         draw(result, asked.out / f"stability-{result.name}.png")
-    if not asked.only:
+    if not asked.only and not asked.redraw:
         data = {result.name: result.to_json() for result in results}
         (asked.out / "stability.json").write_text(json.dumps(data, separators=(",", ":")) + "\n", encoding="utf-8")
         if asked.out == DOCS / "charts":

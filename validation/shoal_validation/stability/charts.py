@@ -36,7 +36,7 @@ WORDS = {
     Outcome.DRIFTED: "drifted: joints opened",
 }
 BRANCH = "b: went on along the wrong branch"
-COLUMNS = 4
+COLUMNS = 3
 
 
 def draw(result: Result, path: Path) -> None:
@@ -44,18 +44,19 @@ def draw(result: Result, path: Path) -> None:
     panels = result.panels
     columns = min(COLUMNS, len(panels))
     rows = math.ceil(len(panels) / columns)
-    height = 0.55 + 0.27 * len(result.y.values)
+    height = 0.85 + 0.27 * len(result.y.values)
     with mpl.rc_context({"font.size": 11, "hatch.linewidth": 0.5, "hatch.color": "#ff9c9c"}):
-        figure = Figure(figsize=(14.0, rows * height + 2.6), dpi=100, layout="constrained")
+        figure = Figure(figsize=(8.6, rows * height + 2.8), dpi=110, layout="constrained")
         axes = figure.subplots(rows, columns, squeeze=False)
         for place, panel in zip(axes.flat, panels, strict=False):
             _panel(place, panel.cells, result.x, result.y)
-            place.set_title(panel.method, fontsize=11, fontweight="bold" if panel.ours else "normal")
+            place.set_title(textwrap.fill(panel.method, 26), fontsize=10, fontweight="bold" if panel.ours else "normal")
         for place in axes.flat[len(panels) :]:
             place.set_axis_off()
         _label(axes, len(panels), result)
-        figure.suptitle(f"{result.question}\n{result.summary}", fontsize=14)
-        figure.legend(handles=_legend(result), loc="outside lower center", ncols=4, frameon=False)
+        said = (textwrap.fill(text, 90) for text in (f"{result.summary.capitalize()}.", result.question))
+        figure.suptitle("\n".join(said), fontsize=12, x=0.01, ha="left")
+        figure.legend(handles=_legend(result), loc="outside lower center", ncols=2, frameon=False)
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path)
 
@@ -88,7 +89,7 @@ def _label(axes: Any, count: int, result: Result) -> None:
         place.tick_params(length=0, labelsize=9)
         if lowest:
             place.tick_params(axis="x", rotation=45)
-            place.set_xlabel(result.x.title, fontsize=10)
+            place.set_xlabel(textwrap.fill(result.x.title, 28), fontsize=10)
         if column == 0:
             place.set_ylabel(textwrap.fill(result.y.title, 20), fontsize=10)
 

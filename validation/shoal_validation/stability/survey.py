@@ -86,3 +86,32 @@ def survey(asked: StabilityMap, note: Callable[[str], None] = lambda _: None) ->
         panels.append(panel)
         note(f"{asked.name}, {method.name}: " + ", ".join(f"{number} {kind}" for kind, number in panel.count.items()))
     return Result(asked.name, asked.question, asked.teaches, asked.x, asked.y, tuple(panels))
+
+
+def stored(asked: StabilityMap, kept: dict[str, Any]) -> Result:
+    """A map as `Result.to_json` keeps it, for a picture: its cells have their classes, and no settings."""
+    places = [(x, y) for y in asked.y.values for x in asked.x.values]
+    panels = []
+    for method in asked.methods:
+        rows = zip(places, kept["panels"][method.name], strict=True)
+        cells = tuple(_read(place, evidence) for place, evidence in rows)
+        panels.append(Panel(method.name, method.ours, method.checked, cells))
+    return Result(asked.name, asked.question, asked.teaches, asked.x, asked.y, tuple(panels))
+
+
+def _read(place: tuple[Any, Any], evidence: dict[str, Any]) -> Cell:
+    numbers = {
+        name: float("nan" if evidence[name] is None else evidence[name])
+        for name in ("error", "energy_drift", "constraint_drift")
+    }
+    return Cell(
+        *place,
+        outcome=Outcome(evidence["outcome"]),
+        status=evidence["status"],
+        steps=evidence["steps"],
+        branch="branch" in evidence,
+        message=evidence.get("message", ""),
+        scene=evidence.get("scene", ""),
+        settings=evidence.get("settings", {}),
+        **numbers,
+    )

@@ -35,36 +35,38 @@ ON_MESH = 1e-4
 """The same for the error on one mesh."""
 NAMED = 11
 """Names of the front that the height of a picture has room for."""
+WIDE = 8.6
+"""Width of a picture [in]: its letters are then as large as those of the page that shows it."""
 
 
 def flexible(study: Study) -> Figure:
-    """Continuum error on the left, error in time on the scene's own mesh on the right."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(15, 6.4), layout="constrained")
-    _families(left, study)
-    left.set_ylabel("largest error of B against the converged beam [m]")
-    left.set_title(_message(study))
-    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=5, frameon=False)
-    _integrators(right, study)
+    """Continuum error above, error in time on the scene's own mesh below."""
+    figure, (above, below) = plt.subplots(2, 1, figsize=(WIDE, 13.5), layout="constrained")
+    _families(above, study, NAMED)
+    above.set_ylabel("largest error of B against the converged beam [m]")
+    above.set_title(_message(study), loc="left")
+    above.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=5, frameon=False)
+    _integrators(below, study)
     return figure
 
 
 def rigid(studies: Sequence[Study]) -> Figure:
     """One panel per problem."""
-    columns = min(3, len(studies))
+    columns = min(2, len(studies))
     rows = -(-len(studies) // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(6.2 * columns, 5.2 * rows), layout="constrained", squeeze=False)
+    figure, axes = plt.subplots(rows, columns, figsize=(WIDE, 4.9 * rows), layout="constrained", squeeze=False)
     for axis, study in zip(axes.flat, studies, strict=False):
-        _families(axis, study)
+        _families(axis, study, NAMED - 4)
         axis.set_ylabel(f"largest error of {study.problem.marker} [m]")
-        axis.set_title(_message(study))
-        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=5, frameon=False)
+        axis.set_title(_message(study), loc="left", fontsize=10.5)
+        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
     for axis in list(axes.flat)[len(studies) :]:
         axis.set_axis_off()
     return figure
 
 
-def _families(axis: Axes, study: Study) -> None:
-    """Every believed point, faint; the front of each family as a staircase; the names on the front of all."""
+def _families(axis: Axes, study: Study, most: int) -> None:
+    """Every believed point, faint; the front of each family as a staircase; up to `most` names on the front of all."""
     floor = study.problem.reference.error
     for family, look in LOOKS.items():
         points = [p for p in study.points if p.family == family and p.ok]
@@ -75,24 +77,25 @@ def _families(axis: Axes, study: Study) -> None:
         best = front(points, floor)
         axis.plot(*_places(best, floor), **look, markersize=6, drawstyle="steps-post", label=family, linewidth=1.8)
     singles = front([p for p in study.points if p.family != MANY], floor)
-    for point in _spread(singles, floor):
-        name = point.label.removeprefix(f"{OURS}, ").replace(", step", " at")
+    for point in _spread(singles, floor, most):
+        name = point.label.removeprefix(f"{OURS}, ").replace(", step", " at").replace(", tolerance", "")
         place = (point.seconds * 1e3, max(point.error, floor))
-        axis.annotate(name, place, (-5, -10), textcoords="offset points", fontsize=8, ha="right", bbox=PAPER)
+        axis.annotate(name, place, (-5, -10), textcoords="offset points", fontsize=9, ha="right", bbox=PAPER)
     _finish(axis, floor, "reference's own error")
     # Room for the names, which stand to the left of the front.
     axis.set_xlim(left=axis.get_xlim()[0] / 15)
 
 
-def _spread(points: list[Point], floor: float) -> list[Point]:
+def _spread(points: list[Point], floor: float, most: int) -> list[Point]:
     """Those of a front whose errors are far enough apart for their names not to cover each other."""
     if not points:
         return []
     heights = [np.log10(max(p.error, floor)) for p in points]
-    gap = (heights[0] - min(heights[-1], np.log10(floor))) / NAMED
+    gap = (heights[0] - min(heights[-1], np.log10(floor))) / most
     found, last = [], np.inf
     for point, height in zip(points, heights, strict=True):
-        if last - height >= gap:
+        # At the floor stands its own name.
+        if last - height >= gap and point.error > floor:
             found.append(point)
             last = height
     return found
@@ -113,13 +116,13 @@ def _integrators(axis: Axes, study: Study) -> None:
         places = [p.seconds * 1e3 for p in points], [max(p.mesh_error or 0.0, reference.error) for p in points]
         look = {"color": LOOKS[family]["color"], "marker": MARKERS[k % 8], "linestyle": LINES[k % 4]}
         axis.plot(*places, **look, markersize=5, linewidth=1.4, label=label)
-    axis.set_ylabel(f"largest error of B against the same mesh ({SCENE_MESH}), converged in time [m]")
+    axis.set_ylabel("largest error of B against the same mesh, converged in time [m]")
     there = [p for p in on_mesh if p.mesh_error is not None and p.mesh_error <= ON_MESH]
     best = {p.family: p for p in sorted(there, key=lambda point: -point.seconds)}
     took = ", ".join(f"{family} {best[family].seconds * 1e3:.3g} ms" for family in (OURS, "Exudyn") if family in best)
-    axis.set_title(f"The integrator alone, on the mesh {SCENE_MESH}\n{ON_MESH * 1e3:g} mm: {took}")
+    axis.set_title(f"The integrator alone, on the mesh {SCENE_MESH}\n{ON_MESH * 1e3:g} mm: {took}", loc="left")
     _finish(axis, reference.error, "own error of the time-converged motion")
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8.5)
+    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=9.5, frameon=False)
 
 
 def _finish(axis: Axes, floor: float, floor_name: str) -> None:
@@ -127,7 +130,7 @@ def _finish(axis: Axes, floor: float, floor_name: str) -> None:
     axis.set_yscale("log")
     axis.axhline(floor, color="#888888", linewidth=1, linestyle=(0, (1, 3)))
     below = axis.get_yaxis_transform()
-    axis.text(0.99, floor * 0.85, floor_name, transform=below, ha="right", va="top", fontsize=8)
+    axis.text(0.99, floor * 0.85, floor_name, transform=below, ha="right", va="top", fontsize=9)
     axis.set_ylim(bottom=floor / 5)
     axis.set_xlabel("time of one simulation [ms]")
     axis.grid(visible=True, which="major", alpha=0.3)

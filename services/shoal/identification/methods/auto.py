@@ -17,6 +17,7 @@ from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
 from shoal.identification.starts import starting_points
+from shoal.identification.units import of_channels
 from shoal.trajectory import Array
 
 LARGE = 30.0
@@ -75,7 +76,8 @@ def _first_that_explains(model: ForwardModel, methods: dict[str, Callable[[], Ou
         found.append(outcome)
         if explains(model, outcome):
             break
-        reason = f"the fit before left {np.sqrt(outcome.fitness / model.things):.2g}"
+        left = f"{np.sqrt(outcome.fitness / model.things):.2g} {of_channels(model.measurement)}"
+        reason = f"the fit before left {left.rstrip()}"
     best = min(found, key=lambda outcome: outcome.fitness)
     ends = [(o.point, o.fitness) for o in found if o is not best] + [m for o in found for m in o.minima]
     apart = [(point, fitness) for point, fitness in ends if _apart(model, point, best.point)]
@@ -88,7 +90,7 @@ def explains(model: ForwardModel, outcome: Outcome) -> bool:
     left = np.sqrt(outcome.fitness * model.samples / rows)
     if model.noise is not None:
         return bool(left <= _NOISES * model.noise)
-    noise = np.nanmax([np.nanmax(noise_of(recording)) for recording in model.measurement.recordings.values()])
+    noise = max(float(np.max(np.nan_to_num(noise_of(r)))) for r in model.measurement.recordings.values())
     return bool(left <= max(_UNEXPLAINED * model.spread, _NOISES * noise))
 
 

@@ -11,14 +11,16 @@ from shoal.errors import ComputationError, InputError
 from shoal.mechanics import forces, stability
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.build import build
-from shoal.mechanics.dynamics import derived_rows, work_space
+from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.integrators import choose, facts, pick
 from shoal.mechanics.march import march
+from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import SINGLE, Array
 from shoal.scene import Scene
 
-_LANE = slice(0, 1)
+LANE = slice(0, 1)
+"""The only lane of a model of one scene."""
 
 
 class State(NamedTuple):
@@ -50,15 +52,10 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
     none = np.zeros(0, dtype=np.int64)
     found = []
     for time in map(float, times):
-        arrays = model.tile(SINGLE, _LANE)
-        room = work_space(SINGLE, arrays)
-        arrays = ready(SINGLE, arrays, room)
-        room.z[:n], room.zdot[:n] = model.q0[:, 0], model.v0[:, 0]
-        derived_rows(SINGLE, arrays, room)
-        room.memory[:] = forces.initial_memory(SINGLE, arrays.forces, room.z, model.start_angles[:, 0])
+        arrays, room = at_start(model)
         steps = max(1, int(np.ceil(time / scene.solver.step - 1e-9))) if time > 0 else 0
         step = time / steps if steps else scene.solver.step
-        scheme = choose(scene.solver, model, SINGLE, _LANE, choice.name)
+        scheme = choose(scene.solver, model, SINGLE, LANE, choice.name)
         if facts(choice.name).adaptive:
             steps, step = (scene.solver.max_steps if steps else 0), scene.solver.step
         march(SINGLE, scheme, arrays, room, step, steps, np.array([time]), none, scene.solver.rank_tolerance)
@@ -68,3 +65,15 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
         evaluator.turns = room.memory
         found.append(State(time, q, v, evaluator.acceleration(q, v, time), room.memory.copy()))
     return evaluator, found
+
+
+def at_start(model: Model) -> tuple[Arrays, Work]:
+    """The arrays and the work space of one lane that stands at its start, as a march takes them."""
+    n = model.unknowns
+    arrays = model.tile(SINGLE, LANE)
+    room = work_space(SINGLE, arrays)
+    arrays = ready(SINGLE, arrays, room)
+    room.z[:n], room.zdot[:n] = model.q0[:, 0], model.v0[:, 0]
+    derived_rows(SINGLE, arrays, room)
+    room.memory[:] = forces.initial_memory(SINGLE, arrays.forces, room.z, model.start_angles[:, 0])
+    return arrays, room

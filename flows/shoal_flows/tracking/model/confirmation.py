@@ -1,0 +1,77 @@
+"""The identified machine on a second engine: whether what was fitted is the machine's motion or our solver's error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from shoal.engines import get_engine
+from shoal.errors import ShoalError
+from shoal.identification.measurement import Recording
+from shoal.pictures.answer import Answer
+from shoal.trajectory import Array
+
+ACCURACY = 1e-4
+"""Of the range of a signal: how far engines may differ where no noise is stated and the fit leaves even less."""
+
+_UNITS = {"x": "m", "y": "m", "angle": "rad", "rate": "rad/s"}
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What a second engine says of the signals that were fitted.
+
+    signal: where the engines differ most for what is allowed; away, allowed: root mean square there, in SI units
+    refusal: why there is no answer, else empty
+    """
+
+    engine: str
+    signal: str = ""
+    away: float = np.nan
+    allowed: float = np.nan
+    refusal: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the second engine sees the same motion."""
+        return self.away <= self.allowed
+
+    def __str__(self) -> str:
+        if self.refusal:
+            return f"{self.engine} does not confirm the motion: {self.refusal}"
+        words, unit = "confirms" if self.ok else "does not confirm", _UNITS[self.signal.rpartition(".")[2]]
+        numbers = f"differs by {self.away:.1e} {unit} (RMS), allowed are {self.allowed:.1e} {unit}"
+        return f"{self.engine} {words} the motion: {self.signal} {numbers}"
+
+
+def confirm(answer: Answer) -> Confirmation:
+    """Simulate what was identified on Exudyn (on ours, if Exudyn was fitted), at every sample of every recording.
+
+    Allowed is the noise of each signal as stated, else as estimated from what the fit leaves, and at least `ACCURACY`.
+    """
+    estimate = answer.estimate
+    engine = "gauss" if estimate.engine.startswith("exudyn") else "exudyn"
+    try:
+        model = replace(answer.model, engine=get_engine(engine))
+        seen = {name: model.observe(answer.point[None], name)[0] for name in estimate.predicted}
+    except (ShoalError, ModuleNotFoundError) as error:
+        return Confirmation(engine, refusal=str(error))
+    if not all(np.all(np.isfinite(values)) for values in seen.values()):
+        return Confirmation(engine, refusal=model.refusal or "its simulation failed")
+    rows = [
+        Confirmation(engine, f"{name}/{signal}" if len(seen) > 1 else signal, away, allowed)
+        for name, recording in estimate.measurement.recordings.items()
+        for signal, away, allowed in _signals(recording, estimate.predicted[name], seen[name])
+    ]
+    return max(rows, key=lambda row: row.away / row.allowed)
+
+
+def _signals(recording: Recording, fitted: Array, seen: Array) -> Iterator[tuple[str, float, float]]:
+    """Name, distance of the engines, and what is allowed, for every channel; arrays are (samples, channels)."""
+    left = recording.values - fitted
+    for k, channel in enumerate(recording.channels):
+        stated = float(recording.noise[k])
+        estimated = max(float(np.sqrt(np.nanmean(left[:, k] ** 2))), ACCURACY * float(np.ptp(fitted[:, k])))
+        away = float(np.sqrt(np.mean((seen[:, k] - fitted[:, k]) ** 2)))
+        yield f"{channel.marker}.{channel.quantity}", away, stated if np.isfinite(stated) else estimated

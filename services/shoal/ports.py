@@ -1,0 +1,19 @@
+"""Whether a server can listen somewhere, asked before it is started."""
+
+from __future__ import annotations
+
+import socket
+
+from shoal.errors import InputError
+
+
+def check_free(host: str, port: int, setting: str = "port") -> None:
+    """Refuse a place where no server can listen. setting: what chooses the port. Raises InputError."""
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or error
+            advice = f"choose another with {'--port' if setting == 'port' else setting}"
+            raise InputError(f"{setting}: cannot listen on {host}:{port}: {reason}; {advice}") from None

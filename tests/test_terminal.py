@@ -1,0 +1,243 @@
+"""What a command prints fits 80 columns on a terminal, is plain in a log file, and a mistake is one line."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import re
+import socket
+import struct
+import subprocess
+import sys
+import termios
+from collections.abc import Callable
+from functools import cache
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from rich.console import Console
+from shoal import terminal
+from shoal.cli import main
+from shoal.doctor import Check
+from shoal.engines import get_engine
+from shoal.engines.compare import compare
+from shoal.engines.sweep import sweep
+from shoal.identification import Estimate, identify, load_problem
+from shoal.identification.design import design
+from shoal.mechanics.analysis.modes import modes
+from shoal.mechanics.analysis.reactions import reactions
+from shoal.mechanics.analysis.statics import statics
+from shoal.scene import load_scene
+from shoal.selection import Selection, select
+
+WIDTH = 80
+CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
+PENDULUM, DOUBLE = "single-pendulum", load_scene("rigid-double-pendulum")
+ANGLES = {path: np.array([0.1, 1.0]) for path in ("initial.OA.angle", "initial.AB.angle")}
+
+
+@cache
+def chosen() -> Selection:
+    return select(load_scene("flexible-double-pendulum"), 0.1, [0.1])
+
+
+@cache
+def found() -> Estimate:
+    return identify(load_problem("paper-case-1"), method="least-squares")
+
+
+def squeezed() -> None:
+    scene = load_scene("andrews-squeezer")
+    terminal.trajectory_table(get_engine("gauss").simulate(scene, [1e-3]), scene)
+    terminal.reactions_table(reactions(scene, [1e-3]))
+
+
+TABLES: dict[str, Callable[[], None]] = {
+    "trajectory, reactions": squeezed,
+    "selection": lambda: terminal.selection_table(chosen()),
+    "sweep": lambda: terminal.sweep_table(sweep(DOUBLE, ANGLES, get_engine("gauss"), 0.1)),
+    "comparison": lambda: terminal.comparison_table(compare(DOUBLE, ["gauss", "casadi"], [0.1])),
+    "equilibrium": lambda: terminal.equilibrium_table(statics(DOUBLE)),
+    "modes": lambda: terminal.modes_table(modes(DOUBLE)),
+    "estimate": lambda: terminal.estimate_table(found()),
+    "design": lambda: terminal.design_table(design(load_problem("paper-case-1"), noise=1e-3)),
+}
+PROSE: dict[str, Callable[[], None]] = {
+    "doctor": lambda: terminal.doctor_table([Check("MLflow server", False, "does not answer", "start it " * 12)]),
+    "listing": lambda: terminal.listing("scenes", {"flexible-double-pendulum-hanging": "a description " * 12}),
+}
+
+
+def printed(draw: Callable[[], None], monkeypatch: pytest.MonkeyPatch, width: int, *, log: bool = False) -> str:
+    """What a table prints on a terminal of a width, or in a log file."""
+    stream = StringIO()
+    kind = None if log else True
+    monkeypatch.setattr(terminal, "out", Console(file=stream, width=width, force_terminal=kind, highlight=False))
+    draw()
+    return stream.getvalue()
+
+
+def lines(text: str) -> int:
+    """Lines of tables below their rulers, up to the next line that is blank."""
+    counts = [0, 0]
+    below = False
+    for line in text.splitlines():
+        below = ("─" in line or below) and bool(line.strip())
+        counts[below] += 1
+    return counts[True]
+
+
+@pytest.mark.parametrize("what", [*TABLES, *PROSE])
+def test_table_fits_a_terminal_and_a_log_file(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    draw = (TABLES | PROSE)[what]
+    text = re.sub(r"\x1b\[[0-9;]*m", "", printed(draw, monkeypatch, WIDTH))
+    assert max(map(len, text.splitlines())) <= WIDTH
+    assert CONTROL.search(text) is None
+    logged = printed(draw, monkeypatch, WIDTH, log=True)
+    assert CONTROL.search(logged) is None
+
+
+@pytest.mark.parametrize("what", TABLES)
+def test_no_row_is_folded(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table has as many lines below its headings as with more room."""
+    few, many = (lines(printed(TABLES[what], monkeypatch, width)) for width in (WIDTH, 200))
+    assert few == many
+    assert few > 0
+
+
+def test_numbers_have_their_units(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Brackets are no markup."""
+    estimated = printed(TABLES["estimate"], monkeypatch, WIDTH, log=True)
+    for words in ("theta1 [rad] ", " m (RMS), ", " m², RMS "):
+        assert words in estimated
+    assert "OA.angle [rad]" in printed(TABLES["sweep"], monkeypatch, WIDTH, log=True)
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in sorted(main.commands))])
+def test_help_fits(command: list[str]) -> None:
+    result = CliRunner().invoke(main, [*command, "--help"], env={"COLUMNS": str(WIDTH)})
+    assert result.exit_code == 0
+    assert max(map(len, result.stdout.splitlines())) <= WIDTH
+
+
+COMMAND = [str(Path(sys.executable).with_name("shoal")), "simulate", PENDULUM, "--at", "0.1", "--no-verify"]
+COMMAND += ["--engine", "exudyn"]  # nothing has to be compiled or loaded for it
+
+
+def test_a_command_into_a_file_shows_no_progress() -> None:
+    done = subprocess.run(COMMAND, capture_output=True, text=True, check=True)
+    assert CONTROL.search(done.stdout) is None
+    assert done.stderr == ""
+
+
+def test_a_command_on_a_real_terminal_stays_within_it() -> None:
+    """Its progress and its answer."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, WIDTH, 0, 0))
+    environment = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "NO_COLOR")} | {"TERM": "xterm"}
+    with subprocess.Popen(COMMAND, stdin=theirs, stdout=theirs, stderr=theirs, env=environment) as running:
+        os.close(theirs)
+        seen = b""
+        while piece := _read(ours):
+            seen += piece
+    os.close(ours)
+    assert running.returncode == 0
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", seen.decode())
+    assert "status ok" in text
+    assert "simulating" in text
+    assert max(len(line) for part in text.split("\n") for line in part.split("\r")) <= WIDTH
+
+
+def _read(terminal_end: int) -> bytes:
+    try:
+        return os.read(terminal_end, 65536)
+    except OSError:  # the other end is closed
+        return b""
+
+
+FIND = """
+name: find
+scene: single-pendulum
+parameters: {angle: {path: initial.OA.angle, lower: -3.0, upper: 3.0}}
+channels: [{marker: A, quantity: x, column: x}, {marker: A, quantity: y, column: y}]
+source: {kind: file}
+"""
+FILES = {
+    "find.yaml": FIND,
+    "unit.yaml": FIND.replace("column: x", "column: x, unit: deg"),
+    "path.yaml": FIND.replace("OA.angle", "OB.angle"),
+    "bounds.yaml": FIND.replace("-3.0", "4.0"),
+    "marker.yaml": FIND.replace("marker: A, quantity: y", "marker: Z, quantity: y"),
+    "text.yaml": "hello",
+    "broken.yaml": "a: [1",
+    "nothing.yaml": "",
+    "empty.csv": "t,x,y\n",
+    "nan.csv": "t,x,y\n0,nan,0\n0.1,nan,0.1\n0.2,nan,0.2\n",
+    "other.json": "{}",
+}
+MISTAKES = {
+    "simulate missing.yaml": "missing.yaml",
+    "simulate no-such-scene": "one of andrews-squeezer",
+    "simulate folder": "one of andrews-squeezer",
+    "simulate text.yaml": "a mapping of fields",
+    "simulate broken.yaml": "line 2",
+    "simulate nothing.yaml": "a mapping of fields",
+    f"simulate {PENDULUM} --set bodies.OA.maas=1": "bodies.OA has kind, mass",
+    f"simulate {PENDULUM} --set bodies.OA.mass=-1": "greater than 0",
+    f"simulate {PENDULUM} --set initial.OA.angle=90": "in degrees?",
+    f"simulate {PENDULUM} --set bodies": "PATH=VALUE",
+    f"simulate {PENDULUM} --engine ode45": "there are gauss",
+    f"simulate {PENDULUM} --at a,b": "such as 0.1,0.2,0.5",
+    f"simulate {PENDULUM} --at nan": "finite times in s",
+    f"simulate {PENDULUM} --tolerance -1": "above 0 m",
+    f"simulate {PENDULUM} --out x.pdf": "use one of .html",
+    f"simulate {PENDULUM} --out missing/x.png": "does not exist",
+    f"simulate {PENDULUM} --out folder": "is a directory",
+    "simulate": "shoal simulate --help",
+    f"simulat {PENDULUM}": "Did you mean 'simulate'?",
+    "identify find.yaml": "--data FILE",
+    "identify find.yaml --data missing.csv": "missing.csv",
+    "identify find.yaml --data folder": "Is a directory",
+    "identify find.yaml --data empty.csv": "at least 3",
+    "identify find.yaml --data nan.csv": "column 'x' has no sample",
+    "identify unit.yaml --data nan.csv": "one of m, cm, mm",
+    "identify path.yaml --data nan.csv": "initial has OA",
+    "identify bounds.yaml --data nan.csv": "not below upper",
+    "identify marker.yaml --data nan.csv": "there are A",
+    "identify paper-case-1 --method newton": "there are auto",
+    "identify paper-case-1 --time-limit 0": "range x>0",
+    "report other.json": "--out FILE.json",
+    f"sweep {PENDULUM} --vary initial.OA.angle=0:1": "such as initial.OA.angle=0:1.5:31",
+    f"reactions {PENDULUM}": "--at",
+    "design paper-case-1 --noise 1e-3 --rate 0": "rate: needed, and positive",
+    "scenes missing": "there are andrews-squeezer",
+}
+
+
+@pytest.mark.parametrize(("command", "advice"), MISTAKES.items(), ids=MISTAKES)
+def test_a_mistake_is_one_line_that_says_what_is_right(
+    command: str, advice: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("folder").mkdir()
+    for name, text in FILES.items():
+        Path(name).write_text(text)
+    result = CliRunner().invoke(main, command.split(), prog_name="shoal")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith("shoal: ")
+    assert result.stderr.count("\n") == 1
+    assert advice in result.stderr
+
+
+def test_a_port_in_use_is_one_line() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        result = CliRunner().invoke(main, ["serve", "gauss", "--port", str(taken.getsockname()[1])])
+    assert result.exit_code == 2
+    assert "Address already in use; choose another with --port" in result.stderr
+    assert result.stderr.count("\n") == 1
