@@ -69,6 +69,8 @@ def test_study_is_logged_with_a_child_per_fit(client: Any, fits: list[Fit], tmp_
     assert again[fits[0].cell.name].estimate.parameters == estimate.parameters
     assert list(stored(child.info.run_id)) == [fits[0].cell.name]
     best = client.get_metric_history(child.info.run_id, "fitness/best")
+    logarithms = client.get_metric_history(child.info.run_id, "fitness/best log10")
+    assert [10**m.value for m in logarithms] == pytest.approx([m.value for m in best])
     assert [metric.value for metric in best] == [row[1] for row in estimate.iterations]
     tip = client.get_metric_history(child.info.run_id, "tip/x")
     assert len(tip) == 300

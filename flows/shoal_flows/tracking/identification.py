@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
@@ -108,6 +109,8 @@ def _log_progress(run: Run, fit: Fit) -> None:
     counted, values = fit.estimate.history
     for iteration, best, mean in fit.estimate.iterations:
         run.metric("fitness/best", best, iteration)
+        # MLflow's charts begin with linear axes, on which all but the first steps lie on the floor.
+        run.metric("fitness/best log10", math.log10(best) if best > 0 else -math.inf, iteration)
         run.metric("fitness/mean", mean, iteration)
         reached = np.flatnonzero(values <= best)
         if reached.size:
