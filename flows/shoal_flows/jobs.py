@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from shoal.engines import compare as comparing
-from shoal.engines import get_engine
+from shoal.engines import get_engine, spot_checks
 from shoal.engines import sweep as sweeping
 from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
@@ -134,6 +134,11 @@ def joined(parts: Sequence[sweeping.Sweep]) -> sweeping.Sweep:
         status=status,
         wall_s=sum(part.wall_s for part in parts),
     )
+
+
+def spot_checked(found: sweeping.Sweep, engine: str) -> sweeping.Sweep:
+    """A sweep with the errors that are estimated at a few of its points."""
+    return spot_checks.spot_checked(found, get_engine(engine))
 
 
 def _stacked(columns: Sequence[Mapping[str, Array]]) -> dict[str, Array]:

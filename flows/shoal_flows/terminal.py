@@ -66,6 +66,8 @@ def show(result: Any) -> None:
             console.print(f"{name} at {result.motion.times[-1]:g} s: ({x:.9f}, {y:.9f}) m")
     elif isinstance(result, Swept):
         console.print(f"{len(result.sweep.status)} points in {result.sweep.wall_s:.2f} s")
+        if result.sweep.check is not None:
+            console.print(str(result.sweep.check), soft_wrap=True)
     if not isinstance(result, DemoResult) and not result.run_id.startswith(LOCAL):
         console.print(f"MLflow run {result.run_id}; browse it with `shoal ui`", soft_wrap=True)
 

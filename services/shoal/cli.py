@@ -111,6 +111,13 @@ def option_set(command: Command) -> Command:
     return click.option("--set", "values", multiple=True, metavar="PATH=VALUE", callback=key_value, help=text)(command)
 
 
+def option_verify(command: Command) -> Command:
+    """--verify, --no-verify."""
+    return click.option("--verify/--no-verify", default=True, show_default=True, help="Estimate errors by more runs.")(
+        command
+    )
+
+
 def option_json(command: Command) -> Command:
     """--json."""
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")(command)
@@ -167,7 +174,7 @@ def scenes(name: str | None) -> None:
     metavar="METRES",
     help="Find the cheapest model whose error at the markers stays below; overrides elements, integrator and step.",
 )
-@click.option("--verify/--no-verify", default=True, show_default=True, help="Estimate the error by a second run.")
+@option_verify
 @option_json
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .html, .gif, .png, .csv or .json.")
 def simulate(
@@ -418,6 +425,7 @@ def design(
 @option_engine
 @option_set
 @click.option("--at", "time", type=float, metavar="T", help="Instant [s]; the scene's duration by default.")
+@option_verify
 @option_json
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write .csv, .json or .png.")
 def sweep(
@@ -426,12 +434,14 @@ def sweep(
     engine: str,
     values: dict[str, str],
     time: float | None,
+    verify: bool,
     as_json: bool,
     out: Path | None,
 ) -> None:
     """Marker positions of SCENE over a grid of values. At one instant; the paper's Figure 4, for example."""
     from shoal import terminal
     from shoal.engines import get_engine
+    from shoal.engines.spot_checks import spot_checked
     from shoal.engines.sweep import sweep
     from shoal.scene import load_scene
 
@@ -440,11 +450,12 @@ def sweep(
     grid = {path: terminal.axis(path, text) for path, text in vary.items()}
     with terminal.working(f"sweeping {wanted.name}"):
         result = sweep(wanted, grid, get_engine(engine), time)
+        result = spot_checked(result, get_engine(engine)) if verify else result
     if out is not None:
         with whole(out) as path:
             terminal.write_sweep(result, path)
     terminal.show(result.to_json(), as_json, lambda: terminal.sweep_table(result))
-    _finish(result.ok, "some points failed; their status is in the table")
+    _finish(result.ok, result.complaint)
 
 
 @main.command()

@@ -74,13 +74,19 @@ def sweep(
     *,
     values: Values | None = None,
     engine: str = "gauss",
+    verify: bool = True,
 ) -> Sweep:
-    """Marker positions at one instant [s] over the full grid of `vary` (path -> values). Raises InputError."""
+    """Marker positions at one instant [s] over the full grid of `vary` (path -> values). Raises InputError.
+
+    verify: whether errors are estimated at some of its points by more careful runs
+    """
     from shoal.engines import get_engine
+    from shoal.engines.spot_checks import spot_checked
     from shoal.engines.sweep import sweep
 
     grid = {path: np.asarray(lanes, dtype=float) for path, lanes in vary.items()}
-    return sweep(_scene(scene, values), grid, get_engine(engine), time)
+    found = sweep(_scene(scene, values), grid, get_engine(engine), time)
+    return spot_checked(found, get_engine(engine)) if verify else found
 
 
 def compare(

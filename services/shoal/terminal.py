@@ -308,6 +308,8 @@ def sweep_table(sweep: Sweep) -> None:
         moved = [row[f"{last}.dx"], row[f"{last}.dy"]]
         table.add_row(*numbers, *("-" if m is None else f"{m:.6f}" for m in moved), row["status"])
     out.print(table)
+    if sweep.check is not None:
+        _say(str(sweep.check))
 
 
 def _short(paths: list[str]) -> list[str]:

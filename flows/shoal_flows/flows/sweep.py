@@ -29,5 +29,4 @@ def sweep(
     with progress(1, f"{scene} over {', '.join(axis.path for axis in vary)}"):
         result = Swept(*run_grid(scene, {axis.path: (axis.low, axis.high, axis.count) for axis in vary}, engine, time))
     show_result(f"{scene}: sweep", tables.of_sweep(result.sweep), result.run_id)
-    wrong = [status for status in result.sweep.status if status != "ok"]
-    return ended(result, [f"{len(wrong)} of {len(result.sweep.status)} points: {', '.join(sorted(set(wrong)))}"])
+    return ended(result, [result.sweep.complaint])

@@ -60,7 +60,8 @@ def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene,
 def run_grid(scene: str, vary: Mapping[str, Sequence[float]], engine: str, time: float | None) -> tuple[Sweep, str]:
     """One scene over a grid, with the id of its run."""
     with events.work(f"{scene} over {', '.join(vary)}"):
-        result = jobs.joined([part.result() for part in _parts(scene, vary, engine, time)])
+        whole = jobs.joined([part.result() for part in _parts(scene, vary, engine, time)])
+        result = workers.run(jobs.spot_checked, whole, engine)
         return result, tracked.log_sweep(result)
 
 

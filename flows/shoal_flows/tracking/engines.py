@@ -60,6 +60,10 @@ def log_sweep(result: Sweep) -> str:
         run.metric("final/points", len(result.status))
         run.metric("final/wall_s", result.wall_s)
         run.metric("final/failed_points", sum(status != "ok" for status in result.status))
+        if result.check is not None:
+            for name in ("time_error", "mesh_error"):
+                if (error := getattr(result.check, name)) is not None:
+                    run.metric(f"final/{name}", error)
         run.text(_table(result), "sweep.csv")
         if len(result.grid) <= 2:
             for marker in result.displacements:

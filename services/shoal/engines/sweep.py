@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,30 @@ from shoal.trajectory import Array, Status, plain
 
 
 @dataclass(frozen=True)
+class SpotCheck:
+    """Largest estimated errors at the markers [m] among the points that were looked at; None: none was estimated.
+
+    complaint: the first point that a more careful run does not bear out, and why
+    """
+
+    looked_at: int
+    points: int
+    time_error: float | None = None
+    mesh_error: float | None = None
+    complaint: str = ""
+
+    def __str__(self) -> str:
+        errors = {"time": self.time_error, "mesh": self.mesh_error}
+        known = ", ".join(f"{name} {error:.1e} m" for name, error in errors.items() if error is not None)
+        return f"estimated error at the markers, largest of {self.looked_at} points: {known or 'unknown'}"
+
+
+@dataclass(frozen=True)
 class Sweep:
     """Marker positions and displacements from the start at `time` [s] over a grid.
 
     grid: path -> value of every point, (points,); positions, displacements [m]: marker -> (points, 2)
+    check: what more careful runs of some points say, None if there were none
     """
 
     scene: Scene
@@ -28,11 +48,20 @@ class Sweep:
     displacements: dict[str, Array]
     status: tuple[Status, ...]
     wall_s: float
+    check: SpotCheck | None = None
 
     @property
     def ok(self) -> bool:
         """Whether every point may be believed."""
-        return all(status is Status.OK for status in self.status)
+        return not self.complaint
+
+    @property
+    def complaint(self) -> str:
+        """Why not all of it can be believed; empty if nothing speaks against it."""
+        wrong = [status for status in self.status if status is not Status.OK]
+        if wrong:
+            return f"{len(wrong)} of {len(self.status)} points: {', '.join(sorted(set(wrong)))}"
+        return self.check.complaint if self.check is not None else ""
 
     def rows(self) -> list[dict[str, Any]]:
         """The table: one row a point, with the values, positions, displacements and status."""
@@ -54,6 +83,7 @@ class Sweep:
             "engine": self.engine,
             "time": self.time,
             "rows": self.rows(),
+            "verification": None if self.check is None else plain(asdict(self.check)),
             "wall_s": self.wall_s,
         }
 
