@@ -241,3 +241,18 @@ def test_a_port_in_use_is_one_line() -> None:
     assert result.exit_code == 2
     assert "Address already in use; choose another with --port" in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_who_waits_for_the_compiler_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    heard = Console(file=StringIO(), width=80)
+    monkeypatch.setattr(terminal, "err", heard)
+    with terminal.working("simulating"):
+        pass
+    assert "compiling the solver" in heard.file.getvalue()  # type: ignore[attr-defined]
+    (tmp_path / "kernel.nbi").touch()
+    heard = Console(file=StringIO(), width=80)
+    monkeypatch.setattr(terminal, "err", heard)
+    with terminal.working("simulating"):
+        pass
+    assert heard.file.getvalue() == ""  # type: ignore[attr-defined]

@@ -39,6 +39,11 @@ def kernel_cache() -> Path:
     return folder if _writable(folder) else _private_temporary(name)
 
 
+def compiled() -> bool:
+    """Whether there are compiled kernels; without, the first run takes minutes."""
+    return any(Path(os.environ.get("NUMBA_CACHE_DIR") or kernel_cache()).rglob("*.nbi"))
+
+
 def prepare_kernel_cache() -> None:
     """Point Numba at `kernel_cache()` unless the user chose a folder. Call before importing Numba."""
     if not os.environ.get("NUMBA_CACHE_DIR"):

@@ -16,6 +16,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from shoal.errors import InputError
+from shoal.home import compiled
 from shoal.pictures.choice import rows
 from shoal.pictures.numbers import rounded
 from shoal.trajectory import Array, plain
@@ -77,6 +78,8 @@ def rungs_progress(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def _progress() -> Progress:
+    if not compiled():
+        err.print("compiling the solver for this machine; this takes a few minutes, once", soft_wrap=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     return Progress(*columns, console=err, transient=True, disable=not err.is_terminal)
 
