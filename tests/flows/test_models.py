@@ -195,7 +195,8 @@ def test_champion_stays_where_validation_fails_and_the_tag_says_why(fits: list[F
     # One problem alone is no night.
     history.save(replace(night, started="2026-01-03T02:00:00", only="four-bar", lines=()), no_nights)
     assert validation.doubts(fits[0].estimate, confirmed(fits[0]))
-    history.save(replace(night, started="2026-01-04T02:00:00", lines=()), no_nights)
+    slower = replace(line, verdict=Line.SLOWER)
+    history.save(replace(night, started="2026-01-04T02:00:00", lines=(slower,)), no_nights)
     assert registered(fits[0], "guarded").aliases == ["champion"]
     assert int(store.connect().get_registered_model("guarded").aliases["champion"]) == 4
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from shoal.identification import Estimate
 from shoal_validation.nightly import history
+from shoal_validation.nightly.result import Verdict
 from shoal_validation.nightly.run import machine
 
 from shoal_flows.tracking.model.confirmation import Confirmation
+
+_WRONG = (Verdict.LESS_ACCURATE, Verdict.FAILED)
 
 
 def doubts(estimate: Estimate, confirmation: Confirmation) -> list[str]:
@@ -20,10 +23,10 @@ def doubts(estimate: Estimate, confirmation: Confirmation) -> list[str]:
 
 
 def _night() -> list[str]:
-    """What the latest night of all problems on this machine says, if there was one."""
+    """What the latest night of all problems on this machine says, if there was one; slow lines are right too."""
     nights, _ = history.load(history.folder(), machine())
     whole = [night for night in nights if night.only is None]
-    if not whole or whole[-1].passed:
+    wrong = [line for line in whole[-1].lines if line.verdict in _WRONG] if whole else []
+    if not wrong:
         return []
-    wrong = [line for line in whole[-1].lines if not line.verdict.fine]
     return [f"the night of {whole[-1].started} has {len(wrong)} lines not as they should be: {wrong[0].complaint}"]
