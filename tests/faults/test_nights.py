@@ -7,9 +7,11 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from shoal_validation.nightly.hold import hold
@@ -80,11 +82,17 @@ for night in range({NIGHTS}):
 """
 
 
+@pytest.fixture
+def temporary() -> Iterator[Path]:
+    """A folder of few letters: the path of a socket may have 107."""
+    with TemporaryDirectory(prefix="night-") as folder:
+        yield Path(folder)
+
+
 @pytest.mark.slow
-def test_thirty_nights_through_prefect_and_mlflow(tmp_path: Path) -> None:
+def test_thirty_nights_through_prefect_and_mlflow(tmp_path: Path, temporary: Path) -> None:
     """Files of the state keep their number; databases grow by a bounded amount; MLflow has every night."""
-    home, temporary = tmp_path / "home", tmp_path / "temporary"
-    temporary.mkdir()
+    home = tmp_path / "home"
     ours = {name: value for name, value in os.environ.items() if not name.startswith(("PREFECT_", "MLFLOW_"))}
     environment = {**ours, "SHOAL_HOME": str(home), "TMPDIR": str(temporary)}
     done = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=False)
