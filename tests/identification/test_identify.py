@@ -36,7 +36,7 @@ def test_least_squares_on_casadi_data_of_the_same_mesh_is_exact(name: str) -> No
 def test_data_from_exudyns_fine_mesh_lie_within_the_intervals(name: str) -> None:
     estimate = run(name, "least-squares")
     assert estimate.verdict is Verdict.IDENTIFIED
-    assert "is what the fit leaves; --tolerance" in estimate.message
+    assert "is all that the fit leaves; --tolerance" in estimate.message
     for parameter, true in estimate.truth.items():
         found = estimate.parameters[parameter]
         assert found.value == pytest.approx(true, abs=1e-3)

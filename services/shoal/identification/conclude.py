@@ -180,10 +180,10 @@ def _coarse(model: ForwardModel, mesh: float | None, tests: ResidualTests) -> st
     if model.noise is not None and mesh > model.noise:
         excess, wanted = f"exceeds the noise of {tests.sized(model.noise)}", model.noise
     elif model.noise is None and mesh / _ALIKE < tests.size < mesh * _ALIKE:
-        excess, wanted = "is what the fit leaves", mesh
+        excess, wanted = "is all that the fit leaves", mesh
     else:
         return ""
-    return f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted / 3:.1g} chooses a mesh"
+    return f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted / 3:.1g} finds a better mesh"
 
 
 def _better(profiled: dict[str, Profile]) -> str:
