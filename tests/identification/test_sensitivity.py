@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from shoal.engines import get_engine
 from shoal.engines.casadi_shooting import shot
-from shoal.identification import Measurement, Problem
+from shoal.identification import Measurement, Problem, identify
 from shoal.identification.covariance import blocks_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.least_squares import linearise as naive
-from shoal.identification.sensitivity import sensitivity
+from shoal.identification.sensitivity import believed, sensitivity
 from shoal.identification.uncertainty import linearise
 from shoal_validation.coverage.cases import tip
+from shoal_validation.inverse_precision.cases import rigid_problem, textbook
 
 PATHS = ("initial.OA.angle", "initial.AB.angle")
 STATE = (*PATHS, "initial.OA.rate", "initial.AB.rate")
@@ -106,3 +107,23 @@ def test_steps_that_never_agree_are_not_reliable() -> None:
     seen = sensitivity(model, CHAOTIC)
     assert not seen.reliable
     assert seen.doubt > 1e-2
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_intervals_of_a_chaotic_record_rest_on_its_beginning_and_hold(seed: int) -> None:
+    """Data by scipy's integrator; derivatives of 10 s, and intervals with them, are off by orders of magnitude."""
+    problem = rigid_problem()
+    found = identify(problem, measurement=textbook(problem, 10.0, 0.01, seed=seed))
+    assert "the intervals rest on the first" in found.message
+    for name, true in found.truth.items():
+        value = found.parameters[name]
+        assert abs(value.value - true) < 4 * value.std
+        assert value.std < 1e-2
+
+
+def test_derivatives_that_hold_are_those_of_the_whole_record() -> None:
+    model = model_of(np.array([0.5, 0.2]), 1.0)
+    point = np.array([0.5, 0.2])
+    one, other = sensitivity(model, point), believed(model, point)
+    assert other.end is None
+    assert np.array_equal(one.jacobian, other.jacobian)

@@ -18,7 +18,7 @@ from shoal.identification.methods import Outcome
 from shoal.identification.profiles import Profile, profiles
 from shoal.identification.rank import combinations
 from shoal.identification.residual_tests import ResidualTests, residual_tests
-from shoal.identification.sensitivity import sensitivity
+from shoal.identification.sensitivity import believed
 from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
 from shoal.identification.units import unit
 from shoal.mechanics.simulate import stable_step
@@ -58,7 +58,7 @@ def conclude(
     searched, point, measurement = model, outcome.point, model.measurement
     model = replace(model, memory=None, whole=None, deadline=None)
     # The intervals look at the neighbourhood of the answer.
-    seen = sensitivity(model, point)
+    seen = believed(model, point)
     possible = bool(np.all(np.isfinite(seen.residual)))
     if not possible:
         seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))

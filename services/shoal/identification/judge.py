@@ -116,9 +116,8 @@ def _identifiable(
         reasons.append(f"{', '.join(vague)}: less certain than the range between the bounds")
         advice.append("measure longer or with less noise, or add what is known as a prior")
     if not seen.reliable:
-        notes.append(
-            "the derivatives are in doubt, and so are the intervals: the motion is chaotic, or its steps coarse"
-        )
+        known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"
+        notes.append(f"the motion is chaotic, or its steps coarse: the intervals {known}")
         advice.append("shorten the motion, or tighten the solver's tolerances")
     if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
         share = 100 * tests.size / tests.signal

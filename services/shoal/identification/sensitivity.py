@@ -6,7 +6,7 @@ orders of magnitude); a step that is too small drowns in round-off. Both show wh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,9 @@ AGREED = 1e-2
 _NOTHING = 1e-6
 _ROUNDS = 4
 _WELL_CONDITIONED = 1e3
+_NONE = 1e-200
+_SHORTER = 0.75 ** np.arange(1, 9)
+"""Parts of a record that are tried where the derivatives of the whole cannot be believed."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +37,14 @@ class Sensitivity:
 
     doubt: relative difference of two step sizes, the worst of all directions
     growth: largest over smallest singular value, of parameters in units of their size
+    end: until when the derivatives can be believed [s by the clock]; those of later rows are zero; None: all can
     """
 
     residual: Array
     jacobian: Array
     doubt: float
     growth: float
+    end: float | None = None
 
     @property
     def reliable(self) -> bool:
@@ -68,9 +73,30 @@ def sensitivity(model: ForwardModel, point: Array) -> Sensitivity:
     return Sensitivity(residual, columns @ basis.T / sizes, float(np.max(doubt)), growth)
 
 
+def believed(model: ForwardModel, point: Array) -> Sensitivity:
+    """As `sensitivity`, but of a chaotic motion only of the beginning that has derivatives, where there is one.
+
+    Intervals that rest on the beginning are too wide rather than too narrow: what follows is not held to tell anything.
+    """
+    seen = sensitivity(model, point)
+    if seen.reliable:
+        return seen
+    for end in _SHORTER * model.measurement.end:
+        part = model.until(float(end))
+        if len(part.rows.time) <= len(point):
+            break
+        early = sensitivity(part, point)
+        if early.reliable:
+            jacobian = np.zeros_like(seen.jacobian)
+            kept = np.append(model.rows.time <= end + 1e-12, np.ones(len(seen.residual) - len(model.rows.time), bool))
+            jacobian[kept] = early.jacobian
+            return replace(seen, jacobian=jacobian, end=float(end))
+    return seen
+
+
 def _growth(columns: Array) -> float:
     singular = np.linalg.svd(columns, compute_uv=False)
-    return float(singular[0] / max(singular[-1], 1e-300))
+    return float(singular[0] / singular[-1]) if singular[-1] > _NONE * singular[0] else np.inf
 
 
 def _differences(
@@ -99,9 +125,11 @@ def _differences(
         least[k] = np.min(size[np.isfinite(size)], initial=np.inf)
         if np.all(np.isfinite(table[best])):
             columns[:, k], doubts[k] = table[best], doubt[best]
-    # Where two steps never agree and next to nothing changes, there is nothing but round-off.
+    # Where two steps never agree and next to nothing changes, there is nothing but round-off. The spread of the data is
+    # the measure of that, and not what chaos magnifies.
     size = np.linalg.norm(columns, axis=0)
-    nothing = (doubts > AGREED) & (np.minimum(size, least) < _NOTHING * np.max(size))
+    usual = min(float(np.max(size)), np.sqrt(columns.shape[0]) * model.spread)
+    nothing = (doubts > AGREED) & (np.minimum(size, least) < _NOTHING * usual)
     columns[:, nothing], doubts[nothing] = 0.0, 0.0
     return seen[0], columns, doubts
 

@@ -11,7 +11,7 @@ from shoal.engines import get_engine
 from shoal.identification import Estimate, Problem
 from shoal.identification.covariance import blocks_of
 from shoal.identification.forward import ForwardModel
-from shoal.identification.sensitivity import sensitivity
+from shoal.identification.sensitivity import believed
 from shoal.identification.uncertainty import Linearisation, linearise
 from shoal.trajectory import Array
 
@@ -49,7 +49,7 @@ class Answer:
     @cached_property
     def linearised(self) -> Linearisation:
         """Covariance at the answer."""
-        seen = sensitivity(self.model, self.point)
+        seen = believed(self.model, self.point)
         blocks = blocks_of(self.model, len(seen.residual))
         return linearise(seen.jacobian, seen.residual, self.model.sizes(self.point), blocks)
 

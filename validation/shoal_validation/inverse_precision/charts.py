@@ -167,4 +167,4 @@ def _draw_panel(axis: Axes, panel: Panel, cells: list[Cell]) -> None:
     axis.set_yticks(range(len(noises)), [f"{noise:.0e}" for noise in noises], fontsize=11)
     axis.set_xlabel("horizon [s]", fontsize=12)
     axis.set_ylabel("noise [m]", fontsize=12)
-    axis.set_title(panel.title, fontsize=11)
+    axis.set_title(panel.title.replace(", noise", "\nnoise"), fontsize=11)
