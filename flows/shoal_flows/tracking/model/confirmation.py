@@ -9,13 +9,12 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import ShoalError
 from shoal.identification.measurement import Recording
+from shoal.identification.units import QUANTITIES
 from shoal.pictures.answer import Answer
 from shoal.trajectory import Array
 
 ACCURACY = 1e-4
 """Of the range of a signal: how far engines may differ where no noise is stated and the fit leaves even less."""
-
-_UNITS = {"x": "m", "y": "m", "angle": "rad", "rate": "rad/s"}
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class Confirmation:
     def __str__(self) -> str:
         if self.refusal:
             return f"{self.engine} does not confirm the motion: {self.refusal}"
-        words, unit = "confirms" if self.ok else "does not confirm", _UNITS[self.signal.rpartition(".")[2]]
+        words, unit = "confirms" if self.ok else "does not confirm", QUANTITIES[self.signal.rpartition(".")[2]]
         numbers = f"differs by {self.away:.1e} {unit} (RMS), allowed are {self.allowed:.1e} {unit}"
         return f"{self.engine} {words} the motion: {self.signal} {numbers}"
 

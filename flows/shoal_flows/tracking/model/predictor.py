@@ -12,10 +12,10 @@ from mlflow.models import set_model
 from mlflow.pyfunc import PythonModel
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
+from shoal.identification.units import QUANTITIES
 from shoal.scene import load_scene
 
 TIME = "t [s]"
-_UNITS = {"x": "m", "y": "m", "angle": "rad"}
 
 
 class IdentifiedMachine(PythonModel):  # type: ignore[misc]
@@ -46,7 +46,7 @@ class IdentifiedMachine(PythonModel):  # type: ignore[misc]
 
 def with_unit(column: str) -> str:
     """A column of a trajectory with its unit: `B.x [m]`."""
-    return f"{column} [{_UNITS[column.rpartition('.')[2]]}]"
+    return f"{column} [{QUANTITIES[column.rpartition('.')[2]]}]"
 
 
 set_model(IdentifiedMachine())
