@@ -13,6 +13,7 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
 from shoal.identification.residual_tests import ResidualTests
 from shoal.identification.sensitivity import Sensitivity
+from shoal.identification.stationarity import downhill, sentence
 from shoal.identification.suspects import Suspect, suspects
 from shoal.identification.swaps import exchanged
 from shoal.identification.uncertainty import LEVEL, Linearisation
@@ -47,13 +48,16 @@ def judge(
     parameters: Mapping[str, Value],
     unknown: list[str],
 ) -> Judgement:
-    """The verdict on an outcome: failures first, then the model, then rivals, then what is identifiable."""
+    """The verdict on an outcome: failures first, then the minimum, the model, rivals, and what is identifiable."""
     if not outcome.ended:
         advice = ["allow more time, or start from a better place"]
         return Judgement(Verdict.FAILED, outcome.message or "the method did not come to its end", advice)
     if few(model):
         reason = f"{tests.rows} measured numbers for {len(parameters)} unknown: too few to tell how uncertain they are"
         return Judgement(Verdict.FAILED, reason, ["measure more, or state the noise of the channels"])
+    if unfinished := _unfinished(model, outcome.point, seen):
+        advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
+        return Judgement(Verdict.UNFINISHED, unfinished, advice)
     found: list[Suspect] = []
     if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
         found = suspects(model, outcome.point, seen.residual, seen.jacobian)
@@ -66,6 +70,16 @@ def judge(
         advice = ["measure another marker or a longer motion, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
     return _identifiable(seen, tests, parameters, unknown, found)
+
+
+def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
+    """Why a point is no end of a search; empty if it may be one."""
+    outside = (point < model.lower) | (point > model.upper)
+    if np.any(outside):
+        names = ", ".join(name for name, out in zip(model.names, outside, strict=True) if out)
+        return f"{names} ended outside the bounds of the search"
+    better = downhill(model, point, seen)
+    return "" if better is None else sentence(model, point, better)
 
 
 def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -> Judgement:
