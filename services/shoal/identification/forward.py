@@ -177,14 +177,13 @@ class ForwardModel:
         possible = self._possible(points, values, scene)
         for clock, delay in np.unique(pace[possible], axis=0):
             lanes = np.flatnonzero(possible & np.all(pace == (clock, delay), axis=1))
-            instants = times / clock + delay
-            if instants[0] < 0:
-                continue
+            # Until its time zero a machine is held at its start.
+            instants, shown = np.unique(np.maximum(times / clock + delay, 0.0), return_inverse=True)
             inputs = {path: numbers[lanes] for path, numbers in values.items()}
             shared = {path: float(x[0]) for path, x in inputs.items() if _same_in_all(path, x)}
             inputs = {path: x for path, x in inputs.items() if path not in shared}
             view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
-            seen[lanes] = self._simulate(scene.with_values(shared), inputs, instants, view, name)
+            seen[lanes] = self._simulate(scene.with_values(shared), inputs, instants, view, name)[:, shown]
         return seen
 
     def _simulate(self, scene: Scene, values: dict[str, Array], times: Array, view: Camera, name: str) -> Array:

@@ -56,7 +56,7 @@ def judge(
         return Judgement(Verdict.FAILED, reason, ["measure more, or state the noise of the channels"])
     found: list[Suspect] = []
     if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
-        found = suspects(model, outcome.point, seen.residual, seen.jacobian)
+        found = suspects(model, outcome.point, seen.residual, seen.jacobian, float(np.hypot(tests.noise, tests.mesh))).suspects
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
     rivals = [rival for rival in rivals_of(model, outcome, at) if not _within(model, rival, parameters)]
