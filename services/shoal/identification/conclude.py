@@ -11,6 +11,7 @@ from shoal.errors import InputError
 from shoal.identification.adapt import Stage
 from shoal.identification.bootstrap import bootstrap
 from shoal.identification.covariance import blocks_of
+from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge import Judgement, few, judge
@@ -18,7 +19,7 @@ from shoal.identification.methods import Outcome
 from shoal.identification.profiles import Profile, profiles
 from shoal.identification.rank import combinations
 from shoal.identification.residual_tests import ResidualTests, residual_tests
-from shoal.identification.sensitivity import believed
+from shoal.identification.sensitivity import Sensitivity, believed
 from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
 from shoal.identification.units import unit
 from shoal.mechanics.simulate import stable_step
@@ -56,22 +57,29 @@ def conclude(
 ) -> Estimate:
     """The estimate of an outcome. The runs it takes are not counted: no method is charged for them."""
     searched, point, measurement = model, outcome.point, model.measurement
-    model = replace(model, memory=None, whole=None, deadline=None)
+    model = replace(model, memory=None, whole=None)
+    if model.deadline is not None:
+        model.deadline.extend()
     # The intervals look at the neighbourhood of the answer.
-    seen = believed(model, point)
+    looked = unless_late(lambda: believed(model, point), None)
+    seen = looked or _unseen(model)
+    if looked is None:
+        outcome = replace(outcome, ended=False, message=outcome.message or "no time was left for the intervals")
     possible = bool(np.all(np.isfinite(seen.residual)))
     if not possible:
         seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
     blocks = blocks_of(model, len(seen.residual))
     at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks)
-    predicted = {name: model.observe(point[None], name)[0] for name in measurement.recordings}
-    model_error = _model_error(model, point, predicted) if possible else None
+    predicted = {name: _predicted(model, point, name) for name in measurement.recordings}
+    model_error = unless_late(lambda: _model_error(model, point, predicted), None) if possible and looked else None
     correction = None if model_error is None else -at.pseudo_inverse @ model_error
     mesh = None if model_error is None else float(np.sqrt(np.mean(model_error[: len(model.rows.time)] ** 2)))
     parameters = _parameters(model, point, at, correction)
-    profiled = profiles(model, point, at) if wishes.profiles and possible else {}
+    if looked is None:
+        parameters = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in parameters.items()}
+    profiled = profiles(model, point, at) if wishes.profiles and possible and looked else {}
     parameters |= {n: replace(parameters[n], identifiable=False) for n, p in profiled.items() if p.open}
-    unknown = combinations(model, point, at) if possible else []
+    unknown = combinations(model, point, at) if possible and looked else []
     tests = residual_tests(model, seen.residual, blocks, at.noise, mesh or 0.0)
     if possible:
         judgement = judge(model, outcome, seen, at, tests, parameters, unknown)
@@ -79,7 +87,7 @@ def conclude(
         message = "no parameter set could be simulated; look at the bounds and the scene"
         judgement = Judgement(Verdict.FAILED, message)
     correlation = autocorrelation(seen.residual, blocks)
-    draws = wishes.bootstrap if possible else 0
+    draws = wishes.bootstrap if possible and looked else 0
     rng = np.random.default_rng(seed)
     notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, None if stages else mesh, tests))
     return Estimate(
@@ -121,6 +129,19 @@ def conclude(
         measurement=measurement,
         covariance=_covariance(model, point, at),
     )
+
+
+def _unseen(model: ForwardModel) -> Sensitivity:
+    """What is known of the neighbourhood of an answer where there is no time to look: nothing."""
+    priors = sum(entry.parameter.prior is not None for entry in model.parameters.entries.values())
+    rows = len(model.rows.time) + priors
+    return Sensitivity(np.zeros(rows), np.zeros((rows, len(model.names))), np.inf, np.inf)
+
+
+def _predicted(model: ForwardModel, point: Array, name: str) -> Array:
+    """Channels of a recording at an answer, (samples, channels); nan where there is no time to run it."""
+    nothing = np.full((1, *model.measurement.recordings[name].values.shape), np.nan)
+    return np.asarray(unless_late(lambda: model.observe(point[None], name), nothing)[0])
 
 
 def _values_of(model: ForwardModel, point: Array) -> dict[str, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
@@ -51,7 +52,7 @@ def judge(
         return Judgement(Verdict.FAILED, reason, ["measure more, or state the noise of the channels"])
     found: list[Suspect] = []
     if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
-        found = suspects(model, outcome.point, seen.residual, seen.jacobian)
+        found = unless_late(lambda: suspects(model, outcome.point, seen.residual, seen.jacobian), [])
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
     rivals = [rival for rival in rivals_of(model, outcome, at) if not within(model, rival, parameters)]
