@@ -77,7 +77,7 @@ def _ratio(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(_signed(rng, np.log(low), np.log(high))))
 
 
-def _fault(  # noqa: C901, PLR0911, PLR0912 - a list of kinds
+def _fault(
     kind: str, scene: Scene, seen: list[tuple[str, str]], size: Size, rng: np.random.Generator
 ) -> _Fault | None:
     """A fault of a kind, of random place and size; None where the machine or what is seen of it has none."""
@@ -129,9 +129,7 @@ def _fault(  # noqa: C901, PLR0911, PLR0912 - a list of kinds
             fields = {"youngs_modulus": float(modulus), "element": "ancf-cable", "elements": 4}
             return _Fault({f"bodies.{body}.{field}": value for field, value in fields.items()}, f"bending of {body}")
         case "rate" if scene.name != "four-bar":
-            return _Fault(
-                {f"initial.{body}.rate": _signed(rng, 0.1, 1.0) * size.rate}, f"rate of {body} at the start"
-            )
+            return _Fault({f"initial.{body}.rate": _signed(rng, 0.1, 1.0) * size.rate}, f"rate of {body} at the start")
         case "moving":
             axis = str(rng.choice(["x", "y"]))
             wave = f"{_signed(rng, 0.01, 0.05) * size.length}*sin({float(rng.uniform(0.5, 3.0)) * size.rate}*t)"
@@ -176,7 +174,7 @@ def _recorded(
     going = moments > 0
     try:
         run = get_engine("exudyn").simulate(truth, moments[going])
-    except Exception:  # noqa: BLE001 - of another engine, which may fail in its own way
+    except Exception:
         return None
     if not run.ok:
         return None

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
+import numpy as np
 from shoal.engines import get_engine
 from shoal.identification import Verdict
 from shoal.identification.conclude import NOTHING, conclude
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import get_method
 from shoal.identification.suspects import Suspect
-
-import numpy as np
 
 from shoal_validation.suspects.cases import case
 
@@ -51,7 +50,8 @@ def trial(seed: int, kind: str | None = None) -> Trial:
     outcome = get_method("least-squares")(model, np.random.default_rng(seed), lambda *_: None)
     estimate = conclude(model, outcome, "least-squares", seed, 0.0, [], NOTHING)
     held = [
-        estimate.parameters[name].lower <= truth <= estimate.parameters[name].upper for name, truth in drawn.truth.items()
+        estimate.parameters[name].lower <= truth <= estimate.parameters[name].upper
+        for name, truth in drawn.truth.items()
     ]
     tests = estimate.residual_tests
     return Trial(
@@ -60,7 +60,7 @@ def trial(seed: int, kind: str | None = None) -> Trial:
         drawn.cause,
         estimate.verdict,
         first_of(estimate.suspects, tests.rows),
-        tests.systematic,
+        tests.limited,
         float(np.mean(held)),
         tests.ratio,
     )

@@ -35,7 +35,7 @@ def of_machine(model: ForwardModel) -> Iterator[Candidate]:
     for name, body in scene.bodies.items():
         if not isinstance(body, PointMass):
             rate, most = scene.start(name).rate, 10.0 * size.rate
-            free = Parameter(path=f"initial.{name}.rate", lower=rate - most, upper=rate + most)
+            free = Parameter(path=f"initial.{name}.rate", lower=rate - most, upper=rate + most, scale="linear")
             yield Candidate(f"rate of {name} at the start", rate, free, rate + _STEP * size.rate, "machine")
     yield from _bending(scene, size)
 
@@ -53,7 +53,7 @@ def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
         }
         for field, upper in most.items():
             stated = float(getattr(joint, field))
-            free = Parameter(path=f"joints.{name}.{field}", lower=0.0, upper=max(upper, 4 * stated))
+            free = Parameter(path=f"joints.{name}.{field}", lower=0.0, upper=max(upper, 4 * stated), scale="linear")
             words = "friction" if field == "friction" else "dry friction"
             yield Candidate(f"{words} of {name}", stated, free, stated + _STEP * upper, "machine")
 
@@ -73,7 +73,7 @@ def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
             with_mass = Scene.parse(data)
         except InputError:
             continue
-        free = Parameter(path="bodies.further.mass", lower=1e-6 * size.mass, upper=size.mass)
+        free = Parameter(path="bodies.further.mass", lower=1e-6 * size.mass, upper=size.mass, scale="linear")
         yield Candidate(f"mass at {name}", 0.0, free, _STEP * size.mass, "machine", with_mass)
     for name, body in scene.bodies.items() if len(scene.bodies) > 1 else ():
         field = "density" if isinstance(body, Rod) else "mass"
@@ -118,7 +118,7 @@ def _pivots(scene: Scene, size: Size) -> Iterator[Candidate]:
     for (name, field), place in places.items() if len(places) > 1 else ():
         for axis, stated in enumerate(place):
             path, width = f"joints.{name}.{field}.point.{axis}", _SHIFT * size.length
-            free = Parameter(path=path, lower=stated - width, upper=stated + width)
+            free = Parameter(path=path, lower=stated - width, upper=stated + width, scale="linear")
             yield Candidate(f"{'xy'[axis]} of the pivot {name}", stated, free, stated + _STEP * width, "machine")
 
 

@@ -8,13 +8,13 @@ numbers. Where nothing explains it, values of each candidate are tried over its 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shoal.identification.forward import ForwardModel, TimeIsUp
+from shoal.identification.deadline import TimeIsUp
+from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import descend_many
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.starts import starting_points
@@ -40,6 +40,8 @@ _UNSEEN = 1e-6
 _BETTER = 0.99
 """Of the misfit: a lower one with nothing changed is that of a better minimum."""
 _PATIENCE = 10.0
+_CONSTANT = 0.5
+"""Of the signal: an explanation that leaves more is none, as a constant leaves hardly more."""
 _FAR = 3.0
 """Times the misfit of the best: what leaves more is not listed."""
 
@@ -61,9 +63,7 @@ class _Scored:
     starts: Array
 
 
-def suspects(
-    model: ForwardModel, point: Array, residual: Array, jacobian: Array, noise: float = 0.0
-) -> Findings:
+def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array, noise: float = 0.0) -> Findings:
     """What explains the residual at an answer, the best first. Runs are not counted.
 
     noise: what no explanation can go below [RMS]. Past the model's deadline it ends with what was found until then.
@@ -74,7 +74,8 @@ def suspects(
     except TimeIsUp:
         pass
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
-    found = sorted(search.found, key=lambda s: (float(f"{s.after:.2e}"), s.name))
+    told = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.spread)
+    found = sorted(told, key=lambda s: (float(f"{s.after:.2e}"), s.name))
     return Findings([suspect for suspect in found if suspect.after <= _FAR * found[0].after], search.better)
 
 
@@ -117,7 +118,6 @@ class _Search:
         own = [candidate for candidate in candidates if candidate.scene is None]
         groups = [own, *([candidate] for candidate in candidates if candidate.scene is not None)]
         for group in groups:
-            _on_time(self.model)
             stated = [c.vector(c.probe if c.inverse else c.stated) for c in group]
             points = np.tile(np.append(self.point, stated), (len(group), 1))
             for k, candidate in enumerate(group):
@@ -143,7 +143,6 @@ class _Search:
 
     def _scanned(self, candidate: Candidate, places: Array) -> _Scored:
         """To be fitted from the best of a scan of its values, at each of the places (points, parameters)."""
-        _on_time(self.model)
         free = candidate.freed(self.model)
         values = np.linspace(free.lower[-1], free.upper[-1], _SCAN)
         points = np.column_stack([np.repeat(places, len(values), axis=0), np.tile(values, len(places))])
@@ -155,7 +154,6 @@ class _Search:
         """Fit the most promising with the parameters, and keep those that explain the misfit."""
         promising = sorted((s for s in scored if s.promise < _HOPELESS), key=lambda s: s.promise)
         for entry in promising[:most]:
-            _on_time(self.model)
             free = entry.candidate.freed(self.model)
             starts = np.clip(entry.starts, free.lower, free.upper)
             start = starts[int(np.argmin(free.cost(free.uncounted(starts))))]
@@ -181,12 +179,12 @@ class _Search:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
         begun = []
         for reading in of_data(self.model):
-            _on_time(self.model)
             starts = starting_points(reading.model)
             costs = reading.model.cost(reading.model.uncounted(starts))
-            begun.append((float(np.min(costs)) / reading.model.spread**2, len(begun), reading, starts[np.argsort(costs)]))
+            begun.append(
+                (float(np.min(costs)) / reading.model.spread**2, len(begun), reading, starts[np.argsort(costs)])
+            )
         for _, _, reading, starts in sorted(begun, key=lambda entry: entry[:2])[:_FITTED]:
-            _on_time(self.model)
             ends = descend_many(reading.model, starts[:3], patience=_PATIENCE)
             after = min(misfit(end.residual) for end in ends) * self.model.spread / reading.model.spread
             if explains(self.before, after, self.noise, len(self.residual)):
@@ -205,9 +203,3 @@ class _Search:
 
 def _of_reading(reading: Reading, before: float, after: float, unit: str) -> Suspect:
     return Suspect(reading.name, 1.0, reading.value, before, after, reading.change, unit, "data")
-
-
-def _on_time(model: ForwardModel) -> None:
-    """Raises TimeIsUp past the model's deadline."""
-    if model.deadline is not None and time.monotonic() > model.deadline:
-        raise TimeIsUp(model)
