@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import gauss
+from shoal.mechanics import dynamics, gauss
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import newton
 from shoal.mechanics.integrators.dense import cubic
@@ -75,8 +75,15 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
     for i in range(end):
         auxiliary[i] += (1 - alpha_f) / (1 - alpha_m) * w.a[i]
     if m.constraints.size > 0:
-        gauss.project_rates(tile, m, w.gauss, t + h, w.z, w.zdot, scheme.newton.rank_tolerance)
+        now = dynamics.instant(w, t + h)
+        gauss.project_rates(tile, m, w.gauss, now, w.z, w.zdot, scheme.newton.rank_tolerance)
     return h
 
 
-implement(GeneralizedAlpha, step, FACTS, cubic)
+@njit(cache=True, error_model="numpy")
+def anew(scheme: GeneralizedAlpha) -> None:
+    """The auxiliary acceleration begins as the true one."""
+    scheme.started[0] = 0.0
+
+
+implement(GeneralizedAlpha, step, FACTS, cubic, anew)
