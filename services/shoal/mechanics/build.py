@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import constraints, functions, gauss
+from shoal.mechanics import constraints, fitting, functions, gauss
 from shoal.mechanics.affine import Affine, Number
 from shoal.mechanics.drives import Drives
 from shoal.mechanics.elements import ELEMENTS, ancf_cable, ancf_full, beam
@@ -78,8 +78,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     for one in terms.held:
         if one.drive is not None:
             with _naming(one.name):
-                functions.require_no_jump(one.drive.function, horizon)
-                loads.fitted.append(functions.fit(one.drive, horizon, one.drive.knots, steep=False))
+                fitting.require_no_jump(one.drive.function, horizon)
+                loads.fitted.append(fitting.fit(one.drive, horizon, one.drive.knots, steep=False))
     held_rows = rows.size
     marker_rows = []
     for marker in scene.markers.values():
@@ -339,7 +339,7 @@ class _Loads:
         if f.number == 1.0 or self.horizon == 0.0:
             return -1
         with _naming(field):
-            self.fitted.append(functions.fit(f, self.horizon, f.knots))
+            self.fitted.append(fitting.fit(f, self.horizon, f.knots))
         return len(self.fitted) - 1
 
     def _turn(self, first: Attachment, second: Attachment) -> Number:
@@ -360,13 +360,13 @@ class _Loads:
         if elastic is not None and self.horizon > 0.0:
             size = _SPRING_RANGE
             with _naming(f"loads.{name}.elastic"):
-                fitted = functions.fit(elastic, size, elastic.knots, begin=-size)
-            self.fitted += [fitted, functions.antiderivative(fitted)]
+                fitted = fitting.fit(elastic, size, elastic.knots, begin=-size)
+            self.fitted += [fitted, fitting.antiderivative(fitted)]
             table, energy = len(self.fitted) - 2, len(self.fitted) - 1
         driven = -1
         if drive is not None and self.horizon > 0.0:
             with _naming(f"loads.{name}.torque"):
-                self.fitted.append(functions.fit(drive, self.horizon, drive.knots))
+                self.fitted.append(fitting.fit(drive, self.horizon, drive.knots))
             driven = len(self.fitted) - 1
         vectors = [*vectors, *vectors[-1:] * (3 - len(vectors))]
         self.kinds.append(kind)

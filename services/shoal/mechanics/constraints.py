@@ -22,6 +22,7 @@ from shoal.mechanics.tile import Array, Index, Tile
 from shoal.mechanics.vector import pointer
 from shoal.scene.function import Composed
 
+
 class Constraints(NamedTuple):
     """Product p of constraint k in start[k]:start[k+1] is factor[p] * z[left[p]] * z[right[p]]; left = -1 stands for 1.
 

@@ -49,7 +49,20 @@ def work_space(tile: Tile, m: Arrays) -> Work:
     rows = m.rows * width
     sizes = (rows, rows, rows, 3 * rows, 4 * rows, ELEMENT_ROWS * width, m.forces.size * width, width, 3 * width)
     z, zdot, a, before, stage, element, memory, power, energy = (np.zeros(size) for size in sizes)
-    return Work(gate.home(), z, zdot, a, before, stage, element, memory, power, energy, np.full(1, np.inf), gauss.work_space(width, m))
+    return Work(
+        gate.home(),
+        z,
+        zdot,
+        a,
+        before,
+        stage,
+        element,
+        memory,
+        power,
+        energy,
+        np.full(1, np.inf),
+        gauss.work_space(width, m),
+    )
 
 
 @njit(cache=True, error_model="numpy")

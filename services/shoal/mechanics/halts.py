@@ -41,7 +41,7 @@ def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
     laws = {int(number) for kind in (model.forces.table, model.forces.energy) for number in kind}
     found = []
     for number in (k for k in range(model.functions.size) if k not in laws):
-        found += [model.kinks[number], _narrow(model.breaks(number), longest, adaptive)]
+        found += [model.kinks[number], narrow(model.breaks(number), longest, adaptive)]
     times = np.unique(np.concatenate([np.zeros(0), *found]))
     times = times[(times > RESOLUTION * end) & (times <= end)]
     times = times[np.diff(times, prepend=0.0) > RESOLUTION * end]
@@ -53,7 +53,7 @@ def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
     return Halts(times, start, np.concatenate([np.zeros(0), *marks]))
 
 
-def _narrow(breaks: Array, longest: float, adaptive: bool) -> Array:
+def narrow(breaks: Array, longest: float, adaptive: bool) -> Array:
     """Breaks beside narrow pieces: all of them for fixed steps; where widths change for those that see the error."""
     widths = np.diff(breaks)
     least, most = np.minimum(widths[1:], widths[:-1]), np.maximum(widths[1:], widths[:-1])
@@ -67,7 +67,7 @@ def _marks(model: Model, number: int) -> Array:
     """Places on the elongation between which a force law is smooth and of one width; none for no law."""
     if number < 0:
         return np.zeros(0)
-    return np.union1d(model.kinks[number], _narrow(model.breaks(number), np.inf, True))
+    return np.union1d(model.kinks[number], narrow(model.breaks(number), np.inf, True))
 
 
 @njit(cache=True, error_model="numpy")

@@ -73,7 +73,9 @@ def simulate(
             derived_rows(tile, arrays, room)
             room.memory[:] = forces.initial_memory(tile, arrays.forces, room.z, pack(model.start_angles, part, tile))
         if search is not None:
-            record, found = swarm_motion.march(search, asked, arrays, room, steps, times, model.marker_rows, stops.times)
+            record, found = swarm_motion.march(
+                search, asked, arrays, room, steps, times, model.marker_rows, stops.times
+            )
             evidence.update(found)
             return tuple(unpack(field, part, tile) for field in record)
         scheme = choose(scene.solver, model, tile, part, choice.name)

@@ -129,7 +129,7 @@ class _Cutter:
         # Neighbours within rounding are one place.
         apart = np.diff(every, prepend=-np.inf) > 4 * _ULP * np.abs(every)
         apart |= np.isin(every, edges)
-        every = every[apart]
+        every = np.asarray(every[apart])
         if every.size > _MOST_SWITCHES:
             self._refuse(f"switches more than {_MOST_SWITCHES} times", self.begin)
         return every
@@ -143,10 +143,9 @@ class _Cutter:
             if looked > _MOST_INTERVALS:
                 self._refuse(f"switches too often, or {written(node)} touches 0,", float(lower[0]))
             low, high = enclose(node, lower, upper, 1)
-            if strict:
-                free = (low[0] > 0) | (high[0] < 0)
-            else:
-                free = (low[0] >= 0) | (high[0] <= 0)
+            free = (low[0] > 0) | (high[0] < 0)
+            if not strict:
+                free |= (low[0] == 0) | (high[0] == 0)
             monotone = (low[1] > 0) | (high[1] < 0) | ((low[1] == 0) & (high[1] == 0))
             sure = ~free & monotone
             brackets.append(np.stack([lower[sure], upper[sure]]))

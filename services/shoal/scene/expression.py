@@ -72,6 +72,7 @@ def evaluate_array(text: str, values: Mapping[str, Number]) -> Number:
 
 @lru_cache(maxsize=256)
 def parse(text: str) -> ast.Expression:
+    """The syntax tree of an expression. Raises InputError if it is not arithmetic."""
     if len(text) > _LONGEST:
         raise InputError(f"expression: longer than {_LONGEST} characters")
     try:

@@ -92,12 +92,14 @@ def _value(node: Node, t: Any) -> Any:
 def written(node: Node) -> str:
     """A tree as a user would write it."""
     if not isinstance(node, tuple):
-        return node if node == "t" else f"{node:g}"
+        return "t" if node == "t" else f"{node:g}"
     operation, *arguments = node
-    parts = [written(argument) for argument in arguments]
     if operation in _SIGNS.values():
-        inner = (f"({part})" if isinstance(a, tuple) and a[0] in "+-neg" else part for a, part in zip(arguments, parts))
-        return operation.join(parts if operation == "+" else inner)
-    if operation == "neg":
-        return f"-({parts[0]})"
-    return f"({parts[0]})**2" if operation == "square" else f"{operation}({', '.join(parts)})"
+        closed = [isinstance(argument, tuple) and argument[0] in ("+", "-", "neg") for argument in arguments]
+        first, last = (
+            f"({written(argument)})" if brackets and operation != "+" else written(argument)
+            for argument, brackets in zip(arguments, closed, strict=True)
+        )
+        return f"{first} {operation} {last}" if operation in "+-" else f"{first}{operation}{last}"
+    inner = ", ".join(written(argument) for argument in arguments)
+    return {"neg": f"-({inner})", "square": f"({inner})**2"}.get(operation, f"{operation}({inner})")

@@ -113,10 +113,24 @@ class Function(Record):
         times, values = np.array(self.table).T
         if not self.smooth:
             return np.asarray(np.interp(t.astype(float), times, values))
+        return np.asarray(self._spline()(np.clip(t.astype(float), times[0], times[-1])))
+
+    def table_slope(self, t: float, left: bool) -> float:
+        """The derivative of a table at one time [s], on its left or right side."""
+        assert self.table is not None
+        times, values = np.array(self.table).T
+        row = int(np.searchsorted(times, t, side="left" if left else "right")) - 1
+        if not 0 <= row < len(times) - 1:
+            return 0.0
+        if self.smooth:
+            return float(self._spline()(t, 1))
+        return float((values[row + 1] - values[row]) / (times[row + 1] - times[row]))
+
+    def _spline(self) -> Any:
         # Importing scipy takes longer than reading a scene.
         from scipy.interpolate import CubicSpline
 
-        return np.asarray(CubicSpline(times, values)(np.clip(t.astype(float), times[0], times[-1])))
+        return CubicSpline(*np.array(self.table).T)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shoal.mechanics.halts import Halts, halts
 from shoal.mechanics.integrators import (
     dop853,
     energy_momentum,
@@ -18,7 +19,6 @@ from shoal.mechanics.integrators import (
     semi_implicit_euler,
 )
 from shoal.mechanics.integrators.scheme import Facts
-from shoal.mechanics.halts import Halts, halts
 from shoal.mechanics.model import Model
 from shoal.mechanics.tile import Tile
 from shoal.scene import Solver
