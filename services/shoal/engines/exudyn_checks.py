@@ -80,8 +80,10 @@ def _turns(angle: Array) -> Array:
 
 
 def _energy_drift(machine: Machine, record: Record, rows: Indices, energy: Array, moving: Array) -> float:
-    power = machine.lost_power(record.times, record.q, record.v)
-    lost = np.concatenate([[0.0], np.cumsum(np.diff(record.times) * (power[1:] + power[:-1]) / 2)])
+    # Where a load jumps, steps begin on its right side and end on its left.
+    sides = (record.times, np.nextafter(record.times, 0.0))
+    right, left = (machine.lost_power(side, record.q, record.v) for side in sides)
+    lost = np.concatenate([[0.0], np.cumsum(np.diff(record.times) * (left[1:] + right[:-1]) / 2)])
     energy = energy + lost[rows]
     # A machine at rest has no energy to compare with; round-off of its potential must not count as drift.
     scale = max(float(np.max(moving)), 1e-9 * float(np.max(np.abs(energy))), np.finfo(float).tiny)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Value, Verdict
 from shoal.identification.forward import ForwardModel
@@ -16,6 +18,7 @@ from shoal.identification.stationarity import downhill, sentence
 from shoal.identification.suspects import Suspect, suspects
 from shoal.identification.swaps import exchanged
 from shoal.identification.uncertainty import Linearisation
+from shoal.trajectory import Array
 
 _DECISIVE = 5.0
 """A property of the measurement that lowers even a small misfit by this factor refutes what was stated of it."""

@@ -17,7 +17,7 @@ from shoal.mechanics import reach as reaches
 from shoal.mechanics.build import build, with_start
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.groups import start_angle
-from shoal.mechanics.integrators import Choice, choose, facts, pick
+from shoal.mechanics.integrators import Choice, choose, facts, halting, pick
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.march import SAMPLED, Record, march
 from shoal.mechanics.model import Model
@@ -57,6 +57,7 @@ def simulate(
         _check_step(scene, choice)
     step = scene.solver.step
     steps = scene.solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / step - 1e-9))
+    stops = halting(scene.solver, model, choice.name, float(times[-1]))
     tile, parts = tiles(lanes)
 
     def run(part: slice) -> tuple[Array, ...]:
@@ -69,13 +70,14 @@ def simulate(
             derived_rows(tile, arrays, room)
             room.memory[:] = forces.initial_memory(tile, arrays.forces, room.z, pack(model.start_angles, part, tile))
         if search is not None:
-            record, found = swarm_motion.march(search, asked, arrays, room, steps, times, model.marker_rows)
+            record, found = swarm_motion.march(
+                search, asked, arrays, room, steps, times, model.marker_rows, stops.times
+            )
             evidence.update(found)
             return tuple(unpack(field, part, tile) for field in record)
         scheme = choose(scene.solver, model, tile, part, choice.name)
-        record = march(
-            tile, scheme, arrays, room, step, steps, times, model.marker_rows.ravel(), scene.solver.rank_tolerance
-        )
+        rows, tolerance = model.marker_rows.ravel(), scene.solver.rank_tolerance
+        record = march(tile, scheme, arrays, room, step, steps, times, rows, tolerance, stops)
         return tuple(unpack(field, part, tile) for field in record)
 
     workers = min(threads or os.cpu_count() or 1, len(parts))
@@ -136,7 +138,7 @@ def _key(scene: Scene, end: float) -> tuple[str, float]:
     """What a model is built from: the scene, and up to where its functions of time are wanted [s]."""
     usual = {name: Solver.model_fields[name].default for name in _PACE}
     neutral = scene.model_copy(update={"solver": scene.solver.model_copy(update=usual)})
-    return neutral.model_dump_json(), max(end, scene.solver.duration) + max(0.0, scene.solver.step - usual["step"])
+    return neutral.model_dump_json(), max(end, scene.solver.duration)
 
 
 @lru_cache(maxsize=64)

@@ -139,7 +139,7 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
         newton.add_reactions(tile, m, w, room.newton, room.middle)
         # The unknown is the midpoint, which moves half as far as the end.
         dynamics.derive(tile, m, w.z, m.held_rows, False)
-        constraints.residual(tile, m.constraints, m.functions, t + h, w.z, w.gauss.gap)
+        constraints.residual(tile, m.constraints, m.functions, dynamics.instant(w, t + h), w.z, w.gauss.gap)
         for k in range(m.constraints.size * width):
             w.gauss.gap[k] *= 0.5
         newton.correct(tile, m, w, room.newton, room.middle, 4.0 / (h * h), 2.0 / h)

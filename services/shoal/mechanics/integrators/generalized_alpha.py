@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import gauss, sparse
+from shoal.mechanics import dynamics, gauss, sparse
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import newton
 from shoal.mechanics.integrators.dense import cubic
@@ -77,7 +77,8 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
     if m.constraints.size > 0:
         for i in range(end):
             w.before[i] = w.zdot[i]
-        gauss.project_rates(tile, m, w.gauss, t + h, w.z, w.zdot, scheme.newton.rank_tolerance)
+        now = dynamics.instant(w, t + h)
+        gauss.project_rates(tile, m, w.gauss, now, w.z, w.zdot, scheme.newton.rank_tolerance)
         if m.driven:
             _count_impulse(tile, m, w, h)
     return h
@@ -98,4 +99,10 @@ def _count_impulse(tile: Tile, m: Arrays, w: Work, h: float) -> None:
         w.power[i % width] -= (w.zdot[i] - 0.5 * w.before[i]) * w.stage[i] / h
 
 
-implement(GeneralizedAlpha, step, FACTS, cubic)
+@njit(cache=True, error_model="numpy")
+def anew(scheme: GeneralizedAlpha) -> None:
+    """The auxiliary acceleration begins as the true one."""
+    scheme.started[0] = 0.0
+
+
+implement(GeneralizedAlpha, step, FACTS, cubic, anew)

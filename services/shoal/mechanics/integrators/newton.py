@@ -140,6 +140,7 @@ def solve(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, mass_factor:
     residual = newton.residual
     end = m.unknowns * len(tile)
     iterations = 0
+    t = dynamics.instant(w, t)
     while iterations < ITERATIONS:
         iterations += 1
         dynamics.force(tile, m, w, t, w.z, w.zdot, residual)

@@ -60,6 +60,11 @@ def interpolate(
     raise NotImplementedError(type(scheme).__name__)
 
 
+def restart(scheme: Any) -> None:
+    """Forget earlier steps: what follows does not continue them smoothly."""
+    raise NotImplementedError(type(scheme).__name__)
+
+
 def adaptive(scheme: Any) -> bool:
     """Whether the scheme chooses its steps itself."""
     raise NotImplementedError(type(scheme).__name__)
@@ -70,10 +75,11 @@ def averages(scheme: Any) -> bool:
     raise NotImplementedError(type(scheme).__name__)
 
 
-def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quintic) -> None:
+def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quintic, anew: Any = None) -> None:
     """Let compiled calls with settings of this type run the kernel `step`, and `inside` for the motion within it.
 
-    The parameters of the kernels are named as those of `advance` and `interpolate`.
+    anew: forgets what a scheme remembers from step to step, if anything. The parameters of the kernels are named as
+    those of `advance`, `interpolate` and `restart`.
     """
 
     def ours(scheme: Any) -> bool:
@@ -86,6 +92,12 @@ def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quint
     @overload(interpolate, jit_options={"error_model": "numpy"})
     def choose_inside(tile, scheme, m, w, past, x, h, q, v):  # type: ignore[no-untyped-def]
         return _body(inside) if ours(scheme) else None
+
+    @overload(restart, jit_options={"error_model": "numpy"})
+    def choose_restart(scheme):  # type: ignore[no-untyped-def]
+        if not ours(scheme):
+            return None
+        return (lambda scheme: None) if anew is None else _body(anew)
 
     @overload(adaptive)
     def choose_adaptive(scheme):  # type: ignore[no-untyped-def]
