@@ -56,10 +56,10 @@ def comes_by_itself(prefect: str, name: str, parameters: Mapping[str, object]) -
     (schedule,) = call(schedules, [{"schedule": rule, "active": True, "parameters": parameters}])
 
     def begun() -> list[dict[str, Any]]:
-        runs = call(f"{prefect}/api/flow_runs/filter", {"flow_runs": {"start_time": {"after_": first.isoformat()}}})
+        runs = call(f"{prefect}/api/flow_runs/filter", {"flow_runs": {"start_time": {"is_null_": False}}})
         return [run for run in runs if run["auto_scheduled"] and run["created_by"]["id"] == schedule["id"]]
 
-    (run,) = until(begun, "a run of the schedule")
+    run = until(begun, "a run of the schedule")[0]
     urlopen(Request(f"{schedules}/{schedule['id']}", method="DELETE"), timeout=30).close()
     return dict(run)
 
