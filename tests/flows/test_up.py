@@ -216,5 +216,5 @@ def test_everything_starts_again_on_what_is_there() -> None:
         home.chmod(0o755)
         for _ in range(2):
             with running(home, "--postgres") as at:
-                assert all(urlopen(f"{at[name.upper()]}/ready", timeout=5).status == 200 for name in SERVICES)
+                assert all(urlopen(f"{at[name.upper()]}/ready", timeout=60).status == 200 for name in SERVICES)
                 check(at)
