@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sqlite3
 import time
 from collections.abc import Callable, Mapping
@@ -114,6 +115,14 @@ def _end(at: Mapping[str, str], home: Path, run: str, when: datetime) -> None:
     ):
         cursor.execute("UPDATE flow_run SET end_time = %s WHERE id = %s", (f"{text}+00", run))
         assert cursor.rowcount == 1
+
+
+def fails_aloud(home: Path) -> None:
+    """A scheduler that cannot read its schedules says so in the output of `make up`. Nothing is scheduled any more."""
+    with closing(sqlite3.connect(home / "prefect" / "prefect.db", timeout=60)) as database, database:
+        database.execute("ALTER TABLE deployment_schedule RENAME TO deployment_schedule_away")
+    line = re.compile(r"ERROR.* schedule_deployments\(\)")
+    until(lambda: line.search((home / "up.log").read_text(errors="replace")), "the scheduler's failure is told")
 
 
 def slots_taken(prefect: str) -> int:

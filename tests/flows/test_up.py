@@ -25,6 +25,7 @@ from background import (
     automate,
     comes_by_itself,
     comes_late,
+    fails_aloud,
     goes_after_90_days,
     nights,
     slots_taken,
@@ -148,6 +149,7 @@ def test_a_study_outlives_prefects_server(tmp_path: Path, undisturbed: Mapping[s
         check_study(at, run, undisturbed)
         assert "prefect ended by itself: it is started again" in (tmp_path / "up.log").read_text()
         check_afterwards(tmp_path, at, scheduled, run)
+        fails_aloud(tmp_path)
 
 
 @pytest.mark.slow
