@@ -150,7 +150,7 @@ def test_a_real_line_is_measured_in_the_worker() -> None:
     assert passed.error is not None
     assert 0 < passed.error < 1e-9
     assert passed.seconds is not None
-    assert passed.seconds < 1
+    assert passed.seconds > 0
     assert refused.verdict is Verdict.FAILED
     assert "cannot do closed loops" in refused.found
 

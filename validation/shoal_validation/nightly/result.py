@@ -12,6 +12,8 @@ from shoal.trajectory import plain
 
 SCHEMA = "shoal-night"
 VERSION = 1
+ROUND_OFF = 1e-10
+"""Errors below this are noise."""
 
 
 class Verdict(StrEnum):
@@ -34,7 +36,8 @@ class Result:
     """One line of a night.
 
     expected, found: in words; error, limit: in `unit`, None where there is none; seconds: median of whole calls;
-    reason: why this limit; usual_error, usual_seconds: medians of the nights before, None on the first one.
+    reason: why this limit; noise: error below which more than usual is no loss; usual_error, usual_seconds: medians of
+    the nights before, None on the first one.
     """
 
     problem: str
@@ -49,6 +52,7 @@ class Result:
     status: str
     verdict: Verdict
     reason: str
+    noise: float = ROUND_OFF
     usual_error: float | None = None
     usual_seconds: float | None = None
 
