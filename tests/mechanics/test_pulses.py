@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ def impulse(scene: Scene) -> float:
 def integral(function: Any, places: list[float]) -> float:
     """Of a function that is smooth between places."""
     total = 0.0
-    for low, high in zip(places[:-1], places[1:], strict=True):
+    for low, high in pairwise(places):
         total += (high - low) / 2 * float(WEIGHTS @ function((low + high) / 2 + (high - low) / 2 * NODES))
     return total
 

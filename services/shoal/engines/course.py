@@ -69,8 +69,7 @@ class Course:
 
     def _slope(self, t: float, left: bool) -> float:
         if self.pieces is not None:
-            low, high = at(self.pieces.around(t, left), np.array([t]))
-            return float(low[1, 0] + high[1, 0]) / 2
+            return float(self._bounded(t, left)[1])
         return self.function.table_slope(t, left)
 
     def __call__(self, t: Array) -> Array:
@@ -84,4 +83,13 @@ class Course:
         for number in np.unique(which):
             chosen: Any = which == number
             out[chosen] = value(nodes[number], t[chosen])
+        if not np.all(known := np.isfinite(out)):
+            # sin(t)/t at 0
+            out[~known] = [self._bounded(float(instant))[0] for instant in t[~known]]
         return out
+
+    def _bounded(self, t: float, left: bool = False) -> Array:
+        """Value and slope by bounds as narrow as rounding."""
+        assert self.pieces is not None
+        low, high = at(self.pieces.around(t, left), np.array([t]))
+        return np.asarray(low[:, 0] + high[:, 0]) / 2

@@ -18,6 +18,8 @@ from shoal.mechanics.tile import Array, Index, Tile
 
 NARROW = 0.25
 """Pieces narrower than this fraction of the longest step are not left to the step."""
+PARTS = 8
+"""Fixed steps that a narrow piece is passed in."""
 GRADED = 1.9
 """Neighbouring pieces whose widths differ by more than this factor lead to something narrow."""
 CROSSED = 0.5
@@ -54,13 +56,14 @@ def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
 
 
 def narrow(breaks: Array, longest: float, adaptive: bool) -> Array:
-    """Breaks beside narrow pieces: all of them for fixed steps; where widths change for those that see the error."""
+    """Places at narrow pieces: for steps that see their error where widths change, for fixed ones PARTS to a piece."""
     widths = np.diff(breaks)
+    if not adaptive:
+        chosen = np.flatnonzero(widths < NARROW * longest)
+        inside = breaks[chosen, None] + widths[chosen, None] * np.linspace(0.0, 1.0, PARTS + 1)
+        return np.unique(np.concatenate([inside[:, 1:].ravel(), breaks[chosen]]))
     least, most = np.minimum(widths[1:], widths[:-1]), np.maximum(widths[1:], widths[:-1])
-    chosen = least < NARROW * longest
-    if adaptive:
-        chosen &= most > GRADED * least
-    return breaks[1:-1][chosen]
+    return breaks[1:-1][(least < NARROW * longest) & (most > GRADED * least)]
 
 
 def _marks(model: Model, number: int) -> Array:
