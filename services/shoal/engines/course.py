@@ -15,11 +15,28 @@ from shoal.mechanics.halts import narrow
 from shoal.scene import Function
 from shoal.scene.branches import Branches, branches
 from shoal.scene.enclosure import at
-from shoal.scene.formula import value
+from shoal.scene.formula import Node, value
 from shoal.trajectory import Array
 
 SLOPE_JUMP = 1e-9
 """A slope that changes by less than this, or than this relative to itself, does not jump."""
+
+
+_SOON = 1e-6
+"""[s]"""
+
+
+def slope_after(f: Function, t: float) -> float:
+    """The derivative of a function on the right side of one instant [s]. Raises InputError where it has none."""
+    if f.formula is None:
+        return f.table_slope(t, left=False)
+    return float(_bounded(branches(f.formula, t, t + _SOON).nodes[0], t)[1])
+
+
+def _bounded(node: Node, t: float) -> Array:
+    """Value and slope of a smooth tree by bounds as narrow as rounding."""
+    low, high = at(node, np.array([t]))
+    return np.asarray(low[:, 0] + high[:, 0]) / 2
 
 
 @dataclass
@@ -69,7 +86,7 @@ class Course:
 
     def _slope(self, t: float, left: bool) -> float:
         if self.pieces is not None:
-            return float(self._bounded(t, left)[1])
+            return float(_bounded(self.pieces.around(t, left), t)[1])
         return self.function.table_slope(t, left)
 
     def __call__(self, t: Array) -> Array:
@@ -85,11 +102,7 @@ class Course:
             out[chosen] = value(nodes[number], t[chosen])
         if not np.all(known := np.isfinite(out)):
             # sin(t)/t at 0
-            out[~known] = [self._bounded(float(instant))[0] for instant in t[~known]]
+            out[~known] = [
+                _bounded(self.pieces.around(float(instant), False), float(instant))[0] for instant in t[~known]
+            ]
         return out
-
-    def _bounded(self, t: float, left: bool = False) -> Array:
-        """Value and slope by bounds as narrow as rounding."""
-        assert self.pieces is not None
-        low, high = at(self.pieces.around(t, left), np.array([t]))
-        return np.asarray(low[:, 0] + high[:, 0]) / 2
