@@ -102,7 +102,6 @@ class Course:
             out[chosen] = value(nodes[number], t[chosen])
         if not np.all(known := np.isfinite(out)):
             # sin(t)/t at 0
-            out[~known] = [
-                _bounded(self.pieces.around(float(instant), False), float(instant))[0] for instant in t[~known]
-            ]
+            gaps = t[~known].tolist()
+            out[~known] = [_bounded(self.pieces.around(gap, False), gap)[0] for gap in gaps]
         return out
