@@ -10,7 +10,7 @@ from numba import njit
 from shoal.mechanics import constraints, dynamics, gauss, model
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
-from shoal.mechanics.integrators.scheme import adaptive, advance, interpolate, restart
+from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.tile import Array, Index, Tile
 from shoal.mechanics.vector import pointer
@@ -202,7 +202,8 @@ def march(
                         dissipated[lane] += taken * 5.0 / 12.0 * w.power[lane]
             weight = 1.0 / 12.0 if free else 0.5
             for lane in range(width):
-                dissipated[lane] += weight * taken * (last_power[lane] + power[lane])
+                other = power[lane] if averages(scheme) else last_power[lane]
+                dissipated[lane] += weight * taken * (other + power[lane])
                 last_power[lane] = power[lane]
         if (number + cuts) % check_every == 0 or number == steps or now >= ending:
             _energy(tile, m, w, energy, record.energy_scale)

@@ -28,6 +28,7 @@ class Facts(NamedTuple):
     order: in time. stable_step_times_frequency, stable_step_times_decay: the largest stable step times the
     highest frequency and times the fastest decay rate. adaptive: chooses its steps by its tolerances.
     conserves: the energy of a frictionless machine stays what it was, but for round-off and Newton's tolerance.
+    mean_power: w.power is the mean over the step, by which the energy balance is as exact as that; else at its end.
     """
 
     order: int
@@ -37,6 +38,7 @@ class Facts(NamedTuple):
     stable_step_times_decay: float = np.inf
     adaptive: bool = False
     conserves: bool = False
+    mean_power: bool = False
 
 
 def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, t: float, h: float) -> float:
@@ -65,6 +67,11 @@ def restart(scheme: Any) -> None:
 
 def adaptive(scheme: Any) -> bool:
     """Whether the scheme chooses its steps itself."""
+    raise NotImplementedError(type(scheme).__name__)
+
+
+def averages(scheme: Any) -> bool:
+    """Whether the scheme leaves the mean power of its step in w.power."""
     raise NotImplementedError(type(scheme).__name__)
 
 
@@ -97,6 +104,12 @@ def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quint
         if not ours(scheme):
             return None
         return (lambda scheme: True) if facts.adaptive else (lambda scheme: False)
+
+    @overload(averages)
+    def choose_averages(scheme):  # type: ignore[no-untyped-def]
+        if not ours(scheme):
+            return None
+        return (lambda scheme: True) if facts.mean_power else (lambda scheme: False)
 
 
 def _body(kernel: Any) -> Any:
