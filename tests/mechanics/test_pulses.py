@@ -121,6 +121,7 @@ def test_a_thousand_pulses(integrator: str) -> None:
     assert max(error(integrator, draw, plain=False) for _ in range(500)) < (1e-9 if integrator in EXACT else 2e-2)
 
 
+TOOTH = [[k / 1000, 1.0 if k == 437 else 0.0] for k in range(1001)]
 TEETH = [[0.0, 0.0]] + [[k / 50 + x, y] for k in range(1, 41) for x, y in ((0.0, 0.0), (1e-5, 1.0), (2e-5, 0.0))]
 
 
@@ -131,6 +132,7 @@ TEETH = [[0.0, 0.0]] + [[k / 50 + x, y] for k in range(1, 41) for x, y in ((0.0,
         pytest.param("step(sin(50*t))", 1.0, 8 * np.pi / 50, id="nested"),
         pytest.param("+".join(f"step(t-.0{k})-step(t-.0{k}01)" for k in range(1, 10)), 1.0, 9e-4, id="nine-teeth"),
         pytest.param({"table": TEETH, "smooth": False}, 1.0, 40e-5, id="table-of-teeth"),
+        pytest.param({"table": TOOTH}, 10.0, 1e-3, id="one-row-of-a-spline"),
         pytest.param("exp(-((t - 0.43)/1e-5)**2)", 1.0, 1e-5 * np.sqrt(np.pi), id="smooth-and-narrow"),
         pytest.param("1/(1 + ((t - 0.43)/1e-5)**2)", 1.0, 1e-5 * (np.arctan(5.7e4) + np.arctan(4.3e4)), id="peak"),
         pytest.param("step(t - 0.5) - step(t - 0.50001)", 1.0, 1e-5, id="within-a-step"),

@@ -131,8 +131,7 @@ def _stretches(
         ]
         return found, pieces.edges[1:-1]
     edges = np.unique(np.array([begin, *(knot for knot in knots if begin < knot < horizon), horizon], dtype=float))
-    kinks = np.array([kink for kink in getattr(function, "kinks", knots) if begin < kink < horizon])
-    return [_Stretch(function, None, edges[:-1], edges[1:])], kinks
+    return [_Stretch(function, None, edges[:-1], edges[1:])], edges[1:-1]
 
 
 def _bisected(part: _Stretch, begin: float, horizon: float, scale: float, steep: bool) -> list[tuple[Array, Array]]:
