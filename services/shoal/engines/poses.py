@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.engines.course import slope_after
 from shoal.errors import InputError
 from shoal.scene import (
     GROUND,
@@ -100,11 +101,8 @@ def value(f: Function, time: float) -> float:
 
 
 def slope(f: Function, time: float) -> float:
-    """Its derivative, by differences of fourth order that reach to both sides, or forward at the start."""
-    step = 1e-4
-    at = time + step * (np.array([-2, -1, 1, 2]) if time >= 2 * step else np.arange(5))
-    weights = np.array([1, -8, 8, -1]) if time >= 2 * step else np.array([-25, 48, -36, 16, -3])
-    return float(weights @ f(at)) / (12 * step)
+    """Its derivative from then on."""
+    return slope_after(f, time)
 
 
 def kept_turn(scene: Scene, joint: Joint) -> float | None:

@@ -196,6 +196,12 @@ class Model:
         first, last = self.functions.start[number : number + 2]
         return self.functions.breaks[first + number : last + number + 1]
 
+    def sizes(self, number: int) -> Array:
+        """A bound on the size of a function on each of its pieces."""
+        first, last = self.functions.start[number : number + 2]
+        coefficients = self.functions.coefficients.reshape(self.functions.start[-1], -1)
+        return np.asarray(np.abs(coefficients[first:last]).sum(axis=1))
+
     @property
     def flexible(self) -> int:
         """Number of flexible elements."""

@@ -211,9 +211,9 @@ def march(
     """March one lane from the state in `room`, as `march.march` does, with accelerations that a swarm finds.
 
     marker_rows: (markers, 4). stops: times that steps are cut short to end at [s]. The second result says what the
-    swarm did: evaluations of Gauss's function counted, accelerations sought, mean and worst `excess` of G above its true
-    minimum [kg m^2/s^4], mean and worst `error` of the acceleration relative to the true one, both measured in the mass
-    metric.
+    swarm did: evaluations of Gauss's function counted, accelerations sought, mean and worst `excess` of G above its
+    true minimum [kg m^2/s^4], mean and worst `error` of the acceleration relative to the true one, both measured in
+    the mass metric.
     """
     n, step, markers = arrays.unknowns, solver.step, len(marker_rows)
     q, v = room.z[:n], room.zdot[:n]
