@@ -13,12 +13,14 @@ from shoal.identification.bootstrap import bootstrap
 from shoal.identification.covariance import blocks_of
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate, Value, Verdict
-from shoal.identification.forward import ForwardModel
+from shoal.identification.forward import ForwardModel, accepts
 from shoal.identification.judge import Judgement, few, judge
 from shoal.identification.methods import Outcome
+from shoal.identification.problem import RESERVED
 from shoal.identification.profiles import Profile, profiles
 from shoal.identification.rank import combinations
 from shoal.identification.residual_tests import ResidualTests, residual_tests
+from shoal.identification.rivals import valley
 from shoal.identification.sensitivity import Sensitivity, believed
 from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
 from shoal.identification.units import unit
@@ -74,7 +76,10 @@ def conclude(
     model_error = unless_late(lambda: _model_error(model, point, predicted), None) if possible and looked else None
     correction = None if model_error is None else -at.pseudo_inverse @ model_error
     mesh = None if model_error is None else float(np.sqrt(np.mean(model_error[: len(model.rows.time)] ** 2)))
-    parameters = _parameters(model, point, at, correction)
+    alone: tuple[Outcome, list[Array]] = (outcome, [])
+    found, beside = unless_late(lambda: valley(model, outcome, at), alone) if looked and possible else alone
+    ends = [point, *beside]
+    parameters = _spanning([_parameters(model, end, at, correction) for end in ends])
     if looked is None:
         parameters = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in parameters.items()}
     profiled = profiles(model, point, at) if wishes.profiles and possible and looked else {}
@@ -82,7 +87,7 @@ def conclude(
     unknown = combinations(model, point, at) if possible and looked else []
     tests = residual_tests(model, seen.residual, blocks, at.noise, mesh or 0.0)
     if possible:
-        judgement = judge(model, outcome, seen, at, tests, parameters, unknown)
+        judgement = judge(model, found, seen, at, tests, parameters, unknown)
     else:
         message = "no parameter set could be simulated; look at the bounds and the scene"
         judgement = Judgement(Verdict.FAILED, message)
@@ -100,7 +105,7 @@ def conclude(
         advice=judgement.advice,
         choice=outcome.choice,
         parameters=parameters,
-        quantities=_quantities(model, point, at, correction),
+        quantities=_spanning([_quantities(model, end, at, correction) for end in ends]),
         combinations=unknown,
         fitness=outcome.fitness,
         rms=float(np.sqrt(outcome.fitness / model.things)),
@@ -110,7 +115,7 @@ def conclude(
         wall_s=wall,
         history=searched.counter.history,
         iterations=outcome.iterations,
-        minima=[{**_values_of(model, p), "fitness": f} for p, f in outcome.minima if np.isfinite(f)],
+        minima=[{**_values_of(model, p), "fitness": f} for p, f in found.minima if np.isfinite(f)],
         residual_autocorrelation=correlation,
         residual_tests=tests,
         suspects=judgement.suspects,
@@ -221,9 +226,27 @@ def _parameters(model: ForwardModel, point: Array, at: Linearisation, correction
         shift = None if correction is None else float(correction[k])
         told = about.fixed and not at_bound and about.std < span and not few(model)
         known = _value(float(point[k]), about, told, shift, at_bound)
-        known = replace(known, unit=unit(model.parameters.entries[name].parameter.path or ""))
-        found[name] = known.exponential() if model.parameters.logarithmic[k] else known
+        path = model.parameters.entries[name].parameter.path or ""
+        known = known.exponential() if model.parameters.logarithmic[k] else known
+        told = known.identifiable and _possible(model, path, known)
+        found[name] = replace(known, unit=unit(path), identifiable=told)
     return found
+
+
+def _possible(model: ForwardModel, path: str, known: Value) -> bool:
+    """Whether an interval ends at values that can be: a mass whose interval reaches below zero is not known."""
+    head, _, name = path.partition(".")
+    if head == RESERVED:
+        return known.lower > 0.0 or name not in ("clock", "scale")
+    return not path or all(accepts(model.scene, path, end) for end in (known.lower, known.upper))
+
+
+def _spanning(ends: list[dict[str, Value]]) -> dict[str, Value]:
+    """The values of the first, with intervals that span those at all ends of its valley."""
+    first = ends[0]
+    lower = {name: min(end[name].lower for end in ends) for name in first}
+    upper = {name: max(end[name].upper for end in ends) for name in first}
+    return {name: replace(value, lower=lower[name], upper=upper[name]) for name, value in first.items()}
 
 
 def _covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:

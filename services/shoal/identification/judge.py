@@ -109,7 +109,7 @@ def _identifiable(
         reasons.append(f"only combinations are known: {len(unknown)} direction(s) leave the motion unchanged")
         advice.append("fix one parameter of each combination, or rely on the quantities that are identifiable")
     elif vague := [name for name, v in parameters.items() if not v.identifiable and not v.at_bound]:
-        reasons.append(f"{', '.join(vague)}: less certain than the range between the bounds")
+        reasons.append(f"{', '.join(vague)}: less certain than the range of what is possible")
         advice.append("measure longer or with less noise, or add what is known as a prior")
     if not seen.reliable:
         known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"

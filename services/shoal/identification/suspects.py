@@ -105,7 +105,7 @@ def _freed(model: ForwardModel, point: Array) -> Iterator[_Freed]:
         key = f"suspect-{name}"
         problem = model.problem.model_copy(update={"parameters": {**model.problem.parameters, key: parameter}})
         free = replace(model, problem=problem, memory=None, whole=None)
-        start = np.append(point, np.log(stated) if parameter.scale == "log" else stated)
+        start = np.append(point, np.log(stated) if parameter.logarithmic else stated)
         yield _Freed(name, free, start, start)
 
 
