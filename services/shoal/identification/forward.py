@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -157,12 +157,18 @@ class ForwardModel:
         return np.asarray(np.sum(residuals**2, axis=1) / self.samples)
 
     def observe(
-        self, points: Array, name: str | None = None, times: Array | None = None, scene: Scene | None = None
+        self,
+        points: Array,
+        name: str | None = None,
+        times: Array | None = None,
+        scene: Scene | None = None,
+        factors: Mapping[str, float] | None = None,
     ) -> Array:
         """Channels of a recording in the model, (points, samples, channels); nan where a simulation failed.
 
         name: of the recording, else the first; times: by its clock [s], else those of its samples; scene: instead of
-        the model's. Not counted.
+        the model's; factors: by which fields of it are multiplied. Not counted. Until its time zero a machine is held
+        at its start.
         """
         name = name or next(iter(self.measurement.recordings))
         recording = self.measurement.recordings[name]
@@ -170,20 +176,20 @@ class ForwardModel:
         scene = scene or self.scene
         scene = scene.with_values(recording.stated.known) if recording.stated.known else scene
         values = self.parameters.scene_values(points, name)
+        for path, factor in (factors or {}).items():
+            values[path] = factor * values.get(path, np.full(len(points), scene.value(path)))
         seen_by = self.parameters.measurement_values(points, name, recording.stated)
         seen = np.full((len(points), len(times), len(recording.channels)), np.nan)
         pace = np.column_stack([seen_by.pop("clock"), seen_by.pop("delay")])
         possible = self._possible(points, values, scene)
         for clock, delay in np.unique(pace[possible], axis=0):
             lanes = np.flatnonzero(possible & np.all(pace == (clock, delay), axis=1))
-            instants = times / clock + delay
-            if instants[0] < 0:
-                continue
+            instants, shown = np.unique(np.maximum(times / clock + delay, 0.0), return_inverse=True)
             inputs = {path: numbers[lanes] for path, numbers in values.items()}
             shared = {path: float(x[0]) for path, x in inputs.items() if _same_in_all(path, x)}
             inputs = {path: x for path, x in inputs.items() if path not in shared}
             view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
-            seen[lanes] = self._simulate(scene.with_values(shared), inputs, instants, view, name)
+            seen[lanes] = self._simulate(scene.with_values(shared), inputs, instants, view, name)[:, shown]
         return seen
 
     def _simulate(self, scene: Scene, values: dict[str, Array], times: Array, view: Camera, name: str) -> Array:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Value, Verdict
 from shoal.identification.forward import ForwardModel
@@ -12,26 +14,34 @@ from shoal.identification.methods import Outcome
 from shoal.identification.residual_tests import ResidualTests
 from shoal.identification.rivals import relation, rivals_of, within
 from shoal.identification.sensitivity import Sensitivity
-from shoal.identification.suspects import Suspect, suspects
+from shoal.identification.stationarity import downhill, sentence
+from shoal.identification.suspects import Findings, Suspect, suspects
 from shoal.identification.swaps import exchanged
 from shoal.identification.uncertainty import Linearisation
+from shoal.trajectory import Array
 
 _DECISIVE = 5.0
 """A property of the measurement that lowers even a small misfit by this factor refutes what was stated of it."""
 _NEGLIGIBLE = 1e-4
 """Of the signal: a misfit below it is not looked into."""
+_OTHERS = 3
+"""Suspects that explain less than the best, and are named beside it."""
 _FEWEST = 3
 """More numbers than parameters that have to be measured for what the fit leaves to tell the noise."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict, why, what to do next, and the properties of the measurement that would explain a misfit."""
+    """The verdict, why, what to do next, and the properties of the measurement that would explain a misfit.
+
+    better: a point (parameters,) that fits better, if one was met, and its fitness
+    """
 
     verdict: Verdict
     message: str = ""
     advice: list[str] = field(default_factory=list)
     suspects: list[Suspect] = field(default_factory=list)
+    better: tuple[Array, float] | None = None
 
 
 def judge(
@@ -43,18 +53,33 @@ def judge(
     parameters: Mapping[str, Value],
     unknown: list[str],
 ) -> Judgement:
-    """The verdict on an outcome: failures first, then the model, then rivals, then what is identifiable."""
+    """The verdict on an outcome: failures first, then the minimum, the model, rivals, and what is identifiable."""
     if not outcome.ended:
         advice = ["allow more time, or start from a better place"]
         return Judgement(Verdict.FAILED, outcome.message or "the method did not come to its end", advice)
     if few(model):
         reason = f"{tests.rows} measured numbers for {len(parameters)} unknown: too few to tell how uncertain they are"
         return Judgement(Verdict.FAILED, reason, ["measure more, or state the noise of the channels"])
+    if unfinished := _unfinished(model, outcome.point, seen):
+        advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
+        return Judgement(Verdict.UNFINISHED, unfinished, advice)
     found: list[Suspect] = []
-    if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
-        found = unless_late(lambda: suspects(model, outcome.point, seen.residual, seen.jacobian), [])
+    if (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal:
+        findings = unless_late(
+            lambda: suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained), Findings()
+        )
+        found = findings.suspects
+        if findings.better is not None:
+            place = findings.better
+            fitness = unless_late(lambda: float(model.cost(model.uncounted(place[None]))[0]), outcome.fitness)
+            reason = f"a better minimum was met, of fitness {fitness:.3g} instead of {outcome.fitness:.3g}"
+            advice = ["look for another minimum (--method multi-start)"]
+            return Judgement(Verdict.FAILED, reason, advice, found, (place, fitness))
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
+    if not outcome.converged:
+        advice = ["start from a better place, or look for another minimum (--method multi-start)"]
+        return Judgement(Verdict.FAILED, outcome.message or "the search did not converge", advice, found)
     rivals = [rival for rival in rivals_of(model, outcome, at) if not within(model, rival, parameters)]
     if rivals:
         kinds = {relation(model, outcome.point, rival) for rival in rivals}
@@ -64,15 +89,27 @@ def judge(
     return _identifiable(seen, tests, parameters, unknown, found)
 
 
+def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
+    """Why a point is no end of a search; empty if it may be one."""
+    outside = (point < model.lower) | (point > model.upper)
+    if np.any(outside):
+        names = ", ".join(name for name, out in zip(model.names, outside, strict=True) if out)
+        return f"{names} ended outside the bounds of the search"
+    better = downhill(model, point, seen)
+    return "" if better is None else sentence(model, point, better)
+
+
 def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -> Judgement:
     reason = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
     advice = []
     if found:
         reason += f"; {found[0]}"
         # A clock and gravity, for instance, have the same effect on a free swing.
-        equals = [other.words for other in found[1:] if other.after < 1.5 * found[0].after]
+        best, *equals = (suspect.words for suspect in found if suspect.equals(found[0], tests.rows))
         reason += f" (as would {', '.join(equals)})" if equals else ""
-        advice.append(f"check the {' or the '.join(s.words for s in found)}, or seek it as a parameter")
+        others = [suspect.words for suspect in found if suspect.words not in (best, *equals)][:_OTHERS]
+        advice.append(f"check the {' or the '.join([best, *equals])}, or seek it as a parameter")
+        advice += [f"less likely: the {' or the '.join(others)}"] if others else []
     if (exchange := exchanged(model)) is not None:
         reason += f"; {exchange}"
         advice.append("check which column is which marker")
@@ -83,8 +120,11 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
 
 
 def _against(tests: ResidualTests) -> str:
+    if tests.explains_nothing:
+        return f"no less than from a constant: the data vary by {tests.sized(tests.signal)}"
     if tests.noise_stated:
-        return f"{tests.ratio:.0f} times the noise of {tests.sized(tests.noise)}"
+        kind = "which is like white noise" if tests.white else "which is not white noise"
+        return f"{tests.ratio:.2g} times the noise of {tests.sized(tests.noise)}, {kind}"
     return f"and not by noise; the data vary by {tests.sized(tests.signal)}"
 
 
@@ -115,10 +155,12 @@ def _identifiable(
         known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"
         notes.append(f"the motion is chaotic, or its steps coarse: the intervals {known}")
         advice.append("shorten the motion, or tighten the solver's tolerances")
-    if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
-        share = 100 * tests.size / tests.signal
-        size = f"{tests.sized(tests.size)} ({share:.2g} % of the signal)"
-        notes.append(f"a systematic residual of {size} widens the intervals")
+    if tests.limited and tests.size > _NEGLIGIBLE * tests.signal:
+        share = 100 * tests.excess / tests.signal
+        size = f"{tests.sized(tests.excess)} ({share:.2g} % of the signal)"
+        notes.append(f"a systematic residual of {size} widens the intervals: the model, not the noise, limits them")
         notes += [str(found[0])] if found else []
+    elif tests.too_large:
+        notes.append(f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found")
     verdict = Verdict.COMBINATION if reasons else Verdict.IDENTIFIED
     return Judgement(verdict, "; ".join([*reasons, *notes]), advice, found)
