@@ -112,7 +112,9 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
     rest = [(outcome.point, outcome.fitness), *outcome.minima]
     choice = f"{outcome.choice}; then from other values of {', '.join(model.names[k] for k in free)}"
     message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
-    return Outcome(best.point, best.fitness, [*outcome.iterations, *rows], message, rest, choice)
+    return Outcome(
+        best.point, best.fitness, [*outcome.iterations, *rows], message, rest, choice, converged=best.converged
+    )
 
 
 def explains(model: ForwardModel, outcome: Outcome) -> bool:
