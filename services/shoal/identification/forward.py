@@ -267,7 +267,8 @@ class ForwardModel:
             whole.counter.charge(len(points), points[0], np.inf)
             values = self.cost(found)
             best = int(np.argmin(values))
-            if (-self.measurement.end, values[best]) < (-whole.reached[0], whole.reached[1]):
+            reached = (-self.measurement.end, values[best]) < (-whole.reached[0], whole.reached[1])
+            if reached and np.isfinite(values[best]):
                 whole.reached = (self.measurement.end, float(values[best]), points[best].copy())
         return found
 
