@@ -15,7 +15,7 @@ from shoal.identification.residual_tests import ResidualTests
 from shoal.identification.rivals import relation, rivals_of, within
 from shoal.identification.sensitivity import Sensitivity
 from shoal.identification.stationarity import downhill, sentence
-from shoal.identification.suspects import Suspect, suspects
+from shoal.identification.suspects import Findings, Suspect, suspects
 from shoal.identification.swaps import exchanged
 from shoal.identification.uncertainty import Linearisation
 from shoal.trajectory import Array
@@ -32,12 +32,16 @@ _FEWEST = 3
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict, why, what to do next, and the properties of the measurement that would explain a misfit."""
+    """The verdict, why, what to do next, and the properties of the measurement that would explain a misfit.
+
+    better: a point (parameters,) that fits better, if one was met, and its fitness
+    """
 
     verdict: Verdict
     message: str = ""
     advice: list[str] = field(default_factory=list)
     suspects: list[Suspect] = field(default_factory=list)
+    better: tuple[Array, float] | None = None
 
 
 def judge(
@@ -61,9 +65,16 @@ def judge(
         return Judgement(Verdict.UNFINISHED, unfinished, advice)
     found: list[Suspect] = []
     if (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal:
-        found = unless_late(
-            lambda: suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained).suspects, []
+        findings = unless_late(
+            lambda: suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained), Findings()
         )
+        found = findings.suspects
+        if findings.better is not None:
+            place = findings.better
+            fitness = unless_late(lambda: float(model.cost(model.uncounted(place[None]))[0]), outcome.fitness)
+            reason = f"a better minimum was met, of fitness {fitness:.3g} instead of {outcome.fitness:.3g}"
+            advice = ["look for another minimum (--method multi-start)"]
+            return Judgement(Verdict.FAILED, reason, advice, found, (place, fitness))
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
     if not outcome.converged:
@@ -138,7 +149,7 @@ def _identifiable(
         reasons.append(f"only combinations are known: {len(unknown)} direction(s) leave the motion unchanged")
         advice.append("fix one parameter of each combination, or rely on the quantities that are identifiable")
     elif vague := [name for name, v in parameters.items() if not v.identifiable and not v.at_bound]:
-        reasons.append(f"{', '.join(vague)}: less certain than the range between the bounds")
+        reasons.append(f"{', '.join(vague)}: less certain than the range of what is possible")
         advice.append("measure longer or with less noise, or add what is known as a prior")
     if not seen.reliable:
         known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"
