@@ -19,6 +19,7 @@ from shoal.errors import InputError
 from shoal.home import compiled
 from shoal.pictures.choice import rows
 from shoal.pictures.numbers import rounded
+from shoal.pictures.start import remarks
 from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
@@ -118,6 +119,8 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
         f"{trajectory.constraint_drift[0]:.1e}"
     )
     _say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms")
+    for remark in remarks(trajectory.model):
+        _say(remark)
     if (verification := trajectory.model.get("verification")) is not None:
         errors = {"time": verification["time_error"], "mesh": verification["mesh_error"]}
         known = ", ".join(f"{name} {error:.1e} m" for name, error in errors.items() if error is not None)

@@ -19,6 +19,7 @@ from shoal.engines.exudyn_loads import add_load
 from shoal.engines.exudyn_record import Indices
 from shoal.engines.poses import initial_poses, span
 from shoal.errors import InputError
+from shoal.mechanics.start import complete
 from shoal.scene import GROUND, DrivenAngle, Rod, Scene
 from shoal.trajectory import Array
 
@@ -88,6 +89,7 @@ class Machine:
 def build(exu: Any, scene: Scene, beam: Beam) -> Machine:
     """Enter bodies, gravity, joints and loads at the initial state. Raises InputError for a joint that is open."""
     items = importlib.import_module("exudyn.itemInterface")
+    scene = complete(scene).scene
     poses = initial_poses(scene)
     container = exu.SystemContainer()
     mbs = container.AddSystem()

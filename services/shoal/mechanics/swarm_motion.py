@@ -217,9 +217,8 @@ def march(
     tally, y = _Tally(), np.empty(n)
     power = dissipated = start = 0.0
     sample = 0
-    before = q.copy(), v.copy()
     _arrive(SINGLE, arrays, room, 0.0, solver.rank_tolerance, ASSEMBLY, gap, record.drift)
-    record.correction[0] = np.max(np.abs(q - before[0]), initial=0.0)
+    record = record._replace(begin=np.concatenate([q, v]))
     directions = marker_rows[:, 2], marker_rows[:, 3]
     turned = np.arctan2(room.z[directions[1]], room.z[directions[0]])
     for number in range(steps + 1):
