@@ -288,3 +288,116 @@ def refused(kind: str, seed: int) -> str:
     except InputError as error:
         return str(error)
     return ""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_start_keeps_what_is_stated_and_agrees_with_the_closed_form(kind: str) -> None:
+    assert max(misses(kind, seed) for seed in range(6)) < 1e-9
+
+
+@pytest.mark.parametrize("kind", ["four-bar", "distance"])
+def test_a_contradiction_is_refused_by_name(kind: str) -> None:
+    for seed in range(3):
+        text = refused(kind, seed)
+        assert text.startswith("initial.b.")
+        assert "joint" in text and "\n" not in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_starts_of_many_machines(kind: str) -> None:
+    assert max(misses(kind, seed) for seed in range(100, 250)) < 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["four-bar", "parallelogram", "distance", "six-bar"])
+def test_contradictions_of_many_machines(kind: str) -> None:
+    for seed in range(100, 130):
+        text = refused(kind, seed)
+        assert text.startswith("initial.") and "\n" not in text
+
+
+RHOMBUS = four_bar(np.random.default_rng(3), equal=True).scene
+
+
+def done(data: dict[str, Any], **start: Any) -> Scene:
+    return complete(Scene.parse({**data, "initial": start})).scene
+
+
+def test_a_rate_that_is_not_stated_follows_and_a_stated_zero_contradicts() -> None:
+    """A parallelogram: both cranks turn alike, and the coupler does not turn."""
+    angles = {name: {"angle": 1.2} for name in "ab"}
+    found = done(RHOMBUS, **angles | {"b": {"angle": 1.2, "rate": 2.0}})
+    assert found.initial["a"].rate == pytest.approx(2.0, abs=1e-12)
+    assert found.initial["b"].rate == 2.0
+    assert found.initial["c"].rate == pytest.approx(0.0, abs=1e-12)
+    still = {"a": {"angle": 1.2, "rate": 0.0}, "b": {"angle": 1.2, "rate": 2.0}}
+    with pytest.raises(InputError, match=r"initial\.b\.rate: 2 rad/s contradicts initial\.a\.rate = 0: joint B asks for 0"):
+        done(RHOMBUS, **still)
+
+
+def test_digits_that_were_rounded_are_corrected_in_the_order_of_the_scene() -> None:
+    rng = np.random.default_rng(0)
+    machine, states = drawn("four-bar", rng)
+    start = {name: {"angle": round(states[name].angle, 6)} for name in ("b", "a", "c")}
+    found = done(machine.scene, **start)
+    assert found.initial["b"].angle == start["b"]["angle"]
+    for name in "ac":
+        assert 0 < abs(found.initial[name].angle - start[name]["angle"]) < 1e-4
+
+
+def test_a_pinned_body_keeps_no_other_place_or_velocity() -> None:
+    with pytest.raises(InputError, match=r"initial\.a\.position: \[0\.5, 0\] m cannot be kept: joint O would stay 0\.5 m"):
+        done(RHOMBUS, a={"position": [0.5, 0.0]})
+    with pytest.raises(InputError, match=r"initial\.a\.velocity: \[0, 3\] m/s cannot be kept: joint O asks for \[0, 0\]"):
+        done(RHOMBUS, a={"angle": 1.0, "velocity": [0.0, 3.0]})
+
+
+def test_two_angles_that_a_joint_ties_are_kept_or_refused() -> None:
+    bodies = {name: bar(1.0, np.random.default_rng(1)) for name in "ab"}
+    joints = {"O": pin("ground", [0.0, 0.0], "a"), "A": {"kind": "weld", "angle": 0.5, **pin("a", "end", "b")}}
+    assert done(scene(bodies, joints), b={"angle": 0.7}).initial["a"].angle == pytest.approx(0.2, abs=1e-12)
+    with pytest.raises(InputError, match=r"initial\.b\.angle: 0\.7 rad contradicts initial\.a\.angle = 0\.3: joint A"):
+        done(scene(bodies, joints), a={"angle": 0.3}, b={"angle": 0.7})
+
+
+def test_what_is_set_moves_the_rest_of_a_loop_and_lanes_without_a_start_are_marked() -> None:
+    rng = np.random.default_rng(0)
+    machine, states = drawn("four-bar", rng)
+    stated = Scene.parse({**machine.scene, "initial": {name: {"angle": one.angle} for name, one in states.items()}})
+    near = states["a"].angle + 0.1
+    found = {name: state_of(complete(stated.with_values({"initial.a.angle": near})).scene, name) for name in states}
+    told = machine.states(near, 0.0)
+    assert min(max(apart(found[n], one[n]) for n in states) for one in told) < 1e-9
+    lanes = complete(stated.with_lanes({"initial.a.angle": np.array([states["a"].angle, near])}))
+    assert not np.any(lanes.failed)
+    assert lanes.scene.initial["b"].angle[1] == pytest.approx(found["b"].angle, abs=1e-9)
+    lengths = np.array([stated.bodies["c"].points["end"][0], 50.0])
+    assert list(complete(stated.with_lanes({"bodies.c.named_points.end.0": lengths})).failed) == [False, True]
+
+
+def test_a_folded_parallelogram_moves_on_one_of_its_branches() -> None:
+    """Bars in one line: rates that only the first derivative of the joints allows are no motion."""
+    flat = {name: {"angle": 0.0} for name in "abc"}
+    found = done(RHOMBUS, **flat | {"a": {"angle": 0.0, "rate": 1.0}, "c": {"angle": 0.0, "rate": 0.0}})
+    assert found.initial["b"].rate == pytest.approx(1.0, abs=1e-9)
+    free = done(RHOMBUS, **flat | {"a": {"angle": 0.0, "rate": 1.0}}).initial
+    crank, rocker, rod = (free[name].rate for name in "abc")
+    l1, l2 = (RHOMBUS["bodies"][name]["named_points"]["end"][0] for name in "ac")
+    # The second derivative of the loop along its line: l1 a^2 + l2 c^2 = l1 b^2.
+    assert l1 * crank**2 + l2 * rod**2 == pytest.approx(l1 * rocker**2, abs=1e-8)
+    wrong = {"a": {"angle": 0.0, "rate": 1.0}, "b": {"angle": 0.0, "rate": 0.5}}
+    wrong["c"] = {"angle": 0.0, "rate": l1 * (0.5 - 1.0) / l2}
+    with pytest.raises(InputError, match="allow no"):
+        done(RHOMBUS, **wrong)
+
+
+def test_open_chains_take_the_direct_path() -> None:
+    bodies = {name: bar(1.0, np.random.default_rng(1)) for name in "ab"}
+    joints = {"O": pin("ground", [0.0, 0.0], "a"), "A": pin("a", "end", "b")}
+    chain = scene(bodies, joints)
+    assert is_direct(Scene.parse(chain))
+    assert not is_direct(Scene.parse({**chain, "initial": {"b": {"position": [0.0, 1.0]}}}))
+    found = done(chain, a={"rate": 1.0})
+    assert found.initial["b"].rate == 0.0
+    assert done(chain, b={"position": [0.0, 1.0]}).initial["a"].angle == pytest.approx(np.pi / 2, abs=1e-9)

@@ -82,7 +82,7 @@ class Assembly:
         self.closure = Closure(scene, np.zeros((lanes, 3 * len(scene.bodies))))
         self.guess = self._guess(0, np.ones(self.angles.shape, dtype=bool))
         extents = _extents(scene)
-        ends = [self.closure.place(self.guess, at).value for j in scene.joints.values() for at in places(j)]
+        ends = [self.closure.here(self.guess, at).value for j in scene.joints.values() for at in places(j)]
         spread = max((float(np.max(np.abs(a - ends[0]))) for a in ends), default=0.0)
         self.size = max(sum(extents.values()), spread) or 1.0
         arms = np.array([max(extents[name], 1e-3 * self.size) for name in scene.bodies])
@@ -133,10 +133,10 @@ class Assembly:
     def others(self, poses: Array) -> Iterator[Array]:
         """Other poses of one machine that keep what is stated, each once."""
         fixed, values = self.held([one for one in self.statements if one.firm])
-        known = [poses]
+        known, first = [poses], np.where(fixed, values, self.guess)
         for attempt in range(1, ATTEMPTS):
             begin = np.where(fixed, values, self._guess(attempt, fixed[:, 2::3]))
-            found, gap = self.close(Closure(self.scene, begin, not self._own), begin, fixed)
+            found, gap = self.close(Closure(self.scene, first), begin, fixed)
             # Turns of a body are one pose.
             away = [np.max(np.abs(np.exp(1j * (found - one)[:, 2::3]) - 1.0)) for one in known]
             if gap[0] <= CLOSED and min(away) > 1e-6:
@@ -161,10 +161,13 @@ class Assembly:
         if not len(rows.names):
             return u, np.zeros(self.lanes)
         length = np.where(rows.angular, 1.0, self.size) / (1.0 if weight is None else weight)
-        gap, slope = rows.gap / length, rows.slope / length[:, None]
+        gap = rows.gap / length
         norm = np.linalg.norm(gap, axis=1)
         damping = np.full(self.lanes, 1e-3)
         running = norm > 1e-15
+        if not np.any(running):
+            return u, np.max(np.abs(gap), axis=1)
+        slope = rows.slope / length[:, None]
         for _ in range(ITERATIONS):
             if not np.any(running):
                 break

@@ -6,8 +6,9 @@ the order of the scene. All arrays lead with the lanes.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
@@ -30,19 +31,36 @@ from shoal.scene import (
     Slider,
     Weld,
 )
+from shoal.scene.joints import places
 
 
-class Rows(NamedTuple):
-    """Gaps (lanes, rows) [m, rad], derivatives by the poses (lanes, rows, 3 bodies), and by time (lanes, rows).
+@dataclass(frozen=True)
+class Rows:
+    """Gaps (lanes, rows) [m, rad], and their derivatives by time (lanes, rows).
 
-    names: the joint of every row. angular: whether its gap is an angle.
+    parts: of every row its columns and the derivatives by these poses, (lanes, columns). names: its joint.
+    angular: whether its gap is an angle.
     """
 
     gap: Array
-    slope: Array
     rate: Array
+    parts: tuple[tuple[list[int], Array], ...]
     names: tuple[str, ...]
     angular: Index
+    columns: int
+
+    @cached_property
+    def slope(self) -> Array:
+        """Derivatives by all poses, (lanes, rows, 3 bodies)."""
+        dense = np.zeros((*self.gap.shape, self.columns))
+        for row, (columns, slope) in enumerate(self.parts):
+            dense[:, row, columns] = slope
+        return dense
+
+    def along(self, v: Array) -> Array:
+        """The derivatives times rates v (lanes, 3 bodies)."""
+        products = [np.einsum("li,li->l", slope, v[:, columns]) for columns, slope in self.parts]
+        return np.stack(products, 1) if products else np.zeros_like(self.gap)
 
 
 @dataclass(frozen=True)
@@ -81,23 +99,28 @@ class Closure:
     def __init__(self, scene: Scene, begin: Array, own: bool = True) -> None:
         self.scene, self.begin, self.own = scene, begin, own
         self.column = {name: 3 * number for number, name in enumerate(scene.bodies)}
+        self._points = {name for name, body in scene.bodies.items() if isinstance(body, PointMass)}
 
     def rows(self, u: Array) -> Rows:
         """All joints at the poses u."""
-        found: list[tuple[str, Array, Array, Array]] = []
+        found: list[tuple[str, list[int], Array, Array, Array]] = []
         for name, joint in self.scene.joints.items():
-            found += [(name, *part) for part in self._joint(joint, u)]
-        for name, body in self.scene.bodies.items():
-            if isinstance(body, PointMass):  # it has no angle
-                k, none = self.column[name] + 2, np.zeros(len(u))
-                found.append((name, u[:, k], self._unit(u, k), none))
+            bodies = dict.fromkeys(at.body for at in places(joint) if at.body != GROUND)
+            columns = [self.column[body] + k for body in bodies for k in range(3)]
+            part = copy(self)
+            part.begin, part.column = self.begin[:, columns], {body: 3 * k for k, body in enumerate(bodies)}
+            found += [(name, columns, *row) for row in part._joint(joint, u[:, columns])]
+        none = np.zeros(len(u))
+        for name in self._points:  # a point mass has no angle
+            k = self.column[name] + 2
+            found.append((name, [k], u[:, k], np.ones((len(u), 1)), none))
         if not found:
-            none = np.zeros((len(u), 0))
-            return Rows(none, np.zeros((len(u), 0, u.shape[1])), none, (), np.zeros(0, dtype=np.int64))
-        names, gap, slope, rate = zip(*found, strict=True)
-        slopes = np.stack(slope, 1)
-        angular = ~np.any(np.delete(slopes, np.s_[2::3], axis=2), axis=(0, 2))
-        return Rows(np.stack(gap, 1), slopes, np.stack(rate, 1), names, angular.astype(np.int64))
+            return Rows(np.zeros((len(u), 0)), np.zeros((len(u), 0)), (), (), np.zeros(0, dtype=np.int64), u.shape[1])
+        names, columns_of, gap, slope, rate = zip(*found, strict=True)
+        angular = [not any(np.any(s[:, k]) for k, c in enumerate(cs) if c % 3 != 2)
+                   for cs, s in zip(columns_of, slope, strict=True)]  # fmt: skip
+        parts = tuple(zip(columns_of, slope, strict=True))
+        return Rows(np.stack(gap, 1), np.stack(rate, 1), parts, names, np.array(angular, dtype=np.int64), u.shape[1])
 
     def place(self, u: Array, at: Attachment) -> Vector:
         """Where an attachment is [m]."""
@@ -115,6 +138,19 @@ class Closure:
         slope = np.zeros((len(u), u.shape[1]), dtype=complex)
         slope[:, k], slope[:, k + 1], slope[:, k + 2] = 1.0, 1j, 1j * arm
         return Vector(u[:, k] + 1j * u[:, k + 1] + arm, slope, np.zeros(len(u)))
+
+    def here(self, u: Array, at: Attachment) -> Vector:
+        """The same with derivatives by the attachment's own body alone, (lanes, 3)."""
+        part, columns = copy(self), self._own(at)
+        part.column = {at.body: 0}
+        return part.place(u[:, columns], at)
+
+    def speed(self, vector: Vector, v: Array, at: Attachment) -> Array:
+        """Velocity [m/s] of what `here` gave."""
+        return np.sum(vector.slope * v[:, self._own(at)], axis=1) + vector.rate
+
+    def _own(self, at: Attachment) -> list[int]:
+        return [] if at.body == GROUND else [self.column[at.body] + k for k in range(3)]
 
     def direction(self, u: Array, at: Attachment, turn: Number) -> Vector:
         """Unit vector of a body at an attachment, turned by `turn` [rad]."""
@@ -164,10 +200,6 @@ class Closure:
             rate = rate_of(joint.angle) if isinstance(joint, DrivenAngle) else 0.0
             found.append((np.angle(unit(b - a - turn)), b_slope - a_slope, none - rate))
         return found
-
-    @property
-    def _points(self) -> set[str]:
-        return {name for name, body in self.scene.bodies.items() if isinstance(body, PointMass)}
 
     def _length(self, joint: Distance, u: Array, now: Array) -> tuple[Number, float]:
         if joint.length is not None:

@@ -45,7 +45,6 @@ class Velocities:
         self.size, self.walk = assembly.size, assembly.walk
         self.guess = assembly.walk.poses(self.closure, poses[:, 2::3], assembly.rates)[1]
         self.flexible = any(body.element != "rigid" for body in self.scene.bodies.values())
-        self.lower = np.linalg.cholesky(_metric(self.scene, poses, self.size))
         largest = [np.max(np.abs(one.values), initial=0.0) * self._unit(one) for one in self.statements]
         fastest = max([*largest, float(np.max(np.abs(self.rows.rate), initial=0.0)), float(np.max(np.abs(self.guess)))])
         self.speed = fastest or 1.0
@@ -59,7 +58,8 @@ class Velocities:
             return Moving(self.guess, np.ones(self.lanes, dtype=bool), [])
         given = [one for one in self.statements if one is not without]
         keep = [k for k, name in enumerate(self.rows.names) if name != joint]
-        basis = _Basis(self.lower, self.guess)
+        lower = np.linalg.cholesky(_metric(self.scene, self.poses, self.size))
+        basis = _Basis(lower, self.guess)
         ok, broken = np.ones(self.lanes, dtype=bool), []
         for k in keep:
             length = 1.0 if self.rows.angular[k] else self.size
@@ -88,7 +88,7 @@ class Velocities:
 
     def _easy(self) -> bool:
         """Whether the first guess is right: at rest, or too large a machine to look for branches."""
-        missed = np.einsum("lri,li->lr", self.rows.slope, self.guess) + self.rows.rate
+        missed = self.rows.along(self.guess) + self.rows.rate
         wrong = [self.guess[:, one.columns] - one.values for one in self.statements]
         if max(float(np.max(np.abs(part), initial=0.0)) for part in (missed, *wrong)) > 1e-13 * self.speed:
             return False

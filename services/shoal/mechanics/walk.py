@@ -36,12 +36,14 @@ class Walk:
         self.scene = scene
         self.steps: list[Step] = []
         known = {GROUND}
-        while waiting := [name for name in scene.bodies if name not in known]:
+        waiting = dict.fromkeys(scene.bodies)
+        while waiting:
             step = self._next(waiting, known)
             self.steps.append(step)
             known.add(step[0])
+            waiting.pop(step[0])
 
-    def _next(self, waiting: list[str], known: set[str]) -> Step:
+    def _next(self, waiting: dict[str, None], known: set[str]) -> Step:
         for kinds in ((Revolute, Weld), None, (Slider,), (Distance,)):
             if kinds is None:
                 for name in waiting:
@@ -49,7 +51,7 @@ class Walk:
                         return name, None, None, 0.0
                 continue
             for joint in self.scene.joints.values():
-                if not isinstance(joint, kinds) or isinstance(joint, Coupling):
+                if not isinstance(joint, kinds):
                     continue
                 for here, there in ((joint.first, joint.second), (joint.second, joint.first)):
                     if here.body in known and there.body in waiting:
@@ -58,8 +60,9 @@ class Walk:
                         if joint.length is not None:
                             return there.body, here, there, value_of(joint.length)
         if any(isinstance(joint, Coupling) for joint in self.scene.joints.values()):
-            return waiting[0], None, None, 0.0
-        raise InputError(f"initial.{waiting[0]}.position: say where {waiting[0]} starts; no joint point tells it")
+            return next(iter(waiting)), None, None, 0.0
+        name = next(iter(waiting))
+        raise InputError(f"initial.{name}.position: say where {name} starts; no joint point tells it")
 
     @property
     def closing(self) -> list[str]:
@@ -82,10 +85,10 @@ class Walk:
                 start = self.scene.start(name)
                 position, speed = as_complex(start.position or (0.0, 0.0)), as_complex(start.velocity)
             else:
-                at = closure.place(u, here)
+                at = closure.here(u, here)
                 arm = unit(u[:, k + 2]) * place_of(self.scene, there)
                 position = at.value + away - arm
-                speed = np.einsum("ij,ij->i", at.slope, v) + at.rate - 1j * v[:, k + 2] * arm
+                speed = closure.speed(at, v, here) - 1j * v[:, k + 2] * arm
             u[:, k], u[:, k + 1] = np.real(position), np.imag(position)
             v[:, k], v[:, k + 1] = np.real(speed), np.imag(speed)
         return u, v
@@ -93,7 +96,7 @@ class Walk:
 
 def guessed_angles(scene: Scene, lanes: int) -> tuple[Array, Array]:
     """Angles [rad] and rates [rad/s] of all bodies: as stated, as a neighbour tells, or zero; each (lanes, bodies)."""
-    both = []
+    both, ties = [], [joint for joint in scene.joints.values() if isinstance(joint, _TIES)]
     for quantity, level in (("angle", 0), ("rate", 1)):
         found: dict[str, Number] = {
             name: value for name, start in scene.initial.items() if (value := getattr(start, quantity)) is not None
@@ -101,7 +104,7 @@ def guessed_angles(scene: Scene, lanes: int) -> tuple[Array, Array]:
         found[GROUND] = 0.0
         waiting = [name for name in scene.bodies if name not in found]
         while waiting:
-            tied = next(_tied(scene, found, level), None)
+            tied = next(_tied(scene, ties, found, level), None)
             name, value = tied if tied is not None else (waiting[0], 0.0)
             found[name] = value
             waiting.remove(name)
@@ -109,10 +112,14 @@ def guessed_angles(scene: Scene, lanes: int) -> tuple[Array, Array]:
     return both[0], both[1]
 
 
-def _tied(scene: Scene, found: dict[str, Number], level: int) -> Iterator[tuple[str, Number]]:
+_Tie = Weld | Slider | Parallel | Perpendicular | DrivenAngle
+_TIES = (Weld, Slider, Parallel, Perpendicular, DrivenAngle)
+
+
+def _tied(scene: Scene, ties: list[_Tie], found: dict[str, Number], level: int) -> Iterator[tuple[str, Number]]:
     """Bodies whose angle (level 0) or rate (level 1) a joint tells from that of a neighbour."""
-    for joint in scene.joints.values():
-        if isinstance(joint, Coupling) or (joint.first.body in found) == (joint.second.body in found):
+    for joint in ties:
+        if (joint.first.body in found) == (joint.second.body in found):
             continue
         sign, here, there = (1, joint.first, joint.second) if joint.first.body in found else (-1, joint.second, joint.first)
         turn: Number = None

@@ -201,7 +201,8 @@ class Scene(Record):
 
         What is set last is kept: where a path moves the start or a joint, the other initial values become guesses.
         """
-        data = self._guessing(values).model_dump(mode="json")
+        fresh = [path for path, value in values.items() if not self._has(path, value)]
+        data = self._guessing(fresh).model_dump(mode="json")
         for path, value in values.items():
             place: Any = data
             *parents, leaf = path.split(".")
@@ -224,6 +225,16 @@ class Scene(Record):
         for path, lanes in values.items():
             scene = _replace(scene, path.split("."), np.asarray(lanes, dtype=float))
         return scene
+
+    def _has(self, path: str, value: Any) -> bool:
+        """Whether the scene states this value there already."""
+        head, *rest = path.split(".")
+        if head == "initial" and len(rest) > 1 and getattr(self.initial.get(rest[0]), rest[1], None) is None:
+            return False
+        try:
+            return bool(self.value(path) == value)
+        except InputError:
+            return False
 
     def _guessing(self, paths: Iterable[str]) -> Scene:
         """This scene with the initial values that `paths` leave alone as guesses, if a path moves the start."""
