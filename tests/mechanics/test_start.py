@@ -1,4 +1,4 @@
-"""Starts of random machines against closed forms of linkages: what is stated is kept, the rest follows, or is refused."""
+"""Starts of random machines against closed forms of linkages: what is stated is kept, the rest follows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-
 from shoal.errors import InputError
 from shoal.mechanics.start import complete, is_direct
 from shoal.scene import Scene
@@ -241,7 +240,8 @@ def apart(found: State, told: State) -> float:
 
 def state_of(scene: Scene, name: str) -> State:
     one = scene.initial[name]
-    assert one.position is not None and one.velocity is not None
+    assert one.position is not None
+    assert one.velocity is not None
     return State(complex(*one.position), float(one.angle or 0.0), complex(*one.velocity), float(one.rate or 0.0))
 
 
@@ -277,8 +277,10 @@ def refused(kind: str, seed: int) -> str:
             start[last] = {"angle": wrong}
             off = min(abs(cmath.phase(cmath.exp(1j * (one[last].angle - wrong)))) for one in others)
         else:
-            wrong = float(states[last].rate + rng.choice([-1, 1]) * rng.uniform(0.02, 1.0) * (1 + abs(states[last].rate)))
-            start = {name: dict(angle=one.angle) for name, one in states.items()} | start
+            wrong = float(
+                states[last].rate + rng.choice([-1, 1]) * rng.uniform(0.02, 1.0) * (1 + abs(states[last].rate))
+            )
+            start = {name: {"angle": one.angle} for name, one in states.items()} | start
             start[last] = start.get(last, {}) | {"rate": wrong}
             off = abs(states[last].rate - wrong)
         if off > 0.02:
@@ -300,7 +302,8 @@ def test_a_contradiction_is_refused_by_name(kind: str) -> None:
     for seed in range(3):
         text = refused(kind, seed)
         assert text.startswith("initial.b.")
-        assert "joint" in text and "\n" not in text
+        assert "joint" in text
+        assert "\n" not in text
 
 
 @pytest.mark.slow
@@ -314,7 +317,8 @@ def test_starts_of_many_machines(kind: str) -> None:
 def test_contradictions_of_many_machines(kind: str) -> None:
     for seed in range(100, 130):
         text = refused(kind, seed)
-        assert text.startswith("initial.") and "\n" not in text
+        assert text.startswith("initial.")
+        assert "\n" not in text
 
 
 RHOMBUS = four_bar(np.random.default_rng(3), equal=True).scene
@@ -332,7 +336,7 @@ def test_a_rate_that_is_not_stated_follows_and_a_stated_zero_contradicts() -> No
     assert found.initial["b"].rate == 2.0
     assert found.initial["c"].rate == pytest.approx(0.0, abs=1e-12)
     still = {"a": {"angle": 1.2, "rate": 0.0}, "b": {"angle": 1.2, "rate": 2.0}}
-    with pytest.raises(InputError, match=r"initial\.b\.rate: 2 rad/s contradicts initial\.a\.rate = 0: joint B asks for 0"):
+    with pytest.raises(InputError, match=r"initial\.b\.rate: 2 rad/s contradicts initial\.a\.rate = 0: joint B"):
         done(RHOMBUS, **still)
 
 
@@ -347,9 +351,9 @@ def test_digits_that_were_rounded_are_corrected_in_the_order_of_the_scene() -> N
 
 
 def test_a_pinned_body_keeps_no_other_place_or_velocity() -> None:
-    with pytest.raises(InputError, match=r"initial\.a\.position: \[0\.5, 0\] m cannot be kept: joint O would stay 0\.5 m"):
+    with pytest.raises(InputError, match=r"initial\.a\.position: \[0\.5, 0\] m cannot be kept: joint O would"):
         done(RHOMBUS, a={"position": [0.5, 0.0]})
-    with pytest.raises(InputError, match=r"initial\.a\.velocity: \[0, 3\] m/s cannot be kept: joint O asks for \[0, 0\]"):
+    with pytest.raises(InputError, match=r"initial\.a\.velocity: \[0, 3\] m/s cannot be kept: joint O asks"):
         done(RHOMBUS, a={"angle": 1.0, "velocity": [0.0, 3.0]})
 
 

@@ -129,10 +129,9 @@ def initial_poses(scene: Scene) -> dict[str, Pose]:
         position, velocity = moving_point(path)
         poses[f"{GROUND}.{name}"] = Pose(position, 0.0, velocity, 0.0)
     scene = complete(scene).scene
-    for name, start in scene.initial.items():
-        assert start.position is not None and start.velocity is not None
-        assert start.angle is not None and start.rate is not None
-        poses[name] = Pose(np.array(start.position), start.angle, np.array(start.velocity), start.rate)
+    for name in scene.bodies:
+        begin = scene.start(name)
+        poses[name] = Pose(np.array(begin.position), begin.angle, np.array(begin.velocity), begin.rate)
     _check_speeds(scene, poses)
     return poses
 

@@ -218,7 +218,9 @@ class Assembly:
         more, values = kept.copy(), np.where(kept, u, 0.0)
         more[:, one.columns], values[:, one.columns] = True, one.values
         trying = ~np.all(kept[:, one.columns], axis=1)
-        if not np.any(trying) or not np.any(self._free(one, u, kept) | (np.abs(u[:, one.columns] - one.values) < CLOSED)):
+        if not np.any(trying) or not np.any(
+            self._free(one, u, kept) | (np.abs(u[:, one.columns] - one.values) < CLOSED)
+        ):
             return u, kept
         closure = Closure(self.scene, np.where(more, values, u), own=False)
         found, gap = self.close(closure, np.where(more, values, u), more)
@@ -229,7 +231,7 @@ class Assembly:
         """Whether the joints and what is kept leave the columns of a statement free, (lanes, columns)."""
         slope = Closure(self.scene, u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self._yield))[:, None, :]
         basis = np.linalg.svd(slope, full_matrices=False)
-        rank = basis.S > DEPENDENT * np.max(basis.S, axis=1, initial=1e-300, keepdims=True)
+        rank = DEPENDENT * np.max(basis.S, axis=1, initial=1e-300, keepdims=True) < basis.S
         told = np.einsum("lri,lr->li", basis.Vh**2, rank.astype(float))
         return np.asarray(1.0 - told[:, one.columns] > DEPENDENT)
 

@@ -215,7 +215,9 @@ class Closure:
             return value_of(joint.angle)
         if isinstance(joint, Weld) and joint.angle is not None:
             return joint.angle
-        if isinstance(joint, Weld | Parallel | Perpendicular) or (isinstance(joint, Slider) and joint.rotation == "locked"):
+        if isinstance(joint, Weld | Parallel | Perpendicular) or (
+            isinstance(joint, Slider) and joint.rotation == "locked"
+        ):
             at = self.begin if self.own or isinstance(joint, Parallel | Perpendicular) else u
             ahead = self._angle(at, joint.second)[0] - self._angle(at, joint.first)[0]
             if isinstance(joint, Parallel):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from shoal.mechanics.assembly import Assembly
@@ -54,17 +56,16 @@ def _split(scene: Scene) -> Scene:
     initial = {name: InitialState(angle=start.angle, position=start.position)
                for name in bodies if (start := scene.start(name))}  # fmt: skip
 
+    names: dict[tuple[str, Any], str] = {}
+
     def apart(at: Attachment) -> Attachment:
-        if at.body == GROUND or at.body in bodies:
+        if at.body == GROUND or scene.bodies[at.body].element == "rigid":
             return at
-        s = scene.location(at)
-        name = f"{at.body}-{len(bodies)}-{s[0]:.9g}-{s[1]:.9g}"
-        name = next((old for old in bodies if old.startswith(f"{at.body}-") and old.endswith(name.split('-', 2)[2])), name)
-        if name not in bodies:
-            start = scene.start(at.body)
-            where = as_complex(start.position or (0.0, 0.0)) + unit(start.angle) * place_of(scene, at)
-            bodies[name] = RigidBody(mass=1.0, inertia=1.0)
-            initial[name] = InitialState(angle=start.angle + lead(scene, at), position=(where.real, where.imag))
+        place, start = scene.location(at), scene.start(at.body)
+        name = names.setdefault((at.body, place), f"{at.body}-{len(names)}")
+        where = as_complex(start.position or (0.0, 0.0)) + unit(start.angle) * place_of(scene, at)
+        bodies[name] = RigidBody(mass=1.0, inertia=1.0)
+        initial[name] = InitialState(angle=start.angle + lead(scene, at), position=(where.real, where.imag))
         return Attachment(body=name, point=(0.0, 0.0))
 
     def remade(joint: Joint) -> Joint:

@@ -27,7 +27,7 @@ _LARGEST = 200
 
 
 class Moving(NamedTuple):
-    """Rates (lanes, 3 bodies) [m/s, rad/s]; whether they are allowed (lanes,); statements that are not met in lane 0."""
+    """Rates (lanes, 3 bodies) [m/s, rad/s]; whether they are allowed (lanes,); statements not met in lane 0."""
 
     rates: Array
     ok: Array

@@ -217,6 +217,7 @@ def march(
     tally, y = _Tally(), np.empty(n)
     power = dissipated = start = 0.0
     sample = 0
+    before = q.copy(), v.copy()
     _arrive(SINGLE, arrays, room, 0.0, solver.rank_tolerance, ASSEMBLY, gap, record.drift)
     record = record._replace(begin=np.concatenate([q, v]))
     directions = marker_rows[:, 2], marker_rows[:, 3]

@@ -121,7 +121,9 @@ def _tied(scene: Scene, ties: list[_Tie], found: dict[str, Number], level: int) 
     for joint in ties:
         if (joint.first.body in found) == (joint.second.body in found):
             continue
-        sign, here, there = (1, joint.first, joint.second) if joint.first.body in found else (-1, joint.second, joint.first)
+        sign, here, there = (
+            (1, joint.first, joint.second) if joint.first.body in found else (-1, joint.second, joint.first)
+        )
         turn: Number = None
         if isinstance(joint, DrivenAngle):
             turn = (value_of, rate_of)[level](joint.angle)

@@ -95,7 +95,11 @@ def _paths(scene: Scene, moving: Motion) -> Drawn:
 
 
 def _provenance(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
-    model = {name: value for name, value in trajectory.model.items() if not isinstance(value, dict | list) or name == "bodies"}
+    model = {
+        name: value
+        for name, value in trajectory.model.items()
+        if not isinstance(value, dict | list) or name == "bodies"
+    }
     return [
         ("engine", trajectory.engine),
         ("model", settings(model)),

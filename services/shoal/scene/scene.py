@@ -153,7 +153,9 @@ class Scene(Record):
         for name in points & self.initial.keys():
             for field in ("angle", "rate"):
                 if value := getattr(self.initial[name], field):
-                    raise ValueError(f"initial.{name}.{field}: {name} is a point mass, which does not turn; found {value:g}")
+                    raise ValueError(
+                        f"initial.{name}.{field}: {name} is a point mass, which does not turn; found {value:g}"
+                    )
 
     def _placed(self) -> set[str]:
         """Bodies whose start the joints tell, from the ground or from a body that says its position."""
@@ -258,9 +260,9 @@ class Scene(Record):
                 place = self.start(part)
             elif isinstance(place, Mapping) and part in place:
                 place = place[part]
-            elif isinstance(place, Begin) and part in Begin._fields:
-                place = getattr(place, part)
-            elif isinstance(place, Record) and part in type(place).model_fields:
+            elif (isinstance(place, Begin) and part in Begin._fields) or (
+                isinstance(place, Record) and part in type(place).model_fields
+            ):
                 place = getattr(place, part)
             elif isinstance(place, tuple):
                 place = place[_key(place, part, path, "")]
