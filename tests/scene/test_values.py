@@ -46,13 +46,29 @@ def test_with_values_starts_a_body_of_which_the_scene_says_nothing() -> None:
         ("bodies.AB.length", 2.0),
         ("solver.integrator", "leapfrog"),
         ("gravity", (0.0, -9.81)),
-        ("initial.OA.rate", 0.0),
+        ("initial.OA.angle", np.pi / 4),
         ("joints.O.first.body", "ground"),
     ],
 )
 def test_value_reads_what_with_values_writes(path: str, expected: object) -> None:
     assert SCENE.value(path) == expected
     assert SCENE.with_values({path: expected}) == SCENE
+
+
+def test_what_is_set_last_makes_guesses_of_the_rest_that_it_may_move() -> None:
+    scene = SCENE.with_values({"initial.OA.angle": 0.5})
+    assert scene.initial["OA"].guess == ()
+    assert scene.initial["AB"].guess == ("angle",)
+    later = scene.with_values({"initial.AB.rate": 1.0, "gravity": [0.0, 0.0]})
+    assert later.initial["AB"].guess == ("angle",)
+    assert later.with_values({"bodies.OA.length": 1.1}).initial["OA"].guess == ("angle",)
+    assert Scene.parse(later.model_dump(mode="json")) == later
+
+
+def test_zero_is_a_statement() -> None:
+    assert SCENE.initial["OA"].rate is None
+    assert SCENE.start("OA").rate == 0.0
+    assert SCENE.with_values({"initial.OA.rate": 0.0}).initial["OA"].rate == 0.0
 
 
 def test_lanes_broadcast_through_the_derived_properties() -> None:

@@ -48,9 +48,11 @@ _SPRING_RANGE = 100.0
 def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     """The same model with the initial state of a scene that differs in nothing else."""
     placement = place(scene)
+    scene = placement.scene
     return replace(
         model,
         scene=scene,
+        failed=placement.failed,
         lanes=lanes,
         q0=_stack(placement.positions),
         v0=_stack(placement.velocities),
@@ -64,6 +66,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     horizon [s]: functions of time are fitted up to it, and at least up to the end of the scene's duration.
     """
     placement = place(scene)
+    scene = placement.scene
     horizon = max(horizon, scene.solver.duration)
     rows = _Rows(len(placement.positions))
     masses = _Masses(scene, placement, rows)
@@ -87,6 +90,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
         marker_rows.append([*rows.of(point), *rows.of(direction)])
     return Model(
         scene=scene,
+        failed=placement.failed,
+        frames=placement.frames,
         lanes=lanes,
         q0=_stack(placement.positions),
         v0=_stack(placement.velocities),

@@ -228,7 +228,7 @@ def march(
     sample = 0
     before = q.copy(), v.copy()
     _arrive(SINGLE, arrays, room, 0.0, solver.rank_tolerance, ASSEMBLY, gap, record.drift)
-    record.correction[0] = np.max(np.abs(q - before[0]), initial=0.0)
+    record = record._replace(begin=np.concatenate([q, v]))
     directions = marker_rows[:, 2], marker_rows[:, 3]
     turned = np.arctan2(room.z[directions[1]], room.z[directions[0]])
     instants = _instants(steps, step, float(times[-1]), stops)
