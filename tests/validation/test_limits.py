@@ -12,8 +12,9 @@ from scipy.integrate import solve_ivp
 from shoal_validation.nightly import measure
 from shoal_validation.nightly.measure import Measured
 from shoal_validation.nightly.methods import RIGID, Method
+from shoal_validation.nightly.page import render
 from shoal_validation.nightly.plan import plan
-from shoal_validation.nightly.result import Verdict
+from shoal_validation.nightly.result import Night, Verdict
 from shoal_validation.nightly.run import judged
 from shoal_validation.nightly.theory import MOTIONS
 from shoal_validation.problems import get_problem
@@ -151,6 +152,8 @@ def test_figures_show_the_difference() -> None:
     assert result.verdict is Verdict.FAILED
     assert result.expected.startswith("at most 1.00e-09 m from")
     assert result.found.startswith("1.04e-09 m in")
+    text = render(Night("2026-01-02T02:00:00", "here", {}, True, None, 1.0, (result,)), [])
+    assert "<td>1.04e-09 m</td><td>1.00e-09 m</td>" in text
     assert judged(line, Measured("ok", 2.0e-9, 0.1)).found.startswith("2.0e-09 m in")
     close = judged(line, Measured("ok", float(np.nextafter(1e-9, 1.0)), 0.1))
     assert close.expected.split()[2] != close.found.split()[0]

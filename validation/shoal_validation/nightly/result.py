@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -107,3 +108,10 @@ class Night:
             return cls(**{name: data[name] for name in known}, lines=lines)
         except (KeyError, TypeError) as error:
             raise ValueError(f"a night with other fields: {error}") from None
+
+
+def apart(found: float | None, allowed: float | None) -> int:
+    """Decimals of a mantissa that show the difference of two unlike numbers."""
+    if found is None or allowed is None or not math.isfinite(found):
+        return 1
+    return next((digits for digits in range(1, 16) if f"{found:.{digits}e}" != f"{allowed:.{digits}e}"), 16)

@@ -15,7 +15,7 @@ from shoal.versions import versions
 from shoal_validation.nightly.history import compare
 from shoal_validation.nightly.measure import Measured
 from shoal_validation.nightly.plan import Line
-from shoal_validation.nightly.result import Night, Result, Verdict
+from shoal_validation.nightly.result import Night, Result, Verdict, apart
 from shoal_validation.nightly.worker import Worker
 
 TIMEOUT = 300.0
@@ -85,13 +85,6 @@ def judged(line: Line, measured: Measured) -> Result:
 def machine() -> str:
     """Processor and cores: what times depend on."""
     return f"{processor()}, {os.cpu_count()} cores"
-
-
-def apart(found: float, allowed: float | None) -> int:
-    """Decimals of a mantissa that show the difference of two unlike numbers."""
-    if allowed is None or not np.isfinite(found):
-        return 1
-    return next((digits for digits in range(1, 16) if f"{found:.{digits}e}" != f"{allowed:.{digits}e}"), 16)
 
 
 def _words(line: Line, measured: Measured, digits: int) -> str:
