@@ -15,7 +15,8 @@ import pytest
 from shoal.errors import InputError
 from shoal.identification import Estimate, Verdict, identify
 from shoal.identification.checkpoint import Memory
-from shoal.identification.forward import ForwardModel, TimeIsUp
+from shoal.identification.deadline import TimeIsUp
+from shoal.identification.forward import ForwardModel
 from shoal_validation.inverse_precision.cases import rigid_problem, textbook
 
 METHOD = "iafsa-unseeded"

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from shoal.identification.forward import ForwardModel, Progress, TimeIsUp
+from shoal.identification.deadline import TimeIsUp
+from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods import Method, Outcome
 from shoal.identification.methods.auto import explains
 from shoal.identification.methods.least_squares import descend
@@ -47,9 +48,12 @@ def coarse_to_fine(
     stages: list[Stage] = []
     start = starting_points(model)[0]
     coarse, chosen = _chosen(model, start, COARSER * tolerance)
-    outcome = search(coarse, rng, progress)
-    stages.append(_stage(chosen, coarse.counter.evaluations))
-    fine, chosen = _chosen(coarse, outcome.point, tolerance)
+    try:
+        outcome = search(coarse, rng, progress)
+        stages.append(_stage(chosen, coarse.counter.evaluations))
+        fine, chosen = _chosen(coarse, outcome.point, tolerance)
+    except TimeIsUp:
+        raise TimeIsUp(coarse) from None
     try:
         descent = descend(fine, outcome.point, progress)
     except TimeIsUp:
@@ -57,7 +61,10 @@ def coarse_to_fine(
     point, fitness, rows = descent.point, descent.fitness, descent.rows
     # The coarse model may have led to the wrong minimum.
     if np.sqrt(fitness) > _OFF * tolerance and not explains(fine, replace(outcome, fitness=fitness)):
-        again = search(fine, rng, progress)
+        try:
+            again = search(fine, rng, progress)
+        except TimeIsUp:
+            raise TimeIsUp(fine) from None
         rows = rows + [(len(rows) + i, best, mean) for i, best, mean in again.iterations]
         point, fitness = min((point, fitness), (again.point, again.fitness), key=lambda end: end[1])
     stages.append(_stage(chosen, fine.counter.evaluations))
@@ -77,7 +84,10 @@ def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[Forwar
     name, recording = max(model.measurement.recordings.items(), key=lambda item: item[1].times[-1])
     clock = model.parameters.measurement_values(point[None], name, recording.stated)
     times = recording.times / clock["clock"][0] + clock["delay"][0]
-    selection = select(model.scene_at(point, name), tolerance, times)
+    deadline = model.deadline
+    selection = select(
+        model.scene_at(point, name), tolerance, times, lambda _: None if deadline is None else deadline.check()
+    )
     fields = {
         path: value for rod, level in selection.chosen.levels.items() for path, value in level.fields(rod).items()
     }

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
 from shoal.identification.measurement import Recording
 from shoal.identification.methods.least_squares import descend
@@ -39,7 +40,7 @@ def bootstrap(
 ) -> Bootstrap:
     """Moving blocks (Kuensch 1989) of the residuals at an answer on the predicted channels, refitted from the answer.
 
-    rho: lag-1 correlation of the residuals, which sets the length of the blocks
+    rho: lag-1 correlation of the residuals, which sets the length of the blocks; fewer draws where time ends
     """
     found, failed = [], 0
     for _ in range(draws):
@@ -48,7 +49,10 @@ def bootstrap(
             for name, recording in model.measurement.recordings.items()
         }
         drawn = replace(model, measurement=replace(model.measurement, recordings=recordings), memory=None, whole=None)
-        end = descend(drawn, point, lambda *_: None)
+        try:
+            end = descend(drawn, point, lambda *_: None)
+        except TimeIsUp:
+            break
         if np.isfinite(end.fitness):
             found.append(model.parameters.to_values(end.point))
         else:

@@ -7,28 +7,28 @@ from typing import Any
 
 import numpy as np
 
-from shoal.errors import InputError
 from shoal.identification.adapt import Stage
 from shoal.identification.bootstrap import bootstrap
 from shoal.identification.covariance import blocks_of
+from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge import Judgement, few, judge
 from shoal.identification.methods import Outcome
+from shoal.identification.model_error import Corrections, ModelError, model_error, rms_of
 from shoal.identification.profiles import Profile, profiles
 from shoal.identification.rank import combinations
 from shoal.identification.residual_tests import ResidualTests, residual_tests
-from shoal.identification.sensitivity import believed
+from shoal.identification.sensitivity import Sensitivity, believed
 from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
 from shoal.identification.units import unit
-from shoal.mechanics.simulate import stable_step
 from shoal.scene import Rod, Scene, expression
 from shoal.trajectory import Array
 
+_NOTICED = 0.1
+"""Of half an interval: a contribution to it that is worth a word."""
 _ALIKE = 3.0
 """A residual within this factor of the mesh error is explained by it."""
-_STABLE = 0.9
-"""Of the stable step at the start: it varies by a few percent along the motion."""
 
 
 @dataclass(frozen=True)
@@ -56,32 +56,45 @@ def conclude(
 ) -> Estimate:
     """The estimate of an outcome. The runs it takes are not counted: no method is charged for them."""
     searched, point, measurement = model, outcome.point, model.measurement
-    model = replace(model, memory=None, whole=None, deadline=None)
+    model = replace(model, memory=None, whole=None)
+    if model.deadline is not None:
+        model.deadline.extend()
     # The intervals look at the neighbourhood of the answer.
-    seen = believed(model, point)
+    looked = unless_late(lambda: believed(model, point), None)
+    seen = looked or _unseen(model)
+    if looked is None:
+        outcome = replace(outcome, ended=False, message=outcome.message or "no time was left for the intervals")
     possible = bool(np.all(np.isfinite(seen.residual)))
     if not possible:
         seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
     blocks = blocks_of(model, len(seen.residual))
     at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks)
-    predicted = {name: model.observe(point[None], name)[0] for name in measurement.recordings}
-    model_error = _model_error(model, point, predicted) if possible else None
-    correction = None if model_error is None else -at.pseudo_inverse @ model_error
-    mesh = None if model_error is None else float(np.sqrt(np.mean(model_error[: len(model.rows.time)] ** 2)))
+    predicted = {name: _predicted(model, point, name) for name in measurement.recordings}
+    nothing = ModelError(None, None)
+    error = unless_late(lambda: model_error(model, point, predicted), nothing) if possible and looked else nothing
+    correction = error.corrections(at.pseudo_inverse)
+    mesh, theory = (
+        None if part is None else rms_of(part[: len(model.rows.time)]) for part in (error.mesh, error.theory)
+    )
+    refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
+    tests = residual_tests(model, seen.residual, blocks, at.noise, float(np.hypot(mesh or 0.0, theory or 0.0)), refined)
+    at = replace(at, systematic=tests.excess * float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1)))))
     parameters = _parameters(model, point, at, correction)
-    profiled = profiles(model, point, at) if wishes.profiles and possible else {}
+    if looked is None:
+        parameters = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in parameters.items()}
+    profiled = profiles(model, point, at) if wishes.profiles and possible and looked else {}
     parameters |= {n: replace(parameters[n], identifiable=False) for n, p in profiled.items() if p.open}
-    unknown = combinations(model, point, at) if possible else []
-    tests = residual_tests(model, seen.residual, blocks, at.noise, mesh or 0.0)
+    unknown = combinations(model, point, at) if possible and looked else []
     if possible:
         judgement = judge(model, outcome, seen, at, tests, parameters, unknown)
     else:
         message = "no parameter set could be simulated; look at the bounds and the scene"
         judgement = Judgement(Verdict.FAILED, message)
     correlation = autocorrelation(seen.residual, blocks)
-    draws = wishes.bootstrap if possible else 0
+    draws = wishes.bootstrap if possible and looked else 0
     rng = np.random.default_rng(seed)
     notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, None if stages else mesh, tests))
+    notes += (_slender(parameters, tests, theory),)
     return Estimate(
         problem=model.problem.name,
         method=method,
@@ -109,9 +122,8 @@ def conclude(
         profiles=profiled,
         bootstrap=bootstrap(model, point, predicted, correlation, draws, rng) if draws else None,
         sensitivity_doubt=seen.doubt,
-        model_error_rms=None
-        if model_error is None
-        else float(np.sqrt(np.sum(model_error**2) / model.samples / model.things)),
+        model_error_rms=_by_thing(model, error.mesh),
+        theory_error_rms=_by_thing(model, error.theory),
         truth=dict(measurement.truth),
         data=measurement.origin,
         notes=[note for recording in measurement.recordings.values() for note in recording.notes],
@@ -123,39 +135,21 @@ def conclude(
     )
 
 
+def _unseen(model: ForwardModel) -> Sensitivity:
+    """What is known of the neighbourhood of an answer where there is no time to look: nothing."""
+    priors = sum(entry.parameter.prior is not None for entry in model.parameters.entries.values())
+    rows = len(model.rows.time) + priors
+    return Sensitivity(np.zeros(rows), np.zeros((rows, len(model.names))), np.inf, np.inf)
+
+
+def _predicted(model: ForwardModel, point: Array, name: str) -> Array:
+    """Channels of a recording at an answer, (samples, channels); nan where there is no time to run it."""
+    nothing = np.full((1, *model.measurement.recordings[name].values.shape), np.nan)
+    return np.asarray(unless_late(lambda: model.observe(point[None], name), nothing)[0])
+
+
 def _values_of(model: ForwardModel, point: Array) -> dict[str, float]:
     return dict(zip(model.names, model.parameters.to_values(point).tolist(), strict=True))
-
-
-def _model_error(model: ForwardModel, point: Array, predicted: dict[str, Array]) -> Array | None:
-    """Motion on twice as many elements minus motion on the model's mesh, (rows,), with zeros for priors.
-
-    None for rigid scenes, and where the finer mesh cannot be run.
-    """
-    scene = model.scene
-    finer = {
-        f"bodies.{name}.elements": 2 * body.elements
-        for name, body in scene.bodies.items()
-        if isinstance(body, Rod) and body.element != "rigid"
-    }
-    if not finer:
-        return None
-    columns = []
-    try:
-        fine_scene = scene.with_values(finer)
-        # Half the step takes away three quarters of a time error of second order, and more of a higher one.
-        integrator = scene.solver.integrator
-        limit = np.inf if integrator == "auto" else stable_step(fine_scene, integrator)
-        step = min(scene.solver.step / 2, _STABLE * limit)
-        fine_scene = fine_scene.with_values({"solver.step": step})
-        for name, recording in model.measurement.recordings.items():
-            error = model.observe(point[None], name, scene=fine_scene)[0] - predicted[name]
-            columns.append(error[np.isfinite(recording.values)])
-    except InputError:
-        return None
-    rows = np.concatenate(columns) * model.rows.weight
-    priors = sum(entry.parameter.prior is not None for entry in model.parameters.entries.values())
-    return np.append(rows, np.zeros(priors)) if np.all(np.isfinite(rows)) else None
 
 
 def _fitted(scene: Scene) -> dict[str, Any]:
@@ -186,18 +180,32 @@ def _coarse(model: ForwardModel, mesh: float | None, tests: ResidualTests) -> st
     return f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted / 3:.1g} finds a better mesh"
 
 
+def _by_thing(model: ForwardModel, rows: Array | None) -> float | None:
+    """Root mean square per observed thing."""
+    return None if rows is None else float(np.sqrt(np.sum(rows**2) / model.samples / model.things))
+
+
+def _slender(parameters: dict[str, Value], tests: ResidualTests, theory: float | None) -> str:
+    """A word where what slender beams neglect limits the answer; empty if it does not."""
+    limited = [n for n, v in parameters.items() if abs(v.theory or 0.0) > _NOTICED * (v.upper - v.lower) / 2]
+    if theory is None or not limited:
+        return ""
+    size = f"about {tests.sized(theory)} of the motion"
+    return f"shear and rotary inertia, which slender beams neglect, are {size} and widen the interval of {', '.join(limited)}"
+
+
 def _better(profiled: dict[str, Profile]) -> str:
     names = ", ".join(name for name, found in profiled.items() if found.better)
     return f"a better fit than the answer was found on the profile of {names}" if names else ""
 
 
-def _parameters(model: ForwardModel, point: Array, at: Linearisation, correction: Array | None) -> dict[str, Value]:
+def _parameters(model: ForwardModel, point: Array, at: Linearisation, correction: Corrections) -> dict[str, Value]:
     found = {}
     for k, name in enumerate(model.names):
         about = spread(lambda p, k=k: float(p[k]), point, at)  # type: ignore[misc]
         span = model.upper[k] - model.lower[k]
         at_bound = bool(min(point[k] - model.lower[k], model.upper[k] - point[k]) < 1e-6 * span)
-        shift = None if correction is None else float(correction[k])
+        shift = correction.of(lambda p, k=k: float(p[k]), point)  # type: ignore[misc]
         told = about.fixed and not at_bound and about.std < span and not few(model)
         known = _value(float(point[k]), about, told, shift, at_bound)
         known = replace(known, unit=unit(model.parameters.entries[name].parameter.path or ""))
@@ -211,7 +219,7 @@ def _covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:
     return np.asarray(slope[:, None] * at.covariance * slope)
 
 
-def _quantities(model: ForwardModel, point: Array, at: Linearisation, correction: Array | None) -> dict[str, Value]:
+def _quantities(model: ForwardModel, point: Array, at: Linearisation, correction: Corrections) -> dict[str, Value]:
     found = {}
     for name, text in model.problem.quantities.items():
         for recording in model.measurement.recordings if _own(model, text) else [None]:
@@ -221,7 +229,7 @@ def _quantities(model: ForwardModel, point: Array, at: Linearisation, correction
                 return expression.evaluate(text, {key: float(x[0]) for key, x in named.items()})
 
             about = spread(value_at, point, at)
-            shift = None if correction is None else value_at(point + correction) - value_at(point)
+            shift = correction.of(value_at, point)
             found[f"{recording}.{name}" if recording else name] = _value(
                 value_at(point), about, about.fixed, shift, False
             )
@@ -234,6 +242,9 @@ def _own(model: ForwardModel, text: str) -> bool:
     return bool(expression.names(text) & keys)
 
 
-def _value(value: float, about: Spread, identifiable: bool, correction: float | None, at_bound: bool) -> Value:
-    half = about.half + abs(correction or 0.0)
-    return Value(value, about.std, value - half, value + half, bool(identifiable), correction, at_bound)
+def _value(
+    value: float, about: Spread, identifiable: bool, shift: tuple[float | None, float | None], at_bound: bool
+) -> Value:
+    mesh, theory = shift
+    half = about.half + abs(mesh or 0.0) + abs(theory or 0.0)
+    return Value(value, about.std, value - half, value + half, bool(identifiable), mesh, at_bound, theory=theory)

@@ -43,6 +43,7 @@ class Value:
 
     correction: what a mesh twice as fine would add to the value, None if not computed; it is not added, but is in
     the interval
+    theory: what shear and rotary inertia would add, by order of magnitude, where slender beams neglect them; likewise
     unit: of all of them, empty where there is none or none is known
     """
 
@@ -54,6 +55,7 @@ class Value:
     correction: float | None = None
     at_bound: bool = False
     unit: str = ""
+    theory: float | None = None
 
     def exponential(self) -> Value:
         """The value of a parameter that was sought by its logarithm."""
@@ -61,7 +63,10 @@ class Value:
         correction = None if self.correction is None else value * self.correction
         with np.errstate(over="ignore"):
             lower, upper = float(np.exp(self.lower)), float(np.exp(self.upper))
-        return replace(self, value=value, std=value * self.std, lower=lower, upper=upper, correction=correction)
+        theory = None if self.theory is None else value * self.theory
+        return replace(
+            self, value=value, std=value * self.std, lower=lower, upper=upper, correction=correction, theory=theory
+        )
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,7 @@ class Estimate:
     predicted: dict[str, Array]
     measurement: Measurement
     covariance: Array | None = None
+    theory_error_rms: float | None = None
 
     @property
     def scene(self) -> Scene:
@@ -175,6 +181,7 @@ class Estimate:
             "bootstrap": None if self.bootstrap is None else self.bootstrap.to_json(),
             "sensitivity_doubt": plain(self.sensitivity_doubt),
             "model_error_rms": plain(self.model_error_rms),
+            "theory_error_rms": plain(self.theory_error_rms),
             "truth": self.truth,
             "data": self.data,
             "notes": self.notes,

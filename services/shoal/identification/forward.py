@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -12,25 +11,22 @@ import numpy as np
 from shoal.engines import Engine, get_engine
 from shoal.errors import InputError
 from shoal.identification.checkpoint import Memory
+from shoal.identification.deadline import Deadline, TimeIsUp
 from shoal.identification.loss import flatten, noise_of, steepness
 from shoal.identification.measurement import Measurement
 from shoal.identification.observation import Camera, observe
 from shoal.identification.parametrization import Parametrization
 from shoal.identification.problem import Problem
+from shoal.mechanics.tile import WIDE
 from shoal.scene import Scene
 from shoal.swarm import EvaluationCounter
-from shoal.trajectory import Array, Status
+from shoal.trajectory import Array, Status, Trajectory
+
+_AT_ONCE = 2 * len(WIDE)
+"""Lanes of a call where the time is limited: whole tiles, enough for two threads."""
 
 Progress = Callable[[int, float, float], None]
 """Called with (iteration, best fitness, mean fitness of the iteration)."""
-
-
-class TimeIsUp(Exception):  # noqa: N818 - an end that is expected, not an error
-    """The time allowed for an identification has passed; the best so far of the model that was running stands."""
-
-    def __init__(self, model: ForwardModel) -> None:
-        super().__init__()
-        self.model = model
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,7 @@ class ForwardModel:
     Fitness is the mean over the samples of the sum of squared residuals (for a tip: the mean squared distance [m^2]).
     Where channels have different noise they are weighted by it, relative to its geometric mean.
 
-    deadline: time (time.monotonic) after which `residuals` raises TimeIsUp; memory: of evaluations made earlier
+    deadline: after which simulations raise TimeIsUp; memory: of evaluations made earlier
     whole: of a model of a part of the recordings, the model of all, which counts its evaluations too
     """
 
@@ -62,7 +58,7 @@ class ForwardModel:
     scene: Scene
     engine: Engine
     measurement: Measurement
-    deadline: float | None = None
+    deadline: Deadline | None = None
     memory: Memory | None = None
     whole: ForwardModel | None = None
     counter: EvaluationCounter = field(init=False)
@@ -72,6 +68,8 @@ class ForwardModel:
     """Simulated time over that of one run of all recordings: full-run equivalents."""
     refusal: str = field(init=False, default="")
     """Why a simulation was refused, if one was."""
+    reached: tuple[float, float, Array] = field(init=False, default=(0.0, np.inf, np.empty(0)))
+    """Of the longest part of the recordings that was fitted: its end [s], the best fitness on it, and the point."""
 
     def __post_init__(self) -> None:
         self.counter = EvaluationCounter(self._residuals, cost=self.cost)
@@ -146,8 +144,8 @@ class ForwardModel:
         return np.asarray(self.counter(points))
 
     def uncounted(self, points: Array) -> Array:
-        """As `residuals`, for what looks at an answer instead of seeking it."""
-        return self._simulated_residuals(points)
+        """As `residuals`, for what looks at an answer instead of seeking it. Raises TimeIsUp."""
+        return np.concatenate([self._simulated_residuals(part) for part in self._portions(points)])
 
     def fitness(self, points: Array) -> Array:
         """Mean squared deviation of each point, (points,). Counted."""
@@ -158,12 +156,18 @@ class ForwardModel:
         return np.asarray(np.sum(residuals**2, axis=1) / self.samples)
 
     def observe(
-        self, points: Array, name: str | None = None, times: Array | None = None, scene: Scene | None = None
+        self,
+        points: Array,
+        name: str | None = None,
+        times: Array | None = None,
+        scene: Scene | None = None,
+        factors: Mapping[str, float] | None = None,
     ) -> Array:
         """Channels of a recording in the model, (points, samples, channels); nan where a simulation failed.
 
         name: of the recording, else the first; times: by its clock [s], else those of its samples; scene: instead of
-        the model's. Not counted.
+        the model's; factors: by which fields of it are multiplied. Not counted. Until its time zero a machine is held
+        at its start.
         """
         name = name or next(iter(self.measurement.recordings))
         recording = self.measurement.recordings[name]
@@ -171,20 +175,20 @@ class ForwardModel:
         scene = scene or self.scene
         scene = scene.with_values(recording.stated.known) if recording.stated.known else scene
         values = self.parameters.scene_values(points, name)
+        for path, factor in (factors or {}).items():
+            values[path] = factor * values.get(path, np.full(len(points), scene.value(path)))
         seen_by = self.parameters.measurement_values(points, name, recording.stated)
         seen = np.full((len(points), len(times), len(recording.channels)), np.nan)
         pace = np.column_stack([seen_by.pop("clock"), seen_by.pop("delay")])
         possible = self._possible(points, values, scene)
         for clock, delay in np.unique(pace[possible], axis=0):
             lanes = np.flatnonzero(possible & np.all(pace == (clock, delay), axis=1))
-            instants = times / clock + delay
-            if instants[0] < 0:
-                continue
+            instants, shown = np.unique(np.maximum(times / clock + delay, 0.0), return_inverse=True)
             inputs = {path: numbers[lanes] for path, numbers in values.items()}
             shared = {path: float(x[0]) for path, x in inputs.items() if _same_in_all(path, x)}
             inputs = {path: x for path, x in inputs.items() if path not in shared}
             view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
-            seen[lanes] = self._simulate(scene.with_values(shared), inputs, instants, view, name)
+            seen[lanes] = self._simulate(scene.with_values(shared), inputs, instants, view, name)[:, shown]
         return seen
 
     def _simulate(self, scene: Scene, values: dict[str, Array], times: Array, view: Camera, name: str) -> Array:
@@ -192,9 +196,7 @@ class ForwardModel:
         lanes = len(next(iter(values.values()))) if values else len(np.atleast_1d(view.x))
         channels = self.measurement.recordings[name].channels
         try:
-            trajectory = (
-                self.engine.simulate_many(scene, values, times) if values else self.engine.simulate(scene, times)
-            )
+            trajectory = self._run(scene, values, times, lanes)
         except InputError as error:
             asked = self.whole or self
             self.refusal = asked.refusal = asked.refusal or str(error)
@@ -209,6 +211,24 @@ class ForwardModel:
         failed = np.array([status is not Status.OK for status in trajectory.status])
         seen[np.broadcast_to(failed, len(seen))] = np.nan
         return seen
+
+    def _run(self, scene: Scene, values: dict[str, Array], times: Array, lanes: int) -> Trajectory:
+        """One call of the engine, if there is time for it. Raises TimeIsUp, InputError."""
+
+        def run(scene: Scene, times: Array) -> Trajectory:
+            return self.engine.simulate_many(scene, values, times) if values else self.engine.simulate(scene, times)
+
+        if self.deadline is None:
+            return run(scene, times)
+        sized = [(name, getattr(body, "elements", 0)) for name, body in scene.bodies.items()]
+        kind = (str(sized), scene.solver.integrator, scene.solver.step, lanes == 1)
+        return self.deadline.run(kind, scene, times, run)
+
+    def warm_up(self) -> None:
+        """Have the engine load or compile what it needs, so that no clock counts it."""
+        start = self.parameters.start
+        for points in (start[None], np.array([start, start])):
+            replace(self, deadline=None).observe(points, times=np.array([min(1e-3, self.measurement.end)]))
 
     def poses(self, points: Array, name: str | None = None) -> Array:
         """Channels at time zero, (points, channels). No motion is simulated, so nothing is counted as an evaluation."""
@@ -237,15 +257,17 @@ class ForwardModel:
         return possible
 
     def _residuals(self, points: Array) -> Array:
-        if self.deadline is not None and time.monotonic() > self.deadline:
-            raise TimeIsUp(self.whole or self)
-        found = self._remembered(points) if self.memory is not None else self._simulated_residuals(points)
+        found = self._remembered(points) if self.memory is not None else self._evaluated(points)
         self.work += len(points)
         if self.whole is not None:
             whole = self.whole
             whole.work += len(points) * self.measurement.end / whole.measurement.end
             # Values of a part cannot be compared with those of the whole, so it counts without a best value.
             whole.counter.charge(len(points), points[0], np.inf)
+            values = self.cost(found)
+            best = int(np.argmin(values))
+            if (-self.measurement.end, values[best]) < (-whole.reached[0], whole.reached[1]):
+                whole.reached = (self.measurement.end, float(values[best]), points[best].copy())
         return found
 
     def _remembered(self, points: Array) -> Array:
@@ -254,9 +276,28 @@ class ForwardModel:
         model = (self.scene.fingerprint, self.measurement.end)
         if (known := self.memory.recall(model, points)) is not None:
             return known
-        found = self._simulated_residuals(points)
+        found = self._evaluated(points)
         self.memory.keep(model, points, found)
         return found
+
+    def _evaluated(self, points: Array) -> Array:
+        """Residuals of points; where the time ends on the way, the best of those that were run counts."""
+        found = list[Array]()
+        try:
+            for part in self._portions(points):
+                found.append(self._simulated_residuals(part))
+        except TimeIsUp:
+            if found:
+                values = self.cost(np.concatenate(found))
+                best = int(np.argmin(values))
+                self.counter.charge(0, points[best], float(values[best]))
+            raise
+        return np.concatenate(found)
+
+    def _portions(self, points: Array) -> Iterator[Array]:
+        """Points by as many as are simulated at once where the time is limited."""
+        size = len(points) if self.deadline is None else _AT_ONCE if self.engine.name == "gauss" else 1
+        yield from (points[k : k + size] for k in range(0, len(points), max(size, 1)))
 
     def _simulated_residuals(self, points: Array) -> Array:
         columns = []

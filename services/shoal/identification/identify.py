@@ -16,11 +16,15 @@ from shoal.errors import InputError
 from shoal.identification.adapt import Stage, coarse_to_fine
 from shoal.identification.checkpoint import Memory
 from shoal.identification.conclude import NOTHING, Wishes, conclude
+from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
-from shoal.identification.forward import ForwardModel, TimeIsUp
+from shoal.identification.forward import ForwardModel
 from shoal.identification.measurement import Measurement, measure
 from shoal.identification.methods import Outcome, get_method
+from shoal.identification.mirrors import with_mirror_images
+from shoal.identification.plausible import check_constant
 from shoal.identification.problem import Problem
+from shoal.identification.recording import EngineSource
 from shoal.scene import Scene
 from shoal.versions import versions
 
@@ -49,8 +53,9 @@ def identify(
     values: fields of the scene to set; measurement: one made earlier, to share it between methods;
     tolerance: error [m] that the model may have at the markers, for which elements, integrator and step are chosen
     instead of taken from the scene (coarse while searching);
-    time_limit: of the search [s]; then the best so far is the answer; checkpoint: file of evaluations, which a run
-    that was broken off finds when it is started again; wishes: what is to be known beyond the answer;
+    time_limit [s]: of everything but data that are computed and kernels that are compiled; then the best so far is the
+    answer; checkpoint: file of evaluations, which a run that was broken off finds when it is started again;
+    wishes: what is to be known beyond the answer;
     progress: is told how the search goes. Raises InputError, ComputationError.
     """
     name = method or problem.method
@@ -58,14 +63,21 @@ def identify(
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
     scene = problem.load_scene(values)
+    deadline = None if time_limit is None else Deadline(time_limit)
+    computed = any(isinstance(source, EngineSource) for source in problem.sources.values())
     if measurement is None:
-        measurement = measure(problem, load_truth(problem), data)
-    model = ForwardModel(problem, scene, get_engine(engine), measurement)
+        with deadline.paused() if deadline is not None and computed else nullcontext():
+            measurement = measure(problem, load_truth(problem), data)
+    model = ForwardModel(problem, scene, get_engine(engine), measurement, deadline)
+    if deadline is not None:
+        with deadline.paused():
+            model.warm_up()
+    unless_late(lambda: check_constant(model), None)
     if checkpoint is not None:
         model.memory = Memory(checkpoint, _fingerprint(model, name, seed, tolerance))
     with nullcontext() if model.memory is None else closing(model.memory):
         begin = time.perf_counter()
-        model, outcome, stages = _search(model, name, np.random.default_rng(seed), tolerance, time_limit, progress)
+        model, outcome, stages = _search(model, name, np.random.default_rng(seed), tolerance, progress)
         wall = time.perf_counter() - begin
         return conclude(model, outcome, name, seed, wall, stages, wishes)
 
@@ -75,7 +87,6 @@ def _search(
     method: str,
     rng: np.random.Generator,
     tolerance: float | None,
-    time_limit: float | None,
     watch: Watch,
 ) -> tuple[ForwardModel, Outcome, list[Stage]]:
     """Run a method as long as it may; returns the model it ended with, where, and the models on the way."""
@@ -84,16 +95,17 @@ def _search(
         watch(iteration, best, mean, asked.counter.evaluations)
 
     search, asked, stages = get_method(method), model, list[Stage]()
-    model.deadline = None if time_limit is None else time.monotonic() + time_limit
     try:
         if tolerance is None:
             outcome = search(model, rng, progress)
         else:
             model, outcome, stages = coarse_to_fine(model, search, tolerance, rng, progress)
     except TimeIsUp as end:
-        model = end.model
-        outcome = _best_so_far(model, time_limit or 0.0)
-    model.deadline = None
+        model = end.model or model
+        outcome = _best_so_far(model)
+    if outcome.ended:
+        found = outcome
+        outcome = unless_late(lambda: with_mirror_images(model, found), found)
     if model.refusal and not np.isfinite(outcome.fitness):
         raise InputError(model.refusal)
     return model, outcome, stages
@@ -104,13 +116,23 @@ def load_truth(problem: Problem) -> Scene:
     return problem.load_scene()
 
 
-def _best_so_far(model: ForwardModel, limit: float) -> Outcome:
-    counter = model.counter
-    if not np.isfinite(counter.best_value):
-        raise InputError(f"time_limit: nothing was found in {limit:g} s; allow more")
-    rows = [(k, float(best), float(best)) for k, best in enumerate(counter.history[1])]
-    message = f"stopped after {limit:g} s, before the method had ended"
-    return Outcome(counter.best, counter.best_value, rows, message, ended=False)
+def _best_so_far(model: ForwardModel) -> Outcome:
+    """The best of the evaluations until now, or where the fit of the beginning had come to. Raises InputError."""
+    counter, deadline = model.counter, model.deadline
+    assert deadline is not None
+    deadline.extend()
+    best, fitness = counter.best, counter.best_value
+    end, _, reached = model.reached
+    message = f"stopped after {deadline.limit:g} s, before the method had ended"
+    if end > 0.0:
+        there = unless_late(lambda: float(model.cost(model.uncounted(reached[None]))[0]), np.inf)
+        if there < fitness:
+            best, fitness, message = reached, there, f"{message}: fitted on the first {end:.3g} s"
+    if not np.isfinite(fitness):
+        slow = f"; a simulation takes about {deadline.cost:.2g} s" if deadline.cost > 0.1 * deadline.limit else ""
+        raise InputError(f"time_limit: nothing was found in {deadline.limit:g} s{slow}; allow more, or a shorter part")
+    rows = [(k, float(value), float(value)) for k, value in enumerate(counter.history[1])]
+    return Outcome(best, fitness, rows, message, ended=False)
 
 
 def _fingerprint(model: ForwardModel, method: str, seed: int, tolerance: float | None) -> str:

@@ -6,27 +6,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import chdtri
 
+from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
 from shoal.identification.residual_tests import ResidualTests
+from shoal.identification.rivals import relation, rivals_of, within
 from shoal.identification.sensitivity import Sensitivity
 from shoal.identification.stationarity import downhill, sentence
 from shoal.identification.suspects import Suspect, suspects
 from shoal.identification.swaps import exchanged
-from shoal.identification.uncertainty import LEVEL, Linearisation
+from shoal.identification.uncertainty import Linearisation
 from shoal.trajectory import Array
 
 _DECISIVE = 5.0
 """A property of the measurement that lowers even a small misfit by this factor refutes what was stated of it."""
 _NEGLIGIBLE = 1e-4
 """Of the signal: a misfit below it is not looked into."""
+_OTHERS = 3
+"""Suspects that explain less than the best, and are named beside it."""
 _FEWEST = 3
 """More numbers than parameters that have to be measured for what the fit leaves to tell the noise."""
-_APART = 1e-3
-"""Of a parameter's range: points that differ by less are the same."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +60,16 @@ def judge(
         advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
         return Judgement(Verdict.UNFINISHED, unfinished, advice)
     found: list[Suspect] = []
-    if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
-        found = suspects(model, outcome.point, seen.residual, seen.jacobian)
+    if (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal:
+        found = unless_late(
+            lambda: suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained).suspects, []
+        )
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
-    rivals = [rival for rival in rivals_of(model, outcome, at) if not _within(model, rival, parameters)]
+    if not outcome.converged:
+        advice = ["start from a better place, or look for another minimum (--method multi-start)"]
+        return Judgement(Verdict.FAILED, outcome.message or "the search did not converge", advice, found)
+    rivals = [rival for rival in rivals_of(model, outcome, at) if not within(model, rival, parameters)]
     if rivals:
         kinds = {relation(model, outcome.point, rival) for rival in rivals}
         message = f"{1 + len(rivals)} parameter sets fit equally well ({', '.join(sorted(kinds))})"
@@ -88,9 +94,11 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
     if found:
         reason += f"; {found[0]}"
         # A clock and gravity, for instance, have the same effect on a free swing.
-        equals = [other.words for other in found[1:] if other.after < 1.5 * found[0].after]
+        best, *equals = (suspect.words for suspect in found if suspect.equals(found[0], tests.rows))
         reason += f" (as would {', '.join(equals)})" if equals else ""
-        advice.append(f"check the {' or the '.join(s.words for s in found)}, or seek it as a parameter")
+        others = [suspect.words for suspect in found if suspect.words not in (best, *equals)][:_OTHERS]
+        advice.append(f"check the {' or the '.join([best, *equals])}, or seek it as a parameter")
+        advice += [f"less likely: the {' or the '.join(others)}"] if others else []
     if (exchange := exchanged(model)) is not None:
         reason += f"; {exchange}"
         advice.append("check which column is which marker")
@@ -101,8 +109,11 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
 
 
 def _against(tests: ResidualTests) -> str:
+    if tests.explains_nothing:
+        return f"no less than from a constant: the data vary by {tests.sized(tests.signal)}"
     if tests.noise_stated:
-        return f"{tests.ratio:.0f} times the noise of {tests.sized(tests.noise)}"
+        kind = "which is like white noise" if tests.white else "which is not white noise"
+        return f"{tests.ratio:.2g} times the noise of {tests.sized(tests.noise)}, {kind}"
     return f"and not by noise; the data vary by {tests.sized(tests.signal)}"
 
 
@@ -133,58 +144,12 @@ def _identifiable(
         known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"
         notes.append(f"the motion is chaotic, or its steps coarse: the intervals {known}")
         advice.append("shorten the motion, or tighten the solver's tolerances")
-    if tests.systematic and tests.size > _NEGLIGIBLE * tests.signal:
-        share = 100 * tests.size / tests.signal
-        size = f"{tests.sized(tests.size)} ({share:.2g} % of the signal)"
-        notes.append(f"a systematic residual of {size} widens the intervals")
+    if tests.limited and tests.size > _NEGLIGIBLE * tests.signal:
+        share = 100 * tests.excess / tests.signal
+        size = f"{tests.sized(tests.excess)} ({share:.2g} % of the signal)"
+        notes.append(f"a systematic residual of {size} widens the intervals: the model, not the noise, limits them")
         notes += [str(found[0])] if found else []
+    elif tests.too_large:
+        notes.append(f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found")
     verdict = Verdict.COMBINATION if reasons else Verdict.IDENTIFIED
     return Judgement(verdict, "; ".join([*reasons, *notes]), advice, found)
-
-
-def rivals_of(model: ForwardModel, outcome: Outcome, at: Linearisation) -> list[Array]:
-    """Other minima that fit as well as the noise can tell, without repetitions, (parameters,) each."""
-    # Of the sum of squares; correlated noise makes larger differences by chance.
-    chance = max(seen.variance / seen.independent(1) for seen in at.noise)
-    doubt = float(chdtri(len(outcome.point), 1.0 - LEVEL)) * chance / model.samples
-    least = max(outcome.fitness, model.things * (model.noise or 0.0) ** 2)
-    limit = outcome.fitness + min(doubt, 0.5 * least) + 1e-18
-    found: list[Array] = []
-    for point, fitness in outcome.minima:
-        if fitness <= limit and all(apart(model, point, other) for other in (outcome.point, *found)):
-            found.append(point)
-    return found
-
-
-def apart(model: ForwardModel, one: Array, other: Array) -> bool:
-    """Whether two points are different machines; angles that differ by whole turns are not."""
-    return bool(np.any(_differing(model, one, other)))
-
-
-def _within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -> bool:
-    """Whether intervals that are wide for the mesh's own error, more than for noise, include a point already."""
-    if not any(value.correction is not None and abs(value.correction) > value.std for value in parameters.values()):
-        return False
-    values = zip(model.names, model.parameters.to_values(point), strict=True)
-    return all(parameters[name].lower <= value <= parameters[name].upper for name, value in values)
-
-
-def relation(model: ForwardModel, one: Array, other: Array) -> str:
-    """What another solution is to the first: a mirror image, or just different."""
-    differing = np.flatnonzero(_differing(model, one, other))
-    paths = [entry.parameter.path or "" for entry in model.parameters.entries.values()]
-    if all(paths[k].startswith("initial.") for k in differing):
-        return "mirror images: the same marker positions with another pose"
-    span = model.upper - model.lower
-    if np.all(np.abs(np.abs(one) - np.abs(other)) <= _APART * span):
-        return "mirror images: parameters with the opposite sign"
-    return "different machines"
-
-
-def _differing(model: ForwardModel, one: Array, other: Array) -> Array:
-    paths = [entry.parameter.path or "" for entry in model.parameters.entries.values()]
-    turning = np.array([path.startswith("initial.") and path.endswith(".angle") for path in paths])
-    difference = np.abs(one - other)
-    turned = np.abs(difference - 2 * np.pi * np.round(difference / (2 * np.pi)))
-    difference = np.where(turning, turned, difference)
-    return np.asarray(difference / (model.upper - model.lower) > _APART)

@@ -11,6 +11,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.identification.observation import camera, observe
+from shoal.identification.plausible import check_units
 from shoal.identification.problem import RESERVED, Problem
 from shoal.identification.reading import described, read
 from shoal.identification.recording import Channel, Clocked, EngineSource, FileSource
@@ -168,6 +169,8 @@ def _recorded(problem: Problem, scene: Scene, source: FileSource, path: Path) ->
     channels = problem.channels_of(source)
     problem.check_channels(channels, scene, path.name)
     found = read(source, channels)
+    sized = any(parameter.path == f"{RESERVED}.scale" for parameter in problem.parameters.values())
+    check_units(source, channels, found.times, found.values, scene, sized)
     return Recording(
         found.times,
         found.channels,

@@ -6,11 +6,13 @@ Bioinformatics 25, 2009).
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.least_squares import linearise
 from shoal.identification.uncertainty import Linearisation, quantile
@@ -51,8 +53,12 @@ class Profile:
 
 
 def profiles(model: ForwardModel, point: Array, at: Linearisation) -> dict[str, Profile]:
-    """The profile of every parameter about an answer."""
-    return {name: profile(model, point, at, k) for k, name in enumerate(model.names)}
+    """The profile of every parameter about an answer, as far as time allows."""
+    found: dict[str, Profile] = {}
+    with suppress(TimeIsUp):
+        for k, name in enumerate(model.names):
+            found[name] = profile(model, point, at, k)
+    return found
 
 
 def profile(model: ForwardModel, point: Array, at: Linearisation, k: int) -> Profile:

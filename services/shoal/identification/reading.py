@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-import csv
-import gzip
-import io
-import warnings
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from shoal.errors import InputError
 from shoal.identification.recording import SI, Channel, FileSource
 from shoal.identification.swaps import mend
+from shoal.identification.table import Mask, Table, load_table
 from shoal.scene.load import read_yaml
 from shoal.scene.record import one_line
 from shoal.trajectory import Array
 
-Mask = NDArray[np.bool_]
-
-LARGEST = 200_000_000
-"""Bytes of a table, unpacked; more are refused."""
 YAML = (".yaml", ".yml")
+MOST = 20_000
+"""Samples of a recording that are fitted; of more every n-th is taken, with a note."""
 _ABOUT = 0.1
 """Of a recording: where its times begin within that part after zero, zero is meant."""
 _FEWEST = 3
@@ -39,9 +32,6 @@ _PAUSE = 1.5
 _NEARLY = 0.8
 """Of half a turn; an angle that turns farther from one sample to the next may as well have turned the other way."""
 
-_EMPTY = ("", "nan", "na", "n/a", "null", "none", "<na>", "nat")
-"""Cells that are gaps, in small letters."""
-
 
 @dataclass(frozen=True)
 class Samples:
@@ -52,43 +42,6 @@ class Samples:
     values: Array
     origin: str
     notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Table:
-    """Columns as a file has them, by name.
-
-    rows: the line of the file that each row stands on, (rows,); decimal: how its text writes the decimal mark
-    """
-
-    path: Path
-    frame: Any
-    rows: NDArray[np.intp]
-    decimal: str = "."
-
-    def numbers(self, column: str) -> Array:
-        """A column, (rows,), nan where a cell is empty. Raises InputError for what is no finite number."""
-        self.require(column)
-        series = self.frame[column]
-        if series.dtype.kind in "iuf":
-            numbers = series.to_numpy(dtype=float, na_value=np.nan)
-        else:
-            words = [None if x is None or x is np.nan or str(x).strip().lower() in _EMPTY else str(x) for x in series]
-            numbers = np.array([np.nan if word is None else _float(word, self.decimal) for word in words])
-            self._refuse_first(np.array([w is not None for w in words]) & np.isnan(numbers), column, "is not a number")
-        self._refuse_first(np.isinf(numbers), column, "is not finite")
-        return np.asarray(numbers, dtype=float)
-
-    def require(self, column: str) -> None:
-        """Refuse a column that is not there."""
-        if column not in self.frame.columns:
-            raise InputError(f"{self.path}: no column {column!r}; there are {_named(self.frame.columns)}")
-
-    def _refuse_first(self, bad: Mask, column: str, why: str) -> None:
-        if np.any(bad):
-            k = int(np.argmax(bad))
-            found = str(self.frame[column].iloc[k])
-            raise InputError(f"{self.path}: row {self.rows[k]}, column {column!r}: {_short(found)} {why}")
 
 
 def described(fields: Mapping[str, Any], path: Path) -> dict[str, Any]:
@@ -138,78 +91,11 @@ def read(source: FileSource, channels: tuple[Channel, ...]) -> Samples:
             raise InputError(f"{path}: column {channel.column!r} has no sample from {_span(times[inside])}")
     notes += _findings(times[inside], values[inside], channels)
     chosen = np.flatnonzero(inside)[:: source.every]
+    if (part := -(-len(chosen) // MOST)) > 1:
+        notes.append(f"of {len(chosen)} samples every {part}th is fitted; `duration` or `every` choose others")
+        chosen = chosen[::part]
     origin = f"{path.name}, {_span(times[chosen])}, {len(chosen)} samples"
     return Samples(times[chosen] - begin, channels, values[chosen], origin, tuple(notes))
-
-
-def load_table(path: Path, columns: list[str] | None = None) -> Table:
-    """A table of CSV or Parquet; columns: names, where it has no header line. Raises InputError."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
-        if data.startswith(b"\x1f\x8b"):
-            with gzip.open(io.BytesIO(data)) as packed:
-                data = packed.read(LARGEST + 1)
-    except (OSError, EOFError, zlib.error) as error:
-        raise InputError(f"data: {path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(data) > LARGEST:
-        raise InputError(f"data: {path} holds more than {LARGEST / 1e6:.0f} MB; cut the part to fit on out of it")
-    if data.startswith(b"PAR1"):
-        return _parquet(path, data)
-    if b"\0" in data[:65536]:
-        raise InputError(f"data: {path} is not CSV: it is binary")
-    return _csv(path, data, columns)
-
-
-def _parquet(path: Path, data: bytes) -> Table:
-    import pandas
-
-    try:
-        frame = pandas.read_parquet(io.BytesIO(data))
-    except ImportError:
-        raise InputError(f"data: {path} is Parquet, which needs the package pyarrow; install it, or give CSV") from None
-    except (OSError, ValueError, KeyError, NotImplementedError, MemoryError) as error:
-        raise InputError(f"data: {path} is not Parquet: {_short(str(error))}") from None
-    return Table(path, frame, np.arange(1, len(frame) + 1))
-
-
-def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
-    import pandas
-
-    try:
-        data = data.removeprefix(b"\xef\xbb\xbf")
-        first = data.split(b"\n", 1)[0].decode("utf-8").strip("\r")
-        separator = next((mark for mark in (";", "\t") if mark in first), ",")
-        decimal = "," if separator == ";" else "."
-        header = [name.strip() for name in next(csv.reader([first], delimiter=separator), [])]
-        names = columns or header
-        if not header:
-            raise InputError(f"data: {path} is not CSV: its first line is empty")
-        twice = [name for name in names if names.count(name) > 1]
-        if columns is None and all(np.isfinite(_float(name, decimal)) for name in header):
-            raise InputError(f"{path}: no header line; name its columns with `columns`")
-        if twice:
-            raise InputError(f"{path}: row 1: column {twice[0]!r} stands twice")
-        with warnings.catch_warnings():
-            # A row with more cells than the header would else be cut off with a mere warning.
-            warnings.simplefilter("error", pandas.errors.ParserWarning)
-            frame = pandas.read_csv(
-                io.BytesIO(data),
-                sep=separator,
-                decimal=decimal,
-                header=None,
-                names=names,
-                skiprows=0 if columns else 1,
-                index_col=False,
-                skip_blank_lines=False,
-                skipinitialspace=True,
-                low_memory=False,
-            )
-    except (ValueError, csv.Error, pandas.errors.ParserWarning, OverflowError, MemoryError) as error:
-        raise InputError(f"data: {path} is not CSV: {_short(str(error))}") from None
-    rows = np.arange(len(frame)) + (1 if columns else 2)
-    filled = frame.notna().any(axis=1).to_numpy()
-    return Table(path, frame[filled], rows[filled], decimal)
 
 
 def _times(source: FileSource, table: Table) -> Array:
@@ -217,8 +103,7 @@ def _times(source: FileSource, table: Table) -> Array:
     if len(table.rows) == 0:
         raise InputError(f"{table.path}: only 0 samples in the file; at least {_FEWEST} are needed")
     if source.rate:
-        # A line that is blank is a frame without any marker.
-        return np.asarray((table.rows - table.rows[0]) / source.rate)
+        return np.asarray(table.frames / source.rate)
     times = table.numbers(source.time) * source.time_scale
     where = f"{table.path}: row {{}}, column {source.time!r}: "
     for k in np.flatnonzero(np.isnan(times))[:1]:
@@ -344,20 +229,3 @@ def _outliers(times: Array, signal: Array) -> int:
 
 def _span(times: Array) -> str:
     return f"{times[0]:g} s to {times[-1]:g} s"
-
-
-def _float(text: str, decimal: str) -> float:
-    """The number that a cell holds, nan if it is none."""
-    try:
-        return float(text.replace(decimal, ".").replace("_", "?"))
-    except ValueError:
-        return float("nan")
-
-
-def _short(text: str) -> str:
-    line = (text.splitlines() or [""])[0]
-    return repr(line if len(line) <= 80 else line[:77] + "...")
-
-
-def _named(names: Any) -> str:
-    return ", ".join(map(str, names))[:300]

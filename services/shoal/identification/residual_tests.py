@@ -15,11 +15,17 @@ from shoal.identification.units import of_channels
 from shoal.trajectory import Array, plain
 
 _LARGE = 3.0
-"""Times the noise, from where on a residual is more than noise and its own uncertainty."""
+"""Times a noise that is only estimated, from where on a residual is more than noise and its own uncertainty."""
+_LOUD = 1.5
+"""Times the stated noise: a white residual up to here is a noise that was stated too small, a larger one is not."""
 _SURE = 1e-6
-"""Chance below which a test counts as failed; models are looked at for many reasons, so it is small."""
+"""Chance below which an estimated noise counts as exceeded; models are looked at for many reasons, so it is small."""
+_DOUBT = 1e-3
+"""Chance below which a test against a stated noise, or of whiteness, counts as failed: a right model fails 1 in 500."""
 _NO_FIT = 0.05
 """Of the signal: a systematic residual above this is a wrong model, one below it an imperfect one."""
+_HARDLY = 0.3
+"""Of the signal: a residual above this that is not white is none of a right model, whatever the noise may be."""
 _OUTLIER = 5.0
 _DIGITS = 1e-12
 """Of the data: no deviation below is held against a model, as a motion is computed to this tolerance by default."""
@@ -34,6 +40,8 @@ class ResidualTests:
     noise: the stated one, else what the data show without any model; signal: spread of the data about their means
     mesh: the model's own error, 0 if unknown; chance_of_size: that noise of this size and correlation leaves such a
     residual (chi-square); chance_of_white: that white noise is so correlated (Ljung and Box 1978), by the worst channel
+    excess: size of what is systematic in it, 0 where the residual is white
+    refined: size of the residual that a finer mesh and theory would leave
     outliers: beyond five robust standard deviations of their channel; rows: how many there are
     unit: of the sizes; empty where channels of different units are taken together, whose sizes mean something only
     against each other
@@ -49,26 +57,53 @@ class ResidualTests:
     outliers: int
     rows: int
     unit: str = ""
+    excess: float = 0.0
+    refined: float = np.inf
+
+    @property
+    def explained(self) -> float:
+        """What noise and mesh explain."""
+        return max(float(np.hypot(self.noise, self.mesh)), 1e-300)
 
     @property
     def ratio(self) -> float:
         """Size over what noise and mesh explain."""
-        return self.size / max(float(np.hypot(self.noise, self.mesh)), 1e-300)
+        return min(self.size, self.refined) / self.explained
 
     @property
     def white(self) -> bool:
         """Whether the residuals may be white noise."""
-        return self.chance_of_white > _SURE
+        return self.chance_of_white > _DOUBT
+
+    @property
+    def too_large(self) -> bool:
+        """Whether the residual is larger than the stated noise, by a chance that leaves little doubt."""
+        return self.noise_stated and self.ratio > 1.0 and self.chance_of_size < _DOUBT
 
     @property
     def systematic(self) -> bool:
-        """Whether the residual is more than noise: much larger, by a chance that leaves no doubt."""
+        """Whether the residual is more than noise: larger than stated, and not white; or much larger."""
+        if self.noise_stated:
+            return self.too_large and (not self.white or self.ratio > _LOUD)
         return self.ratio > _LARGE and self.chance_of_size < _SURE
 
     @property
+    def limited(self) -> bool:
+        """Whether the model, and not the noise, limits what the fit tells."""
+        return self.systematic or self.excess > 0.0
+
+    @property
+    def explains_nothing(self) -> bool:
+        """Whether a constant would fit as well."""
+        return self.size >= self.signal > 0.0 and not (self.noise_stated and not self.too_large)
+
+    @property
     def wrong_model(self) -> bool:
-        """Whether the model is refuted: systematic against a stated noise, or against a good part of the signal."""
-        return self.systematic and (self.noise_stated or self.size > _NO_FIT * self.signal)
+        """Whether the model is refuted: against a stated noise, against a good part of the signal, or a constant."""
+        if self.noise_stated:
+            return self.systematic or self.explains_nothing
+        hardly = not self.white and self.size > _HARDLY * self.signal
+        return hardly or self.explains_nothing or (self.systematic and self.size > _NO_FIT * self.signal)
 
     def sized(self, size: float) -> str:
         """A size with its unit."""
@@ -89,22 +124,35 @@ class ResidualTests:
 
     def to_json(self) -> dict[str, Any]:
         """All fields, and what follows from them."""
-        return plain({**asdict(self), "systematic": self.systematic, "wrong_model": self.wrong_model})  # type: ignore[no-any-return]
+        told = {"ratio": self.ratio, "systematic": self.systematic, "wrong_model": self.wrong_model}
+        return plain({**asdict(self), **told})  # type: ignore[no-any-return]
 
 
 def residual_tests(
-    model: ForwardModel, residual: Array, blocks: list[Block], noise: tuple[Noise, ...], mesh: float
+    model: ForwardModel,
+    residual: Array,
+    blocks: list[Block],
+    noise: tuple[Noise, ...],
+    mesh: float = 0.0,
+    refined: Array | None = None,
 ) -> ResidualTests:
-    """Test the residuals (rows,) of an answer; blocks, noise: as estimated with it; mesh: the model's own error."""
+    """Test the residuals (rows,) of an answer; blocks, noise: as estimated with it.
+
+    mesh: size of the model's own error; refined: residuals (rows,) that the answer of a better mesh and theory would
+    leave, whose whiteness is then what counts
+    """
     measured = [(b, n) for b, n in zip(blocks, noise, strict=True) if not b.known]
     rows = np.concatenate([block.rows for block, _ in measured])
-    size = float(np.sqrt(np.mean(residual[rows] ** 2)))
+    left = residual if refined is None else refined
+    size, smaller = (float(np.sqrt(np.mean(r[rows] ** 2))) for r in (residual, left))
     seen = model.noise if model.noise is not None else _without_model(model)
-    # As many samples as the residual's own memory leaves independent, less the parameters.
-    independent = sum(n.independent(len(b.rows)) for b, n in measured) - len(model.names)
+    # Chi-square with as many samples as the residual's memory leaves independent for its variance (Bartlett 1935),
+    # less the parameters.
+    independent = sum(len(b.rows) * (1.0 - n.rho**2) / (1.0 + n.rho**2) for b, n in measured) - len(model.names)
     freedom = max(1.0, independent)
-    beyond = size / max(float(np.hypot(seen, mesh)), 1e-300)
-    whiteness = [ljung_box(residual[block.rows]) for block, _ in measured]
+    beyond = min(size, smaller) / max(float(np.hypot(seen, mesh)), 1e-300)
+    whiteness = [ljung_box(left[block.rows]) for block, _ in measured]
+    white = min(1.0, min(whiteness) * len(whiteness))
     outlying = [_outlying(residual[block.rows]) for block, _ in measured]
     return ResidualTests(
         size=size,
@@ -114,11 +162,21 @@ def residual_tests(
         mesh=mesh,
         # A product overflows to infinity, which has chance zero; a power would raise OverflowError.
         chance_of_size=float(chdtrc(freedom, freedom * beyond * beyond)),
-        chance_of_white=min(1.0, min(whiteness) * len(whiteness)),
+        chance_of_white=white,
         outliers=sum(outlying),
         rows=len(rows),
         unit=of_channels(model.measurement),
+        excess=0.0 if white > _DOUBT else _excess([left[block.rows] for block, _ in measured], seen, mesh),
+        refined=smaller,
     )
+
+
+def _excess(residuals: list[Array], noise: float, mesh: float) -> float:
+    """Size of what is systematic in residuals (samples,) of the channels: beyond the noise, or alike in neighbours."""
+    count = sum(len(part) for part in residuals)
+    power = sum(float(part @ part) for part in residuals) / count
+    alike = sum(float(part[1:] @ part[:-1]) for part in residuals) / count
+    return float(np.sqrt(max(0.0, power - noise**2 - mesh**2, alike - mesh**2)))
 
 
 def ljung_box(signal: Array, lags: int = 10) -> float:

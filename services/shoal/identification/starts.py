@@ -33,6 +33,12 @@ def starting_points(model: ForwardModel) -> Array:
     return np.asarray(np.clip(points, model.lower, model.upper))
 
 
+def poses_at(model: ForwardModel, point: Array, name: str) -> Array:
+    """The point with every pose that a recording's first samples allow, its rates unchanged, (points, parameters)."""
+    angles = model.parameters.indices(name, ".angle")
+    return _poses(model, name, point, list(angles.values()), _first_pose(model, name)[0]) if angles else point[None]
+
+
 def _of_recording(model: ForwardModel, point: Array, name: str) -> Array:
     """The point with every initial state that the first samples of a recording allow, (points, parameters)."""
     angles = model.parameters.indices(name, ".angle")
@@ -162,6 +168,8 @@ def _with_rates(
 ) -> Array:
     """The point with its rates such that the channels start with the measured slope (least squares)."""
     _, jacobian = _pose_error(model, name, point[None], angles, np.where(np.isfinite(slope), 0.0, np.nan))
+    if not np.all(np.isfinite(jacobian)):
+        return point
     solution, *_ = np.linalg.lstsq(jacobian[0], np.where(np.isfinite(slope), slope, 0.0), rcond=None)
     point = point.copy()
     point[rates] = solution

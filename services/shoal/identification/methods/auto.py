@@ -102,7 +102,7 @@ def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]
     """
     span = model.upper - model.lower
     _, jacobian = linearise(model, point)
-    direction = np.linalg.svd(jacobian * span)[2][-1]
+    direction = np.linalg.svd(np.linalg.qr(jacobian * span, mode="r"))[2][-1]
     reach = _WIDTH / np.max(np.abs(direction))
     line = point + np.linspace(-reach, reach, _LINE)[:, None] * direction * span
     values = model.fitness(np.clip(line, model.lower, model.upper))

@@ -31,7 +31,7 @@ def from_starts(model: ForwardModel, starts: Array, first: tuple[Array, Array], 
     best = min(descents, key=lambda d: d.fitness)
     others = [(d.point, d.fitness) for d in descents if d is not best]
     message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
-    return Outcome(best.point, best.fitness, history(descents), message, others)
+    return Outcome(best.point, best.fitness, history(descents), message, others, converged=best.converged)
 
 
 def descend(model: ForwardModel, start: Array, progress: Progress) -> Descent:

@@ -17,7 +17,8 @@ class Outcome:
 
     iterations: rows of (iteration, best fitness, mean fitness of the iteration)
     minima: other points where a local search ended, with their fitness
-    choice: which method `auto` has taken, and why; ended: whether the method came to its end
+    choice: which method `auto` has taken, and why; ended: whether the method came to its end;
+    converged: whether what it ended with is a minimum, as far as it can tell
     """
 
     point: Array
@@ -27,6 +28,7 @@ class Outcome:
     minima: list[tuple[Array, float]] = field(default_factory=list)
     choice: str = ""
     ended: bool = True
+    converged: bool = True
 
 
 Method = Callable[[ForwardModel, np.random.Generator, Progress], Outcome]

@@ -1,0 +1,49 @@
+"""What a search for the cause of a misfit names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SEVERAL = 2.0
+"""Times smaller: a misfit beyond the noise that falls by this factor is explained."""
+_CHANCE = 10.83
+"""By how much one more parameter lowers a chi-square by chance once in a thousand times."""
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """Something taken as known, the value it was given, the fitted one, and the misfit (RMS) with either.
+
+    change: the two values in words; unit: of the misfits, empty where channels of different units are taken together
+    kind: `measurement`, `machine` or `data` (another reading of the recorded numbers)
+    """
+
+    name: str
+    stated: float
+    value: float
+    before: float
+    after: float
+    change: str
+    unit: str = ""
+    kind: str = "measurement"
+
+    @property
+    def words(self) -> str:
+        """Its name as a sentence has it."""
+        return f"offset in {self.name}" if self.name in ("x", "y") else self.name
+
+    def __str__(self) -> str:
+        """In words, as a message names it."""
+        misfit = f"the misfit from {self.before:.2g} to {self.after:.2g} {self.unit}".rstrip()
+        return f"the {self.words}: {self.change} would lower {misfit}"
+
+    def equals(self, best: Suspect, rows: int) -> bool:
+        """Whether so many rows cannot tell it from the best one: misfits alike within chance or one per cent."""
+        return self.after**2 <= best.after**2 * max(1.0 + _CHANCE / rows, 1.02)
+
+
+def explains(before: float, after: float, noise: float, rows: int) -> bool:
+    """Whether a misfit that falls so, of so many rows with that noise, is explained: severalfold, and not by chance."""
+    beyond = max(after**2 - noise**2, 0.0)
+    severalfold = after * SEVERAL <= before or beyond * SEVERAL**2 <= before**2 - noise**2
+    return severalfold and (before**2 - after**2) * rows > 2 * _CHANCE * max(after, noise) ** 2

@@ -1,0 +1,209 @@
+"""A table of CSV or Parquet, and its columns as numbers; a file that is wrong gets one line."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import re
+import warnings
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shoal.errors import InputError
+from shoal.trajectory import Array
+
+Mask = NDArray[np.bool_]
+
+LARGEST = 200_000_000
+"""Bytes of a table, unpacked; more are refused."""
+_COMMENT = re.compile(rb"^[ \t]*[#%][^\r\n]*", re.MULTILINE)
+_UNITS = re.compile(r"\W*(m?s|sec|seconds?|[cmu]?m|in|px|pixels?|rad|deg|degrees|rev|°|Hz)(/m?s)?\W*", re.IGNORECASE)
+"""A cell of a line of units under the header."""
+_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
+"""First bytes of a text by its encoding."""
+_EMPTY = ("", "nan", "na", "n/a", "null", "none", "<na>", "nat")
+"""Cells that are gaps, in small letters."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns as a file has them, by name.
+
+    rows: the line of the file that each row stands on, (rows,); decimal: how its text writes the decimal mark
+    comments: lines that are no rows, increasing
+    """
+
+    path: Path
+    frame: Any
+    rows: NDArray[np.intp]
+    decimal: str = "."
+    comments: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+
+    @property
+    def frames(self) -> NDArray[np.intp]:
+        """The number of each row among all lines but comments, from 0: a line that is blank is a frame too."""
+        numbers = self.rows - np.searchsorted(self.comments, self.rows)
+        return np.asarray(numbers - numbers[0])
+
+    def numbers(self, column: str) -> Array:
+        """A column, (rows,), nan where a cell is empty. Raises InputError for what is no finite number."""
+        self.require(column)
+        series = self.frame[column]
+        if series.dtype.kind in "iuf":
+            numbers = series.to_numpy(dtype=float, na_value=np.nan)
+        else:
+            words = [None if x is None or x is np.nan or str(x).strip().lower() in _EMPTY else str(x) for x in series]
+            numbers = np.array([np.nan if word is None else _float(word, self.decimal) for word in words])
+            self._refuse_first(np.array([w is not None for w in words]) & np.isnan(numbers), column, "is not a number")
+        self._refuse_first(np.isinf(numbers), column, "is not finite")
+        return np.asarray(numbers, dtype=float)
+
+    def require(self, column: str) -> None:
+        """Refuse a column that is not there."""
+        if column not in self.frame.columns:
+            raise InputError(f"{self.path}: no column {column!r}; there are {_named(self.frame.columns)}")
+
+    def _refuse_first(self, bad: Mask, column: str, why: str) -> None:
+        if np.any(bad):
+            k = int(np.argmax(bad))
+            found = str(self.frame[column].iloc[k])
+            if k == 0 and _UNITS.fullmatch(found):
+                raise InputError(
+                    f"{self.path}: row {self.rows[k]} holds units ({column!r}: {_short(found)}); take the line out, "
+                    "and state `unit` of the channels and `time_scale`"
+                )
+            raise InputError(f"{self.path}: row {self.rows[k]}, column {column!r}: {_short(found)} {why}")
+
+
+def load_table(path: Path, columns: list[str] | None = None) -> Table:
+    """A table of CSV or Parquet; columns: names, where it has no header line. Raises InputError."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(LARGEST + 1)
+        if data.startswith(b"\x1f\x8b"):
+            with gzip.open(io.BytesIO(data)) as packed:
+                data = packed.read(LARGEST + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(f"data: {path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(data) > LARGEST:
+        raise InputError(f"data: {path} holds more than {LARGEST / 1e6:.0f} MB; cut the part to fit on out of it")
+    if data.startswith(b"PAR1"):
+        return _parquet(path, data)
+    return _csv(path, _utf8(path, data), columns)
+
+
+def _utf8(path: Path, data: bytes) -> bytes:
+    """Text as UTF-8: of UTF-16 with a mark and of Latin-1 too. Raises InputError."""
+    encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), None)
+    try:
+        if encoding is not None:
+            data = data.decode(encoding).encode()
+    except UnicodeDecodeError:
+        raise InputError(f"data: {path} is not CSV: it begins as {encoding} and is not") from None
+    if b"\0" in data[:65536]:
+        raise InputError(f"data: {path} is not CSV: it is binary")
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        data = data.decode("latin-1").encode()
+    return data
+
+
+def _parquet(path: Path, data: bytes) -> Table:
+    import pandas
+
+    try:
+        frame = pandas.read_parquet(io.BytesIO(data))
+    except ImportError:
+        raise InputError(f"data: {path} is Parquet, which needs the package pyarrow; install it, or give CSV") from None
+    except (OSError, ValueError, KeyError, NotImplementedError, MemoryError) as error:
+        raise InputError(f"data: {path} is not Parquet: {_short(str(error))}") from None
+    return Table(path, frame, np.arange(1, len(frame) + 1))
+
+
+def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
+    import pandas
+
+    try:
+        first, skipped, data, comments = _header(data, columns is not None)
+        separator = next((mark for mark in (";", "\t") if mark in first), ",")
+        decimal = "," if separator == ";" else "."
+        header = [name.strip() for name in next(csv.reader([first], delimiter=separator), [])]
+        names = columns or header
+        if not header:
+            raise InputError(f"data: {path} is not CSV: its first line is empty")
+        twice = [name for name in names if names.count(name) > 1]
+        if columns is None and all(np.isfinite(_float(name, decimal)) for name in header):
+            raise InputError(f"{path}: no header line; name its columns with `columns`")
+        if twice:
+            raise InputError(f"{path}: row 1: column {twice[0]!r} stands twice")
+        with warnings.catch_warnings():
+            # A row with more cells than the header would else be cut off with a mere warning.
+            warnings.simplefilter("error", pandas.errors.ParserWarning)
+            frame = pandas.read_csv(
+                io.BytesIO(data),
+                sep=separator,
+                decimal=decimal,
+                header=None,
+                names=names,
+                skiprows=skipped,
+                index_col=False,
+                skip_blank_lines=False,
+                skipinitialspace=True,
+                low_memory=False,
+            )
+    except (ValueError, csv.Error, pandas.errors.ParserWarning, OverflowError, MemoryError) as error:
+        raise InputError(f"data: {path} is not CSV: {_short(str(error))}") from None
+    rows = np.arange(len(frame)) + 1 + skipped
+    filled = frame.notna().any(axis=1).to_numpy()
+    return Table(path, frame[filled], rows[filled], decimal, comments)
+
+
+def _header(data: bytes, named: bool) -> tuple[str, int, bytes, NDArray[np.intp]]:
+    """The header line, how many lines to skip, the text with comments blanked, and the lines that these stood on.
+
+    named: whether the columns are named elsewhere; then the first line of data tells how cells are separated. A
+    comment that has as many words as the numbers below it is their header, as `numpy.savetxt` writes it.
+    """
+    if not data.lstrip(b" \t\r\n").startswith((b"#", b"%")) and not _COMMENT.search(data):
+        first = data.split(b"\n", 1)[0].decode().strip("\r")
+        return first, 0 if named else 1, data, np.zeros(0, np.intp)
+    lines = data.splitlines()
+    comments = np.array([k for k, line in enumerate(lines, start=1) if _COMMENT.match(line)], dtype=np.intp)
+    data = _COMMENT.sub(b"", data)
+    begin = next((k for k, line in enumerate(lines, start=1) if line.strip() and k not in set(comments[:1000])), 0)
+    if not begin:
+        return "", 0, data, comments
+    first = lines[begin - 1].decode()
+    if named:
+        return first, begin - 1, data, comments
+    cells = re.split(r"[,;\t]", first)
+    above = [k for k in comments if k < begin]
+    if above and all(np.isfinite(_float(cell.strip(), "," if ";" in first else ".")) for cell in cells):
+        words = lines[above[-1] - 1].decode().lstrip(" \t#%")
+        if len(re.split(r"[,;\t]", words)) == len(cells):
+            return words, begin - 1, data, comments
+    return first, begin, data, comments
+
+
+def _float(text: str, decimal: str) -> float:
+    """The number that a cell holds, nan if it is none."""
+    try:
+        return float(text.replace(decimal, ".").replace("_", "?"))
+    except ValueError:
+        return float("nan")
+
+
+def _short(text: str) -> str:
+    line = (text.splitlines() or [""])[0]
+    return repr(line if len(line) <= 80 else line[:77] + "...")
+
+
+def _named(names: Any) -> str:
+    return ", ".join(map(str, names))[:300]
