@@ -109,7 +109,9 @@ def conclude(
     correlation = autocorrelation(seen.residual, blocks)
     draws = wishes.bootstrap if possible and looked else 0
     rng = np.random.default_rng(seed)
-    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, None if stages else mesh, tests))
+    # Away from the minimum the mesh is not what limits the fit.
+    limits = judgement.verdict is not Verdict.UNFINISHED and not stages
+    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, mesh if limits else None, tests))
     notes += (_slender(parameters, tests, theory),)
     return Estimate(
         problem=model.problem.name,

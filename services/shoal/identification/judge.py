@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shoal.identification.deadline import unless_late
+from shoal.identification.deadline import TimeIsUp, unless_late
 from shoal.identification.estimate import Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
@@ -95,7 +95,10 @@ def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
     if np.any(outside):
         names = ", ".join(name for name, out in zip(model.names, outside, strict=True) if out)
         return f"{names} ended outside the bounds of the search"
-    better = downhill(model, point, seen)
+    try:
+        better = downhill(model, point, seen)
+    except TimeIsUp:
+        return "no time was left to see whether the answer is a minimum"
     return "" if better is None else sentence(model, point, better)
 
 
