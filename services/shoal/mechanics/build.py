@@ -80,7 +80,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     held = constraints.assemble(terms, rows.of, _stack, len(loads.fitted))
     for one in terms.held:
         if one.drive is not None:
-            with _naming(one.name):
+            stated = f"joints.{one.name}" if one.name in scene.joints else one.name.replace(GROUND, "ground_points", 1)
+            with _naming(stated):
                 fitting.require_no_jump(one.drive.function, horizon)
                 loads.fitted.append(fitting.fit(one.drive, horizon, one.drive.knots, steep=False))
     held_rows = rows.size
