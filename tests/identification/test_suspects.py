@@ -33,7 +33,10 @@ def found(points: np.ndarray, times: np.ndarray, gravity: float = -9.81) -> dict
     measurement = Measurement.single(times, tuple(problem.channels), noisy, "scipy DOP853")
     model = ForwardModel(problem, scene, get_engine("gauss"), measurement)
     outcome = least_squares(model, np.random.default_rng(0), lambda *_: None)
-    return {suspect.name: suspect for suspect in suspects(model, outcome.point, *linearise(model, outcome.point), 1e-3).suspects}
+    return {
+        suspect.name: suspect
+        for suspect in suspects(model, outcome.point, *linearise(model, outcome.point), 1e-3).suspects
+    }
 
 
 TIMES = np.arange(1, 151) / 100

@@ -190,8 +190,8 @@ def _slender(parameters: dict[str, Value], tests: ResidualTests, theory: float |
     limited = [n for n, v in parameters.items() if abs(v.theory or 0.0) > _NOTICED * (v.upper - v.lower) / 2]
     if theory is None or not limited:
         return ""
-    size = f"about {tests.sized(theory)} of the motion"
-    return f"shear and rotary inertia, which slender beams neglect, are {size} and widen the interval of {', '.join(limited)}"
+    change = f"change the motion by about {tests.sized(theory)} and widen the interval of {', '.join(limited)}"
+    return f"shear and rotary inertia, which slender beams neglect, {change}"
 
 
 def _better(profiled: dict[str, Profile]) -> str:

@@ -2,13 +2,14 @@
 
 A wrong clock or an omitted mass is a fault that no fit of the parameters shows. Each candidate is freed in turn and the
 residual is regressed on its effect, the parameters following (a score test: Rao 1948); the most promising are then
-fitted together with the parameters. A misfit that is a good part of the signal may also come from another reading of the
-numbers. Where nothing explains it, values of each candidate are tried over its whole range.
+fitted together with the parameters. A misfit that is a good part of the signal may also come from another reading of
+the numbers. Where nothing explains it, values of each candidate are tried over its whole range.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -48,7 +49,7 @@ _FAR = 3.0
 
 @dataclass(frozen=True)
 class Findings:
-    """The suspects, those that explain most first; better: a point of the very model that fits better, if one was met."""
+    """The suspects, those that explain most first; better: a point of the model itself that fits better, if met."""
 
     suspects: list[Suspect] = field(default_factory=list)
     better: Array | None = None
@@ -69,10 +70,8 @@ def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array
     noise: what no explanation can go below [RMS]. Past the model's deadline it ends with what was found until then.
     """
     search = _Search(model, point, residual, jacobian, noise)
-    try:
+    with suppress(TimeIsUp):
         search.run()
-    except TimeIsUp:
-        pass
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
     told = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.spread)
     found = sorted(told, key=lambda s: (float(f"{s.after:.2e}"), s.name))
