@@ -15,6 +15,7 @@ from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge import Judgement, few, judge
 from shoal.identification.methods import Outcome
+from shoal.identification.methods.lanes import Descent
 from shoal.identification.model_error import Corrections, ModelError, model_error, rms_of
 from shoal.identification.profiles import Profile, profiles
 from shoal.identification.rank import combinations
@@ -87,6 +88,8 @@ def conclude(
     unknown = combinations(model, point, at) if possible and looked else []
     if possible:
         judgement = judge(model, outcome, seen, at, tests, parameters, unknown)
+        if judgement.better is not None:
+            return conclude(searched, _moved(outcome, judgement.better), method, seed, wall, stages, wishes)
     else:
         message = "no parameter set could be simulated; look at the bounds and the scene"
         judgement = Judgement(Verdict.FAILED, message)
@@ -178,6 +181,15 @@ def _coarse(model: ForwardModel, mesh: float | None, tests: ResidualTests) -> st
     else:
         return ""
     return f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted / 3:.1g} finds a better mesh"
+
+
+def _moved(outcome: Outcome, better: Descent) -> Outcome:
+    """The outcome at a better minimum; where it was is left as another one."""
+    choice = "; then ".join(part for part in (outcome.choice, "least squares from a refit for a suspect") if part)
+    minima = [(outcome.point, outcome.fitness), *outcome.minima]
+    message = "" if better.converged else "no convergence"
+    moved = replace(outcome, point=better.point, fitness=better.fitness, minima=minima, choice=choice)
+    return replace(moved, message=message, converged=better.converged)
 
 
 def _by_thing(model: ForwardModel, rows: Array | None) -> float | None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
+from shoal.identification.methods.lanes import Descent
 from shoal.identification.residual_tests import ResidualTests
 from shoal.identification.rivals import relation, rivals_of, within
 from shoal.identification.sensitivity import Sensitivity
-from shoal.identification.suspects import Suspect, suspects
+from shoal.identification.suspects import Findings, Suspect, suspects
 from shoal.identification.swaps import exchanged
 from shoal.identification.uncertainty import Linearisation
 
@@ -28,12 +28,16 @@ _FEWEST = 3
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict, why, what to do next, and the properties of the measurement that would explain a misfit."""
+    """The verdict, why, what to do next, and what would explain a misfit.
+
+    better: a minimum that fits better, if the search for suspects met one: go on from there
+    """
 
     verdict: Verdict
     message: str = ""
     advice: list[str] = field(default_factory=list)
     suspects: list[Suspect] = field(default_factory=list)
+    better: Descent | None = None
 
 
 def judge(
@@ -52,11 +56,12 @@ def judge(
     if few(model):
         reason = f"{tests.rows} measured numbers for {len(parameters)} unknown: too few to tell how uncertain they are"
         return Judgement(Verdict.FAILED, reason, ["measure more, or state the noise of the channels"])
-    found: list[Suspect] = []
+    looked = Findings()
     if (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal:
-        found = unless_late(
-            lambda: suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained).suspects, []
-        )
+        looked = suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained)
+    if looked.better is not None:
+        return Judgement(Verdict.FAILED, "a better minimum was met", better=looked.better)
+    found = looked.suspects
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
     if not outcome.converged:
