@@ -12,7 +12,8 @@ from shoal.identification.conclude import NOTHING, conclude
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
 from shoal.identification.methods.least_squares import descend
-from shoal_validation.coverage.cases import tip
+from shoal_validation.coverage.cases import NOISE, tip
+from shoal_validation.coverage.cases import noise as correlated
 
 RECORDINGS = Path(__file__).parents[3] / "shared" / "data" / "multiarm_kaheman"
 ANGLE = {"lower": -np.pi, "upper": np.pi}
@@ -73,6 +74,65 @@ def test_wrong_models_are_not_answers(noise: float | None, values: dict[str, Any
     estimate = fit(noise, values, **data)
     assert estimate.verdict is Verdict.REJECTED, estimate.message
     assert estimate.advice
+
+
+def test_a_small_fault_is_seen_against_a_stated_noise() -> None:
+    """A residual of twice the stated noise that is not white; the cause is named."""
+    estimate = fit(1e-3, friction=0.03)
+    assert 1.2 < estimate.residual_tests.ratio < 5.0
+    assert estimate.verdict is Verdict.REJECTED
+    assert estimate.suspects[0].name == "friction of O"
+    assert "not white noise" in estimate.message
+
+
+def recorded(stated: Problem, more: np.ndarray) -> Measurement:
+    """The right machine with something added to what is seen of its tip, (150, 2)."""
+    times = np.arange(1, 151) / 100
+    points = tip(times, **TRUTH) + more
+    return Measurement.single(times, tuple(stated.channels), points, "scipy DOP853", TRUTH, stated.noise)
+
+
+def judged(noise: float | None, more: np.ndarray) -> Estimate:
+    stated = problem(noise)
+    return identify(stated, method="least-squares", measurement=recorded(stated, more))
+
+
+def test_a_noise_that_was_stated_too_small_is_told_and_no_wrong_model() -> None:
+    draws = np.random.default_rng(5).standard_normal((150, 2))
+    estimate = judged(1e-3, 1.3e-3 * draws)
+    assert estimate.verdict is Verdict.IDENTIFIED
+    assert "times what was stated" in estimate.message
+    assert judged(1e-3, 4e-3 * draws).verdict is Verdict.REJECTED
+
+
+@pytest.mark.parametrize("noise", [None, 3e-3])
+def test_correlated_noise_and_digits_are_no_wrong_model(noise: float | None) -> None:
+    """AR(1) with a memory of ten samples, as large as stated, on positions rounded to six digits."""
+    for seed in range(4):
+        estimate = judged(noise, np.round(3e-3 / NOISE * correlated(150, 0.9, seed), 6))
+        assert estimate.verdict is Verdict.IDENTIFIED, estimate.message
+        assert all(estimate.parameters[n].lower <= x <= estimate.parameters[n].upper for n, x in TRUTH.items())
+
+
+def test_steps_of_the_digits_alone_are_no_wrong_model() -> None:
+    exact = tip(np.arange(1, 151) / 100, **TRUTH)
+    for digits in (3, 6, 15):
+        assert judged(None, np.round(exact, digits) - exact).verdict is Verdict.IDENTIFIED
+
+
+def test_what_explains_no_more_than_a_constant_is_rejected() -> None:
+    stated = problem(None)
+    measurement = recorded(stated, np.zeros((150, 2)))
+    run = replace(measurement.first, values=0.3 * np.random.default_rng(2).standard_normal((150, 2)))
+    estimate = identify(stated, method="least-squares", measurement=replace(measurement, recordings={"r": run}))
+    assert not estimate.verdict.trusted
+
+
+def test_an_end_that_has_not_converged_is_no_answer() -> None:
+    model = model_of(problem(1e-3))
+    end = descend(model, np.array(list(TRUTH.values())), lambda *_: None)
+    outcome = Outcome(end.point, end.fitness, [], "no convergence after 60 iterations", converged=False)
+    assert concluded(model, outcome).verdict is Verdict.FAILED
 
 
 @pytest.mark.slow

@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shoal.engines import get_engine
-from shoal.identification import Measurement, Problem, identify, load_problem
+from shoal.identification import Measurement, Problem, Verdict, identify, load_problem
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.least_squares import least_squares, linearise
 from shoal.identification.suspects import Suspect, suspects
 from shoal_validation.coverage.cases import tip
+from shoal_validation.suspects.study import trial
 
 RECORDINGS = Path(__file__).parents[3] / "shared" / "data" / "multiarm_kaheman"
 ANGLE = {"lower": -np.pi, "upper": np.pi}
@@ -79,6 +80,46 @@ def test_a_late_start() -> None:
     """Recorded time 0 is 0.1 s after the release."""
     named = found(tip(TIMES + 0.1, np.pi / 4, np.pi / 6), TIMES)
     assert named["delay"].value == pytest.approx(0.1, abs=2e-3)
+
+
+def test_a_release_after_the_recording_began() -> None:
+    """The machine is held for 0.3 s."""
+    times = np.arange(1, 181) / 100
+    held = np.concatenate([np.repeat(tip(np.array([1e-9]), np.pi / 4, np.pi / 6), 30, axis=0), TIP])
+    named = found(held, times)
+    assert next(iter(named)) == "delay"
+    assert named["delay"].value == pytest.approx(-0.3, abs=2e-3)
+
+
+def test_friction() -> None:
+    """Of Lagrange's equations, at the ground."""
+    named = found(tip(TIMES, np.pi / 4, np.pi / 6, friction=0.3), TIMES)
+    assert next(iter(named)) == "friction of O"
+    assert named["friction of O"].value == pytest.approx(0.3, rel=2e-2)
+    assert named["friction of O"].kind == "machine"
+
+
+def test_a_heavier_rod() -> None:
+    named = found(tip(TIMES, np.pi / 4, np.pi / 6, density=1500.0), TIMES)
+    heavier = {"mass of AB": 1500.0, "mass of OA": 1000.0 / 1.5}
+    assert next(iter(named)) in heavier
+    for name, density in heavier.items():
+        assert named[name].value == pytest.approx(density, rel=2e-2)
+
+
+def test_millimetres() -> None:
+    named = found(1e3 * TIP, TIMES)
+    assert next(iter(named)) == "unit of the positions"
+    assert named["unit of the positions"].value == pytest.approx(1e-3)
+
+
+@pytest.mark.slow
+def test_causes_are_named_first() -> None:
+    """Random faults of random machines, recorded by Exudyn; the whole study has 200."""
+    wrong = [trial(seed) for seed in range(1000, 1040)]
+    assert sum(t.first for t in wrong) >= 0.85 * sum(t.noticed for t in wrong)
+    right = [trial(seed, "right") for seed in range(40)]
+    assert sum(t.verdict is Verdict.REJECTED for t in right) <= 1
 
 
 def test_what_is_sought_is_no_suspect() -> None:

@@ -1,4 +1,4 @@
-"""The model's own error at an answer: what a finer mesh and a fuller theory would change of the motion, and of the answer."""
+"""The model's own error at an answer: what a finer mesh and a fuller theory would change of motion and answer."""
 
 from __future__ import annotations
 

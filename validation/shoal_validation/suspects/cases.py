@@ -1,4 +1,4 @@
-"""Recordings of machines with a fault that the model does not know: computed by Exudyn, which shares no code with it."""
+"""Recordings of machines with a fault that the model does not know: computed by Exudyn, which shares no code."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
-from shoal.identification.observation import Camera, observe
+from shoal.identification.observation import STRAIGHT, Camera, observe
 from shoal.identification.suspects.size import Size, size_of
 from shoal.scene import Scene
 from shoal.trajectory import Array
@@ -41,7 +41,7 @@ class _Fault:
     clock: float = 1.0
     late: float = 0.0
     held: float = 0.0
-    camera: Camera = Camera()
+    camera: Camera = STRAIGHT
     factors: dict[str, float] | None = None
     exchanged: bool = False
 
@@ -77,9 +77,7 @@ def _ratio(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(_signed(rng, np.log(low), np.log(high))))
 
 
-def _fault(
-    kind: str, scene: Scene, seen: list[tuple[str, str]], size: Size, rng: np.random.Generator
-) -> _Fault | None:
+def _fault(kind: str, scene: Scene, seen: list[tuple[str, str]], size: Size, rng: np.random.Generator) -> _Fault | None:
     """A fault of a kind, of random place and size; None where the machine or what is seen of it has none."""
     positions = seen[0][1] == "x"
     body, joint = str(rng.choice(list(scene.bodies))), str(rng.choice(list(scene.joints)))
@@ -140,7 +138,7 @@ def _fault(
         case "degrees" if not positions:
             return _Fault({}, "unit of the angles", factors={"angle": 57.29577951308232})
         case "time":
-            return _Fault({}, "unit of the time", clock=float(rng.choice([1e3, 1e-3])))
+            return _Fault({}, "unit of the time", clock=1e-3)
         case "mirrored":
             axis = str(rng.choice(["x", "y"]))
             name = f"{axis} axis" if positions else "sense of the angles"

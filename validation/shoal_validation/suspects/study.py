@@ -39,8 +39,8 @@ class Trial:
 
     def __str__(self) -> str:
         mark = "first" if self.first else ("-" if not self.noticed else "MISSED")
-        named = ", ".join(self.named)
-        return f"{self.machine:15s} {self.cause:24s} {mark:6s} {self.verdict} {self.ratio:.3g} cov {self.covered:g} [{named}]"
+        told = f"{self.verdict}, {self.ratio:.3g} times the noise, {100 * self.covered:.0f} % held"
+        return f"{self.machine:15s} {self.cause:24s} {mark:6s} {told} [{', '.join(self.named)}]"
 
 
 def trial(seed: int, kind: str | None = None) -> Trial:
@@ -91,6 +91,7 @@ def summary(trials: list[Trial]) -> tuple[tuple[str, ...], list[tuple[str, ...]]
             )
         )
     seen = [t for t in wrong if t.noticed]
-    last = f"cause named first: {sum(t.first for t in wrong)} of {len(wrong)} ({sum(t.first for t in seen)} of {len(seen)} seen)"
+    named = sum(t.first for t in wrong)
+    last = f"cause named first: {named} of {len(wrong)} ({named} of {len(seen)} whose misfit is seen)"
     rejected = sum(t.verdict is Verdict.REJECTED for t in right)
     return head, rows, f"{last}; right models rejected: {rejected} of {len(right)}"

@@ -1,4 +1,4 @@
-"""What a recording states: its clock, scale, place and tilt of the camera, the release, and the gravity it was made in."""
+"""What a recording states: clock, scale, place and tilt of the camera, the release, and the gravity there."""
 
 from __future__ import annotations
 

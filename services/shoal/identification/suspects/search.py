@@ -2,20 +2,21 @@
 
 A wrong clock or an omitted mass is a fault that no fit of the parameters shows. Each candidate is freed in turn and the
 residual is regressed on its effect, the parameters following (a score test: Rao 1948); the most promising are then
-fitted together with the parameters. A misfit that is a good part of the signal may also come from another reading of the
-numbers. Where nothing explains it, values of each candidate are tried over its whole range.
+fitted together with the parameters. A misfit that is a good part of the signal may also come from another reading of
+the numbers. Where nothing explains it, values of each candidate are tried over its whole range.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import descend_many
+from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.starts import starting_points
 from shoal.identification.suspects.candidate import Candidate, extended, with_parameters
@@ -48,10 +49,10 @@ _FAR = 3.0
 
 @dataclass(frozen=True)
 class Findings:
-    """The suspects, those that explain most first; better: a point of the very model that fits better, if one was met."""
+    """The suspects, those that explain most first; better: a minimum of the model itself that fits better, if met."""
 
     suspects: list[Suspect] = field(default_factory=list)
-    better: Array | None = None
+    better: Descent | None = None
 
 
 @dataclass(frozen=True)
@@ -69,10 +70,8 @@ def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array
     noise: what no explanation can go below [RMS]. Past the model's deadline it ends with what was found until then.
     """
     search = _Search(model, point, residual, jacobian, noise)
-    try:
+    with suppress(TimeIsUp):
         search.run()
-    except TimeIsUp:
-        pass
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
     told = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.spread)
     found = sorted(told, key=lambda s: (float(f"{s.after:.2e}"), s.name))
@@ -92,7 +91,7 @@ class _Search:
         self.inverse = (right[seen].T / singular[seen]) @ left[:, seen].T
         self.found: list[Suspect] = []
         self.ends: list[tuple[float, Array]] = []
-        self.better: Array | None = None
+        self.better: Descent | None = None
 
     def run(self) -> None:
         """Candidates near the answer, other readings, candidates far from it; then whether a better minimum was met."""
@@ -198,7 +197,7 @@ class _Search:
         ends = descend_many(self.model, np.array(promising), patience=_PATIENCE)
         best = min(ends, key=lambda end: end.fitness)
         if misfit(best.residual) < _BETTER * self.before:
-            self.better = best.point
+            self.better = best
 
 
 def _of_reading(reading: Reading, before: float, after: float, unit: str) -> Suspect:
