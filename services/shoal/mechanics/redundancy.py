@@ -53,9 +53,10 @@ def _dependent(assembly: Assembly, poses: Array) -> tuple[tuple[str, ...], Array
 def _split(scene: Scene) -> Scene:
     """The scene with flexible rods as separate bodies, one at each place of a joint: what they hold is not rigid."""
     bodies = {name: body for name, body in scene.bodies.items() if body.element == "rigid"}
-    initial = {name: InitialState(angle=start.angle, position=start.position)
-               for name in bodies if (start := scene.start(name))}  # fmt: skip
-
+    initial = {}
+    for name in bodies:
+        begin = scene.start(name)
+        initial[name] = InitialState(angle=begin.angle, position=begin.position)
     names: dict[tuple[str, Any], str] = {}
 
     def apart(at: Attachment) -> Attachment:
