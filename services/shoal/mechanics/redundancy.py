@@ -32,7 +32,8 @@ def redundant_joints(scene: Scene) -> tuple[str, ...]:
         step = free.T @ np.cos(1.0 + np.arange(len(free)))
         aside = assembly.guess + _ASIDE * step / np.max(np.abs(step))
         poses, gap = assembly.close(Closure(scene, assembly.guess), aside, np.zeros(aside.shape, dtype=bool))
-        if gap[0] < 1e-9:
+        # A machine that comes back cannot move: what holds it twice does so for good.
+        if gap[0] < 1e-9 and np.max(np.abs(poses - assembly.guess)) > 0.25 * _ASIDE:
             names = _dependent(assembly, poses)[0]
     return names
 
