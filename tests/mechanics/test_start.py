@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from shoal.errors import InputError
+from shoal.mechanics.simulate import simulate
 from shoal.mechanics.start import complete, is_direct
 from shoal.scene import Scene
 
@@ -405,3 +406,35 @@ def test_open_chains_take_the_direct_path() -> None:
     found = done(chain, a={"rate": 1.0})
     assert found.initial["b"].rate == 0.0
     assert done(chain, b={"position": [0.0, 1.0]}).initial["a"].angle == pytest.approx(np.pi / 2, abs=1e-9)
+
+
+def test_a_weight_between_two_bars_in_one_line_stays() -> None:
+    """A truss that only the second derivative of its joints holds."""
+    sides = {"L": [-1.0, 0.0], "R": [1.0, 0.0]}
+    joints = {name: {"kind": "distance", **pin("ground", place, "m")} for name, place in sides.items()}
+    data = scene({"m": {"kind": "point-mass", "mass": 1.0}}, joints) | {"initial": {"m": {"position": [0.0, 0.0]}}}
+    run = simulate(Scene.parse(data), np.array([0.5, 1.0]))
+    assert run.ok, run.message
+    assert np.max(np.abs(run.marker("m"))) < 1e-8
+    assert run.model["initial_changes"] == {}
+    assert run.model["redundant_joints"] == ["L", "R"]
+
+
+def test_what_the_start_changes_is_reported_by_body() -> None:
+    machine, states = drawn("four-bar", np.random.default_rng(0))
+    stated = Scene.parse({**machine.scene, "initial": {name: {"angle": one.angle} for name, one in states.items()}})
+    run = simulate(stated.with_values({"initial.a.angle": states["a"].angle + 0.1}), np.array([0.01]))
+    assert set(run.model["initial_changes"]) == {"b", "c"}
+    moved = run.model["initial_changes"]["b"]["angle"]
+    assert moved["stated"] == states["b"].angle
+    assert moved["used"] == run.model["initial"]["b"]["angle"]
+    assert run.model["initial_correction"] > 0.01
+    assert run.model["redundant_joints"] == []
+
+
+@pytest.mark.parametrize("kind", ["parallel", "perpendicular"])
+def test_a_point_mass_has_no_direction_to_hold(kind: str) -> None:
+    joints = {"J": {"kind": kind, **pin("p", "start", "q")}}
+    free = {"initial": {name: {"position": [0.0, 0.0]} for name in "pq"}}
+    with pytest.raises(InputError, match=r"joints\.J.*: p is a point mass, which has no direction"):
+        Scene.parse(scene({name: {"kind": "point-mass", "mass": 1.0} for name in "pq"}, joints) | free)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shoal.mechanics.closure import Closure, place_of
+from shoal.mechanics.closure import Closure, Flags, place_of
 from shoal.mechanics.tile import Array
 from shoal.mechanics.walk import Walk, guessed_angles
 from shoal.scene import Scene
@@ -51,7 +51,7 @@ class Placed(NamedTuple):
     """Poses (lanes, 3 bodies); whether they close the joints and keep what is stated, (lanes,)."""
 
     poses: Array
-    ok: Array
+    ok: Flags
 
 
 def stated(scene: Scene, lanes: int, quantities: tuple[Quantity, ...]) -> list[Statement]:
@@ -90,7 +90,7 @@ class Assembly:
         """Inverse of the metric in which displacements are measured, (3 bodies,)."""
         self.closure = Closure(scene, self.guess)
 
-    def _guess(self, attempt: int, keep: Array) -> Array:
+    def _guess(self, attempt: int, keep: Flags) -> Array:
         """Poses from the stated angles; later attempts shake those not in `keep`, (lanes, bodies)."""
         angles = self.angles
         if attempt:
@@ -99,7 +99,7 @@ class Assembly:
             angles = np.where(keep, angles, angles + shaken)
         return self.walk.poses(self.closure, angles, self.rates)[0]
 
-    def held(self, chosen: list[Statement]) -> tuple[Array, Array]:
+    def held(self, chosen: list[Statement]) -> tuple[Flags, Array]:
         """Which poses these statements fix, and their values; each (lanes, 3 bodies)."""
         fixed, values = np.zeros(self.guess.shape, dtype=bool), np.zeros(self.guess.shape)
         for one in chosen:
@@ -115,7 +115,7 @@ class Assembly:
         loose = self._in_order()
         return Placed(np.where(found.ok[:, None], found.poses, loose.poses), found.ok | loose.ok)
 
-    def seek(self, fixed: Array, values: Array, near: Array | None = None, attempts: int | None = None) -> Placed:
+    def seek(self, fixed: Flags, values: Array, near: Array | None = None, attempts: int | None = None) -> Placed:
         """Poses with some held, from one guess after another (or near one)."""
         most = attempts or (ATTEMPTS if self.lanes == 1 else FEW)
         best, ok = np.where(fixed, values, self.guess), np.zeros(self.lanes, dtype=bool)
@@ -153,7 +153,7 @@ class Assembly:
             for joint in self.scene.joints.values()
         )
 
-    def close(self, closure: Closure, u: Array, fixed: Array, weight: Array | None = None) -> tuple[Array, Array]:
+    def close(self, closure: Closure, u: Array, fixed: Flags, weight: Array | None = None) -> tuple[Array, Array]:
         """Poses from u on with some held, and the largest gap left [1], (lanes,). weight: of every row."""
         give = np.where(fixed, 0.0, self._yield)
         u = u.copy()
@@ -213,7 +213,7 @@ class Assembly:
                 u, kept = self._keep(one, u, kept)
         return Placed(u, ok)
 
-    def _keep(self, one: Statement, u: Array, kept: Array) -> tuple[Array, Array]:
+    def _keep(self, one: Statement, u: Array, kept: Flags) -> tuple[Array, Flags]:
         """Hold one more statement in the lanes where that can be."""
         more, values = kept.copy(), np.where(kept, u, 0.0)
         more[:, one.columns], values[:, one.columns] = True, one.values
@@ -227,7 +227,7 @@ class Assembly:
         better = trying & (gap <= CLOSED)
         return np.where(better[:, None], found, u), np.where(better[:, None], more, kept)
 
-    def _free(self, one: Statement, u: Array, kept: Array) -> Array:
+    def _free(self, one: Statement, u: Array, kept: Flags) -> Flags:
         """Whether the joints and what is kept leave the columns of a statement free, (lanes, columns)."""
         slope = Closure(self.scene, u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self._yield))[:, None, :]
         basis = np.linalg.svd(slope, full_matrices=False)

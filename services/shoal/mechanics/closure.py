@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.mechanics.affine import Number
 from shoal.mechanics.pose import as_complex, unit
@@ -32,6 +33,9 @@ from shoal.scene import (
     Weld,
 )
 from shoal.scene.joints import places
+
+Flags = npt.NDArray[np.bool_]
+"""Yes or no, by lane or by lane and pose."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +151,7 @@ class Closure:
 
     def speed(self, vector: Vector, v: Array, at: Attachment) -> Array:
         """Velocity [m/s] of what `here` gave."""
-        return np.sum(vector.slope * v[:, self._own(at)], axis=1) + vector.rate
+        return np.asarray(np.sum(vector.slope * v[:, self._own(at)], axis=1) + vector.rate)
 
     def _own(self, at: Attachment) -> list[int]:
         return [] if at.body == GROUND else [self.column[at.body] + k for k in range(3)]

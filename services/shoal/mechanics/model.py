@@ -17,6 +17,7 @@ from numba import njit
 
 from shoal.errors import InputError
 from shoal.mechanics import constraints, drives, forces, functions, gate, saddle, sparse
+from shoal.mechanics.closure import Flags
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.drives import Drives
 from shoal.mechanics.elements import ancf_cable, ancf_full, beam
@@ -150,7 +151,7 @@ class Model:
     """
 
     scene: Scene
-    failed: Array
+    failed: Flags
     frames: dict[str, Frame]
     lanes: int
     q0: Array

@@ -15,6 +15,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine, Number, fixed
+from shoal.mechanics.closure import Flags
 from shoal.mechanics.constraints import Terms
 from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame, is_on_axis
@@ -30,7 +31,6 @@ from shoal.mechanics.groups import (
 )
 from shoal.mechanics.pose import Pose, as_complex, unit
 from shoal.mechanics.start import started
-from shoal.mechanics.tile import Array
 from shoal.scene import (
     GROUND,
     Attachment,
@@ -54,7 +54,7 @@ class Placement:
     """
 
     scene: Scene
-    failed: Array
+    failed: Flags
     positions: list[Number] = field(default_factory=list)
     velocities: list[Number] = field(default_factory=list)
     frames: dict[str, Frame] = field(default_factory=dict)

@@ -32,7 +32,8 @@ def redundant_joints(scene: Scene) -> tuple[str, ...]:
         step = free.T @ np.cos(1.0 + np.arange(len(free)))
         aside = assembly.guess + _ASIDE * step / np.max(np.abs(step))
         poses, gap = assembly.close(Closure(scene, assembly.guess), aside, np.zeros(aside.shape, dtype=bool))
-        if gap[0] < 1e-9:
+        # A machine that comes back cannot move: what holds it twice does so for good.
+        if gap[0] < 1e-9 and np.max(np.abs(poses - assembly.guess)) > 0.25 * _ASIDE:
             names = _dependent(assembly, poses)[0]
     return names
 
@@ -53,9 +54,10 @@ def _dependent(assembly: Assembly, poses: Array) -> tuple[tuple[str, ...], Array
 def _split(scene: Scene) -> Scene:
     """The scene with flexible rods as separate bodies, one at each place of a joint: what they hold is not rigid."""
     bodies = {name: body for name, body in scene.bodies.items() if body.element == "rigid"}
-    initial = {name: InitialState(angle=start.angle, position=start.position)
-               for name in bodies if (start := scene.start(name))}  # fmt: skip
-
+    initial = {}
+    for name in bodies:
+        begin = scene.start(name)
+        initial[name] = InitialState(angle=begin.angle, position=begin.position)
     names: dict[tuple[str, Any], str] = {}
 
     def apart(at: Attachment) -> Attachment:

@@ -16,6 +16,7 @@ from pydantic import BaseModel
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly import Assembly, Statement
+from shoal.mechanics.closure import Flags
 from shoal.mechanics.frames import Frame
 from shoal.mechanics.starting_rates import Velocities
 from shoal.mechanics.tile import Array
@@ -33,7 +34,7 @@ class Start(NamedTuple):
     """A scene whose initial state is complete and agrees with its joints; failed: lanes that have none, (lanes,)."""
 
     scene: Scene
-    failed: Array
+    failed: Flags
 
 
 def started(scene: Scene) -> Start:

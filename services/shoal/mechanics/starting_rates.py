@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shoal.mechanics.assembly import ROUNDING, Assembly, Statement, stated
-from shoal.mechanics.closure import Closure
+from shoal.mechanics.closure import Closure, Flags
 from shoal.mechanics.pose import as_complex, unit
 from shoal.mechanics.tile import Array
 from shoal.scene import PointMass, Scene
@@ -30,7 +30,7 @@ class Moving(NamedTuple):
     """Rates (lanes, 3 bodies) [m/s, rad/s]; whether they are allowed (lanes,); statements not met in lane 0."""
 
     rates: Array
-    ok: Array
+    ok: Flags
     broken: list[Statement]
 
 
@@ -58,7 +58,7 @@ class Velocities:
             return Moving(self.guess, np.ones(self.lanes, dtype=bool), [])
         given = [one for one in self.statements if one is not without]
         keep = [k for k, name in enumerate(self.rows.names) if name != joint]
-        lower = np.linalg.cholesky(_metric(self.scene, self.poses, self.size))
+        lower = np.asarray(np.linalg.cholesky(_metric(self.scene, self.poses, self.size)), dtype=float)
         basis = _Basis(lower, self.guess)
         ok, broken = np.ones(self.lanes, dtype=bool), []
         for k in keep:
@@ -67,7 +67,7 @@ class Velocities:
             if not self.flexible:  # an elastic rod gives way
                 ok &= ~told | (left <= 1e2 * AGREES * self.speed * length / self.size)
         closed = basis.size
-        kept: list[tuple[Statement, Array]] = []
+        kept: list[tuple[Statement, Flags]] = []
         for one in given:
             good = np.ones(self.lanes, dtype=bool)
             for column, value in zip(one.columns, one.values.T, strict=True):
@@ -94,7 +94,7 @@ class Velocities:
             return False
         return not np.any(self.guess) or len(self.rows.names) > _LARGEST
 
-    def _on_branch(self, rates: Array, basis: _Basis, closed: int, keep: list[int]) -> tuple[Array, Array]:
+    def _on_branch(self, rates: Array, basis: _Basis, closed: int, keep: list[int]) -> tuple[Array, Flags]:
         """Rates that a singular position allows: those for which the joints stay closed in second order."""
         ok = np.ones(self.lanes, dtype=bool)
         singular = closed < len(keep) or bool(np.any(basis.dependent))
@@ -106,7 +106,7 @@ class Velocities:
             rank = int(np.sum(left.S > SINGULAR))
             null = left.U[:, rank:].T / (np.linalg.norm(slope, axis=1) + 1e-300)
             bend = _Bend(self.closure, self.poses[lane], null, keep)
-            free = basis.rest(lane)
+            free = basis.rest(int(lane))
             found = bend.nearest(rates[lane], free, self.speed / self.size)
             ok[lane] = found is not None
             if found is not None:
@@ -172,7 +172,7 @@ class _Basis:
         """Rows so far."""
         return self.rows.shape[1]
 
-    def add(self, row: Array, target: Array) -> tuple[Array, Array]:
+    def add(self, row: Array, target: Array) -> tuple[Array, Flags]:
         """What a row misses its target by, and whether those before it told it, (lanes,) each."""
         a = np.einsum("lij,lj->li", self.inverse, row)
         length = np.linalg.norm(a, axis=1) + 1e-300
@@ -191,7 +191,7 @@ class _Basis:
 
     def rates(self) -> Array:
         """v with L' v = y."""
-        return np.einsum("lji,lj->li", self.inverse, self.y)
+        return np.asarray(np.einsum("lji,lj->li", self.inverse, self.y))
 
     def rest(self, lane: int) -> Array:
         """Directions of v that no row tells, (directions, 3 bodies), orthonormal in the metric."""
