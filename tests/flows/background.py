@@ -18,9 +18,12 @@ from deployed import PATIENCE, artifacts_of, call
 OFTEN = {
     "PREFECT_SERVER_SERVICES_SCHEDULER_LOOP_SECONDS": "5",
     "PREFECT_SERVER_SERVICES_DB_VACUUM_LOOP_SECONDS": "5",
-    "PREFECT_SERVER_CONCURRENCY_INITIAL_DEPLOYMENT_LEASE_DURATION": "30",
+    "PREFECT_SERVER_CONCURRENCY_INITIAL_DEPLOYMENT_LEASE_DURATION": "120",
 }
-"""Loops of a minute, of an hour, and five minutes after which who holds a slot and is silent loses it."""
+"""Loops of a minute and of an hour, and five minutes after which who holds a slot and is silent loses it.
+
+Two minutes, not half a one: a night has to have started by then, on a busy machine too.
+"""
 
 
 def until(true: Callable[[], Any], what: str) -> Any:
@@ -57,7 +60,8 @@ def comes_by_itself(prefect: str, name: str, parameters: Mapping[str, object]) -
     (schedule,) = call(schedules, [{"schedule": rule, "active": True, "parameters": parameters}])
 
     def begun() -> list[dict[str, Any]]:
-        runs = call(f"{prefect}/api/flow_runs/filter", {"flow_runs": {"start_time": {"is_null_": False}}})
+        wanted = {"flow_runs": {"start_time": {"is_null_": False}}, "sort": "EXPECTED_START_TIME_ASC"}
+        runs = call(f"{prefect}/api/flow_runs/filter", wanted)
         return [run for run in runs if run["auto_scheduled"] and run["created_by"]["id"] == schedule["id"]]
 
     run = until(begun, "a run of the schedule")[0]

@@ -165,7 +165,7 @@ def test_nights_that_nobody_ran_are_not_made_up_for(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_night_that_was_broken_off_does_not_block_the_next(tmp_path: Path) -> None:
-    """Killed together with the server, or stopped with everything: its slot is free after half a minute."""
+    """Killed together with the server, or stopped with everything: its slot is free after two minutes."""
     short = {"only": "four-bar-2", "quick": True}
 
     def holds_the_slot(prefect: str) -> None:
