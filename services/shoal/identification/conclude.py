@@ -96,8 +96,8 @@ def conclude(
     correlation = autocorrelation(seen.residual, blocks)
     draws = wishes.bootstrap if possible and looked else 0
     rng = np.random.default_rng(seed)
-    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, None if stages else mesh, tests))
-    notes += (_slender(parameters, tests, theory),)
+    coarse = _coarse(model, None if stages else mesh, tests)
+    notes = (judgement.message or outcome.message, _better(profiled), coarse, _slender(parameters, tests, theory))
     return Estimate(
         problem=model.problem.name,
         method=method,
