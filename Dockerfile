@@ -23,7 +23,7 @@ RUN apt-get update \
     && rm -rf /var/lib/apt/lists/* \
     && groupadd --gid 10001 shoal \
     && useradd --uid 10001 --gid shoal --no-create-home --home-dir /var/lib/shoal --shell /usr/sbin/nologin shoal \
-    && install -d -o shoal -g shoal /var/lib/shoal /var/lib/mlflow
+    && install -d -o shoal -g shoal /var/lib/shoal /var/lib/mlflow /var/lib/prefect
 COPY --from=build /opt/shoal/venv /opt/shoal/venv
 COPY --chmod=755 deploy/entrypoint.sh /opt/shoal/entrypoint.sh
 COPY prefect.yaml /opt/shoal/prefect.yaml

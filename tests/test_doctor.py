@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from typing import Any
 
 import pytest
 from shoal import doctor
@@ -39,3 +45,59 @@ def test_a_port_in_use_by_another_program_is_told(monkeypatch: pytest.MonkeyPatc
         other.settimeout(5)
         found = doctor._port(other.getsockname()[1], "MLflow").found
     assert "another program" in found
+
+
+NIGHT = {"id": "1", "paused": False, "status": "READY", "schedules": [{"active": True}]}
+COMING = [{"expected_start_time": "2026-12-01T02:00:00Z"}]
+
+
+@contextmanager
+def prefect(answers: dict[str, Any]) -> Iterator[str]:
+    """A server with Prefect's addresses that gives these answers, and 404 to all else."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.rfile.read(int(self.headers.get("Content-Length") or 0))
+            self.send_response(200 if self.path in answers else 404)
+            self.end_headers()
+            self.wfile.write(json.dumps(answers.get(self.path)).encode())
+
+        do_POST = do_GET
+
+        def log_message(self, *_: object) -> None:
+            """Nobody reads it."""
+
+    with HTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever).start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}/api"
+        finally:
+            server.shutdown()
+
+
+@pytest.mark.parametrize(
+    ("night", "coming", "ok", "word"),
+    [
+        (NIGHT, COMING, True, "1 scheduled, the next at 2026-12-01T02:00:00Z"),
+        (NIGHT | {"status": "NOT_READY"}, COMING, True, "no worker takes it: make up ARGS='--with nightly'"),
+        (NIGHT, [], False, "a schedule and no scheduled night"),
+        (NIGHT | {"paused": True}, COMING, False, "is off"),
+        (NIGHT | {"schedules": [{"active": False}]}, [], False, "is off"),
+        (None, [], False, "has no deployment nightly/validation"),
+    ],
+)
+def test_nights_that_never_come_are_found(night: dict[str, Any] | None, coming: list[Any], ok: bool, word: str) -> None:
+    answers = {"/api/health": True, "/api/flow_runs/filter": coming}
+    if night is not None:
+        answers["/api/deployments/name/nightly/validation"] = night
+    with prefect(answers) as address:
+        check = doctor._nights(address)
+    assert check.ok == ok
+    assert word in check.found
+    assert bool(check.advice) != ok
+
+
+def test_without_a_server_no_nights_are_expected() -> None:
+    with prefect({"/api/health": True}) as address:
+        pass
+    assert doctor._nights(address).ok

@@ -19,6 +19,7 @@ from shoal_flows.tracking import outbox
 from shoal_flows.tracking.record import LOCAL
 
 if TYPE_CHECKING:
+    from shoal_flows.jobs import Fit
     from shoal_flows.results import Compared, DemoResult, Study
 
 
@@ -95,9 +96,36 @@ def demo_tables(console: Console, result: DemoResult) -> None:
             numbers = f"{first:.5f}", f"{second:.5f}", f"{error:.3f}", f"{e.fitness:.1e}", str(e.evaluations)
             table.add_row(case.removeprefix("paper-case-"), fit.cell.method, *numbers, f"{e.wall_s:.1f}")
     console.print(table)
+    for case, study in result.studies.items():
+        for fit in study.fits:
+            if not fit.estimate.verdict.trusted:
+                console.print(f"{case}, {fit.cell.method}: {fit.estimate.message}", soft_wrap=True)
+    console.print(_paper_table(result))
     _differences(console, list(result.comparisons.values()))
     for doubt in result.doubts():
         console.print(f"doubt: {doubt}", soft_wrap=True)
+
+
+def _paper_table(result: DemoResult) -> Table:
+    """The paper's swarms on data of the fitted mesh, as the paper's must have been, and on data of a finer model."""
+    from shoal_flows.report.paper import AS, NAMES, TABLES
+
+    table = _table("Fitness [m²] of the paper's swarms, by what the data were computed with")
+    for column in ("case", "swarm", "paper", "fitted mesh", "error°", "finer model", "error°"):
+        table.add_column(column, justify="left" if column in ("case", "swarm") else "right", no_wrap=True)
+    for case, same in result.same_mesh.items():
+        fits = same.by_method(), result.studies[case].by_method()
+        for row, printed in TABLES[case][1].items():
+            for method, kind in AS[row].items():
+                cells = [f"{NAMES[row]} {kind}", printed.fitness]
+                for fit in (found.get(method) for found in fits):
+                    cells += ["failed", ""] if fit is None else [f"{fit.estimate.fitness:.1e}", _error(fit)]
+                table.add_row(case.removeprefix("paper-case-"), *cells)
+    return table
+
+
+def _error(fit: Fit) -> str:
+    return f"{_worst_error(fit):.3f}"
 
 
 def _worst_error(fit: Any) -> float:

@@ -294,7 +294,7 @@ def reactions(scene: str, times: list[float], values: dict[str, str], as_json: b
     metavar="METRES",
     help="Error the model may have at the markers: coarse models for the search, the cheapest good one at the end.",
 )
-@click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="Of the search.")
+@click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="For all of it.")
 @click.option(
     "--checkpoint",
     type=click.Path(path_type=Path, dir_okay=False),

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import socket
 import sys
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from urllib.error import URLError
-from urllib.request import urlopen
+from typing import Any
+from urllib.error import HTTPError, URLError
+from urllib.request import Request, urlopen
 
 import numpy as np
 
@@ -50,6 +53,7 @@ def examine() -> list[Check]:
         *(_package(name, extra) for extra, names in _PACKAGES.items() for name in names),
         _server("Prefect", "PREFECT_API_URL", "a flow starts its own"),
         _server("MLflow", "MLFLOW_TRACKING_URI", "runs go to a database in the state folder"),
+        _nights(os.environ.get("PREFECT_API_URL") or "http://127.0.0.1:4200/api"),
         *(_port(number, what) for number, what in _PORTS.items()),
     ]
 
@@ -123,6 +127,43 @@ def _server(name: str, variable: str, otherwise: str) -> Check:
     if _answers(f"{address.rstrip('/')}/health"):
         return Check(what, True, f"{address} answers")
     return Check(what, False, f"{address} does not answer", f"start it (make up), or unset {variable}")
+
+
+def _nights(address: str) -> Check:
+    """Whether the Prefect server there has the next night in its calendar: a schedule alone makes no run."""
+    what, api = "nights", address.rstrip("/")
+    if not _answers(f"{api}/health"):
+        return Check(what, True, f"no Prefect server at {api}; none are scheduled")
+    try:
+        deployment = _asked(f"{api}/deployments/name/nightly/validation")
+        future = {
+            "expected_start_time": {"after_": datetime.now(UTC).isoformat()},
+            "state": {"type": {"any_": ["SCHEDULED"]}},
+        }
+        chosen = {"deployments": {"id": {"any_": [deployment["id"]]}}, "flow_runs": future}
+        coming = _asked(f"{api}/flow_runs/filter", {**chosen, "sort": "EXPECTED_START_TIME_ASC"})
+    except HTTPError as error:
+        if error.code == 404:
+            return Check(what, False, f"{api} has no deployment nightly/validation", "state it: make up")
+        return Check(what, False, f"{api} does not tell: HTTP status {error.code}", "look at the server's output")
+    except (URLError, OSError, ValueError):
+        return Check(what, False, f"{api} does not tell", "look at the server's output")
+    if deployment["paused"] or not any(schedule["active"] for schedule in deployment["schedules"]):
+        return Check(what, False, "the schedule of nightly/validation is off", "switch it on, on Prefect's pages")
+    if not coming:
+        advice = (
+            "wait a minute after make up; then look at the server's output for what ends its scheduler (make setup)"
+        )
+        return Check(what, False, f"{api} has a schedule and no scheduled night", advice)
+    idle = "; no worker takes it: make up ARGS='--with nightly'" if deployment["status"] != "READY" else ""
+    return Check(what, True, f"{len(coming)} scheduled, the next at {coming[0]['expected_start_time']}{idle}")
+
+
+def _asked(url: str, data: object = None) -> Any:
+    """What a server answers. Raises URLError, OSError, ValueError."""
+    body = None if data is None else json.dumps(data).encode()
+    with urlopen(Request(url, body, {"Content-Type": "application/json"}), timeout=_PATIENCE) as answer:
+        return json.load(answer)
 
 
 def _port(number: int, what: str) -> Check:

@@ -18,6 +18,7 @@ from rich.table import Table
 from shoal.errors import InputError
 from shoal.home import compiled
 from shoal.pictures.choice import rows
+from shoal.pictures.estimates import estimates
 from shoal.pictures.numbers import rounded
 from shoal.trajectory import Array, plain
 
@@ -113,16 +114,16 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
         x, y = trajectory.marker(name)[-1]
         table.add_row(name, f"{x:z.9f}", f"{y:z.9f}")
     out.print(table)
+    verification = trajectory.model.get("verification")
+    unknown = verification is not None and trajectory.ok and verification["time_error"] is None
     _say(
-        f"status {trajectory.status[0]}; energy off by {trajectory.energy_drift[0]:.1e}, constraints by "
-        f"{trajectory.constraint_drift[0]:.1e}"
+        f"status {trajectory.status[0]}{', but its error is not known' if unknown else ''}; energy off by "
+        f"{trajectory.energy_drift[0]:.1e}, constraints by {trajectory.constraint_drift[0]:.1e}"
     )
     _say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms")
-    if (verification := trajectory.model.get("verification")) is not None:
-        errors = {"time": verification["time_error"], "mesh": verification["mesh_error"]}
-        known = ", ".join(f"{name} {error:.1e} m" for name, error in errors.items() if error is not None)
-        notes = (f"estimated error at the markers: {known}" if known else "", verification["note"])
-        _say("; ".join(note for note in notes if note))
+    if verification is not None:
+        for sentence in estimates(verification):
+            _say(sentence)
 
 
 def selection_table(selection: Selection) -> None:

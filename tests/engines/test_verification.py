@@ -74,6 +74,7 @@ def test_other_engines_are_held_against_the_native_one() -> None:
 
 def test_no_second_run_that_takes_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verification, "PATIENCE", 0.0)
+    monkeypatch.setattr(verification, "GENEROUS", 0.0)
     stated = verified(get_engine("gauss"), load_scene("flexible-double-pendulum")).model["verification"]
     assert stated["time_error"] is stated["mesh_error"] is None
     assert "that would take" in stated["note"]

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 from shoal_flows import settings
-from shoal_flows.deployment import processes
+from shoal_flows.deployment import processes, up
 
 ROOT = Path(__file__).parents[2]
 COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text())
@@ -101,6 +101,25 @@ def test_servers_are_as_quiet_as_on_a_desk(tmp_path: Path) -> None:
     stated = SERVICES["prefect"]["environment"]
     for name in ("DO_NOT_TRACK", "PREFECT_SERVER_ANALYTICS_ENABLED", "MLFLOW_DISABLE_TELEMETRY"):
         assert stated[name] == quiet[name]
+
+
+def test_the_server_keeps_the_same_and_as_long_as_on_a_desk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Who holds the slot of the nights is written to a folder that outlives the server, as its database does."""
+    monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
+    desk, stated = up._environment({}), SERVICES["prefect"]["environment"]
+    for name in ("PREFECT_SERVER_CONCURRENCY_LEASE_STORAGE", "PREFECT_SERVER_SERVICES_DB_VACUUM_ENABLED"):
+        assert stated[name] == desk[name]
+    assert Path(desk["PREFECT_HOME"]).is_relative_to(tmp_path)
+    assert any(volume.endswith(f":{stated['PREFECT_HOME']}") for volume in SERVICES["prefect"]["volumes"])
+    assert stated["PREFECT_HOME"] in (ROOT / "Dockerfile").read_text()
+
+
+def test_what_goes_wrong_in_a_server_is_printed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A background service of Prefect logs its failures as errors, to the console alone."""
+    monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
+    name = "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL"
+    assert up._environment({})[name] == "ERROR"
+    assert all(name not in service.get("environment", {}) for service in SERVICES.values())
 
 
 def test_dockerfile_has_the_versions_of_the_project() -> None:

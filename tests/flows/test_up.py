@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -13,6 +12,7 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
+from shoal import doctor
 from shoal.identification import Measurement
 from shoal_flows import jobs
 from shoal_flows.jobs import Cell, Fit
@@ -20,8 +20,17 @@ from shoal_flows.tracking import outbox, store
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from background import (
+    OFTEN,
+    automate,
+    comes_by_itself,
+    comes_late,
+    goes_after_90_days,
+    nights,
+    slots_taken,
+    until,
+)
 from deployed import (
-    PATIENCE,
     SERVICES,
     artifacts_of,
     begin,
@@ -67,10 +76,7 @@ def check(at: Mapping[str, str]) -> None:
 def begun(home: Path, at: Mapping[str, str]) -> dict[str, object]:
     """A study of which one result is kept and another is being computed."""
     run = begin(at["PREFECT"], "identify/identify", STUDY)
-    deadline = time.monotonic() + PATIENCE
-    while not [path for path in home.glob("results/*") if not path.name.startswith(".")]:
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    until(lambda: [path for path in home.glob("results/*") if not path.name.startswith(".")], "a result is kept")
     return run
 
 
@@ -85,6 +91,32 @@ def uploading(home: Path, at: Mapping[str, str], monkeypatch: pytest.MonkeyPatch
             cached.cache_clear()
             after.callback(cached.cache_clear)
         yield
+
+
+def check_schedules(prefect: str) -> dict[str, object]:
+    """The next three nights are scheduled, as `shoal doctor` sees; a schedule makes a run, and the worker begins it.
+
+    A night that no worker takes is late. An automation is stated that has acted in the end.
+    """
+    times = [night["expected_start_time"] for night in nights(prefect)]
+    assert len(times) == 3
+    assert all(time.endswith("T02:00:00Z") for time in times)
+    seen = doctor._nights(f"{prefect}/api")
+    assert seen.ok
+    assert seen.found.startswith(f"3 scheduled, the next at {times[0]}; no worker takes it")
+    automate(prefect, "compare/compare", after="forward/forward")
+    waiting = begin(prefect, "nightly/validation", {})
+    scheduled = comes_by_itself(prefect, "forward/forward", {"scene": "single-pendulum"})
+    comes_late(prefect, waiting)
+    return scheduled
+
+
+def check_afterwards(home: Path, at: Mapping[str, str], scheduled: dict[str, object], study: dict[str, object]) -> None:
+    """The scheduled run has ended well, whatever died meanwhile, and the automation has acted; old runs are removed."""
+    assert ended(at["PREFECT"], scheduled)["state_type"] == "COMPLETED"
+    compare = f"{at['PREFECT']}/api/deployments/name/compare/compare"
+    until(lambda: call(compare)["paused"], "the automation has paused a deployment")
+    goes_after_90_days(at, home, old=scheduled, young=study)
 
 
 def check_study(at: Mapping[str, str], run: dict[str, object], undisturbed: Mapping[str, Fit]) -> None:
@@ -105,7 +137,8 @@ def check_study(at: Mapping[str, str], run: dict[str, object], undisturbed: Mapp
 
 def test_a_study_outlives_prefects_server(tmp_path: Path, undisturbed: Mapping[str, Fit]) -> None:
     """On SQLite; kill -9 in the middle: it is started again, and the worker's flow goes on as if it had been slow."""
-    with running(tmp_path, *WITHOUT) as at:
+    with running(tmp_path, *WITHOUT, settings=OFTEN) as at:
+        scheduled = check_schedules(at["PREFECT"])
         check(at)
         # Readable without the server as well, by `shoal ui` and `shoal rerun`.
         assert list((tmp_path / "artifacts").rglob("trajectory.csv"))
@@ -113,6 +146,7 @@ def test_a_study_outlives_prefects_server(tmp_path: Path, undisturbed: Mapping[s
         assert kill(tmp_path, "prefect", "server", "start") >= 1
         check_study(at, run, undisturbed)
         assert "prefect ended by itself: it is started again" in (tmp_path / "up.log").read_text()
+        check_afterwards(tmp_path, at, scheduled, run)
 
 
 @pytest.mark.slow
@@ -126,6 +160,30 @@ def test_nights_that_nobody_ran_are_not_made_up_for(tmp_path: Path) -> None:
     assert len(list((tmp_path / "validation").glob("night-*.json"))) == 1
 
 
+@pytest.mark.slow
+def test_a_night_that_was_broken_off_does_not_block_the_next(tmp_path: Path) -> None:
+    """Killed together with the server, or stopped with everything: its slot is free after half a minute."""
+    short = {"only": "four-bar-2", "quick": True}
+
+    def holds_the_slot(prefect: str) -> None:
+        night = begin(prefect, "nightly/validation", {})
+        until(lambda: call(f"{prefect}/api/flow_runs/{night['id']}")["state_type"] == "RUNNING", "the night runs")
+        assert slots_taken(prefect) == 1
+
+    with running(tmp_path, "--with", "nightly", *WITHOUT, settings=OFTEN) as at:
+        holds_the_slot(at["PREFECT"])
+        assert kill(tmp_path, "prefect", "server", "start") >= 1
+        assert kill(tmp_path, "prefect.engine") >= 1
+        until(lambda: slots_taken(at["PREFECT"]) == 0, "the slot is free")
+        assert run_deployment(at["PREFECT"], "nightly/validation", short)["state_type"] == "COMPLETED"
+        holds_the_slot(at["PREFECT"])
+    with running(tmp_path, "--with", "nightly", *WITHOUT, settings=OFTEN) as at:
+        until(lambda: slots_taken(at["PREFECT"]) == 0, "the slot is free")
+        night = comes_by_itself(at["PREFECT"], "nightly/validation", short)
+        assert ended(at["PREFECT"], night)["state_type"] == "COMPLETED"
+    assert len(list((tmp_path / "validation").glob("night-*.json"))) == 2
+
+
 @installed
 def test_a_study_outlives_postgresql(undisturbed: Mapping[str, Fit], monkeypatch: pytest.MonkeyPatch) -> None:
     """kill -9 of all its processes in the middle: it is started again, and Prefect and MLflow find it."""
@@ -133,7 +191,8 @@ def test_a_study_outlives_postgresql(undisturbed: Mapping[str, Fit], monkeypatch
     with tempfile.TemporaryDirectory() as name:
         home = Path(name)
         home.chmod(0o755)
-        with running(home, "--postgres", *WITHOUT) as at:
+        with running(home, "--postgres", *WITHOUT, settings=OFTEN) as at:
+            scheduled = check_schedules(at["PREFECT"])
             run = begun(home, at)
             assert kill(home, "postgres") >= 1
             assert ended(at["PREFECT"], run)["state_type"] == "COMPLETED"
@@ -143,6 +202,7 @@ def test_a_study_outlives_postgresql(undisturbed: Mapping[str, Fit], monkeypatch
                 store.upload()
                 assert outbox.pending() == []
             check_study(at, run, undisturbed)
+            check_afterwards(home, at, scheduled, run)
         assert not (home / "mlflow.db").exists()
         assert not (home / "prefect" / "prefect.db").exists()
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shoal.errors import InputError
-from shoal.identification import reading
+from shoal.identification import table as tabular
 from shoal.identification.reading import Samples, described
 from shoal.identification.reading import read as read_source
 from shoal.identification.recording import SI, Channel, FileSource
@@ -124,7 +124,7 @@ def test_a_window_outside_the_recording_says_what_the_file_covers(tmp_path: Path
 
 
 def test_files_beyond_the_bound_are_refused_packed_or_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reading, "LARGEST", 10_000)
+    monkeypatch.setattr(tabular, "LARGEST", 10_000)
     text = rows([np.arange(2000.0), np.zeros(2000)], "t,theta")
     packed = tmp_path / "run.csv.gz"
     packed.write_bytes(gzip.compress(text.encode()))

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
-from shoal.mechanics import drives, functions
+from shoal.mechanics import drives, fitting, functions
 from shoal.mechanics.drives import Drives
 from shoal.mechanics.tile import SINGLE, WIDE, Tile
 from shoal.mechanics.vector import pointer
 
 Array = Any
-PACKED = functions.pack([functions.fit(lambda t: 1 + t, 2.0), functions.fit(lambda t: np.sin(3 * t), 2.0)])
+PACKED = functions.pack([fitting.fit(lambda t: 1 + t, 2.0), fitting.fit(lambda t: np.sin(3 * t), 2.0)])
 TIME = 0.7
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
-from shoal.mechanics import forces, functions
+from shoal.mechanics import fitting, forces, functions
 from shoal.mechanics.forces import ANGLE, DISTANCE, LAW, PLACE, Forces
 from shoal.mechanics.tile import SINGLE, WIDE, Tile
 from shoal.mechanics.vector import pointer
@@ -48,8 +48,8 @@ def _remember(tile, held, z, memory):
     forces.remember(tile, forces.raw(held), pointer(z), pointer(memory))
 
 
-TABLE = functions.fit(lambda x: np.sinh(x) + 0.3 * x**2, 2.0, begin=-2.0)
-PACKED = functions.pack([TABLE, functions.antiderivative(TABLE), functions.fit(lambda t: np.cos(2 * t), 10.0)])
+TABLE = fitting.fit(lambda x: np.sinh(x) + 0.3 * x**2, 2.0, begin=-2.0)
+PACKED = functions.pack([TABLE, fitting.antiderivative(TABLE), fitting.fit(lambda t: np.cos(2 * t), 10.0)])
 NO_TABLE, WITH_TABLE = (-1, -1, -1), (0, 1, 2)
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numba import njit
 from scipy.interpolate import CubicSpline
 from shoal.errors import InputError
-from shoal.mechanics import functions
+from shoal.mechanics import fitting, functions
 from shoal.scene.function import Function
 
 Array = Any
@@ -60,7 +60,7 @@ EXTENDED = np.finfo(np.longdouble).eps < 1e-18
 
 @pytest.mark.parametrize("text", SMOOTH)
 def test_smooth_functions_with_three_derivatives(text: str) -> None:
-    fitted = functions.fit(Function(expression=text), HORIZON)
+    fitted = fitting.fit(Function(expression=text), HORIZON)
     for derivative, exact in enumerate(SMOOTH[text]):
         expected = exact(TIMES)
         # Machines without extended precision lose digits with every derivative.
@@ -73,7 +73,7 @@ def test_smooth_functions_with_three_derivatives(text: str) -> None:
 def test_tables_are_exact(smooth: bool) -> None:
     rows = np.array([[0.0, 1.0], [0.3, -1.0], [2.5, 4.0], [2.6, 4.5], [7.0, 0.0]])
     table = Function(table=rows.tolist(), smooth=smooth)
-    fitted = functions.fit(table, HORIZON, table.knots)
+    fitted = fitting.fit(table, HORIZON, table.knots)
     assert fitted.breaks.tolist() == [0.0, 0.3, 2.5, 2.6, 7.0, HORIZON]
     inside = np.minimum(TIMES, 7.0)
     expected = CubicSpline(rows[:, 0], rows[:, 1])(inside) if smooth else np.interp(inside, rows[:, 0], rows[:, 1])
@@ -84,7 +84,7 @@ def test_tables_are_exact(smooth: bool) -> None:
 
 
 def test_jumps_and_kinks_are_sharp() -> None:
-    step, kink = (functions.fit(Function(expression=text), HORIZON) for text in ("step(t - pi)", "abs(t - pi)"))
+    step, kink = (fitting.fit(Function(expression=text), HORIZON) for text in ("step(t - pi)", "abs(t - pi)"))
     near = np.pi + 1e-8 * HORIZON * np.array([-1.0, 1.0])
     assert along([step], 0, near).tolist() == [0.0, 1.0]
     np.testing.assert_allclose(along([kink], 0, TIMES), np.abs(TIMES - np.pi), rtol=0, atol=1e-12)
@@ -92,23 +92,23 @@ def test_jumps_and_kinks_are_sharp() -> None:
 
 
 def test_a_jump_at_a_knot_stays_a_jump() -> None:
-    fitted = functions.fit(Function(expression="3*step(t - 2)"), HORIZON, (2.0,))
+    fitted = fitting.fit(Function(expression="3*step(t - 2)"), HORIZON, (2.0,))
     assert len(fitted.coefficients) == 2
     assert along([fitted], 0, [np.nextafter(2.0, 0.0), 2.0]).tolist() == [0.0, 3.0]
 
 
 def test_a_short_pulse_is_seen() -> None:
-    fitted = functions.fit(Function(expression="step(t - 5.001) - step(t - 5.006)"), HORIZON)
+    fitted = fitting.fit(Function(expression="step(t - 5.001) - step(t - 5.006)"), HORIZON)
     assert along([fitted], 0, [5.0, 5.003, 5.007]).tolist() == [0.0, 1.0, 0.0]
 
 
 def test_a_removable_gap_is_closed() -> None:
-    fitted = functions.fit(Function(expression="sin(t)/t"), HORIZON)
+    fitted = fitting.fit(Function(expression="sin(t)/t"), HORIZON)
     assert along([fitted], 0, [0.0])[0] == pytest.approx(1.0, abs=1e-14)
 
 
 def test_beyond_the_range_the_ends_hold() -> None:
-    fitted = functions.fit(lambda t: np.cos(t), 2.0, begin=-1.0)
+    fitted = fitting.fit(lambda t: np.cos(t), 2.0, begin=-1.0)
     assert along([fitted], 0, [-5.0, 9.0]) == pytest.approx(np.cos([-1.0, 2.0]), abs=1e-15)
     assert not along([fitted], 0, [-5.0, 9.0], 1).any()
     # Rounding past the end is not beyond it.
@@ -118,7 +118,7 @@ def test_beyond_the_range_the_ends_hold() -> None:
 
 
 def test_many_functions_do_not_mix() -> None:
-    fitted = [functions.fit(Function(expression=text), HORIZON) for text in ("t", "step(t - 1)", "7", "cos(t)")]
+    fitted = [fitting.fit(Function(expression=text), HORIZON) for text in ("t", "step(t - 1)", "7", "cos(t)")]
     for number, exact in enumerate((TIMES, TIMES >= 1.0, np.full_like(TIMES, 7.0), np.cos(TIMES))):
         np.testing.assert_allclose(along(fitted, number, TIMES), exact, rtol=0, atol=1e-13)
     assert not along(fitted, -1, TIMES).any()
@@ -126,28 +126,28 @@ def test_many_functions_do_not_mix() -> None:
 
 
 def test_antiderivative() -> None:
-    fitted = functions.fit(lambda t: np.sin(t) + abs(t), 3.0, (0.0,), begin=-2.0)
+    fitted = fitting.fit(lambda t: np.sin(t) + abs(t), 3.0, (0.0,), begin=-2.0)
     times = np.linspace(-2.0, 3.0, 101)
     expected = 1 - np.cos(times) + times * np.abs(times) / 2
-    np.testing.assert_allclose(along([functions.antiderivative(fitted)], 0, times), expected, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(along([fitting.antiderivative(fitted)], 0, times), expected, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("text", ["log(t - 1)", "1/(t - t)", "sin(1e9*t)", "exp(100*t)*exp(100*t)"])
 def test_what_cannot_be_fitted_is_refused(text: str) -> None:
     with pytest.raises(InputError, match=r"^function: "):
-        functions.fit(Function(expression=text), HORIZON)
+        fitting.fit(Function(expression=text), HORIZON)
 
 
 @pytest.mark.parametrize("end", [0.0, -1.0, np.inf, np.nan])
 def test_an_empty_range_is_refused(end: float) -> None:
     with pytest.raises(InputError, match="range"):
-        functions.fit(np.sin, end)
+        fitting.fit(np.sin, end)
 
 
 @given(st.lists(st.floats(-10, 10), min_size=4, max_size=4), st.floats(1e-3, 1e4))
 def test_cubics_are_one_piece(powers: list[float], horizon: float) -> None:
     scaled = [c / horizon**k for k, c in enumerate(powers)]
-    fitted = functions.fit(lambda t: sum(c * t**k for k, c in enumerate(scaled)) + 0 * t, horizon)
+    fitted = fitting.fit(lambda t: sum(c * t**k for k, c in enumerate(scaled)) + 0 * t, horizon)
     times = np.linspace(0.0, horizon, 9)
     expected = np.polynomial.polynomial.polyval(times, scaled)
     assert len(fitted.coefficients) == 1
@@ -162,7 +162,7 @@ def test_cubics_are_one_piece(powers: list[float], horizon: float) -> None:
     ],
 )
 def test_terms_that_cancel_are_no_reason_to_refuse(function: Any, derivative: Any) -> None:
-    fitted = functions.fit(function, 0.01)
+    fitted = fitting.fit(function, 0.01)
     for t in (0.0013, 0.005, 0.0099):
         assert functions.value(fitted, t) == pytest.approx(float(function(np.longdouble(t))), rel=1e-9)
         assert functions.value(fitted, t, 1) == pytest.approx(float(derivative(np.longdouble(t))), rel=1e-6)

@@ -31,3 +31,10 @@ TABLES: dict[str, tuple[str, dict[str, Printed]]] = {
     ),
 }
 """By problem: the number of the table and its rows by method."""
+
+AS = {
+    "afsa": {"afsa": "as published"},
+    "iafsa": {"iafsa-printed": "as printed", "iafsa": "repaired", "iafsa-unseeded": "repaired, no seeds"},
+}
+"""By row of the paper: the methods that stand for it, and what each is."""
+NAMES = {"afsa": "AFSA", "iafsa": "IAFSA"}

@@ -7,29 +7,25 @@ from shoal.pictures.numbers import length, power
 
 from shoal_flows.jobs import Fit
 from shoal_flows.plan import MESHES, mesh_values, same_mesh_cells
-from shoal_flows.report.paper import TABLES
-from shoal_flows.report.words import covered, degrees, errors
+from shoal_flows.report.paper import AS, NAMES, TABLES
+from shoal_flows.report.words import covered, degrees, errors, largest_error
 from shoal_flows.results import Compared, Study
 
-_PRINTED_NAMES = {"afsa": "AFSA", "iafsa": "IAFSA"}
 
-
-def paper_rows(case: str, study: Study) -> list[list[str]]:
-    """The paper's table with our values beside the printed ones."""
+def paper_rows(case: str, same: Study, study: Study) -> list[list[str]]:
+    """The paper's rows, each followed by ours on data of the fitted mesh, as the paper's must be, and on other data."""
     rows = []
-    fits = study.by_method()
-    for method, printed in TABLES[case][1].items():
-        name = _PRINTED_NAMES[method]
-        rows.append([f"{name}, paper", printed.theta1, printed.theta2, printed.fitness])
-        shown = [(method, "as published" if method == "afsa" else "repaired")]
-        shown += [("iafsa-printed", "as printed")] if method == "iafsa" else []
-        for key, what in shown:
-            if key in fits:
-                e = fits[key].estimate
-                angles = [f"{value.value:.4f}" for value in e.parameters.values()]
-                rows.append([f"{name}, Shoal, {what}", *angles, power(e.fitness)])
+    for row, printed in TABLES[case][1].items():
+        rows.append([f"{NAMES[row]}, paper", "not said", printed.theta1, printed.theta2, "", printed.fitness, ""])
+        for method, kind in AS[row].items():
+            for data, fits in (("the fitted mesh", same.by_method()), ("a finer model", study.by_method())):
+                if (fit := fits.get(method)) is not None:
+                    angles = [f"{value.value:.4f}" for value in fit.estimate.parameters.values()]
+                    off, found = degrees(largest_error(fit), 3), fit.estimate
+                    label = f"{NAMES[row]}, {kind}"
+                    rows.append([label, data, *angles, off, power(found.fitness), str(found.verdict)])
     truth = study.fits[0].estimate.truth if study.fits else {}
-    return [["true value", *(f"{value:.4f}" for value in truth.values()), ""], *rows]
+    return [["true value", "", *(f"{value:.4f}" for value in truth.values()), "", "", ""], *rows]
 
 
 def method_rows(study: Study) -> list[list[str]]:
@@ -76,9 +72,9 @@ def commands(case: str, scene: str, study: Study, compared: Compared) -> list[li
         values = mesh_values(elements, quadrature, step)
         options = " ".join(f"--set {path}={value}" for path, value in values.items())
         rows.append([f"mesh {label}", f"shoal identify {case} --method least-squares {options}"])
-    same = same_mesh_cells(case)[0]
-    options = " ".join(f"--set {path}={value}" for path, value in same.values.items())
-    rows.append(["same mesh", f"shoal identify {same.problem} --method {same.method} {options}"])
+    for same in same_mesh_cells(case):
+        options = " ".join(f"--set {path}={value}" for path, value in same.values.items())
+        rows.append([f"{same.method}, same mesh", f"shoal identify {same.problem} --method {same.method} {options}"])
     engines = ",".join(compared.comparison.trajectories)
     return [*rows, ["engines", f"shoal compare {scene} --engines {engines}"]]
 

@@ -6,6 +6,7 @@ import numpy as np
 from shoal.pictures.numbers import length, power
 
 from shoal_flows.jobs import Fit
+from shoal_flows.report.paper import AS, NAMES, TABLES
 from shoal_flows.results import Compared, DemoResult, Study
 
 
@@ -81,6 +82,21 @@ def same_mesh(title: str, study: Study) -> str:
     return (
         f"{title}: with data of the very mesh that is fitted (CasADi, 2/4 elements), least squares comes to within "
         f"{power(largest_error(fit), 0)} rad in {e.evaluations} evaluations, at a fitness of {power(e.fitness, 1)} m²."
+    )
+
+
+def like_with_like(title: str, case: str, same: Study, study: Study) -> str:
+    """What the paper's swarms reach on data of the fitted mesh, beside what it prints, and on data of a finer model."""
+    on_own, on_other = same.by_method(), study.by_method()
+    methods = {method: f"{NAMES[row]} {kind}" for row, kinds in AS.items() for method, kind in kinds.items()}
+    if not set(methods) <= set(on_own) & set(on_other):
+        return f"{title}: not every swarm ended."
+    reached = [f"{name} {power(on_own[method].estimate.fitness, 1)} m²" for method, name in methods.items()]
+    printed = [f"{NAMES[row]} {one.fitness} m²" for row, one in TABLES[case][1].items()]
+    least = min(on_other[method].estimate.fitness for method in methods)
+    return (
+        f"{title}: on data of the mesh that is fitted, {', '.join(reached)}; the paper prints {' and '.join(printed)}. "
+        f"On data of a finer model none of them comes below {power(least, 1)} m²: the rest is the error of the mesh."
     )
 
 

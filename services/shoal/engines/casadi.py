@@ -17,13 +17,12 @@ from shoal.engines.capabilities import CAPABILITIES
 from shoal.engines.casadi_fixed_step import runge_kutta
 from shoal.engines.casadi_model import CasadiModel, casadi_model
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
+from shoal.mechanics.reach import MARGIN, stretch
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 
 _CHECK_INTERVAL = 0.01
 """Longest time [s] between two instants at which energy, reach and directions are looked at."""
-_STRETCH = 1.1
-"""A marker farther from its ground point than this times the length of its chain is out of reach."""
 
 
 @dataclass(frozen=True)
@@ -162,12 +161,14 @@ def _check(model: CasadiModel, scene: Scene, states: Array, wanted: npt.NDArray[
     # An unstable run may overflow on its way to being rejected.
     with np.errstate(all="ignore"):
         drift = _energy_drift(model, states)
+        longer = stretch(scene, np.max(np.sum(model.energies(states).full()[:2], axis=0)))
         distance = np.linalg.norm(points - model.root.T, axis=2).max(axis=0)
-    excess = distance - _STRETCH * model.reach
+    reach = model.reach + longer
+    excess = distance - MARGIN * reach
     status, message = Status.OK, ""
     if not np.all(excess <= 1e-9):
         worst = int(np.argmax(excess))
-        away, chain = distance[worst], model.reach[worst]
+        away, chain = distance[worst], reach[worst]
         status = Status.OUT_OF_REACH
         message = f"marker {model.markers[worst]} goes {away:.4g} m away, its chain is {chain:.4g} m long"
     elif not drift <= scene.solver.energy_tolerance:

@@ -63,8 +63,8 @@ class ExudynEngine:
         wanted = sampling_times(scene, times)
         require(self.name, scene)
         exu = library()
-        machine = build(exu, scene, self.beam)
-        steps = choose_steps(wanted, scene.solver.step, machine.unknowns)
+        machine = build(exu, scene, self.beam, float(wanted[-1]))
+        steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
         record = Record(steps, machine.reference)
         verdict = judge(machine, record, self._run(exu, machine, record))
         weak = self._damped(scene) and scene.solver.spectral_radius == 1.0 and verdict.message
@@ -108,9 +108,17 @@ class ExudynEngine:
         machine.mbs.SetPostStepUserFunction(record.take)
         try:
             with _silence(exu):
-                done = machine.mbs.SolveDynamic(
-                    self.simulation_settings(exu, machine, record.steps), showHints=False, showCausingItems=False
-                )
+                done, begin, runs = True, 0.0, record.steps.runs
+                for number, (count, end) in enumerate(runs):
+                    record.resumed = number > 0
+                    machine.clock.until = np.nextafter(end, 0.0) if len(runs) > 1 else np.inf
+                    settings = self.simulation_settings(exu, machine, record.steps)
+                    integration = settings.timeIntegration
+                    integration.startTime, integration.endTime, integration.numberOfSteps = begin, end, count
+                    done = done and machine.mbs.SolveDynamic(
+                        settings, updateInitialValues=len(runs) > 1, showHints=False, showCausingItems=False
+                    )
+                    begin = end
         except Exception as error:
             # Whatever the library raises is a failed run.
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
@@ -118,7 +126,7 @@ class ExudynEngine:
             reason = "" if done else "the solver gave up"
         if not reason:
             return ""
-        reached = max(record.seen - 1, 0) * record.steps.size
+        reached = record.steps.instants[min(max(record.seen - 1, 0), record.steps.count)]
         return f"exudyn: {reason} at {reached:.6g} s of {record.steps.wanted[-1]:.6g} s; reduce solver.step"
 
     def simulation_settings(self, exu: Any, machine: Machine, steps: Steps) -> Any:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from shoal.engines.course import Clock
 from shoal.engines.poses import Pose, normal
 from shoal.scene import PointMass, RigidBody, Rod
 from shoal.trajectory import Array
@@ -65,6 +66,7 @@ class System:
     mbs: Any
     items: Any
     gravity: Place
+    clock: Clock
     unknowns: int = field(default=0)
 
     def node(self, item: Any) -> tuple[Any, list[int]]:

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from shoal.engines.course import Clock
 from shoal.engines.exudyn_beam import BeamPart
 from shoal.engines.exudyn_bodies import Part, RigidPart, System
 from shoal.engines.exudyn_cable import CablePart
@@ -41,6 +42,8 @@ class Machine:
     mbs: Any
     container: Any
     """Owns the system; Exudyn frees both when it goes."""
+    clock: Clock
+    """The functions of time, and where steps end because of them."""
     parts: dict[str, Part]
     gaps: list[Gap]
     exchanges: list[Exchange]
@@ -85,13 +88,17 @@ class Machine:
         return np.asarray(sum((part.damping(q, v) for part in self.parts.values()), power))
 
 
-def build(exu: Any, scene: Scene, beam: Beam) -> Machine:
-    """Enter bodies, gravity, joints and loads at the initial state. Raises InputError for a joint that is open."""
+def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None) -> Machine:
+    """Enter bodies, gravity, joints and loads at the initial state. Raises InputError for a joint that is open.
+
+    end [s]: of the run, beyond the scene's duration if at all.
+    """
     items = importlib.import_module("exudyn.itemInterface")
     poses = initial_poses(scene)
     container = exu.SystemContainer()
     mbs = container.AddSystem()
-    system = System(mbs, items, scene.gravity)
+    clock = Clock(max(end or 0.0, scene.solver.duration), scene.solver.step)
+    system = System(mbs, items, scene.gravity, clock)
     parts: dict[str, Part] = {}
     for name, body in scene.bodies.items():
         if not isinstance(body, Rod) or body.element == "rigid":
@@ -104,7 +111,7 @@ def build(exu: Any, scene: Scene, beam: Beam) -> Machine:
     places: dict[str, Part] = {**parts, GROUND: ground}
     for point, path in scene.ground_points.items():
         name = f"{GROUND}.{point}"
-        places[name] = add_moving_point(system, ground, path, poses[name])
+        places[name] = add_moving_point(system, ground, point, path, poses[name])
     ends = Ends(scene, system, places, poses)
     gaps = [add_joint(ends, name, joint) for name, joint in scene.joints.items()]
     friction = (add_friction(ends, name, joint) for name, joint in scene.joints.items())
@@ -112,4 +119,4 @@ def build(exu: Any, scene: Scene, beam: Beam) -> Machine:
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    return Machine(scene, mbs, container, parts, gaps, exchanges, span(scene, poses), np.array(reference))
+    return Machine(scene, mbs, container, clock, parts, gaps, exchanges, span(scene, poses), np.array(reference))

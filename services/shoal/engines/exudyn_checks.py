@@ -8,13 +8,10 @@ import numpy as np
 
 from shoal.engines.exudyn_build import Machine
 from shoal.engines.exudyn_record import Indices, Record
-from shoal.engines.poses import lead, size
-from shoal.scene import GROUND, Revolute, Scene, Weld
-from shoal.scene.joints import places
+from shoal.engines.poses import lead
+from shoal.mechanics.reach import MARGIN, distance_to_ground, reach
 from shoal.trajectory import Array, Status
 
-STRETCH = 1.1
-"""How much longer than its undeformed bodies a machine may reach."""
 LARGEST_GAP = 1e-4
 """Joint gap per metre of machine beyond which a run has drifted."""
 INSTANTS = 400
@@ -41,54 +38,27 @@ def judge(machine: Machine, record: Record, failure: str) -> Verdict:
     points, angles = _markers(machine, record)
     rows = np.unique(np.linspace(0, len(record.q) - 1, INSTANTS).astype(int))
     gap = machine.gap(record.q[rows], record.v[rows])
+    energy, moving = machine.energy(record.times, record.q, record.v, rows)
     # Motion that is prescribed feeds energy through constraints, which is not followed: there is no such check.
-    drift = float("nan") if machine.driven else _energy_drift(machine, record, rows)
+    drift = float("nan") if machine.driven else _energy_drift(machine, record, rows, energy, moving)
     status, message = Status.OK, ""
-    reach = max_reach(machine.scene)
-    far = _farthest(machine.scene, points)
+    furthest = float(reach(machine.scene, np.max(moving)))
+    far = float(np.max(distance_to_ground(machine.scene, points[..., None])))
     tolerance = machine.scene.solver.energy_tolerance
     if failure:
         status, message = Status.FAILED, failure
     elif not (np.all(np.isfinite(record.q)) and np.all(np.isfinite(record.v))):
         status, message = Status.DIVERGED, "the coordinates stopped being finite"
-    elif far > STRETCH * reach:
+    elif far > MARGIN * furthest:
         status, message = (
             Status.OUT_OF_REACH,
-            f"a marker is {far:.3g} m from the ground; the bodies reach {reach:.3g} m",
+            f"a marker is {far:.3g} m from the ground; the bodies reach {furthest:.3g} m",
         )
     elif gap > LARGEST_GAP * machine.span:
         status, message = Status.DRIFTED, f"a joint opened by {gap:.3g} m; reduce solver.step"
     elif drift > tolerance:
         status, message = Status.ENERGY, f"energy is off by {drift:.3g}, allowed is {tolerance:.3g}; reduce solver.step"
     return Verdict(points, angles, status, message, drift, gap)
-
-
-def max_reach(scene: Scene) -> float:
-    """Sum of the bodies' extents [m]: no marker can be farther from the nearest joint with the ground.
-
-    Infinite where a body is not tied to the ground by revolute joints and welds.
-    """
-    return size(scene) if _tethered(scene) else float("inf")
-
-
-def _tethered(scene: Scene) -> bool:
-    """Whether revolute joints and welds tie every body to the fixed ground, so that the machine has a reach."""
-    held, frontier = {GROUND}, [GROUND]
-    while frontier:
-        here = frontier.pop()
-        for joint in scene.joints.values():
-            ends = {side.body for side in places(joint)}
-            if isinstance(joint, Revolute | Weld) and here in ends:
-                frontier += ends - held
-                held |= ends
-    return not scene.ground_points and held >= set(scene.bodies)
-
-
-def _farthest(scene: Scene, points: Array) -> float:
-    ties = [joint for joint in scene.joints.values() if isinstance(joint, Revolute | Weld)]
-    ends = [end for joint in ties for end in (joint.first, joint.second)]
-    pivots = np.array([scene.location(end) for end in ends if end.body == GROUND] or [(0.0, 0.0)])
-    return float(np.max(np.min(np.linalg.norm(points[:, :, None] - pivots, axis=-1), axis=-1)))
 
 
 def _markers(machine: Machine, record: Record) -> tuple[Array, Array]:
@@ -109,11 +79,12 @@ def _turns(angle: Array) -> Array:
     return 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
-def _energy_drift(machine: Machine, record: Record, rows: Indices) -> float:
-    power = machine.lost_power(record.times, record.q, record.v)
-    lost = np.concatenate([[0.0], np.cumsum(np.diff(record.times) * (power[1:] + power[:-1]) / 2)])
-    energy, moving = machine.energy(record.times, record.q, record.v, rows)
-    energy += lost[rows]
+def _energy_drift(machine: Machine, record: Record, rows: Indices, energy: Array, moving: Array) -> float:
+    # Where a load jumps, steps begin on its right side and end on its left.
+    sides = (record.times, np.nextafter(record.times, 0.0))
+    right, left = (machine.lost_power(side, record.q, record.v) for side in sides)
+    lost = np.concatenate([[0.0], np.cumsum(np.diff(record.times) * (left[1:] + right[:-1]) / 2)])
+    energy = energy + lost[rows]
     # A machine at rest has no energy to compare with; round-off of its potential must not count as drift.
     scale = max(float(np.max(moving)), 1e-9 * float(np.max(np.abs(energy))), np.finfo(float).tiny)
     return float(np.max(np.abs(energy - energy[0]))) / scale

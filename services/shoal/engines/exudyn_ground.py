@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from shoal.engines.course import Course
 from shoal.engines.exudyn_bodies import Energy, Motion, Place, RigidPart, System
-from shoal.engines.poses import Pose, slope, value
+from shoal.engines.poses import Pose
+from shoal.errors import InputError
 from shoal.scene import Function, MovingPoint, PointMass
 from shoal.trajectory import Array
 
@@ -53,18 +55,29 @@ class GroundPart:
         return np.zeros(len(q))
 
 
-def add_moving_point(system: System, ground: GroundPart, path: MovingPoint, pose: Pose) -> RigidPart:
+def add_moving_point(system: System, ground: GroundPart, name: str, path: MovingPoint, pose: Pose) -> RigidPart:
     """Enter a point of the ground that moves: a body whose three coordinates are all driven, so its mass is idle."""
     part = RigidPart.add(system, PointMass(mass=1.0), pose)
     for axis, f in enumerate((path.x, path.y)):
-        begin = float(pose.origin[axis])
-        drive(system, (ground.node, 0), (part.node, axis), partial(_moved, f, begin), partial(slope, f))
+        course = driven(system, f, f"ground_points.{name}")
+        drive(system, (ground.node, 0), (part.node, axis), partial(_moved, course, course.value(0.0)), course.slope)
     drive(system, (ground.node, 0), (part.node, 2), lambda t: 0.0, lambda t: 0.0)
     return part
 
 
-def _moved(f: Function, begin: float, time: float) -> float:
-    return value(f, time) - begin
+def driven(system: System, f: Function, field: str) -> Course:
+    """A prescribed position. Raises InputError where its rate jumps: Exudyn knows no impact there."""
+    try:
+        course = system.clock.course(f, held=True)
+    except InputError as error:
+        raise InputError(f"{field}: {str(error).removeprefix('function: ')}") from None
+    if jumps := course.jumps():
+        raise InputError(f"{field}: engine exudyn cannot do a drive whose rate jumps, at t = {jumps[0]:.7g}; use gauss")
+    return course
+
+
+def _moved(course: Course, begin: float, time: float) -> float:
+    return course.value(time) - begin
 
 
 def drive(

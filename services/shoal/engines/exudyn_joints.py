@@ -10,8 +10,8 @@ from shoal.engines.exudyn_bodies import RigidPart
 from shoal.engines.exudyn_chain import cross
 from shoal.engines.exudyn_connectors import Exchange, Law, add_rail, add_torsion
 from shoal.engines.exudyn_ends import Ends
-from shoal.engines.exudyn_ground import Coordinate, GroundPart, drive
-from shoal.engines.poses import kept_turn, slope, value
+from shoal.engines.exudyn_ground import Coordinate, GroundPart, drive, driven
+from shoal.engines.poses import kept_turn, value
 from shoal.errors import InputError
 from shoal.scene import Attachment, Coupling, Distance, DrivenAngle, Parallel, Perpendicular, Revolute, Slider, Weld
 from shoal.scene.joints import Joint
@@ -86,13 +86,14 @@ def _drive_angle(ends: Ends, where: str, joint: DrivenAngle) -> None:
             return part.node, 2
         raise InputError(f"{where}: drives the angle of a flexible rod; weld a rigid body to it instead")
 
-    begin = value(joint.angle, 0.0)
+    course = driven(ends.system, joint.angle, f"{where}.angle")
+    begin = course.value(0.0)
     drive(
         ends.system,
         coordinate(joint.first),
         coordinate(joint.second),
-        lambda t: value(joint.angle, t) - begin,
-        lambda t: slope(joint.angle, t),
+        lambda t: course.value(t) - begin,
+        course.slope,
     )
 
 

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from shoal.engines.course import Course
 from shoal.engines.exudyn_beam import BeamPart
 from shoal.engines.exudyn_cable import CablePart
 from shoal.engines.exudyn_chain import gauss
 from shoal.engines.exudyn_connectors import Exchange, Law, add_spring, add_torsion
 from shoal.engines.exudyn_ends import Ends
-from shoal.engines.poses import value
+from shoal.errors import InputError
 from shoal.scene import DistributedForce, Force, Function, Load, Rod, Spring, Torque, TorsionSpring
 from shoal.trajectory import Array
 
@@ -25,26 +26,33 @@ def add_load(ends: Ends, name: str, load: Load) -> Exchange:
         ends.require_direction(f"loads.{name}", load.first, load.second)
         return add_torsion(ends, load.first, load.second, law, load.angle)
     if isinstance(load, Force):
-        return _add_force(ends, load)
+        return _add_force(ends, load, _course(ends, f"loads.{name}.scale", load.scale))
     if isinstance(load, Torque):
         ends.require_direction(f"loads.{name}", load.at)
-        return _add_torque(ends, load)
-    return _add_distributed(ends, load)
+        return _add_torque(ends, load, _course(ends, f"loads.{name}.torque", load.torque))
+    return _add_distributed(ends, load, _course(ends, f"loads.{name}.scale", load.scale))
 
 
-def _add_force(ends: Ends, load: Force) -> Exchange:
+def _course(ends: Ends, field: str, f: Function) -> Course:
+    try:
+        return ends.system.clock.course(f)
+    except InputError as error:
+        raise InputError(f"{field}: {str(error).removeprefix('function: ')}") from None
+
+
+def _add_force(ends: Ends, load: Force, scale: Course) -> Exchange:
     marker = ends.turn(load.at) if load.follows else ends.hold(load.at)
     ends.system.mbs.AddLoad(
         ends.system.items.LoadForceVector(
             markerNumber=marker,
             bodyFixed=load.follows,
-            **_scaled([*load.force, 0.0], load.scale, "loadVectorUserFunction"),
+            **_scaled([*load.force, 0.0], scale, "loadVectorUserFunction"),
         )
     )
 
     def power(t: Array, q: Array, v: Array) -> Array:
         here = ends.motion(load.at, q, v)
-        force = complex(*load.force) * load.scale(t)
+        force = complex(*load.force) * scale(t)
         if load.follows:
             force = force * np.exp(1j * here.direction)
         return -(force.real * here.velocity[:, 0] + force.imag * here.velocity[:, 1])
@@ -52,30 +60,30 @@ def _add_force(ends: Ends, load: Force) -> Exchange:
     return Exchange(_nothing, power)
 
 
-def _add_torque(ends: Ends, load: Torque) -> Exchange:
+def _add_torque(ends: Ends, load: Torque, torque: Course) -> Exchange:
     for side, sign in ((load.at, 1.0), (load.reaction, -1.0)):
         if side is not None:
             ends.system.mbs.AddLoad(
                 ends.system.items.LoadTorqueVector(
                     markerNumber=ends.turn(side),
-                    **_scaled([0.0, 0.0, sign], load.torque, "loadVectorUserFunction"),
+                    **_scaled([0.0, 0.0, sign], torque, "loadVectorUserFunction"),
                 )
             )
 
     def power(t: Array, q: Array, v: Array) -> Array:
         against = 0.0 if load.reaction is None else ends.motion(load.reaction, q, v).rate
-        return -load.torque(t) * (ends.motion(load.at, q, v).rate - against)
+        return -torque(t) * (ends.motion(load.at, q, v).rate - against)
 
     return Exchange(_nothing, power)
 
 
-def _add_distributed(ends: Ends, load: DistributedForce) -> Exchange:
+def _add_distributed(ends: Ends, load: DistributedForce, scale: Course) -> Exchange:
     part, rod, system = ends.parts[load.body], ends.scene.bodies[load.body], ends.system
     assert isinstance(rod, Rod)
     force = np.array(load.force)
     if isinstance(part, CablePart | BeamPart):
         for element, mass in zip(part.elements, part.sections.mass, strict=True):
-            options = _scaled([*(force / mass), 0.0], load.scale, "loadVectorUserFunction")
+            options = _scaled([*(force / mass), 0.0], scale, "loadVectorUserFunction")
             system.accelerate(element, options.pop("loadVector")[:2], **options)
         places = [((k + (x + 1) / 2) * part.size, 0.0) for k in range(rod.elements) for x in gauss(3)[0]]
         weights = np.tile(gauss(3)[1] * part.size / 2, rod.elements)
@@ -85,23 +93,23 @@ def _add_distributed(ends: Ends, load: DistributedForce) -> Exchange:
         weights = weights * rod.length / 2
         middle = weights @ np.array(places) / rod.length
         marker = part.hold(system, (float(middle[0]), float(middle[1])))
-        options = _scaled([*(force * rod.length), 0.0], load.scale, "loadVectorUserFunction")
+        options = _scaled([*(force * rod.length), 0.0], scale, "loadVectorUserFunction")
         system.mbs.AddLoad(system.items.LoadForceVector(markerNumber=marker, **options))
 
     def power(t: Array, q: Array, v: Array) -> Array:
         flow = sum(w * part.motion(q, v, place).velocity for w, place in zip(weights, places, strict=True))
-        return np.asarray(-load.scale(t) * (flow @ force))
+        return np.asarray(-scale(t) * (flow @ force))
 
     return Exchange(_nothing, power)
 
 
-def _scaled(vector: list[float], scale: Function, keyword: str) -> dict[str, Any]:
+def _scaled(vector: list[float], scale: Course, keyword: str) -> dict[str, Any]:
     """A load vector times a function of time, as Exudyn's options."""
-    if scale.number is not None:
-        return {"loadVector": [scale.number * part for part in vector]}
+    if scale.function.number is not None:
+        return {"loadVector": [scale.function.number * part for part in vector]}
 
     def load(_mbs: Any, t: float, _given: Any) -> list[float]:
-        factor = value(scale, t)
+        factor = scale.value(t)
         return [factor * part for part in vector]
 
     return {"loadVector": vector, keyword: load}

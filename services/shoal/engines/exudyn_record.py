@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,17 +18,45 @@ LARGEST_RECORD = 5_000_000
 
 @dataclass(frozen=True)
 class Steps:
-    """`count` steps of `size` [s]; `kept` are the indices of those recorded, increasing, from 0 to count."""
+    """`count` steps of `size` [s]; `kept` are the indices of those recorded, increasing, from 0 to count.
+
+    spans: where functions of time want steps to end, runs one after the other, each of so many equal steps up to its
+    end [s]; then `size` is the longest.
+    """
 
     wanted: Array
     count: int
     size: float
     kept: Indices
+    spans: tuple[tuple[int, float], ...] = ()
+
+    @property
+    def runs(self) -> tuple[tuple[int, float], ...]:
+        """Number of steps and end [s] of each run."""
+        return self.spans or ((self.count, self.count * self.size),)
+
+    @property
+    def instants(self) -> Array:
+        """Where the steps begin and end [s], (count + 1,)."""
+        if not self.spans:
+            return np.multiply(np.arange(self.count + 1), self.size, dtype=float)
+        ends = [0.0, *(end for _, end in self.spans)]
+        parts = [
+            begin + (end - begin) * np.arange(1, count + 1) / count
+            for (count, end), begin in zip(self.spans, ends, strict=False)
+        ]
+        return np.concatenate([[0.0], *parts])
 
 
-def choose_steps(wanted: Array, step: float, unknowns: int) -> Steps:
-    """Steps no longer than `step` [s] (but for round-off) that meet the wanted times [s] where possible."""
+def choose_steps(wanted: Array, step: float, unknowns: int, halts: Array | None = None) -> Steps:
+    """Steps no longer than `step` [s] (but for round-off) that meet the wanted times [s] where possible.
+
+    halts: times that steps must end at [s], increasing.
+    """
     last = float(wanted[-1])
+    inside = [] if halts is None else halts[(halts > 1e-12 * last) & (halts < last * (1 - 1e-12))].tolist()
+    if inside:
+        return _in_spans(wanted, step, unknowns, [*inside, last])
     between = np.diff(wanted, prepend=0.0)
     interval = float(np.min(between[between > 0], initial=last))
     if last == 0:
@@ -43,6 +71,17 @@ def choose_steps(wanted: Array, step: float, unknowns: int) -> Steps:
     before = np.floor(wanted / size + 1e-9).astype(np.int64)
     kept = np.unique(np.concatenate([np.arange(0, count, stride), before, before + 1, [count]]))
     return Steps(wanted, count, size, kept[kept <= count])
+
+
+def _in_spans(wanted: Array, step: float, unknowns: int, ends: list[float]) -> Steps:
+    begins = [0.0, *ends[:-1]]
+    counts = [max(1, math.ceil((end - begin) / step - 1e-9)) for begin, end in zip(begins, ends, strict=True)]
+    total = sum(counts)
+    steps = Steps(wanted, total, step, np.zeros(0, dtype=np.int64), tuple(zip(counts, ends, strict=True)))
+    stride = max(1, math.ceil(total * unknowns / LARGEST_RECORD))
+    before = np.searchsorted(steps.instants, wanted + 1e-9 * step, side="right") - 1
+    kept = np.unique(np.concatenate([np.arange(0, total, stride), before, before + 1, [0], np.cumsum(counts)]))
+    return replace(steps, kept=kept[kept <= total])
 
 
 def _multiples(times: Array, interval: float) -> bool:
@@ -61,6 +100,8 @@ class Record:
     v: Array = field(init=False)
     seen: int = field(default=0, init=False)
     filled: int = field(default=0, init=False)
+    resumed: bool = field(default=False, init=False)
+    """Whether the next call is that of the initialisation of a run that goes on where the last one ended."""
 
     def __post_init__(self) -> None:
         self.q = np.full((len(self.steps.kept), self.reference.size), np.nan)
@@ -69,10 +110,13 @@ class Record:
     @property
     def times(self) -> Array:
         """Time of each kept step [s], (kept,)."""
-        return np.multiply(self.steps.kept, self.steps.size, dtype=float)
+        return self.steps.instants[self.steps.kept]
 
     def take(self, mbs: Any, _time: float) -> bool:
         """Exudyn's call after the initialisation and after each step."""
+        if self.resumed:
+            self.resumed = False
+            return True
         if self.steps.kept[self.filled] == self.seen:
             # GetODE2CoordinatesTotal, which adds the reference, aborts beyond about 100 coordinates (Exudyn 1.13.6).
             self.q[self.filled] = self.reference + mbs.systemData.GetODE2Coordinates()

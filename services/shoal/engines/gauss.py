@@ -28,10 +28,10 @@ class GaussEngine:
         return CAPABILITIES[self.name]
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
-        """Run one scene; see `Engine`."""
-        from shoal.mechanics.simulate import simulate
+        """Run one scene, under `auto` by the first integrator that can; see `Engine`."""
+        from shoal.mechanics.persist import persist
 
-        return simulate(scene, sampling_times(scene, times), threads=self.threads)
+        return persist(scene, sampling_times(scene, times), self.threads)
 
     def simulate_many(
         self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None

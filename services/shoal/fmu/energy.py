@@ -8,7 +8,7 @@ from shoal.mechanics import stability
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.motion_state import LANE, at_start
 from shoal.mechanics.build import build
-from shoal.mechanics.integrators import choose, facts, pick
+from shoal.mechanics.integrators import choose, facts, halting, pick
 from shoal.mechanics.march import SAMPLED, march
 from shoal.mechanics.model import Model
 from shoal.mechanics.tile import SINGLE
@@ -46,7 +46,8 @@ def _states(model: Model, times: Array) -> tuple[Array, Array]:
     first = np.arange(0, n, 2)
     second = np.minimum(first + 1, n - 1)
     rows = np.column_stack([first, second, first, second]).ravel()
-    record = march(SINGLE, scheme, arrays, room, solver.step, steps, times, rows, solver.rank_tolerance)
+    stops = halting(solver, model, choice.name, float(times[-1]))
+    record = march(SINGLE, scheme, arrays, room, solver.step, steps, times, rows, solver.rank_tolerance, stops)
     samples = record.samples.reshape(len(times), len(first), SAMPLED)
     q, v = (samples[:, :, columns].reshape(len(times), -1)[:, :n] for columns in ([0, 1], [5, 6]))
     return q, v

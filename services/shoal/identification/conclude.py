@@ -12,14 +12,15 @@ from shoal.identification.bootstrap import bootstrap
 from shoal.identification.covariance import blocks_of
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate, Value, Verdict
-from shoal.identification.forward import ForwardModel
+from shoal.identification.forward import ForwardModel, accepts
 from shoal.identification.judge import Judgement, few, judge
 from shoal.identification.methods import Outcome
-from shoal.identification.methods.lanes import Descent
 from shoal.identification.model_error import Corrections, ModelError, model_error, rms_of
+from shoal.identification.problem import RESERVED
 from shoal.identification.profiles import Profile, profiles
 from shoal.identification.rank import combinations
 from shoal.identification.residual_tests import ResidualTests, residual_tests
+from shoal.identification.rivals import valley
 from shoal.identification.sensitivity import Sensitivity, believed
 from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
 from shoal.identification.units import unit
@@ -30,6 +31,10 @@ _NOTICED = 0.1
 """Of half an interval: a contribution to it that is worth a word."""
 _ALIKE = 3.0
 """A residual within this factor of the mesh error is explained by it."""
+
+
+_ROUNDS = 2
+"""How often an answer moves on to a better minimum that was met."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +59,12 @@ def conclude(
     wall: float,
     stages: list[Stage],
     wishes: Wishes,
+    rounds: int = _ROUNDS,
 ) -> Estimate:
-    """The estimate of an outcome. The runs it takes are not counted: no method is charged for them."""
+    """The estimate of an outcome. The runs it takes are not counted: no method is charged for them.
+
+    Where what looks for the cause of a misfit meets a better minimum, that one is concluded from, so many times.
+    """
     searched, point, measurement = model, outcome.point, model.measurement
     model = replace(model, memory=None, whole=None)
     if model.deadline is not None:
@@ -80,24 +89,28 @@ def conclude(
     refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
     tests = residual_tests(model, seen.residual, blocks, at.noise, float(np.hypot(mesh or 0.0, theory or 0.0)), refined)
     at = replace(at, systematic=tests.excess * float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1)))))
-    parameters = _parameters(model, point, at, correction)
+    alone: tuple[Outcome, list[Array]] = (outcome, [])
+    found, beside = unless_late(lambda: valley(model, outcome, at), alone) if looked and possible else alone
+    ends = [point, *beside]
+    parameters = _spanning([_parameters(model, end, at, correction) for end in ends])
     if looked is None:
         parameters = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in parameters.items()}
     profiled = profiles(model, point, at) if wishes.profiles and possible and looked else {}
     parameters |= {n: replace(parameters[n], identifiable=False) for n, p in profiled.items() if p.open}
     unknown = combinations(model, point, at) if possible and looked else []
     if possible:
-        judgement = judge(model, outcome, seen, at, tests, parameters, unknown)
-        if judgement.better is not None:
-            return conclude(searched, _moved(outcome, judgement.better), method, seed, wall, stages, wishes)
+        judgement = judge(model, found, seen, at, tests, parameters, unknown)
     else:
         message = "no parameter set could be simulated; look at the bounds and the scene"
         judgement = Judgement(Verdict.FAILED, message)
+    if judgement.better is not None and rounds > 0:
+        better = _going_on(outcome, *judgement.better)
+        return conclude(searched, better, method, seed, wall, stages, wishes, rounds - 1)
     correlation = autocorrelation(seen.residual, blocks)
     draws = wishes.bootstrap if possible and looked else 0
     rng = np.random.default_rng(seed)
-    coarse = _coarse(model, None if stages else mesh, tests)
-    notes = (judgement.message or outcome.message, _better(profiled), coarse, _slender(parameters, tests, theory))
+    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, None if stages else mesh, tests))
+    notes += (_slender(parameters, tests, theory),)
     return Estimate(
         problem=model.problem.name,
         method=method,
@@ -108,7 +121,7 @@ def conclude(
         advice=judgement.advice,
         choice=outcome.choice,
         parameters=parameters,
-        quantities=_quantities(model, point, at, correction),
+        quantities=_spanning([_quantities(model, end, at, correction) for end in ends]),
         combinations=unknown,
         fitness=outcome.fitness,
         rms=float(np.sqrt(outcome.fitness / model.things)),
@@ -118,7 +131,7 @@ def conclude(
         wall_s=wall,
         history=searched.counter.history,
         iterations=outcome.iterations,
-        minima=[{**_values_of(model, p), "fitness": f} for p, f in outcome.minima if np.isfinite(f)],
+        minima=[{**_values_of(model, p), "fitness": f} for p, f in found.minima if np.isfinite(f)],
         residual_autocorrelation=correlation,
         residual_tests=tests,
         suspects=judgement.suspects,
@@ -183,15 +196,6 @@ def _coarse(model: ForwardModel, mesh: float | None, tests: ResidualTests) -> st
     return f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted / 3:.1g} finds a better mesh"
 
 
-def _moved(outcome: Outcome, better: Descent) -> Outcome:
-    """The outcome at a better minimum; where it was is left as another one."""
-    choice = "; then ".join(part for part in (outcome.choice, "least squares from a refit for a suspect") if part)
-    minima = [(outcome.point, outcome.fitness), *outcome.minima]
-    message = "" if better.converged else "no convergence"
-    moved = replace(outcome, point=better.point, fitness=better.fitness, minima=minima, choice=choice)
-    return replace(moved, message=message, converged=better.converged)
-
-
 def _by_thing(model: ForwardModel, rows: Array | None) -> float | None:
     """Root mean square per observed thing."""
     return None if rows is None else float(np.sqrt(np.sum(rows**2) / model.samples / model.things))
@@ -202,8 +206,8 @@ def _slender(parameters: dict[str, Value], tests: ResidualTests, theory: float |
     limited = [n for n, v in parameters.items() if abs(v.theory or 0.0) > _NOTICED * (v.upper - v.lower) / 2]
     if theory is None or not limited:
         return ""
-    change = f"change the motion by about {tests.sized(theory)} and widen the interval of {', '.join(limited)}"
-    return f"shear and rotary inertia, which slender beams neglect, {change}"
+    size = f"about {tests.sized(theory)} of the motion"
+    return f"shear and rotary inertia, which slender beams neglect, are {size} and widen the interval of {', '.join(limited)}"
 
 
 def _better(profiled: dict[str, Profile]) -> str:
@@ -220,9 +224,35 @@ def _parameters(model: ForwardModel, point: Array, at: Linearisation, correction
         shift = correction.of(lambda p, k=k: float(p[k]), point)  # type: ignore[misc]
         told = about.fixed and not at_bound and about.std < span and not few(model)
         known = _value(float(point[k]), about, told, shift, at_bound)
-        known = replace(known, unit=unit(model.parameters.entries[name].parameter.path or ""))
-        found[name] = known.exponential() if model.parameters.logarithmic[k] else known
+        path = model.parameters.entries[name].parameter.path or ""
+        known = known.exponential() if model.parameters.logarithmic[k] else known
+        told = known.identifiable and _possible(model, path, known)
+        found[name] = replace(known, unit=unit(path), identifiable=told)
     return found
+
+
+def _possible(model: ForwardModel, path: str, known: Value) -> bool:
+    """Whether an interval ends at values that can be: a mass whose interval reaches below zero is not known."""
+    head, _, name = path.partition(".")
+    if head == RESERVED:
+        return known.lower > 0.0 or name not in ("clock", "scale")
+    return not path or all(accepts(model.scene, path, end) for end in (known.lower, known.upper))
+
+
+def _spanning(ends: list[dict[str, Value]]) -> dict[str, Value]:
+    """The values of the first, with intervals that span those at all ends of its valley."""
+    first = ends[0]
+    lower = {name: min(end[name].lower for end in ends) for name in first}
+    upper = {name: max(end[name].upper for end in ends) for name in first}
+    return {name: replace(value, lower=lower[name], upper=upper[name]) for name, value in first.items()}
+
+
+def _going_on(outcome: Outcome, point: Array, fitness: float) -> Outcome:
+    """The outcome at a better minimum than its own, which is then one of the others."""
+    rows = [*outcome.iterations, (len(outcome.iterations), fitness, fitness)]
+    choice = f"{outcome.choice}; then on from a better minimum, met on the way to the cause of the misfit"
+    minima = [(outcome.point, outcome.fitness), *outcome.minima]
+    return replace(outcome, point=point, fitness=fitness, minima=minima, iterations=rows, choice=choice.lstrip("; "))
 
 
 def _covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:

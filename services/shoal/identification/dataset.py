@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.identification.units import QUANTITIES, squared
+from shoal.identification.units import of_channel, squared
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,6 +70,6 @@ def _signals(estimate: Estimate, name: str) -> xr.Dataset:
         measured, fitted = recording.values[:, k], predicted[:, k]
         parts = {"measured": measured, "predicted": fitted, "residual": fitted - measured}
         for part, signal in parts.items():
-            empty = (("time", "marker"), np.full(shape, np.nan), {"units": QUANTITIES[channel.quantity]})
+            empty = (("time", "marker"), np.full(shape, np.nan), {"units": of_channel(channel)})
             columns.setdefault(f"{part}_{channel.quantity}", empty)[1][:, markers.index(channel.marker)] = signal
     return xr.Dataset(columns, {"time": ("time", recording.times, {"units": "s"}), "marker": markers})

@@ -169,7 +169,11 @@ def design(
     noise, angle_noise = _noise(problem, noise, angle_noise)
     duration, rate = _today(source, measurement, duration, rate)
     scene, candidates = _candidates(problem.load_scene(values))
-    chosen = problem.model_copy(update={"loss": "squares", "recordings": {name: source} if problem.recordings else {}})
+    # Standard deviations are told in the parameters' own units, but for those that are stated to be logarithms.
+    scales = {n: p.model_copy(update={"scale": "linear"}) for n, p in problem.parameters.items() if p.scale == "auto"}
+    changes = {"loss": "squares", "recordings": {name: source} if problem.recordings else {}}
+    changes["parameters"] = {**problem.parameters, **scales}
+    chosen = problem.model_copy(update=changes)
     channels = (*problem.channels_of(source), *(channel for c in candidates for channel in c.channels))
     times = _grid(duration, rate)
     nothing = Recording(times, channels, np.zeros((len(times), len(channels))), "", np.full(len(channels), np.nan))

@@ -28,6 +28,7 @@ class Verdict(StrEnum):
     COMBINATION = "identified up to a combination"
     AMBIGUOUS = "ambiguous"
     REJECTED = "model rejected"
+    UNFINISHED = "not at a minimum"
     FAILED = "failed"
 
     @property

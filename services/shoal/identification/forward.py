@@ -95,8 +95,9 @@ class ForwardModel:
         return self.parameters.upper
 
     def sizes(self, point: Array) -> Array:
-        """Size of each parameter at a point, at least a thousandth of its range, (parameters,)."""
-        return np.maximum(np.abs(point), 1e-3 * (self.upper - self.lower))
+        """Size of each parameter at a point, at least a thousandth of its range, 1 of a logarithm, (parameters,)."""
+        sizes = np.maximum(np.abs(point), 1e-3 * (self.upper - self.lower))
+        return np.where(self.parameters.logarithmic, 1.0, sizes)
 
     @cached_property
     def rows(self) -> Rows:
@@ -252,8 +253,8 @@ class ForwardModel:
         for path, numbers in values.items() if np.any(doubtful) else ():
             # Limits of fields are intervals: where the extremes are accepted, so is what lies between.
             extremes = {float(np.min(numbers[doubtful])), float(np.max(numbers[doubtful]))}
-            if not all(_accepts(scene, path, x) for x in extremes):
-                possible[doubtful] &= [_accepts(scene, path, float(x)) for x in numbers[doubtful]]
+            if not all(accepts(scene, path, x) for x in extremes):
+                possible[doubtful] &= [accepts(scene, path, float(x)) for x in numbers[doubtful]]
         return possible
 
     def _residuals(self, points: Array) -> Array:
@@ -266,7 +267,8 @@ class ForwardModel:
             whole.counter.charge(len(points), points[0], np.inf)
             values = self.cost(found)
             best = int(np.argmin(values))
-            if (-self.measurement.end, values[best]) < (-whole.reached[0], whole.reached[1]):
+            reached = (-self.measurement.end, values[best]) < (-whole.reached[0], whole.reached[1])
+            if reached and np.isfinite(values[best]):
                 whole.reached = (self.measurement.end, float(values[best]), points[best].copy())
         return found
 
@@ -347,7 +349,8 @@ def _same_in_all(path: str, numbers: Array) -> bool:
     return len(numbers) > 1 and not path.startswith("initial.") and bool(np.all(numbers == numbers[0]))
 
 
-def _accepts(scene: Scene, path: str, value: float) -> bool:
+def accepts(scene: Scene, path: str, value: float) -> bool:
+    """Whether a scene may have a value at a path."""
     try:
         scene.with_values({path: value})
     except InputError:

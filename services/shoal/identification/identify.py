@@ -25,6 +25,7 @@ from shoal.identification.mirrors import with_mirror_images
 from shoal.identification.plausible import check_constant
 from shoal.identification.problem import Problem
 from shoal.identification.recording import EngineSource
+from shoal.identification.starts import starting_points
 from shoal.scene import Scene
 from shoal.versions import versions
 
@@ -128,6 +129,10 @@ def _best_so_far(model: ForwardModel) -> Outcome:
         there = unless_late(lambda: float(model.cost(model.uncounted(reached[None]))[0]), np.inf)
         if there < fitness:
             best, fitness, message = reached, there, f"{message}: fitted on the first {end:.3g} s"
+    if not np.isfinite(fitness):
+        start = unless_late(lambda: starting_points(model)[:1], model.parameters.start[None])
+        fitness = unless_late(lambda: float(model.fitness(start)[0]), np.inf)
+        best, message = start[0], f"{message} or found more than a start"
     if not np.isfinite(fitness):
         slow = f"; a simulation takes about {deadline.cost:.2g} s" if deadline.cost > 0.1 * deadline.limit else ""
         raise InputError(f"time_limit: nothing was found in {deadline.limit:g} s{slow}; allow more, or a shorter part")

@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
-from shoal.identification.methods.lanes import Descent
 from shoal.identification.residual_tests import ResidualTests
 from shoal.identification.rivals import relation, rivals_of, within
 from shoal.identification.sensitivity import Sensitivity
+from shoal.identification.stationarity import downhill, sentence
 from shoal.identification.suspects import Findings, Suspect, suspects
 from shoal.identification.swaps import exchanged
 from shoal.identification.uncertainty import Linearisation
+from shoal.trajectory import Array
 
 _DECISIVE = 5.0
 """A property of the measurement that lowers even a small misfit by this factor refutes what was stated of it."""
@@ -28,16 +32,16 @@ _FEWEST = 3
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict, why, what to do next, and what would explain a misfit.
+    """The verdict, why, what to do next, and the properties of the measurement that would explain a misfit.
 
-    better: a minimum that fits better, if the search for suspects met one: go on from there
+    better: a point (parameters,) that fits better, if one was met, and its fitness
     """
 
     verdict: Verdict
     message: str = ""
     advice: list[str] = field(default_factory=list)
     suspects: list[Suspect] = field(default_factory=list)
-    better: Descent | None = None
+    better: tuple[Array, float] | None = None
 
 
 def judge(
@@ -49,19 +53,28 @@ def judge(
     parameters: Mapping[str, Value],
     unknown: list[str],
 ) -> Judgement:
-    """The verdict on an outcome: failures first, then the model, then rivals, then what is identifiable."""
+    """The verdict on an outcome: failures first, then the minimum, the model, rivals, and what is identifiable."""
     if not outcome.ended:
         advice = ["allow more time, or start from a better place"]
         return Judgement(Verdict.FAILED, outcome.message or "the method did not come to its end", advice)
     if few(model):
         reason = f"{tests.rows} measured numbers for {len(parameters)} unknown: too few to tell how uncertain they are"
         return Judgement(Verdict.FAILED, reason, ["measure more, or state the noise of the channels"])
-    looked = Findings()
+    if unfinished := _unfinished(model, outcome.point, seen):
+        advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
+        return Judgement(Verdict.UNFINISHED, unfinished, advice)
+    found: list[Suspect] = []
     if (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal:
-        looked = suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained)
-    if looked.better is not None:
-        return Judgement(Verdict.FAILED, "a better minimum was met", better=looked.better)
-    found = looked.suspects
+        findings = unless_late(
+            lambda: suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained), Findings()
+        )
+        found = findings.suspects
+        if findings.better is not None:
+            place = findings.better
+            fitness = unless_late(lambda: float(model.cost(model.uncounted(place[None]))[0]), outcome.fitness)
+            reason = f"a better minimum was met, of fitness {fitness:.3g} instead of {outcome.fitness:.3g}"
+            advice = ["look for another minimum (--method multi-start)"]
+            return Judgement(Verdict.FAILED, reason, advice, found, (place, fitness))
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
     if not outcome.converged:
@@ -74,6 +87,16 @@ def judge(
         advice = ["measure another marker or a longer motion, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
     return _identifiable(seen, tests, parameters, unknown, found)
+
+
+def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
+    """Why a point is no end of a search; empty if it may be one."""
+    outside = (point < model.lower) | (point > model.upper)
+    if np.any(outside):
+        names = ", ".join(name for name, out in zip(model.names, outside, strict=True) if out)
+        return f"{names} ended outside the bounds of the search"
+    better = downhill(model, point, seen)
+    return "" if better is None else sentence(model, point, better)
 
 
 def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -> Judgement:
@@ -126,7 +149,7 @@ def _identifiable(
         reasons.append(f"only combinations are known: {len(unknown)} direction(s) leave the motion unchanged")
         advice.append("fix one parameter of each combination, or rely on the quantities that are identifiable")
     elif vague := [name for name, v in parameters.items() if not v.identifiable and not v.at_bound]:
-        reasons.append(f"{', '.join(vague)}: less certain than the range between the bounds")
+        reasons.append(f"{', '.join(vague)}: less certain than the range of what is possible")
         advice.append("measure longer or with less noise, or add what is known as a prior")
     if not seen.reliable:
         known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"

@@ -45,11 +45,18 @@ def with_mirror_images(model: ForwardModel, outcome: Outcome) -> Outcome:
     good = [k for k in np.argsort(values, kind="stable") if left[k] < _FITS * model.spread][:_FOLLOWED]
     if not good:
         return outcome
-    ends = [(d.point, d.fitness) for d in descend_many(looking, points[good]) if np.isfinite(d.fitness)]
     known = [outcome.point, *(point for point, _ in outcome.minima)]
-    fresh = [end for end in ends if all(apart(model, end[0], other) for other in known)]
-    (point, fitness), *rest = sorted([(outcome.point, outcome.fitness), *fresh], key=lambda end: end[1])
-    return replace(outcome, point=point, fitness=fitness, minima=[*outcome.minima, *rest])
+    ends = [
+        descent
+        for descent in descend_many(looking, points[good])
+        if np.isfinite(descent.fitness) and all(apart(model, descent.point, other) for other in known)
+    ]
+    minima = [*outcome.minima, *((descent.point, descent.fitness) for descent in ends)]
+    best = min(ends, key=lambda descent: descent.fitness, default=None)
+    if best is None or best.fitness >= outcome.fitness:
+        return replace(outcome, minima=minima)
+    minima = [(outcome.point, outcome.fitness), *(end for end in minima if end[0] is not best.point)]
+    return replace(outcome, point=best.point, fitness=best.fitness, minima=minima, converged=best.converged)
 
 
 def images(model: ForwardModel, point: Array) -> Array:

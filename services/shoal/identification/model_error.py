@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.engines.theory import slender_share
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Rod, Scene
-from shoal.selection.theory import slender_share
 from shoal.trajectory import Array
 
 _STABLE = 0.9

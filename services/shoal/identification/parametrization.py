@@ -77,7 +77,7 @@ class Parametrization:
     @cached_property
     def logarithmic(self) -> Array:
         """Which components stand by their logarithm, (components,), bool."""
-        return np.array([entry.parameter.scale == "log" for entry in self.entries.values()])
+        return np.array([entry.parameter.logarithmic for entry in self.entries.values()])
 
     def to_vector(self, values: Array) -> Array:
         """Components of parameters in their own units, (..., components)."""

@@ -32,6 +32,8 @@ _PARTS = 50.0
 """Of the shortest period: rates are taken over that time, so that noise does not count."""
 _STILL = 1e-9
 """Of a channel's size: what moves less does not move."""
+_FEWEST = 3
+"""Samples, without which there is no motion."""
 _LENGTHS = {"cm": 100.0, "mm": 1000.0, "um": 1e6}
 
 
@@ -108,7 +110,8 @@ def check_constant(model: ForwardModel) -> None:
     if model.measurement.truth:
         return
     for name, recording in model.measurement.recordings.items():
-        still = [k for k, signal in enumerate(recording.values.T) if _spread(signal) <= _STILL]
+        seen_often = np.isfinite(recording.values).sum(axis=0) >= _FEWEST
+        still = [k for k in np.flatnonzero(seen_often) if _spread(recording.values[:, k]) <= _STILL]
         if not still:
             continue
         seen = model.observe(model.parameters.start[None], name)[0]

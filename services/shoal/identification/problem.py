@@ -20,6 +20,11 @@ from shoal.scene.scene import Name
 MEASUREMENT = ("clock", "delay", "scale", "x", "y", "tilt")
 """What a parameter can be that is none of the scene's: the path is `measurement.` and one of these."""
 RESERVED = "measurement"
+_POSITIVE = {
+    *("length", "height", "width", "end_height", "end_width", "density", "mass", "inertia", "youngs_modulus"),
+    *("stiffness", "damping", "friction", "coulomb", "retardation", "clock", "scale"),
+}
+"""Last names of paths to quantities that are positive, and known by their order of magnitude rather than by a sum."""
 
 
 class Prior(Record):
@@ -34,7 +39,8 @@ class Parameter(Record):
 
     path: a field of the scene, or `measurement.` and clock, delay, scale, x, y or tilt; without one the parameter
         only stands in `ties`
-    scale: `log` for numbers that are known in order of magnitude only
+    scale: `log` for numbers that are known in order of magnitude only; `auto` is that for quantities that are positive
+        by nature (a mass, a length, a modulus, friction) where `lower` is above 0, else `linear`
     own: every recording has its own (an initial state, for instance), named RECORDING.NAME
     """
 
@@ -42,7 +48,7 @@ class Parameter(Record):
     lower: float
     upper: float
     start: float | None = None
-    scale: Literal["linear", "log"] = "linear"
+    scale: Literal["auto", "linear", "log"] = "auto"
     prior: Prior | None = None
     own: bool = False
 
@@ -58,6 +64,12 @@ class Parameter(Record):
         if head == RESERVED and rest not in MEASUREMENT:
             raise ValueError(f"path {self.path!r}: a measurement has {', '.join(MEASUREMENT)}")
         return self
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether it is sought by its logarithm."""
+        positive = self.lower > 0 and (self.path or "").rpartition(".")[2] in _POSITIVE
+        return self.scale == "log" or (self.scale == "auto" and positive)
 
     @property
     def of_measurement(self) -> bool:

@@ -88,9 +88,9 @@ def _at_rest(model: ForwardModel, name: str) -> bool:
 def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pose: Array) -> Array:
     """Distinct minimisers of the pose error over the angles, best first, (points, parameters)."""
     count = _CANDIDATES * len(angles)
-    scatter = _scatter(count, len(angles))
+    evenly = scatter(count, len(angles))
     points = np.repeat(middle[None], count, axis=0)
-    points[:, angles] = model.lower[angles] + scatter * (model.upper - model.lower)[angles]
+    points[:, angles] = model.lower[angles] + evenly * (model.upper - model.lower)[angles]
     damping = np.full(count, 1e-3)
     error, jacobian = _pose_error(model, name, points, angles, pose)
     cost = np.sum(error**2, axis=1)
@@ -114,7 +114,7 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
     return _distinct(model, points, cost, angles)
 
 
-def _scatter(count: int, dimensions: int) -> Array:
+def scatter(count: int, dimensions: int) -> Array:
     """Points that fill the unit cube evenly, (count, dimensions): Kronecker's sequence of the generalised golden ratio.
 
     Roberts (2018). scipy's qmc has other ones, and takes a second to import.

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from shoal.identification.measurement import Measurement
+    from shoal.identification.recording import Channel
 
 QUANTITIES = {"x": "m", "y": "m", "angle": "rad", "rate": "rad/s"}
 """Of what a channel measures."""
@@ -46,8 +47,13 @@ def unit(path: str) -> str:
 def of_channels(measurement: Measurement) -> str:
     """The unit that all channels of all recordings share, else nothing."""
     runs = measurement.recordings.values()
-    units = {QUANTITIES[channel.quantity] for recording in runs for channel in recording.channels}
+    units = {of_channel(channel) for recording in runs for channel in recording.channels}
     return units.pop() if len(units) == 1 else ""
+
+
+def of_channel(channel: Channel) -> str:
+    """The unit of a channel's samples: px where nothing but the recording's `scale` says how large one is."""
+    return "px" if channel.unit == "px" and channel.scale == 1.0 else QUANTITIES[channel.quantity]
 
 
 def squared(unit: str) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import constraints, functions, gauss
+from shoal.mechanics import constraints, fitting, functions, gauss
 from shoal.mechanics.affine import Affine, Number
 from shoal.mechanics.drives import Drives
 from shoal.mechanics.elements import ELEMENTS, ancf_cable, ancf_full, beam
@@ -59,10 +61,10 @@ def with_start(model: Model, scene: Scene, lanes: int) -> Model:
 def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     """Assemble the model of a scene whose numbers may be arrays over lanes. Raises InputError.
 
-    horizon [s]: functions of time are fitted up to it (default: the scene's duration).
+    horizon [s]: functions of time are fitted up to it, and at least up to the end of the scene's duration.
     """
     placement = place(scene)
-    horizon = max(horizon, scene.solver.duration) + scene.solver.step
+    horizon = max(horizon, scene.solver.duration)
     rows = _Rows(len(placement.positions))
     masses = _Masses(scene, placement, rows)
     for name, body in scene.bodies.items():
@@ -75,7 +77,9 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     held = constraints.assemble(terms, rows.of, _stack, len(loads.fitted))
     for one in terms.held:
         if one.drive is not None:
-            loads.fitted.append(functions.fit(one.drive[0], horizon, one.drive[1]))
+            with _naming(one.name):
+                fitting.require_no_jump(one.drive.function, horizon)
+                loads.fitted.append(fitting.fit(one.drive, horizon, one.drive.knots, steep=False))
     held_rows = rows.size
     marker_rows = []
     for marker in scene.markers.values():
@@ -97,12 +101,22 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
         start_angles=_stack(loads.angles),
         drives=loads.drives(),
         functions=functions.pack(loads.fitted),
+        kinks=tuple(one.kinks for one in loads.fitted),
         constraints=held,
         constraint_names=tuple(one.name for one in terms.held),
         marker_rows=_index(marker_rows),
         method=gauss.METHODS.get(scene.solver.acceleration, gauss.PROJECTION),
         baumgarte=scene.solver.baumgarte,
     )
+
+
+@contextmanager
+def _naming(field: str) -> Iterator[None]:
+    """Name the field in what is said of its function."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{field}: {str(error).removeprefix('function: ')}") from None
 
 
 class _Rows:
@@ -303,7 +317,7 @@ class _Loads:
                 else:
                     line = placement.direction(scene, joint.first) * unit(joint.direction)
                     ends = [placement.point(scene, side) for side in (joint.first, joint.second)]
-                    self._measure(PLACE, [*ends, line], law, 0.0)
+                    self._measure(name, PLACE, [*ends, line], law, 0.0)
         for name, load in scene.loads.items():
             if isinstance(load, Spring):
                 self._spring(name, load)
@@ -316,15 +330,16 @@ class _Loads:
                 base = load.reaction or Attachment(body=GROUND, point=(0.0, 0.0))
                 self._angle(name, base, load.at, law, drive=load.torque)
             elif isinstance(load, Force):
-                self._force(load)
+                self._force(name, load)
             elif isinstance(load, DistributedForce):
-                self._distributed(load)
+                self._distributed(name, load)
 
-    def _function(self, f: Function) -> int:
+    def _function(self, field: str, f: Function) -> int:
         """Number of a function of time; -1 for the constant 1."""
         if f.number == 1.0 or self.horizon == 0.0:
             return -1
-        self.fitted.append(functions.fit(f, self.horizon, f.knots))
+        with _naming(field):
+            self.fitted.append(fitting.fit(f, self.horizon, f.knots))
         return len(self.fitted) - 1
 
     def _turn(self, first: Attachment, second: Attachment) -> Number:
@@ -332,6 +347,7 @@ class _Loads:
 
     def _measure(
         self,
+        name: str,
         kind: int,
         vectors: list[Affine],
         law: list[Number],
@@ -343,12 +359,14 @@ class _Loads:
         table = energy = -1
         if elastic is not None and self.horizon > 0.0:
             size = _SPRING_RANGE
-            fitted = functions.fit(elastic, size, elastic.knots, begin=-size)
-            self.fitted += [fitted, functions.antiderivative(fitted)]
+            with _naming(f"loads.{name}.elastic"):
+                fitted = fitting.fit(elastic, size, elastic.knots, begin=-size)
+            self.fitted += [fitted, fitting.antiderivative(fitted)]
             table, energy = len(self.fitted) - 2, len(self.fitted) - 1
         driven = -1
         if drive is not None and self.horizon > 0.0:
-            self.fitted.append(functions.fit(drive, self.horizon, drive.knots))
+            with _naming(f"loads.{name}.torque"):
+                self.fitted.append(fitting.fit(drive, self.horizon, drive.knots))
             driven = len(self.fitted) - 1
         vectors = [*vectors, *vectors[-1:] * (3 - len(vectors))]
         self.kinds.append(kind)
@@ -371,7 +389,7 @@ class _Loads:
             if side.body != GROUND and isinstance(self.scene.bodies[side.body], PointMass):
                 raise InputError(f"{name}: {side.body} is a point mass, which has no angle")
         directions = [self.placement.direction(self.scene, side) for side in (first, second)]
-        self._measure(ANGLE, directions, law, self._turn(first, second), elastic=elastic, drive=drive)
+        self._measure(name, ANGLE, directions, law, self._turn(first, second), elastic=elastic, drive=drive)
 
     def _spring(self, name: str, load: Spring) -> None:
         ends = [self.placement.point(self.scene, side) for side in (load.first, load.second)]
@@ -379,12 +397,12 @@ class _Loads:
         if rest is None:
             first, second = (self.placement.start_of(end)[0] for end in ends)
             rest = np.abs(second - first)
-        self._measure(DISTANCE, ends, [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0], 0.0,
+        self._measure(name, DISTANCE, ends, [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0], 0.0,
                       elastic=load.elastic)  # fmt: skip
 
-    def _force(self, load: Force) -> None:
+    def _force(self, name: str, load: Force) -> None:
         point = self.placement.point(self.scene, load.at)
-        value, number = as_complex(load.force), self._function(load.scale)
+        value, number = as_complex(load.force), self._function(f"loads.{name}.scale", load.scale)
         if load.follows:
             direction = self.placement.direction(self.scene, load.at)
             self.following.append(([*self.rows.of(point), *self.rows.of(direction)], value, number))
@@ -392,10 +410,10 @@ class _Loads:
         for row, part in zip(self.rows.of(point), (np.real(value), np.imag(value)), strict=True):
             self.fixed.append((row, part, number))
 
-    def _distributed(self, load: DistributedForce) -> None:
+    def _distributed(self, name: str, load: DistributedForce) -> None:
         rod, frame = self.scene.bodies[load.body], self.placement.frames[load.body]
         assert isinstance(rod, Rod)
-        value, number = as_complex(load.force), self._function(load.scale)
+        value, number = as_complex(load.force), self._function(f"loads.{name}.scale", load.scale)
         if isinstance(frame, BeamFrame):
             element = ELEMENTS[rod.element]
             parts = element.weight(1.0, 1.0, 1.0, frame.element_length)

@@ -8,9 +8,9 @@ the column `column[e]` of the constraint whose range in `entry` contains e.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -20,9 +20,7 @@ from shoal.mechanics.affine import Affine, Number
 from shoal.mechanics.functions import Functions
 from shoal.mechanics.tile import Array, Index, Tile
 from shoal.mechanics.vector import pointer
-
-Drive = tuple[Callable[[Any], Any], Sequence[float]]
-"""A function of time, and the knots between which it is one polynomial."""
+from shoal.scene.function import Composed
 
 
 class Constraints(NamedTuple):
@@ -56,7 +54,7 @@ class Held:
     w: Affine
     crossed: bool
     constant: Number
-    drive: Drive | None
+    drive: Composed | None
 
     def products(self, rows: Callable[[Affine], tuple[int, int]]) -> list[tuple[int, int, Number, Affine, Affine]]:
         """(left row, right row, factor, left vector, right vector); left row -1 for a linear term.
@@ -87,15 +85,15 @@ class Terms:
     def __init__(self) -> None:
         self.held: list[Held] = []
 
-    def dot(self, name: str, u: Affine, w: Affine, constant: Number = 0.0, drive: Drive | None = None) -> None:
+    def dot(self, name: str, u: Affine, w: Affine, constant: Number = 0.0, drive: Composed | None = None) -> None:
         """u . w + constant + drive(t) = 0."""
         self.held.append(Held(name, u, w, False, constant, drive))
 
-    def cross(self, name: str, u: Affine, w: Affine, constant: Number = 0.0, drive: Drive | None = None) -> None:
+    def cross(self, name: str, u: Affine, w: Affine, constant: Number = 0.0, drive: Composed | None = None) -> None:
         """u x w + constant + drive(t) = 0."""
         self.held.append(Held(name, u, w, True, constant, drive))
 
-    def vanish(self, name: str, vector: Affine, drives: tuple[Drive, Drive] | None = None) -> None:
+    def vanish(self, name: str, vector: Affine, drives: tuple[Composed, Composed] | None = None) -> None:
         """vector + drives(t) = 0, two linear constraints [m]."""
         for axis, part in enumerate((1.0, 1j)):
             self.dot(name, Affine({}, part), vector, 0.0, drives[axis] if drives else None)

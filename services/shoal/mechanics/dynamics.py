@@ -25,7 +25,8 @@ class Work(NamedTuple):
     z, zdot, a: coordinates, rates and accelerations, (rows, lanes). before: z, zdot and a at the
     beginning of the step. stage: room of four states for integrators. element: 64 rows. memory: the
     continuous angle of every force element, (forces, lanes). power: dissipated minus supplied power
-    [W], (lanes,). energy: kinetic, elastic, potential [J], (3, lanes).
+    [W], (lanes,). energy: kinetic, elastic, potential [J], (3, lanes). until: the last instant [s] before
+    functions of time may jump, (1,); what is asked for later, is asked for then.
     """
 
     home: Array
@@ -38,6 +39,7 @@ class Work(NamedTuple):
     memory: Array
     power: Array
     energy: Array
+    until: Array
     gauss: gauss.GaussWork
 
 
@@ -47,7 +49,20 @@ def work_space(tile: Tile, m: Arrays) -> Work:
     rows = m.rows * width
     sizes = (rows, rows, rows, 3 * rows, 4 * rows, ELEMENT_ROWS * width, m.forces.size * width, width, 3 * width)
     z, zdot, a, before, stage, element, memory, power, energy = (np.zeros(size) for size in sizes)
-    return Work(gate.home(), z, zdot, a, before, stage, element, memory, power, energy, gauss.work_space(width, m))
+    return Work(
+        gate.home(),
+        z,
+        zdot,
+        a,
+        before,
+        stage,
+        element,
+        memory,
+        power,
+        energy,
+        np.full(1, np.inf),
+        gauss.work_space(width, m),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -64,8 +79,15 @@ def raw(w: Work) -> Work:
         pointer(w.memory),
         pointer(w.power),
         pointer(w.energy),
+        pointer(w.until),
         gauss.raw(w.gauss),
     )
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def instant(w: Work, t: float) -> float:
+    """The time [s] at which functions of time are to be asked: a step that ends at a jump knows its left side only."""
+    return min(t, w.until[0])  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -111,6 +133,7 @@ def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Ar
 
     Fills the derived rows of z and zdot that forces act on, and the dissipated minus supplied power.
     """
+    t = instant(w, t)
     gate.call(m.gates.motion, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, 0.0, f, ALL))
 
 
@@ -159,6 +182,7 @@ def _force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: A
 @njit(cache=True, error_model="numpy", forceinline=True)
 def acceleration(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """The acceleration by Gauss's principle; z, zdot, a: (rows, lanes), a valid on the unknowns."""
+    t = instant(w, t)
     arguments = (gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, tolerance, a, ACCELERATION)
     gate.call(m.gates.motion, (tile, *arguments))
 
@@ -183,7 +207,14 @@ def _motion_gate(tile, pm, pw, t, z, zdot, tolerance, a, part):  # type: ignore[
 def settle(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, iterations: int = 3) -> None:
     """Remove the drift of a constrained model (nothing to do where sharing expressed every joint)."""
     if m.constraints.size > 0 and m.projects:
+        t = instant(w, t)
         gate.call(m.gates.settle, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, tolerance, iterations))
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def meet(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
+    """Let driven constraints take up their new rates at once: a plastic impact, the least change in the mass metric."""
+    gate.call(m.gates.settle, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, tolerance, 3))
 
 
 @njit(cache=True, error_model="numpy")

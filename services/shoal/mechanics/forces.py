@@ -24,7 +24,7 @@ STIFFNESS, CUBIC, DAMPING, NATURAL, COULOMB, SPEED, AMPLITUDE = range(7)
 LAW = 7
 
 # Rows of the work space: coordinates of a, b, d; gradient of g in them; g or x; g'; the elastic force.
-_GRADIENT, _VALUE, _RATE, _ELASTIC = 6, 12, 13, 14
+_GRADIENT, VALUE, _RATE, _ELASTIC = 6, 12, 13, 14
 _TURN = 2.0 * np.pi
 
 
@@ -122,21 +122,21 @@ def _gradient(tile: Tile, forces: Forces, number: int, z: Array, w: Array) -> No
             value = ux * nx + uy * ny
             w[out], w[out + width], w[out + 2 * width], w[out + 3 * width] = -nx, -ny, nx, ny
             w[out + 4 * width], w[out + 5 * width] = (ux - value * nx) * inverse, (uy - value * ny) * inverse
-        w[_VALUE * width + lane] = value
+        w[VALUE * width + lane] = value
 
 
 @njit(cache=True, error_model="numpy")
-def _measure(tile: Tile, forces: Forces, number: int, z: Array, memory: Array, w: Array) -> None:
+def measure(tile: Tile, forces: Forces, number: int, z: Array, memory: Array, w: Array) -> None:
     """As `_gradient`, with x = g - g0 in place of g."""
     width = len(tile)
     _gradient(tile, forces, number, z, w)
     natural = (LAW * number + NATURAL) * width
     for lane in range(width):
-        value = w[_VALUE * width + lane]
+        value = w[VALUE * width + lane]
         if forces.kind[number] == ANGLE:
             last = memory[number * width + lane]
             value = _angle(w[lane], w[width + lane], w[2 * width + lane], w[3 * width + lane], last)
-        w[_VALUE * width + lane] = value - forces.law[natural + lane]
+        w[VALUE * width + lane] = value - forces.law[natural + lane]
 
 
 @njit(cache=True, error_model="numpy")
@@ -177,7 +177,7 @@ def add_force(
     """
     width = len(tile)
     for number in range(forces.size):
-        _measure(tile, forces, number, z, memory, w)
+        measure(tile, forces, number, z, memory, w)
         drive = 0.0
         if moving:
             _rate(tile, forces, number, zdot, w)
@@ -187,7 +187,7 @@ def add_force(
                 w[_RATE * width + lane] = 0.0
         law = LAW * number * width
         for lane in range(width):
-            x, rate = w[_VALUE * width + lane], w[_RATE * width + lane]
+            x, rate = w[VALUE * width + lane], w[_RATE * width + lane]
             k, k3 = forces.law[law + STIFFNESS * width + lane], forces.law[law + CUBIC * width + lane]
             elastic = (k + k3 * x * x) * x + evaluate(functions, forces.table[number], x, 0)
             limit, speed = forces.law[law + COULOMB * width + lane], forces.law[law + SPEED * width + lane]
@@ -206,11 +206,11 @@ def add_energy(
     """Add the elastic energy [J] to a row of energy; w: work space of 15 rows. Pointers."""
     width = len(tile)
     for number in range(forces.size):
-        _measure(tile, forces, number, z, memory, w)
+        measure(tile, forces, number, z, memory, w)
         law = LAW * number * width
         table = forces.table[number]
         for lane in range(width):
-            x = w[_VALUE * width + lane]
+            x = w[VALUE * width + lane]
             k, k3 = forces.law[law + STIFFNESS * width + lane], forces.law[law + CUBIC * width + lane]
             stored = evaluate(functions, forces.energy[number], x, 0)
             # Beyond its range the table's force holds, so that the energy grows with the way.
@@ -246,12 +246,12 @@ def tangent(
     """
     width = len(tile)
     for number in range(forces.size):
-        _measure(tile, forces, number, z, memory, w)
+        measure(tile, forces, number, z, memory, w)
         kind, table = forces.kind[number], forces.table[number]
         law = LAW * number * width
         start = (first + ROWS * ROWS * number) * width
         for lane in range(width):
-            x = w[_VALUE * width + lane]
+            x = w[VALUE * width + lane]
             k, k3 = forces.law[law + STIFFNESS * width + lane], forces.law[law + CUBIC * width + lane]
             elastic = (k + k3 * x * x) * x + evaluate(functions, table, x, 0)
             slope = k + 3.0 * k3 * x * x + evaluate(functions, table, x, 1)

@@ -1,52 +1,32 @@
 """Functions of one number as piecewise polynomials: one kernel for formulas, tables and force laws.
 
-A piece interpolates in Chebyshev points (Trefethen, Approximation Theory and Practice, 2013, ch. 2 to 4)
-and is stored as powers of the local coordinate s in [-1, 1]. A function is sampled in extended precision
-where the machine has it, so that three derivatives of a smooth function are good to nearly all digits.
+A piece is stored as powers of the local coordinate s in [-1, 1]; `fitting` finds the pieces.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-from shoal.errors import InputError
 from shoal.mechanics.tile import Array, Index
 from shoal.mechanics.vector import pointer
 
 ORDER = 16
-"""Stored coefficients of a piece; `fit` leaves the last one zero, so that the antiderivative has room."""
-
-_SMALLEST = 1e-9
-"""Width, as a fraction of the range, at which bisecting ends: a kink or jump is that sharp."""
-
-_WIDE = 1 / 64
-_PROBES = 4096
-"""Pieces wider than this fraction of the range are also held against so many even samples of the whole range, so
-that a pulse of a thousandth of the range is not overlooked."""
-
-_CANCELLED, _SHORT = 1e-14, 1 / 16
-"""What is as good as this, relative to the function's size, is good enough for pieces as short as that."""
-
-_MOST_PIECES = 2**17
-"""Pieces looked at in all, of which about half are kept: a bound on time and memory."""
-
-_CROWD, _TRIED, _MOST_OF = 2**10, 64, 0.6
-"""From so many pieces on, so many of the shortest that the bound allows are tried before all the others; where they
-fail on that part of the range, halving the rest would go beyond the bound."""
-
-Extended = npt.NDArray[Any]
+"""Stored coefficients of a piece; `fitting` leaves the last one zero, so that the antiderivative has room."""
 
 
 class Piecewise(NamedTuple):
-    """One function: increasing breaks (pieces + 1,) and the powers 1, s, s^2, ... of each piece (pieces, ORDER)."""
+    """One function: increasing breaks (pieces + 1,) and the powers 1, s, s^2, ... of each piece (pieces, ORDER).
+
+    kinks: those of the breaks at which the function or one of its derivatives jumps.
+    """
 
     breaks: Array
     coefficients: Array
+    kinks: Array
 
 
 class Functions(NamedTuple):
@@ -56,124 +36,6 @@ class Functions(NamedTuple):
     start: Index
     breaks: Array
     coefficients: Array
-
-
-def _angles(number: int) -> Extended:
-    """Angles of the Chebyshev points cos(angle) of the first kind: never the ends, where a function may jump."""
-    return np.asarray(np.arccos(np.longdouble(-1.0)) * (np.arange(number) + 0.5) / number)
-
-
-_SIZE = ORDER - 1
-_CHECKS = np.cos(_angles(3 * _SIZE))
-"""Where a piece is looked at; every third from the second on is a node of the interpolation."""
-_TO_SERIES = np.cos(np.outer(np.arange(_SIZE), _angles(_SIZE))) * (2.0 / np.longdouble(_SIZE))
-_TO_SERIES[0] /= 2.0
-_AT_CHECKS = np.cos(np.outer(_angles(3 * _SIZE), np.arange(_SIZE)))
-_TO_POWERS = np.zeros((_SIZE, ORDER), dtype=np.longdouble)
-for _k in range(_SIZE):
-    _TO_POWERS[_k, : _k + 1] = np.polynomial.chebyshev.cheb2poly(np.eye(_SIZE)[_k])[: _k + 1]
-
-
-def fit(
-    function: Callable[[Any], Any], horizon: float, knots: Sequence[float] = (), *, begin: float = 0.0
-) -> Piecewise:
-    """A function on [begin, horizon], bisected until it is met to about as many digits as its values have.
-
-    `function` takes and returns arrays. Between knots where it is one polynomial (a table) it is exact; a jump
-    at a knot stays a jump, elsewhere it becomes a ramp 1e-9 of the range wide. Raises InputError where the
-    function is not finite or varies too fast.
-    """
-    if not (np.isfinite([begin, horizon]).all() and begin < horizon):
-        raise InputError(f"function: a range from {begin:g} to {horizon:g} is none")
-    edges = np.unique(np.array([begin, *(knot for knot in knots if begin < knot < horizon), horizon], dtype=float))
-    lower, upper = edges[:-1], edges[1:]
-    done: list[tuple[Array, Array]] = []
-    probes = begin + (horizon - begin) * (np.arange(_PROBES, dtype=np.longdouble) + 0.5) / _PROBES
-    probed = _sample(function, probes)
-    pieces, scale = 0, np.abs(probed).max()
-    while lower.size:
-        pieces += lower.size
-        if pieces > _MOST_PIECES:
-            raise InputError(f"function: varies too fast or jumps too often between {begin:g} and {horizon:g}")
-        middle = (lower + upper) / 2
-        half = (upper - lower) / 2
-        series, error, size, noise, digits = _interpolated(function, lower, upper)
-        scale = max(scale, size.max())
-        tolerance = 16.0 * digits * scale + 2.0 * noise
-        # Terms that cancel leave their own round-off, which shorter pieces cannot lessen.
-        cancelled = (error > tolerance) & (error <= _CANCELLED * scale) & (upper - lower <= _SHORT * (horizon - begin))
-        tolerance, noise = np.where(cancelled, error, tolerance), np.where(cancelled, error, noise)
-        good = error <= tolerance
-        for k in np.flatnonzero(good & (upper - lower > _WIDE * (horizon - begin))):
-            inside = slice(*np.searchsorted(probes, [lower[k], upper[k]]))
-            found = np.polynomial.chebyshev.chebval((probes[inside] - middle[k]) / half[k], series[k])
-            good[k] = np.abs(found - probed[inside]).max() <= tolerance[k]
-        if lower.size >= _CROWD and not good.all():
-            # A function that fails at most places in the shortest pieces that the bound allows will not be met.
-            few = lower[~good][:: max(1, np.count_nonzero(~good) // _TRIED)]
-            _, off, _, about, _ = _interpolated(function, few, few + 2 * (horizon - begin) / _MOST_PIECES)
-            failing = np.mean(off > np.maximum(16.0 * digits * scale + 2.0 * about, _CANCELLED * scale))
-            if failing * np.sum((upper - lower)[~good]) > _MOST_OF * (horizon - begin):
-                raise InputError(f"function: varies too fast or jumps too often between {begin:g} and {horizon:g}")
-        smallest = upper - lower <= _SMALLEST * (horizon - begin)
-        # What is only noise in the last coefficients would grow in the derivatives.
-        tail = np.cumsum(np.abs(series[:, ::-1]), axis=1)[:, ::-1]
-        series[tail <= (4.0 * digits * size + noise)[:, None]] = 0.0
-        powers = series @ _TO_POWERS
-        sharp = smallest & ~good
-        if sharp.any():
-            ends = _sample(function, np.stack([lower[sharp], upper[sharp]], axis=1))
-            powers[sharp] = 0.0
-            powers[sharp, 0], powers[sharp, 1] = ends.mean(axis=1), (ends[:, 1] - ends[:, 0]) / 2
-        ready = good | smallest
-        done.append((lower[ready], powers[ready].astype(float)))
-        lower, middle, upper = lower[~ready], middle[~ready], upper[~ready]
-        lower, upper = np.concatenate([lower, middle]), np.concatenate([middle, upper])
-    starts = np.concatenate([part for part, _ in done])
-    order = np.argsort(starts)
-    return Piecewise(np.append(starts[order], horizon), np.concatenate([part for _, part in done])[order])
-
-
-def _interpolated(
-    function: Callable[[Any], Any], lower: Array, upper: Array
-) -> tuple[Extended, Extended, Extended, Extended, Any]:
-    """Of each piece: Chebyshev series (pieces, ORDER - 1), its error, the largest value and its noise (pieces,).
-
-    The last is the relative precision of the values.
-    """
-    half = (upper - lower) / 2
-    values = _sample(function, ((lower + upper) / 2)[:, None] + half[:, None] * _CHECKS)
-    digits = np.finfo(values.dtype).eps
-    series = values[:, 1::3] @ _TO_SERIES.T
-    error = np.abs(series @ _AT_CHECKS.T - values).max(axis=1)
-    # A function's values cannot be better than its argument, which is rounded too.
-    steepest = np.abs(np.diff(values) / np.diff(_CHECKS)).max(axis=1) / half
-    noise = digits * np.maximum(np.abs(lower), np.abs(upper)) * steepest
-    return series, error, np.abs(values).max(axis=1), noise, digits
-
-
-def _sample(function: Callable[[Any], Any], points: Extended) -> Extended:
-    values = np.broadcast_to(np.asarray(function(points.ravel())), points.size).reshape(points.shape)
-    if values.dtype not in (np.dtype(np.float64), np.dtype(np.longdouble)):
-        values = values.astype(np.float64)
-    finite = np.abs(values) <= np.finfo(np.float64).max
-    if not finite.all():
-        raise InputError(f"function: has no finite value at {float(points[~finite][0]):g}")
-    return values
-
-
-def antiderivative(piecewise: Piecewise) -> Piecewise:
-    """The integral from 0 (or from the end of the range nearest to 0) of a fitted function."""
-    breaks, coefficients = piecewise
-    half = np.diff(breaks)[:, None] / 2
-    powers = np.zeros_like(coefficients)
-    powers[:, 1:] = half * coefficients[:, :-1] / np.arange(1, ORDER)
-    signs = (-1.0) ** np.arange(ORDER)
-    powers[:, 0] = -(powers @ signs)
-    powers[1:, 0] += np.cumsum(powers.sum(axis=1))[:-1]
-    whole = Piecewise(breaks, powers)
-    powers[:, 0] -= value(whole, 0.0)
-    return whole
 
 
 def value(piecewise: Piecewise, at: float, derivative: int = 0) -> float:

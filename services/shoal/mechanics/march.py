@@ -9,7 +9,8 @@ from numba import njit
 
 from shoal.mechanics import constraints, dynamics, gauss, model
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.integrators.scheme import adaptive, advance, interpolate
+from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
+from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.tile import Array, Index, Tile
 from shoal.mechanics.vector import pointer
@@ -57,15 +58,21 @@ def march(
     times: Array,
     marker_rows: Index,
     tolerance: float,
+    halts: Halts,
 ) -> Record:
     """March from the state in `room` and sample the marker rows at `times` [s] (increasing).
 
     Schemes of fixed step take `steps` steps of `step` [s]; adaptive ones end at the last of the times and
-    take at most `steps`. What was not reached stays nan.
+    take at most `steps`. Steps are cut short to end at the halts; there forces may jump, and driven constraints their
+    rates. What was not reached stays nan.
     """
     width = len(tile)
     m, w = model.raw(arrays), dynamics.raw(room)
     dynamics.enter(m, w)
+    halt, halting = 0, halts.times.size
+    w.until[0] = np.nextafter(halts.times[0], 0.0) if halting > 0 else np.inf
+    watched = halts.marks.size > 0
+    elongation = np.zeros(m.forces.size * width)
     end = m.unknowns * width
     markers = marker_rows.size // 4
     per_sample = SAMPLED * markers * width
@@ -94,15 +101,18 @@ def march(
     _energy(tile, m, w, start, record.energy_scale)
     free = adaptive(scheme)
     loaded = dynamics.loaded(m)
-    ending = times[-1] if free else steps * step
+    ending = times[-1] if free or (halting > 0 and halts.times[-1] == times[-1]) else steps * step
+    snap = RESOLUTION * ending
     check_every = CHECK_EVERY if free else max(1, steps // CHECKS)
     turns, above = np.zeros(markers * width), np.zeros(markers * width)
     _count_turns(tile, m, w, marker_rows, turns, above)
     turns[:] = 0.0
-    now, taken, number, sample = 0.0, step, 0, 0
+    now, taken, number, sample, cuts = 0.0, step, 0, 0, 0
+    whole = True
     while True:
-        while sample < len(times) and times[sample] <= now + 1e-9 * taken:
-            if abs(times[sample] - now) <= 1e-9 * taken:
+        slack = 1e-9 * (taken if free else step)
+        while sample < len(times) and times[sample] <= now + slack:
+            if abs(times[sample] - now) <= slack:
                 for i in range(end):
                     inside_q[i], inside_v[i] = w.z[i], w.zdot[i]
             else:
@@ -128,17 +138,55 @@ def march(
             sample += 1
         if number == steps or now >= ending:
             break
-        if (free and loaded) or (sample < len(times) and (free or times[sample] < now + step * (1 - 1e-9))):
+        if halt < halting and now == halts.times[halt]:
+            halt += 1
+            w.until[0] = np.nextafter(halts.times[halt], 0.0) if halt < halting else np.inf
+            restart(scheme)
+            if m.driven:
+                _energy(tile, m, w, energy, record.energy_scale)
+                dynamics.meet(tile, m, w, now, tolerance)
+                for lane in range(width):
+                    dissipated[lane] += energy[lane]
+                _energy(tile, m, w, energy, record.energy_scale)
+                for lane in range(width):
+                    dissipated[lane] -= energy[lane]
+            dynamics.acceleration(tile, m, w, now, w.z, w.zdot, tolerance, w.a)
+            for lane in range(width):
+                last_power[lane] = w.power[lane]
+        target = ending if free else min((number + 1) * step, ending)
+        halted = halt < halting and halts.times[halt] <= target + snap
+        if halted:
+            target = halts.times[halt]
+        if watched or (free and loaded) or (sample < len(times) and (free or times[sample] < now + step * (1 - 1e-9))):
             for i in range(end):
                 past[i], past[end + i], past[2 * end + i] = w.z[i], w.zdot[i], w.a[i]
-        rest = ending - now
+        rest = step if whole and not (free or halted) else target - now
         begin = now
-        taken = advance(tile, scheme, m, w, now, rest if free else step)
-        number += 1
+        if watched:
+            dynamics.derive(tile, m, w.z, m.force_rows, False)
+            elongations(tile, m.forces, w.z, w.memory, w.element, elongation)
+        taken = advance(tile, scheme, m, w, now, rest)
+        while watched and taken > snap:
+            dynamics.derive(tile, m, w.z, m.force_rows, False)
+            if not leapt(tile, m.forces, halts, elongation, w.z, w.memory, w.element):
+                break
+            for i in range(end):
+                w.z[i], w.zdot[i], w.a[i] = past[i], past[end + i], past[2 * end + i]
+            restart(scheme)
+            taken = advance(tile, scheme, m, w, now, 0.5 * taken)
+        arrived = taken >= rest
+        if free:
+            number += 1
+            now = target if arrived else now + taken
+        else:
+            # Fixed steps are counted, not summed, so that requested times fall on steps exactly.
+            grid = (number + 1) * step
+            whole = arrived and (not halted or abs(grid - target) <= snap)
+            now = (target if halted else grid) if arrived else now + taken
+            number += 1 if whole else 0
+            cuts += 0 if whole else 1
         dynamics.remember(tile, m, w)
         _count_turns(tile, m, w, marker_rows, turns, above)
-        # Fixed steps are counted, not summed, so that requested times fall on steps exactly.
-        now = (ending if taken >= rest else now + taken) if free else number * step
         if loaded:
             for lane in range(width):
                 power[lane] = w.power[lane]
@@ -154,9 +202,10 @@ def march(
                         dissipated[lane] += taken * 5.0 / 12.0 * w.power[lane]
             weight = 1.0 / 12.0 if free else 0.5
             for lane in range(width):
-                dissipated[lane] += weight * taken * (last_power[lane] + power[lane])
+                other = power[lane] if averages(scheme) else last_power[lane]
+                dissipated[lane] += weight * taken * (other + power[lane])
                 last_power[lane] = power[lane]
-        if number % check_every == 0 or number == steps or now >= ending:
+        if (number + cuts) % check_every == 0 or number == steps or now >= ending:
             _energy(tile, m, w, energy, record.energy_scale)
             dynamics.derive(tile, m, w.z, m.held_rows, False)
             constraints.drift(tile, m.constraints, m.functions, now, w.z, gap, record.drift)
@@ -169,7 +218,7 @@ def march(
             if not alive:
                 break
     for lane in range(width):
-        record.steps[lane] = number
+        record.steps[lane] = number + cuts
         record.evaluations[lane] = scheme.evaluations[0]
         record.reached[lane] = now
     return record

@@ -143,8 +143,8 @@ class Model:
 
     q0, v0: initial coordinates and rates, (unknowns, lanes). Arrays of lane-dependent numbers are
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
-    their turns from [rad], (forces, lanes) or (forces, 1). owners: for each family of elements the
-    body of every element.
+    their turns from [rad], (forces, lanes) or (forces, 1). kinks: of every function, where it or a derivative jumps.
+    owners: for each family of elements the body of every element.
     """
 
     scene: Scene
@@ -162,6 +162,7 @@ class Model:
     start_angles: Array
     drives: Drives
     functions: Functions
+    kinks: tuple[Array, ...]
     constraints: Constraints
     constraint_names: tuple[str, ...]
     marker_rows: Index
@@ -189,6 +190,11 @@ class Model:
     def rows(self) -> int:
         """Unknowns plus derived rows."""
         return self.unknowns + len(self.derived.start) - 1
+
+    def breaks(self, number: int) -> Array:
+        """Where the pieces of a function begin and end."""
+        first, last = self.functions.start[number : number + 2]
+        return self.functions.breaks[first + number : last + number + 1]
 
     @property
     def flexible(self) -> int:

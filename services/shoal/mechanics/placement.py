@@ -15,7 +15,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine, Number, fixed
-from shoal.mechanics.constraints import Drive, Terms
+from shoal.mechanics.constraints import Terms
 from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame, is_on_axis
 from shoal.mechanics.groups import (
@@ -129,7 +129,7 @@ def _place_driver(name: str, x: Function, y: Function, points: list[JointPoint],
     begin, rate = _value_and_rate(x), _value_and_rate(y)
     pair = result.new_pair(begin[0] + 1j * rate[0], begin[1] + 1j * rate[1])
     result.drivers[moving(name)] = pair
-    drives = ((lambda t: -x(t), x.knots), (lambda t: -y(t), y.knots))
+    drives = x.through("neg"), y.through("neg")
     result.terms.vanish(f"{GROUND}.{name}", pair, drives)
     for point in points:
         if point.touches(moving(name)):
@@ -327,7 +327,7 @@ def _add_joints(scene: Scene, result: Placement) -> None:
             for term in joint.terms:
                 axis = 1.0 if term.axis == "x" else -1j
                 total = total + result.point(scene, term.at) * (term.factor * axis)
-            terms.dot(name, fixed(1.0), total, 0.0, _minus(joint.value))
+            terms.dot(name, fixed(1.0), total, 0.0, joint.value.through("neg"))
             continue
         first, second = joint.first, joint.second
         if isinstance(joint, Slider) and (first.body != GROUND or isinstance(first.point, str)):
@@ -338,13 +338,13 @@ def _add_joints(scene: Scene, result: Placement) -> None:
             if joint.length is None:
                 terms.dot(name, gap, gap, -(np.abs(result.start_of(gap)[0]) ** 2))
             else:
-                terms.dot(name, gap, gap, 0.0, _minus_square(joint.length))
+                terms.dot(name, gap, gap, 0.0, joint.length.through("square", "neg"))
         elif isinstance(joint, DrivenAngle):
             if not (is_stiff(scene, first.body) and is_stiff(scene, second.body)):
                 raise InputError(f"joints.{name}: drives the angle of a flexible rod; weld a rigid body to it instead")
             a, b = result.direction(scene, first), result.direction(scene, second)
-            terms.dot(name, a, b, 0.0, (_composed(np.cos, joint.angle), joint.angle.knots))
-            terms.cross(name, a, b, 0.0, (_composed(np.sin, joint.angle), joint.angle.knots))
+            terms.dot(name, a, b, 0.0, joint.angle.through("cos", "neg"))
+            terms.cross(name, a, b, 0.0, joint.angle.through("sin", "neg"))
         turn = kept_turn(scene, joint)
         flexible = [side for side in (first, second) if not is_stiff(scene, side.body)]
         if turn is not None and flexible and not (isinstance(joint, Weld) and _is_clamp(scene, joint, result)):
@@ -359,15 +359,3 @@ def _is_clamp(scene: Scene, joint: Weld, result: Placement) -> bool:
     side = next(side for body, side in sides.items() if body != GROUND)
     frame = result.frames[side.body]
     return isinstance(frame, BeamFrame) and frame.node(as_complex(scene.location(side))) is not None
-
-
-def _minus(f: Function) -> Drive:
-    return (lambda t: -f(t)), f.knots
-
-
-def _minus_square(f: Function) -> Drive:
-    return (lambda t: -(f(t) ** 2)), f.knots
-
-
-def _composed(outer: Callable[[Number], Number], f: Function) -> Callable[[Number], Number]:
-    return lambda t: -outer(f(t))

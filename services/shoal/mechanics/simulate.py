@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, lru_cache
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import forces, stability, swarm_motion
+from shoal.mechanics import reach as reaches
 from shoal.mechanics.build import build, with_start
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.groups import start_angle
-from shoal.mechanics.integrators import Choice, choose, facts, pick
+from shoal.mechanics.integrators import Choice, choose, facts, halting, pick
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.march import SAMPLED, Record, march
 from shoal.mechanics.model import Model
 from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import Array, pack, tiles, unpack
-from shoal.scene import GROUND, Attachment, Revolute, Scene, Solver, Weld
-from shoal.scene.joints import places
+from shoal.scene import Scene, Solver
 from shoal.trajectory import Status, Trajectory
 
-REACH_MARGIN = 1.1
 DRIFT_TOLERANCE = 1e-6
 STEP_MARGIN = 0.95
 """Of the stable step, which is that of the start and varies by a few percent along the motion."""
@@ -60,6 +57,7 @@ def simulate(
         _check_step(scene, choice)
     step = scene.solver.step
     steps = scene.solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / step - 1e-9))
+    stops = halting(scene.solver, model, choice.name, float(times[-1]))
     tile, parts = tiles(lanes)
 
     def run(part: slice) -> tuple[Array, ...]:
@@ -72,13 +70,14 @@ def simulate(
             derived_rows(tile, arrays, room)
             room.memory[:] = forces.initial_memory(tile, arrays.forces, room.z, pack(model.start_angles, part, tile))
         if search is not None:
-            record, found = swarm_motion.march(search, asked, arrays, room, steps, times, model.marker_rows)
+            record, found = swarm_motion.march(
+                search, asked, arrays, room, steps, times, model.marker_rows, stops.times
+            )
             evidence.update(found)
             return tuple(unpack(field, part, tile) for field in record)
         scheme = choose(scene.solver, model, tile, part, choice.name)
-        record = march(
-            tile, scheme, arrays, room, step, steps, times, model.marker_rows.ravel(), scene.solver.rank_tolerance
-        )
+        rows, tolerance = model.marker_rows.ravel(), scene.solver.rank_tolerance
+        record = march(tile, scheme, arrays, room, step, steps, times, rows, tolerance, stops)
         return tuple(unpack(field, part, tile) for field in record)
 
     workers = min(threads or os.cpu_count() or 1, len(parts))
@@ -139,7 +138,7 @@ def _key(scene: Scene, end: float) -> tuple[str, float]:
     """What a model is built from: the scene, and up to where its functions of time are wanted [s]."""
     usual = {name: Solver.model_fields[name].default for name in _PACE}
     neutral = scene.model_copy(update={"solver": scene.solver.model_copy(update=usual)})
-    return neutral.model_dump_json(), max(end, scene.solver.duration) + max(0.0, scene.solver.step - usual["step"])
+    return neutral.model_dump_json(), max(end, scene.solver.duration)
 
 
 @lru_cache(maxsize=64)
@@ -194,7 +193,7 @@ def _relative(error: Array, scale: Array, scene: Scene, model: Model) -> Array:
     rods set the scale, as far as round-off goes.
     """
     stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
-    floor = 1e-9 * float(np.max(np.abs(model.weight), initial=0.0)) * _size(scene) + 1e-12 * float(stiff)
+    floor = 1e-9 * float(np.max(np.abs(model.weight), initial=0.0)) * reaches.size(scene) + 1e-12 * float(stiff)
     relative: Array = error / np.maximum(scale, floor + 1e-300)
     return relative
 
@@ -203,8 +202,8 @@ def _verdict(
     scene: Scene, model: Model, record: Record, choice: Choice, points: Array, energy_drift: Array
 ) -> tuple[tuple[Status, ...], str]:
     """Status of every lane, and the reason for the first that is not ok."""
-    reach = _reach(scene) * REACH_MARGIN
-    farthest = np.max(_distance_to_ground(scene, points), axis=(0, 1))
+    reach = reaches.MARGIN * reaches.reach(scene, record.energy_scale[0])
+    farthest = np.max(reaches.distance_to_ground(scene, points), axis=(0, 1))
     adaptive = facts(choice.name).adaptive
     drift, steps, reached = record.drift[0], record.steps[0], record.reached[0]
     statuses, message = [], ""
@@ -220,9 +219,9 @@ def _verdict(
             status = Status.DIVERGED
             advice = "no step is short enough for it" if adaptive else "use a smaller step"
             reason = f"the motion is not finite; {advice}"
-        elif farthest[lane] > reach:
+        elif farthest[lane] > reach[lane]:
             status = Status.OUT_OF_REACH
-            reason = f"a marker is {farthest[lane]:.3g} m away, the reach is {reach:.3g} m"
+            reason = f"a marker is {farthest[lane]:.3g} m away, the reach is {reach[lane]:.3g} m"
         elif energy_drift[lane] > scene.solver.energy_tolerance:
             status = Status.ENERGY
             reason = f"energy is off by {energy_drift[lane]:.2g}, allowed {scene.solver.energy_tolerance:g} (relative)"
@@ -233,49 +232,6 @@ def _verdict(
         statuses.append(status)
         message = message or reason
     return tuple(statuses), message
-
-
-def _distance_to_ground(scene: Scene, points: Array) -> Array:
-    """Distance of every marker to the nearest anchor on the ground [m], (samples, markers, lanes)."""
-    sides = (side for joint in scene.joints.values() if isinstance(joint, _TETHERS) for side in _ends(joint))
-    anchors = [scene.location(side) for side in sides if side.body == GROUND]
-    distances = [np.hypot(points[:, :, 0] - x, points[:, :, 1] - y) for x, y in anchors or [(0.0, 0.0)]]
-    return np.asarray(np.min(distances, axis=0))
-
-
-_TETHERS = Revolute | Weld
-
-
-def _ends(joint: Revolute | Weld) -> tuple[Attachment, Attachment]:
-    return joint.first, joint.second
-
-
-def _reach(scene: Scene) -> float:
-    """No point can be farther from an anchor of its machine than all bodies stretched out in a line [m].
-
-    Infinite for machines with bodies that only sliders, springs or nothing at all hold.
-    """
-    held, frontier = {GROUND}, [GROUND]
-    while frontier:
-        here = frontier.pop()
-        for joint in scene.joints.values():
-            if isinstance(joint, _TETHERS) and here in (ends := {side.body for side in _ends(joint)}):
-                frontier += (new := ends - held)
-                held |= new
-    if scene.ground_points or not held >= set(scene.bodies):
-        return float(np.inf)
-    return _size(scene)
-
-
-def _size(scene: Scene) -> float:
-    """All bodies stretched out in a line [m]."""
-    sides = [side for joint in scene.joints.values() for side in places(joint)]
-    attached = [*sides, *scene.markers.values()]
-    total = 0.0
-    for name, body in scene.bodies.items():
-        used = {*(scene.location(place) for place in attached if place.body == name), *body.points.values()}
-        total += max((math.dist(a, b) for a, b in combinations(used, 2)), default=0.0)
-    return total
 
 
 def _facts(scene: Scene, model: Model, choice: Choice, record: Record) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from scipy.linalg import cholesky, solve_triangular
 from shoal.errors import InputError
 from shoal.mechanics import constraints, dynamics, model
 from shoal.mechanics.dynamics import Work
+from shoal.mechanics.halts import RESOLUTION
 from shoal.mechanics.march import ASSEMBLY, SAMPLED, Record
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.tile import SINGLE, Array, Index, Tile
@@ -198,13 +199,21 @@ class _Tally:
 
 
 def march(
-    search: Search, solver: Solver, arrays: Arrays, room: Work, steps: int, times: Array, marker_rows: Index
+    search: Search,
+    solver: Solver,
+    arrays: Arrays,
+    room: Work,
+    steps: int,
+    times: Array,
+    marker_rows: Index,
+    stops: Array,
 ) -> tuple[Record, dict[str, Any]]:
     """March one lane from the state in `room`, as `march.march` does, with accelerations that a swarm finds.
 
-    marker_rows: (markers, 4). The second result says what the swarm did: evaluations of Gauss's function counted,
-    accelerations sought, mean and worst `excess` of G above its true minimum [kg m^2/s^4], mean and worst `error`
-    of the acceleration relative to the true one, both measured in the mass metric.
+    marker_rows: (markers, 4). stops: times that steps are cut short to end at [s]. The second result says what the
+    swarm did: evaluations of Gauss's function counted, accelerations sought, mean and worst `excess` of G above its true
+    minimum [kg m^2/s^4], mean and worst `error` of the acceleration relative to the true one, both measured in the mass
+    metric.
     """
     n, step, markers = arrays.unknowns, solver.step, len(marker_rows)
     q, v = room.z[:n], room.zdot[:n]
@@ -222,8 +231,14 @@ def march(
     record.correction[0] = np.max(np.abs(q - before[0]), initial=0.0)
     directions = marker_rows[:, 2], marker_rows[:, 3]
     turned = np.arctan2(room.z[directions[1]], room.z[directions[0]])
-    for number in range(steps + 1):
-        now = number * step
+    instants = _instants(steps, step, float(times[-1]), stops)
+    steps = len(instants) - 1
+    for number, now in enumerate(instants):
+        step = now - instants[number - 1] if stops.size and number else solver.step
+        if left := now in stops:
+            room.until[0] = np.nextafter(now, 0.0)
+            _evaluate(SINGLE, arrays, room, now)
+            room.until[0], supplied = np.inf, float(room.power[0])
         _evaluate(SINGLE, arrays, room, now)  # step 2
         gauss = _gauss_function(arrays, room, lower, solver.rank_tolerance)
         if gauss is None:
@@ -241,7 +256,7 @@ def march(
                 room.gauss.multiplier[:] = (gauss.free - y) @ gauss.inverse
                 _drive_power(SINGLE, arrays, room, now)
             last, power = power, float(room.power[0])
-            dissipated += 0.5 * step * (last + power) if number else 0.0
+            dissipated += 0.5 * step * (last + (supplied if left else power)) if number else 0.0
         moving, energy = float(room.energy[0] + room.energy[1]), float(np.sum(room.energy))
         start = start if number else energy
         record.energy_scale[0] = np.maximum(record.energy_scale[0], moving)
@@ -258,6 +273,7 @@ def march(
             search.progress(number, steps)
         if number == steps:
             break
+        step = instants[number + 1] - now if stops.size else solver.step
         before = q.copy(), v.copy()
         v += step * solve_triangular(lower, y, lower=True, trans=1)  # step 4
         q += step * v
@@ -274,6 +290,16 @@ def march(
             **tally.facts(),
         },
     }
+
+
+def _instants(steps: int, step: float, end: float, stops: Array) -> list[float]:
+    """The ends of fixed steps [s], cut short at the stops."""
+    grid = np.arange(steps + 1) * step
+    if stops.size:
+        apart = np.abs(grid[:, None] - stops).min(axis=1) > RESOLUTION * end
+        grid = np.union1d(grid[apart & (grid <= end * (1 + RESOLUTION))], stops)
+    instants: list[float] = grid.tolist()
+    return instants
 
 
 def _gauss_function(arrays: Arrays, room: Work, lower: Array, tolerance: float) -> GaussFunction | None:

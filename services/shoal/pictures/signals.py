@@ -10,7 +10,7 @@ import numpy as np
 from shoal.identification import Estimate
 from shoal.identification.loss import noise_of
 from shoal.identification.recording import Channel
-from shoal.identification.units import QUANTITIES
+from shoal.identification.units import of_channel
 from shoal.trajectory import Array
 
 
@@ -45,7 +45,7 @@ class Signal:
     @property
     def unit(self) -> str:
         """Of the values."""
-        return QUANTITIES[self.channel.quantity]
+        return of_channel(self.channel)
 
     @property
     def misfit(self) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.pictures.choice import rows, why
 from shoal.pictures.drawn import Drawn
+from shoal.pictures.estimates import estimates
 from shoal.pictures.ladder import ladder
 from shoal.pictures.motion import Motion, scene_motion
 from shoal.pictures.numbers import length
@@ -40,11 +41,18 @@ def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None
         lead=_lead(trajectory, selection),
         motion=animation(moving, "The machine"),
         rows=[[name, *_end(trajectory, name)] for name in trajectory.markers],
-        remarks=[] if selection is None else why(selection),
+        remarks=_remarks(trajectory, selection),
         pictures=[one.embedded() for one in pictures],
         models=[] if selection is None else rows(selection),
         provenance=_provenance(trajectory, scene),
     )
+
+
+def _remarks(trajectory: Trajectory, selection: Selection | None) -> list[str]:
+    if selection is not None:
+        return why(selection)
+    verification = trajectory.model.get("verification")
+    return [] if verification is None else [f"{one[0].upper()}{one[1:]}." for one in estimates(verification)]
 
 
 def moved(trajectory: Trajectory, scene: Scene) -> Motion:

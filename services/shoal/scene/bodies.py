@@ -15,6 +15,14 @@ Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
 
 _POINTS = 24
 """Quadrature points along a curved rod."""
+_ONLY_FLEXIBLE = {
+    "youngs_modulus": None,
+    "elements": 1,
+    "quadrature": "full",
+    "law": "plane-stress",
+    "retardation": 0.0,
+}
+"""Fields that a rigid rod has no use for, and what they are where nobody states them."""
 
 
 class Rod(Record):
@@ -23,9 +31,11 @@ class Rod(Record):
     Lengths in m, density in kg/m^3, moduli in Pa. `height` is the thickness in the plane of
     motion. `element` is the model of the rod, with `elements` elements of equal length: `rigid`,
     `ancf-cable` (cubic, Bernoulli-Euler), `ancf-quintic` (the same of higher order) or `ancf-full`
-    (with shear and stretch of the section). `quadrature` of a cable is `full` (Gauss, 5 points axial
-    and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points bending). `law` is that of
-    ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature of the unstrained axis over
+    (with shear and stretch of the section). `rigid` where nothing else is stated that only a flexible
+    rod has. `rotary_inertia`: whether a rigid rod has that of its height; the paper's has not, nor
+    have cables and quintic elements, while ancf-full always has. `quadrature` of a cable is `full`
+    (Gauss, 5 points axial and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points
+    bending). `law` is that of ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature of the unstrained axis over
     its arc length. `end_height`, `end_width`: the section at the far end of a tapered rod (each
     element has the section of its middle). `retardation` [s]: Kelvin-Voigt damping, stress
     E (strain + retardation * strain rate).
@@ -46,6 +56,28 @@ class Rod(Record):
     end_height: Positive | None = None
     end_width: Positive | None = None
     retardation: NonNegative = 0.0
+    rotary_inertia: bool = False
+
+    @model_validator(mode="after")
+    def _nothing_is_ignored(self) -> Rod:
+        if self.element == "rigid":
+            flexible = {name for name, unsaid in _ONLY_FLEXIBLE.items() if getattr(self, name) != unsaid}
+            if flexible and "element" not in self.model_fields_set:
+                told = " and ".join(name for name in _ONLY_FLEXIBLE if name in flexible)
+                raise ValueError(
+                    f"element is missing, and a rigid rod has no {told}; state element: ancf-cable (or ancf-quintic, "
+                    "ancf-full), or element: rigid"
+                )
+            return self
+        if self.rotary_inertia and self.element != "ancf-full":
+            raise ValueError(
+                f"rotary_inertia: {self.element} has none; use ancf-full, or a rigid rod, or rotary_inertia: false"
+            )
+        if self.quadrature != "full" and self.element != "ancf-cable":
+            raise ValueError(f"quadrature: {self.element} has its own; {self.quadrature} is for ancf-cable")
+        if self.law != "plane-stress" and self.element != "ancf-full":
+            raise ValueError(f"law: {self.law} is for ancf-full; {self.element} has no choice of law")
+        return self
 
     @model_validator(mode="after")
     def _slender_and_complete(self) -> Rod:
@@ -93,9 +125,11 @@ class Rod(Record):
 
     @property
     def inertia(self) -> float:
-        """Moment of inertia about the centre of mass [kg m^2] of the slender rod (no rotary part)."""
+        """Moment of inertia about the centre of mass [kg m^2]; of the slender rod, unless `rotary_inertia` says more."""
         x, y = self.centre_of_mass
         total: float = sum(mass * abs(place - x - 1j * y) ** 2 for mass, place in self._pieces())
+        if self.rotary_inertia:
+            total += sum(mass * height**2 / 12 for (mass, _), height in zip(self._pieces(), self._heights(), strict=True))
         return total
 
     @property
@@ -106,12 +140,20 @@ class Rod(Record):
 
     def _pieces(self) -> list[tuple[Any, Any]]:
         """Masses [kg] at places x + iy [m] that have the rod's mass, centre and inertia (Gauss's quadrature)."""
-        nodes, weights = np.polynomial.legendre.leggauss(_POINTS if self.curvature else 3)
         pieces = []
-        for x, weight in zip((nodes + 1) / 2, weights / 2, strict=True):
+        for x, weight in self._rule():
             height, width = self.section(x)
             pieces.append((self.density * height * width * self.length * weight, self.axis(x * self.length)))
         return pieces
+
+    def _heights(self) -> list[Any]:
+        """The heights [m] of the pieces."""
+        return [self.section(x)[0] for x, _ in self._rule()]
+
+    def _rule(self) -> list[tuple[float, float]]:
+        """Nodes as fractions of the length, and weights."""
+        nodes, weights = np.polynomial.legendre.leggauss(_POINTS if self.curvature else 3)
+        return list(zip((nodes + 1) / 2, weights / 2, strict=True))
 
     def axis(self, s: Any) -> Any:
         """Point x + iy [m] of the unstrained axis at the arc length s."""

@@ -26,7 +26,7 @@ def _ramp(x: Number) -> Number:
     return x * x * x * (10.0 + x * (6.0 * x - 15.0))
 
 
-_ONE: dict[str, Callable[[Number], Number]] = {
+ONE: dict[str, Callable[[Number], Number]] = {
     "sin": np.sin,
     "cos": np.cos,
     "tan": np.tan,
@@ -38,24 +38,24 @@ _ONE: dict[str, Callable[[Number], Number]] = {
     "step": lambda x: np.heaviside(x, 1.0),
     "ramp": _ramp,
 }
-_MANY: dict[str, Callable[[Number, Number], Number]] = {"min": np.minimum, "max": np.maximum}
+MANY: dict[str, Callable[[Number, Number], Number]] = {"min": np.minimum, "max": np.maximum}
 _CONSTANTS = {"pi": math.pi, "e": math.e}
-_BINARY: dict[type[ast.operator], Callable[[Number, Number], Number]] = {
+BINARY: dict[type[ast.operator], Callable[[Number, Number], Number]] = {
     ast.Add: np.add,
     ast.Sub: np.subtract,
     ast.Mult: np.multiply,
     ast.Div: np.divide,
     ast.Pow: np.power,
 }
-_PLAIN = (ast.Expression, ast.Name, ast.BinOp, ast.UnaryOp, ast.UAdd, ast.USub, ast.Load, *_BINARY)
+_PLAIN = (ast.Expression, ast.Name, ast.BinOp, ast.UnaryOp, ast.UAdd, ast.USub, ast.Load, *BINARY)
 _LONGEST = 500
 _DEEPEST = 100
 
 
 def names(text: str) -> set[str]:
     """Names an expression needs a value for (not `pi`, `e`, functions). Raises InputError if it is not arithmetic."""
-    used = {node.id for node in ast.walk(_parse(text)) if isinstance(node, ast.Name)}
-    return used - {*_ONE, *_MANY, *_CONSTANTS}
+    used = {node.id for node in ast.walk(parse(text)) if isinstance(node, ast.Name)}
+    return used - {*ONE, *MANY, *_CONSTANTS}
 
 
 def evaluate(text: str, values: Mapping[str, float]) -> float:
@@ -66,12 +66,13 @@ def evaluate(text: str, values: Mapping[str, float]) -> float:
 def evaluate_array(text: str, values: Mapping[str, Number]) -> Number:
     """As `evaluate`, entry by entry for arrays that broadcast; precision is that of the arrays."""
     with np.errstate(all="ignore"):
-        value = np.asarray(_value(_parse(text).body, {**_CONSTANTS, **values}))
+        value = np.asarray(_value(parse(text).body, {**_CONSTANTS, **values}))
     return np.where(np.isfinite(value), value, np.nan)
 
 
 @lru_cache(maxsize=256)
-def _parse(text: str) -> ast.Expression:
+def parse(text: str) -> ast.Expression:
+    """The syntax tree of an expression. Raises InputError if it is not arithmetic."""
     if len(text) > _LONGEST:
         raise InputError(f"expression: longer than {_LONGEST} characters")
     try:
@@ -116,10 +117,10 @@ def _check_plain(node: ast.AST, text: str) -> None:
 
 def _check_call(node: ast.Call, text: str) -> None:
     name = node.func.id if isinstance(node.func, ast.Name) else None
-    if name not in _ONE and name not in _MANY:
-        raise InputError(f"expression: {text!r} calls what is none of {', '.join([*_ONE, *_MANY])}")
-    if node.keywords or (len(node.args) != 1 if name in _ONE else len(node.args) < 2):
-        raise InputError(f"expression: {name} takes {'one number' if name in _ONE else 'two numbers or more'}")
+    if name not in ONE and name not in MANY:
+        raise InputError(f"expression: {text!r} calls what is none of {', '.join([*ONE, *MANY])}")
+    if node.keywords or (len(node.args) != 1 if name in ONE else len(node.args) < 2):
+        raise InputError(f"expression: {name} takes {'one number' if name in ONE else 'two numbers or more'}")
 
 
 def _value(node: Any, values: Mapping[str, Number]) -> Number:
@@ -133,6 +134,6 @@ def _value(node: Any, values: Mapping[str, Number]) -> Number:
         inner = _value(node.operand, values)
         return -inner if isinstance(node.op, ast.USub) else inner
     if isinstance(node, ast.BinOp):
-        return _BINARY[type(node.op)](_value(node.left, values), _value(node.right, values))
+        return BINARY[type(node.op)](_value(node.left, values), _value(node.right, values))
     arguments = [_value(argument, values) for argument in node.args]
-    return _ONE[node.func.id](*arguments) if node.func.id in _ONE else reduce(_MANY[node.func.id], arguments)
+    return ONE[node.func.id](*arguments) if node.func.id in ONE else reduce(MANY[node.func.id], arguments)

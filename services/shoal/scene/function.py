@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Self
 
@@ -11,6 +12,7 @@ from pydantic import field_validator, model_serializer, model_validator
 
 from shoal.errors import InputError
 from shoal.scene import expression as arithmetic
+from shoal.scene import formula
 from shoal.scene.record import Record
 
 Array = npt.NDArray[Any]
@@ -79,9 +81,25 @@ class Function(Record):
         return self.number if self.number is not None else self.expression
 
     @property
+    def formula(self) -> formula.Node | None:
+        """The function as a tree; None for a table. Raises InputError for constants without a finite value."""
+        if self.table is not None:
+            return None
+        return float(self.number) if self.number is not None else formula.tree(str(self.expression))
+
+    @property
     def knots(self) -> tuple[float, ...]:
-        """Times between which the function is one polynomial [s]; none for an expression."""
+        """Times between which a table is one polynomial [s]; none for an expression."""
         return tuple(time for time, _ in self.table or ())
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Those of the knots at which a table's slope jumps [s]: all of straight lines, the ends of a spline."""
+        return self.knots[:: len(self.knots) - 1] if self.smooth and self.table else self.knots
+
+    def through(self, *operations: str) -> Composed:
+        """Operations of `formula` on the function's value, in their order."""
+        return Composed(self, operations)
 
     def __call__(self, t: Array) -> Array:
         """Values at the times t [s], of the shape and precision of t; nan where there is none."""
@@ -95,7 +113,54 @@ class Function(Record):
         times, values = np.array(self.table).T
         if not self.smooth:
             return np.asarray(np.interp(t.astype(float), times, values))
+        return np.asarray(self._spline()(np.clip(t.astype(float), times[0], times[-1])))
+
+    def table_slope(self, t: float, left: bool) -> float:
+        """The derivative of a table at one time [s], on its left or right side."""
+        assert self.table is not None
+        times, values = np.array(self.table).T
+        row = int(np.searchsorted(times, t, side="left" if left else "right")) - 1
+        if not 0 <= row < len(times) - 1:
+            return 0.0
+        if self.smooth:
+            return float(self._spline()(t, 1))
+        return float((values[row + 1] - values[row]) / (times[row + 1] - times[row]))
+
+    def _spline(self) -> Any:
         # Importing scipy takes longer than reading a scene.
         from scipy.interpolate import CubicSpline
 
-        return np.asarray(CubicSpline(times, values)(np.clip(t.astype(float), times[0], times[-1])))
+        return CubicSpline(*np.array(self.table).T)
+
+
+@dataclass(frozen=True)
+class Composed:
+    """A function of time and what is done to its value."""
+
+    function: Function
+    operations: tuple[str, ...] = ()
+
+    @property
+    def formula(self) -> formula.Node | None:
+        """As of `Function`."""
+        node = self.function.formula
+        for operation in self.operations if node is not None else ():
+            node = formula.make(operation, node)
+        return node
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """As of `Function`."""
+        return self.function.knots
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """As of `Function`."""
+        return self.function.kinks
+
+    def __call__(self, t: Array) -> Array:
+        """As of `Function`."""
+        value = self.function(t)
+        for operation in self.operations:
+            value = formula.OPERATIONS[operation](value)
+        return value

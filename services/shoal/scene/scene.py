@@ -164,6 +164,10 @@ class Scene(Record):
             if parents[:1] == ["initial"] and leaf in InitialState.model_fields:
                 place.setdefault(leaf, None)
             place[_key(place, leaf, path, ".".join(parents))] = value
+        for name, body in self.bodies.items():
+            said = {"bodies", f"bodies.{name}", f"bodies.{name}.element"} & set(values)
+            if "element" not in body.model_fields_set and not said:
+                del data["bodies"][name]["element"]  # what was left unsaid stays so
         return Scene.parse(data, self.name)
 
     def with_lanes(self, values: Mapping[str, npt.NDArray[np.float64]]) -> Scene:

@@ -28,8 +28,8 @@ class Level:
         values: dict[str, Any] = {f"bodies.{rod}.element": self.element}
         if self.element != "rigid":
             values[f"bodies.{rod}.elements"] = self.elements
-        if self.element == "ancf-cable":
-            values[f"bodies.{rod}.quadrature"] = "reduced"
+            values[f"bodies.{rod}.quadrature"] = "reduced" if self.element == "ancf-cable" else "full"
+            values[f"bodies.{rod}.rotary_inertia"] = False
         return values
 
 

@@ -122,7 +122,7 @@ def select(
         rungs=runs.rungs,
         priors=priors,
         rigid=rigid,
-        shear=neglected(chosen, runs),
+        shear=neglected(chosen),
         wall_s=time.perf_counter() - begin,
     )
 

@@ -12,11 +12,11 @@ from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.loss import noise_of
 from shoal.identification.methods.growth import growth, swings
 from shoal.identification.methods.lanes import descend_many, distinct, linearise_many
-from shoal.identification.methods.least_squares import from_starts, linearise
+from shoal.identification.methods.least_squares import PATIENCE, from_starts, linearise
 from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
-from shoal.identification.starts import starting_points
+from shoal.identification.starts import scatter, starting_points
 from shoal.identification.units import of_channels
 from shoal.trajectory import Array
 
@@ -29,6 +29,9 @@ _UNEXPLAINED = 0.05
 _NOISES = 3.0
 _SWINGS = 3
 """A record that swings more often may be fitted with another phase: false minima."""
+_FACTOR, _ELSEWHERE, _DESCENTS = 5.0, 31, 4
+"""Positive quantities are tried within this factor, at so many points, and the best of them are followed."""
+_GAINED = 1e-3
 _LINE, _WIDTH, _LOOKED_AT = 41, 0.05, 2
 """Points of the line on which false minima are sought, its half by the box, and the dips that are followed."""
 
@@ -51,6 +54,8 @@ def auto(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> O
         del methods["least-squares"]
     reason = f"a deviation grows {max(grown, 1.0):.2g}-fold over {model.measurement.end:.3g} s"
     outcome = _first_that_explains(model, methods, reason)
+    if not explains(model, outcome) and np.isfinite(outcome.fitness):
+        outcome = _elsewhere(model, outcome, progress)
     if swings(model) < _SWINGS or grown > FRACTAL or not np.isfinite(outcome.fitness):
         return outcome
     near = [(outcome.point, outcome.fitness), *false_minima(model, outcome.point)]
@@ -82,6 +87,34 @@ def _first_that_explains(model: ForwardModel, methods: dict[str, Callable[[], Ou
     ends = [(o.point, o.fitness) for o in found if o is not best] + [m for o in found for m in o.minima]
     apart = [(point, fitness) for point, fitness in ends if _apart(model, point, best.point)]
     return replace(best, minima=apart, choice="; then ".join(steps))
+
+
+def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Outcome:
+    """The outcome, or where descents end from other values of what is no initial state: a modulus or a mass that is
+    wrong by a factor leads a fit to a false minimum with every pose.
+    """
+    states = np.array([(e.parameter.path or "").startswith("initial.") for e in model.parameters.entries.values()])
+    free = np.flatnonzero(~states)
+    if not free.size:
+        return outcome
+    width = np.minimum(np.log(_FACTOR), (model.upper - model.lower)[free] / 2)
+    width = np.where(model.parameters.logarithmic[free], width, (model.upper - model.lower)[free] / 2)
+    points = np.repeat(outcome.point[None], _ELSEWHERE, axis=0)
+    points[:, free] += (2 * scatter(_ELSEWHERE, len(free)) - 1) * width
+    points = np.clip(points, model.lower, model.upper)
+    values = model.fitness(points)
+    chosen = points[np.argsort(values, kind="stable")[:_DESCENTS]]
+    ends = [d for d in descend_many(model, chosen, progress, patience=PATIENCE) if np.isfinite(d.fitness)]
+    best = min(ends, key=lambda d: d.fitness, default=None)
+    if best is None or best.fitness >= outcome.fitness * (1.0 - _GAINED):
+        return outcome
+    rows = [(len(outcome.iterations) + i, value, mean) for i, value, mean in best.rows]
+    rest = [(outcome.point, outcome.fitness), *outcome.minima]
+    choice = f"{outcome.choice}; then from other values of {', '.join(model.names[k] for k in free)}"
+    message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
+    return Outcome(
+        best.point, best.fitness, [*outcome.iterations, *rows], message, rest, choice, converged=best.converged
+    )
 
 
 def explains(model: ForwardModel, outcome: Outcome) -> bool:

@@ -44,13 +44,13 @@ class Candidate:
 
     def vector(self, value: float) -> float:
         """A value as the component of a point."""
-        return float(np.log(max(value, _TINY * self.parameter.upper))) if self.parameter.scale == "log" else value
+        return float(np.log(max(value, _TINY * self.parameter.upper))) if self.parameter.logarithmic else value
 
     def at(self, amount: float) -> float:
         """The value within its bounds at which the effect is so many times that of the probe, to first order."""
         if self.inverse:
             value = self.probe / max(amount, 1e-6)
-        elif self.parameter.scale == "log":
+        elif self.parameter.logarithmic:
             value = self.stated * (self.probe / self.stated) ** np.clip(amount, -1e5, 1e5)
         else:
             value = self.stated + amount * (self.probe - self.stated)
@@ -60,7 +60,7 @@ class Candidate:
         """The inverse of `at`."""
         if self.inverse:
             return self.probe / value
-        if self.parameter.scale == "log":
+        if self.parameter.logarithmic:
             return float(np.log(value / self.stated) / np.log(self.probe / self.stated))
         return (value - self.stated) / (self.probe - self.stated)
 

@@ -12,7 +12,7 @@ from shoal.mechanics import forces, stability
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.build import build
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
-from shoal.mechanics.integrators import choose, facts, pick
+from shoal.mechanics.integrators import choose, facts, halting, pick
 from shoal.mechanics.march import march
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.tangent import ready
@@ -58,7 +58,8 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
         scheme = choose(scene.solver, model, SINGLE, LANE, choice.name)
         if facts(choice.name).adaptive:
             steps, step = (scene.solver.max_steps if steps else 0), scene.solver.step
-        march(SINGLE, scheme, arrays, room, step, steps, np.array([time]), none, scene.solver.rank_tolerance)
+        stops = halting(scene.solver.model_copy(update={"step": step}), model, choice.name, time)
+        march(SINGLE, scheme, arrays, room, step, steps, np.array([time]), none, scene.solver.rank_tolerance, stops)
         q, v = room.z[:n].copy(), room.zdot[:n].copy()
         if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))):
             raise ComputationError(f"{scene.name}: the motion is not finite at {time:g} s; use a smaller step")

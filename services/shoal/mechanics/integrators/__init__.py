@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shoal.mechanics.halts import Halts, halts
 from shoal.mechanics.integrators import (
     dop853,
     energy_momentum,
@@ -76,3 +77,11 @@ def choose(solver: Solver, model: Model, tile: Tile, lanes: slice, name: str | N
         # A machine at rest must not leap over what a drive does later.
         solver = solver.model_copy(update={"max_step": solver.duration / STRIDES})
     return INTEGRATORS[name or solver.integrator].settings(solver, model, tile, lanes)
+
+
+def halting(solver: Solver, model: Model, name: str, end: float) -> Halts:
+    """Where the steps of an integrator end in a run up to `end` [s] because of functions of time, and force laws."""
+    if not facts(name).adaptive:
+        return halts(model, end, solver.step, False)
+    longest = solver.max_step if solver.max_step is not None else solver.duration / STRIDES
+    return halts(model, end, longest, True)

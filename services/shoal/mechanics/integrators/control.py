@@ -126,9 +126,10 @@ def shorter(error: float, h: float, order: int) -> float:
 
 @njit(cache=True, error_model="numpy")
 def accept(c: Control, error: float, h: float, order: int, rejected: bool) -> None:
-    """Suggest the step after an accepted one."""
+    """Suggest the step after an accepted one. One that was cut short leaves what had been suggested."""
     growth = GROW if error == 0.0 else min(GROW, max(SHRINK, SAFETY * error ** (-1.0 / order)))
-    c.suggestion[0] = min(c.largest, h * (min(1.0, growth) if rejected else growth))
+    least = c.suggestion[0] if not rejected and h < c.suggestion[0] else 0.0
+    c.suggestion[0] = min(c.largest, max(least, h * (min(1.0, growth) if rejected else growth)))
 
 
 @njit(cache=True, error_model="numpy")

@@ -14,6 +14,7 @@ from numba import njit
 
 from shoal.mechanics import constraints, dynamics, sparse
 from shoal.mechanics.dynamics import Work
+from shoal.mechanics.functions import evaluate
 from shoal.mechanics.integrators import newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
@@ -30,13 +31,14 @@ class EnergyMomentum(NamedTuple):
     """Settings and room.
 
     middle: the midpoint, change: what the step changes, both (rows, lanes). elastic: energy at its beginning [J],
-    (lanes,).
+    power: dissipated minus supplied by loads at the midpoint [W], both (lanes,).
     """
 
     newton: Newton
     middle: Array
     change: Array
     elastic: Array
+    power: Array
     evaluations: Array
 
 
@@ -44,6 +46,7 @@ FACTS = Facts(
     order=2,
     explicit=False,
     conserves=True,
+    mean_power=True,
     good_for="long free motion of stiff elastic machines: their energy stays what it was at any step",
 )
 
@@ -52,14 +55,19 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> EnergyMo
     """Settings for one tile of lanes."""
     rows, width = model.rows * len(tile), len(tile)
     room = newton_room(solver, model, tile, lanes)
-    return EnergyMomentum(room, np.zeros(rows), np.zeros(rows), np.zeros(width), np.zeros(1))
+    return EnergyMomentum(room, np.zeros(rows), np.zeros(rows), np.zeros(width), np.zeros(width), np.zeros(1))
 
 
 @njit(cache=True, error_model="numpy")
 def _raw(s: EnergyMomentum) -> EnergyMomentum:
     """The same with pointers in place of arrays."""
     return EnergyMomentum(
-        newton.raw(s.newton), pointer(s.middle), pointer(s.change), pointer(s.elastic), pointer(s.evaluations)
+        newton.raw(s.newton),
+        pointer(s.middle),
+        pointer(s.change),
+        pointer(s.elastic),
+        pointer(s.power),
+        pointer(s.evaluations),
     )
 
 
@@ -97,6 +105,8 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
     for i in range(end):
         change[i] /= h
     dynamics.force(tile, m, w, t + 0.5 * h, middle, change, w.stage)
+    for lane in range(width):
+        scheme.power[lane] = w.power[lane]
     for i in range(end):
         change[i] *= h
         f[i] += w.stage[i]
@@ -129,7 +139,7 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
         newton.add_reactions(tile, m, w, room.newton, room.middle)
         # The unknown is the midpoint, which moves half as far as the end.
         dynamics.derive(tile, m, w.z, m.held_rows, False)
-        constraints.residual(tile, m.constraints, m.functions, t + h, w.z, w.gauss.gap)
+        constraints.residual(tile, m.constraints, m.functions, dynamics.instant(w, t + h), w.z, w.gauss.gap)
         for k in range(m.constraints.size * width):
             w.gauss.gap[k] *= 0.5
         newton.correct(tile, m, w, room.newton, room.middle, 4.0 / (h * h), 2.0 / h)
@@ -142,7 +152,22 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
         w.zdot[i] = 2.0 * (w.z[i] - w.before[i]) / h - w.zdot[i]
     room.evaluations[0] += 1
     dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, room.newton.rank_tolerance, w.a)
+    for lane in range(width):
+        w.power[lane] = room.power[lane]
+    if m.driven:
+        _count_drives(tile, m, w, room.newton, t, h)
     return h
+
+
+@njit(cache=True, error_model="numpy")
+def _count_drives(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, h: float) -> None:
+    """Take from w.power [W] the mean of what the drives supply, lambda (c(t + h) - c(t)) / h."""
+    width = len(tile)
+    for k in range(m.constraints.size):
+        drive = m.constraints.drive[k]
+        rate = (evaluate(m.functions, drive, t + h, 0) - evaluate(m.functions, drive, t, 0)) / h
+        for lane in range(width):
+            w.power[lane] -= newton.multiplier[k * width + lane] * rate
 
 
 implement(EnergyMomentum, step, FACTS, cubic)

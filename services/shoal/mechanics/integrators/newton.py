@@ -135,11 +135,12 @@ def solve(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, mass_factor:
     """Find the end of a step at the time t: M a + C_q' lambda = Q(q, v, t), C(q) = 0; returns the iterations.
 
     The method ties rates and accelerations to coordinates: dv = damping_factor dq, da = mass_factor dq. w holds the
-    first guess, then the solution.
+    first guess, then the solution, and the power of loads and of the drives that hold it.
     """
     residual = newton.residual
     end = m.unknowns * len(tile)
     iterations = 0
+    t = dynamics.instant(w, t)
     while iterations < ITERATIONS:
         iterations += 1
         dynamics.force(tile, m, w, t, w.z, w.zdot, residual)
@@ -155,5 +156,7 @@ def solve(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, mass_factor:
             w.a[i] += mass_factor * residual[i]
         if largest_change(tile, m, newton) <= newton.tolerance:
             break
+    if m.driven:
+        constraints.add_power(tile, m.constraints, m.functions, t, newton.multiplier, w.power)
     mark_failures(tile, m, w, newton)
     return iterations

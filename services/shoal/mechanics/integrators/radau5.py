@@ -424,4 +424,10 @@ def inside(tile: Tile, scheme: Radau5, m: Arrays, w: Work, past: Array, x: float
         q[i] = w.before[i] + h * x * (p0 + x * (p1 / 2 + x * (p2 / 3 + x * p3 / 4)))
 
 
-implement(Radau5, step, FACTS, inside)
+@njit(cache=True, error_model="numpy")
+def anew(scheme: Radau5) -> None:
+    """The last step foretells nothing."""
+    scheme.last[0] = 0.0
+
+
+implement(Radau5, step, FACTS, inside, anew)

@@ -28,6 +28,7 @@ class Facts(NamedTuple):
     order: in time. stable_step_times_frequency, stable_step_times_decay: the largest stable step times the
     highest frequency and times the fastest decay rate. adaptive: chooses its steps by its tolerances.
     conserves: the energy of a frictionless machine stays what it was, but for round-off and Newton's tolerance.
+    mean_power: w.power is the mean over the step, by which the energy balance is as exact as that; else at its end.
     """
 
     order: int
@@ -37,6 +38,7 @@ class Facts(NamedTuple):
     stable_step_times_decay: float = np.inf
     adaptive: bool = False
     conserves: bool = False
+    mean_power: bool = False
 
 
 def advance(tile: Tile, scheme: Any, m: Arrays, w: Work, t: float, h: float) -> float:
@@ -58,15 +60,26 @@ def interpolate(
     raise NotImplementedError(type(scheme).__name__)
 
 
+def restart(scheme: Any) -> None:
+    """Forget earlier steps: what follows does not continue them smoothly."""
+    raise NotImplementedError(type(scheme).__name__)
+
+
 def adaptive(scheme: Any) -> bool:
     """Whether the scheme chooses its steps itself."""
     raise NotImplementedError(type(scheme).__name__)
 
 
-def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quintic) -> None:
+def averages(scheme: Any) -> bool:
+    """Whether the scheme leaves the mean power of its step in w.power."""
+    raise NotImplementedError(type(scheme).__name__)
+
+
+def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quintic, anew: Any = None) -> None:
     """Let compiled calls with settings of this type run the kernel `step`, and `inside` for the motion within it.
 
-    The parameters of the kernels are named as those of `advance` and `interpolate`.
+    anew: forgets what a scheme remembers from step to step, if anything. The parameters of the kernels are named as
+    those of `advance`, `interpolate` and `restart`.
     """
 
     def ours(scheme: Any) -> bool:
@@ -80,11 +93,23 @@ def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quint
     def choose_inside(tile, scheme, m, w, past, x, h, q, v):  # type: ignore[no-untyped-def]
         return _body(inside) if ours(scheme) else None
 
+    @overload(restart, jit_options={"error_model": "numpy"})
+    def choose_restart(scheme):  # type: ignore[no-untyped-def]
+        if not ours(scheme):
+            return None
+        return (lambda scheme: None) if anew is None else _body(anew)
+
     @overload(adaptive)
     def choose_adaptive(scheme):  # type: ignore[no-untyped-def]
         if not ours(scheme):
             return None
         return (lambda scheme: True) if facts.adaptive else (lambda scheme: False)
+
+    @overload(averages)
+    def choose_averages(scheme):  # type: ignore[no-untyped-def]
+        if not ours(scheme):
+            return None
+        return (lambda scheme: True) if facts.mean_power else (lambda scheme: False)
 
 
 def _body(kernel: Any) -> Any:

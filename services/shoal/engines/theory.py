@@ -1,0 +1,55 @@
+"""What the theory of a slender rod leaves out: shear, and the rotary inertia of its section."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shoal.engines.contract import Engine
+from shoal.errors import InputError
+from shoal.scene import Rod, Scene
+from shoal.trajectory import Trajectory
+
+WITH_SHEAR = ("exudyn-ge",)
+"""Engines whose flexible rods have shear and rotary inertia, whatever element the scene states."""
+
+
+def left_out(trajectory: Trajectory, scene: Scene, native: Engine) -> float | None:
+    """Displacement of the markers [m] that shear and rotary inertia would cause in a run of a scene.
+
+    None without rods that leave them out, or where it is not known. That the whole rod turns with its section's inertia
+    is the distance of two runs with rigid rods, with and without it. In the first bending mode of a flexible rod shear
+    and rotary inertia change the stiffness and the mass by pi^2 r^2 / L^2 times E / (kappa G) and 1 (Timoshenko 1921;
+    r radius of gyration of the section, kappa by Cowper 1966); this share of the effect that bending has at all, the
+    distance from the run with rigid rods, is an order of magnitude.
+    """
+    rods = {name: body for name, body in scene.bodies.items() if isinstance(body, Rod)}
+    shearing = trajectory.engine in WITH_SHEAR
+    full = [name for name, rod in rods.items() if rod.element != "rigid" and (shearing or rod.element == "ancf-full")]
+    slender = {name: rod for name, rod in rods.items() if name not in full and not rod.rotary_inertia}
+    flexible = [rod for rod in rods.values() if rod.element != "rigid"]
+    # A place on a curved rod is told by its arc length where it is flexible, by its coordinates where it is rigid.
+    if not slender or any(rod.curvature for rod in flexible):
+        return None
+    values: dict[str, object] = {f"bodies.{name}.element": "rigid" for name in rods}
+    values |= {f"bodies.{name}.rotary_inertia": name not in slender for name in rods}
+    stout = values | {f"bodies.{name}.rotary_inertia": True for name in slender}
+    try:
+        runs = [
+            native.simulate(scene.with_values({**one, "solver.integrator": "auto"}), trajectory.times)
+            for one in (values, stout)
+        ]
+    except InputError:
+        return None
+    if not all(run.ok for run in runs):
+        return None
+    rotary = runs[0].distance(runs[1])
+    share = max((slender_share(rod) for rod in slender.values() if rod.element != "rigid"), default=0.0)
+    return rotary + (share * runs[0].distance(trajectory) if share else 0.0)
+
+
+def slender_share(rod: Rod) -> float:
+    """By how much shear and rotary inertia lower the stiffness of a rod in bending, over its mass."""
+    nu = rod.poisson_ratio
+    kappa = 10 * (1 + nu) / (12 + 11 * nu)
+    slenderness = np.pi * rod.height / np.sqrt(12.0) / rod.length
+    return float(slenderness**2 * (2 * (1 + nu) / kappa + 1.0))

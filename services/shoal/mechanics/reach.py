@@ -1,0 +1,85 @@
+"""How far a machine can reach: no point is farther from its anchor than all bodies stretched out in a line.
+
+A flexible rod stretches. Its strain energy is at least E A L e^2 / 2 for the mean strain e of its axis, as the mean of
+squares is not below the square of the mean (for the Green strain of ancf-full, which is not below e, even more). So the
+energy of a run bounds its reach.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+
+import numpy as np
+
+from shoal.mechanics.tile import Array
+from shoal.scene import GROUND, Attachment, Revolute, Rod, Scene, Weld
+from shoal.scene.joints import places
+
+MARGIN = 1.1
+"""A run is rejected beyond so many times the reach, which bending and the samples of the energy round off."""
+BREAKS = 10.0
+"""No rod stretches by so many times its length: rubber breaks before."""
+TETHERS = Revolute | Weld
+
+
+def size(scene: Scene) -> float:
+    """All undeformed bodies stretched out in a line [m]."""
+    sides = [side for joint in scene.joints.values() for side in places(joint)]
+    attached = [*sides, *scene.markers.values()]
+    total = 0.0
+    for name, body in scene.bodies.items():
+        used = {*(scene.location(place) for place in attached if place.body == name), *body.points.values()}
+        total += max((math.dist(a, b) for a, b in combinations(used, 2)), default=0.0)
+    return total
+
+
+def reach(scene: Scene, energy: Array) -> Array:
+    """Reach of a machine [m] whose kinetic and elastic energy is at most `energy` [J], of its shape, (lanes,).
+
+    Infinite for machines with bodies that only sliders, springs or nothing at all hold to fixed ground.
+    """
+    if not tethered(scene):
+        return np.full(np.shape(energy), np.inf)
+    return size(scene) + stretch(scene, energy)
+
+
+def stretch(scene: Scene, energy: Array) -> Array:
+    """The length [m] by which the flexible rods together are longer at most, where their energy is so large [J]."""
+    total = np.zeros(np.shape(energy))
+    for rod in scene.bodies.values():
+        if isinstance(rod, Rod) and rod.element != "rigid":
+            assert rod.youngs_modulus is not None
+            # The thinnest section bounds the stiffness of a tapered rod.
+            height, width = rod.section(1.0)
+            area = np.minimum(rod.height, height) * np.minimum(rod.width, width)
+            strain = np.sqrt(2 * energy / (rod.youngs_modulus * area * rod.length))
+            total = total + rod.length * np.minimum(strain, BREAKS)
+    return total
+
+
+def tethered(scene: Scene) -> bool:
+    """Whether revolute joints and welds tie every body to fixed ground."""
+    held, frontier = {GROUND}, [GROUND]
+    while frontier:
+        here = frontier.pop()
+        for joint in scene.joints.values():
+            if isinstance(joint, TETHERS) and here in (ends := {side.body for side in _ends(joint)}):
+                frontier += (new := ends - held)
+                held |= new
+    return not scene.ground_points and held >= set(scene.bodies)
+
+
+def distance_to_ground(scene: Scene, points: Array) -> Array:
+    """Distance of every marker to the nearest anchor on the ground [m], (samples, markers, lanes).
+
+    points: (samples, markers, 2, lanes).
+    """
+    sides = (side for joint in scene.joints.values() if isinstance(joint, TETHERS) for side in _ends(joint))
+    anchors = [scene.location(side) for side in sides if side.body == GROUND]
+    distances = [np.hypot(points[:, :, 0] - x, points[:, :, 1] - y) for x, y in anchors or [(0.0, 0.0)]]
+    return np.asarray(np.min(distances, axis=0))
+
+
+def _ends(joint: Revolute | Weld) -> tuple[Attachment, Attachment]:
+    return joint.first, joint.second

@@ -1,0 +1,25 @@
+"""What second runs say about a run, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+
+def estimates(verification: Mapping[str, Any]) -> Iterator[str]:
+    """Sentences about the errors at the markers and about what the model leaves out; `asdict` of a Verification."""
+    errors = {"time": verification["time_error"], "mesh": verification["mesh_error"]}
+    if known := ", ".join(f"{name} {error:.1e} m" for name, error in errors.items() if error is not None):
+        yield f"estimated error at the markers: {known}"
+    if verification["note"]:
+        yield verification["note"]
+    if verification["left_out"] is not None:
+        yield (
+            "left out by the theory of slender rods: shear and rotary inertia of the section, about "
+            f"{verification['left_out']:.1e} m (rotary_inertia: true counts it in rigid rods, ancf-full has both)"
+        )
+    if verification["friction"] is not None:
+        yield (
+            f"dry friction is smoothed below coulomb_speed, so that what should stick creeps: about "
+            f"{verification['friction']:.1e} m at the markers (proportional to coulomb_speed)"
+        )
