@@ -1,6 +1,7 @@
 """The command line: what it prints, and with which exit status it leaves."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,22 @@ def test_compare_shows_three_engines_close_together() -> None:
     assert all(row["largest"] < 1e-5 for row in found["differences"])  # type: ignore[attr-defined]
 
 
+def test_a_scene_and_a_problem_of_one_name_are_both_printed() -> None:
+    scene, problem = shoal("scenes", "ibm-double-pendulum"), shoal("problems", "ibm-double-pendulum")
+    assert "bodies:" in scene.stdout
+    assert "shoal problems ibm-double-pendulum" in scene.stderr
+    assert "parameters:" in problem.stdout
+    assert shoal("scenes", "paper-case-1").stdout == shoal("problems", "paper-case-1").stdout
+    assert "kaheman-double" in shoal("problems").stdout
+
+
+def test_lists_mappings_and_nothing_can_be_set() -> None:
+    fields = ("gravity=[0, 0]", "initial.OA={angle: 0.6}", "solver.max_step=null")
+    options = [part for field in fields for part in ("--set", field)]
+    found = answer("simulate", "single-pendulum", "--no-verify", *options)
+    assert found["final"]["A"] == pytest.approx([math.cos(0.6), math.sin(0.6)], abs=1e-12)  # type: ignore[index]
+
+
 def test_scenes_lists_and_prints() -> None:
     assert "flexible-double-pendulum" in shoal("scenes").stdout
     assert shoal("scenes", "single-pendulum").stdout.startswith("name: single-pendulum")
@@ -87,6 +104,12 @@ def test_a_printed_scene_can_be_simulated_again(tmp_path: Path) -> None:
         (["identify", "kaheman-double"], "--data"),
         (["identify", "kaheman-double", "--data", "nowhere.csv"], "nowhere.csv"),
         (["scenes", "nothing"], "nothing"),
+        (["scenes", "singel-pendulum"], "did you mean single-pendulum"),
+        (["problems", "kaheman"], "did you mean kaheman-single or kaheman-double"),
+        (["simulate", "rigid-pendulum"], "rigid-double-pendulum"),
+        (["simulate", "single-pendulum", "--set", "gravity=[0"], "gravity: '[0' is neither a list"),
+        (["simulate", "single-pendulum", "--set", "gravity=[0]"], "gravity"),
+        (["simulate", "single-pendulum", "--set", "bodies.OA.mass=[1]"], "bodies.OA.mass"),
         (["simulate"], "SCENE"),
         (["dance"], "dance"),
     ],

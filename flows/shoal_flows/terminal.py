@@ -110,14 +110,14 @@ def _paper_table(result: DemoResult) -> Table:
     """The paper's swarms on data of the fitted mesh, as the paper's must have been, and on data of a finer model."""
     from shoal_flows.report.paper import AS, NAMES, TABLES
 
-    table = _table("Fitness [m²] of the paper's swarms, by what the data were computed with")
-    for column in ("case", "swarm", "paper", "fitted mesh", "error°", "finer model", "error°"):
+    table = _table("Fitness in m² of the paper's swarms, by what the data were computed with")
+    for column in ("case", "swarm", "paper", "same mesh", "error°", "finer", "error°"):
         table.add_column(column, justify="left" if column in ("case", "swarm") else "right", no_wrap=True)
     for case, same in result.same_mesh.items():
         fits = same.by_method(), result.studies[case].by_method()
         for row, printed in TABLES[case][1].items():
             for method, kind in AS[row].items():
-                cells = [f"{NAMES[row]} {kind}", printed.fitness]
+                cells = [f"{NAMES[row]} {kind}", f"{printed.value:.1e}"]
                 for fit in (found.get(method) for found in fits):
                     cells += ["failed", ""] if fit is None else [f"{fit.estimate.fitness:.1e}", _error(fit)]
                 table.add_row(case.removeprefix("paper-case-"), *cells)

@@ -68,6 +68,26 @@ def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[s
     return found
 
 
+def field_values(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, Any]:
+    """PATH=VALUE pairs; a value in brackets or braces is a list or a mapping as YAML writes it, `null` is nothing."""
+    return {path: _structured(path, text) for path, text in key_value(context, parameter, pairs).items()}
+
+
+def _structured(path: str, text: str) -> Any:
+    if text == "null":
+        return None
+    if text[0] not in "[{":
+        return text
+    from shoal.scene.load import read_yaml
+
+    try:
+        return read_yaml(text, path)
+    except InputError:
+        raise click.BadParameter(
+            f"{path}: {text!r} is neither a list such as [0, -9.81] nor a mapping such as {{angle: 0.6}}"
+        ) from None
+
+
 def recordings(
     context: click.Context, parameter: click.Parameter, given: tuple[str, ...]
 ) -> str | dict[str, str] | None:
@@ -108,7 +128,9 @@ Command = Callable[..., Any]
 def option_set(command: Command) -> Command:
     """--set PATH=VALUE."""
     text = "Set any field of the scene, such as bodies.OA.elements=16, solver.step=1e-5 (repeatable)."
-    return click.option("--set", "values", multiple=True, metavar="PATH=VALUE", callback=key_value, help=text)(command)
+    return click.option("--set", "values", multiple=True, metavar="PATH=VALUE", callback=field_values, help=text)(
+        command
+    )
 
 
 def option_verify(command: Command) -> Command:
@@ -141,26 +163,57 @@ def main() -> None:
 @main.command()
 @click.argument("name", required=False)
 def scenes(name: str | None) -> None:
-    """List the built-in scenes and problems, or print one as YAML."""
+    """List the built-in scenes and problems, or print one as YAML. Where both have the name, the scene."""
     from shoal import terminal
-    from shoal.identification.problem import load_problem, problem_library, problem_names
-    from shoal.scene.load import load_scene, scene_library, scene_names
+    from shoal.identification.problem import problem_names
+    from shoal.scene.load import load_scene, scene_library, scene_names, unknown
     from shoal.scene.parametric import parametric
 
     if name is None:
         terminal.listing("scenes", {n: load_scene(n).description for n in scene_names()})
-        terminal.listing("problems", {n: load_problem(n).description for n in problem_names()})
+        _problems()
         return
     if (data := parametric(name)) is not None:
         import yaml
 
         click.echo(yaml.safe_dump(data, sort_keys=False), nl=False)
         return
-    for folder, known in ((scene_library(), scene_names()), (problem_library(), problem_names())):
-        if name in known:
-            click.echo((folder / f"{name}.yaml").read_text(encoding="utf-8"), nl=False)
-            return
-    raise InputError(f"{name}: no such scene or problem; there are {', '.join([*scene_names(), *problem_names()])}")
+    if name in scene_names():
+        click.echo((scene_library() / f"{name}.yaml").read_text(encoding="utf-8"), nl=False)
+        if name in problem_names():
+            click.echo(f"shoal: there is a problem of that name too: shoal problems {name}", err=True)
+        return
+    if name not in problem_names():
+        raise InputError(unknown(name, "scene or problem", [*scene_names(), *problem_names()]) + "; see `shoal scenes`")
+    _print_problem(name)
+
+
+@main.command()
+@click.argument("name", required=False)
+def problems(name: str | None) -> None:
+    """List the built-in problems, or print one as YAML."""
+    from shoal.identification.problem import problem_names
+    from shoal.scene.load import unknown
+
+    if name is None:
+        _problems()
+        return
+    if name not in problem_names():
+        raise InputError(unknown(name, "problem", problem_names()) + "; see `shoal problems`")
+    _print_problem(name)
+
+
+def _problems() -> None:
+    from shoal import terminal
+    from shoal.identification.problem import load_problem, problem_names
+
+    terminal.listing("problems", {n: load_problem(n).description for n in problem_names()})
+
+
+def _print_problem(name: str) -> None:
+    from shoal.identification.problem import problem_library
+
+    click.echo((problem_library() / f"{name}.yaml").read_text(encoding="utf-8"), nl=False)
 
 
 @main.command()

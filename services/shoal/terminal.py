@@ -20,6 +20,7 @@ from shoal.home import compiled
 from shoal.pictures.choice import rows
 from shoal.pictures.estimates import estimates
 from shoal.pictures.numbers import rounded
+from shoal.pictures.start import remarks
 from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
@@ -117,10 +118,12 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
     verification = trajectory.model.get("verification")
     unknown = verification is not None and trajectory.ok and verification["time_error"] is None
     _say(
-        f"status {trajectory.status[0]}{', but its error is not known' if unknown else ''}; energy off by "
+        f"status {trajectory.status[0]}{', but its time error is not known' if unknown else ''}; energy off by "
         f"{trajectory.energy_drift[0]:.1e}, constraints by {trajectory.constraint_drift[0]:.1e}"
     )
     _say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms")
+    for remark in remarks(trajectory.model):
+        _say(remark)
     if verification is not None:
         for sentence in estimates(verification):
             _say(sentence)

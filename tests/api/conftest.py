@@ -20,7 +20,7 @@ from running import serving
 @pytest.fixture(scope="session")
 def gauss() -> Iterator[httpx.Client]:
     """A client of the native engine's service."""
-    with serving("gauss", Settings(workers=1)) as url, httpx.Client(base_url=url, timeout=30) as client:
+    with serving("gauss", Settings(workers=1)) as url, httpx.Client(base_url=url, timeout=300) as client:
         yield client
 
 
@@ -28,11 +28,11 @@ def gauss() -> Iterator[httpx.Client]:
 def obedient() -> Iterator[httpx.Client]:
     """A client of a service with one worker, one place in the queue and little patience."""
     settings = Settings(
-        workers=1, queue=1, job_queue=1, wall_seconds=1.0, job_seconds=20.0, body_bytes=2**20, max_memory_mb=2048
+        workers=1, queue=1, job_queue=1, wall_seconds=4.0, job_seconds=900.0, body_bytes=2**20, max_memory_mb=2048
     )
     with (
         serving(engines_for_tests.NAME, settings, engines_for_tests.obedient) as url,
-        httpx.Client(base_url=url, timeout=30) as client,
+        httpx.Client(base_url=url, timeout=300) as client,
     ):
         yield client
 

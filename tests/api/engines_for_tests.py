@@ -37,7 +37,7 @@ class Obedient:
         if scene.name == "hang":
             time.sleep(3600)
         if scene.name == "short":
-            time.sleep(0.6)
+            time.sleep(1.0)
         if scene.name == "crash":
             os.kill(os.getpid(), signal.SIGKILL)
         if scene.name == "huge":

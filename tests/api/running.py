@@ -33,7 +33,7 @@ def serving(engine: str, settings: Settings, make_engine: MakeEngine | None = No
         thread.join()
 
 
-def eventually(met: Callable[[], bool], seconds: float = 60.0) -> None:
+def eventually(met: Callable[[], bool], seconds: float = 300.0) -> None:
     """Wait until something is so."""
     deadline = time.monotonic() + seconds
     while not met():

@@ -20,4 +20,4 @@ def test_limits_do_not_follow_the_wall(
     assert obedient.post("/v1/simulate", json={"scene": machine | {"name": "short"}, **ask}).status_code == 200
     begin = time.monotonic()
     assert obedient.post("/v1/simulate", json={"scene": machine | {"name": "hang"}, **ask}).status_code == 504
-    assert 0.9 < time.monotonic() - begin < 10
+    assert time.monotonic() - begin > 3.9

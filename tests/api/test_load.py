@@ -85,9 +85,13 @@ def test_nobody_computes_for_a_client_that_left(obedient: httpx.Client, machine:
     eventually(lambda: post(obedient, machine).status_code == 200)
     note = tmp_path / "computed"
     with ThreadPoolExecutor(1) as threads:
-        first = threads.submit(post, obedient, machine | {"name": "short"})
-        time.sleep(0.2)
-        with httpx.Client(base_url=obedient.base_url, timeout=0.1) as hasty, pytest.raises(httpx.ReadTimeout):
+        begun = tmp_path / "begun"
+        first = threads.submit(post, obedient, machine | {"name": "short", "description": str(begun)})
+        eventually(begun.exists)
+        with (
+            httpx.Client(base_url=obedient.base_url, timeout=httpx.Timeout(60, read=0.1)) as hasty,
+            pytest.raises(httpx.ReadTimeout),
+        ):
             post(hasty, machine | {"description": str(note)})
         assert first.result().status_code == 200
     assert post(obedient, machine).status_code == 200

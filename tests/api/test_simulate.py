@@ -79,7 +79,8 @@ def test_hang_ends_after_its_time(obedient: httpx.Client, machine: Machine) -> N
     begin = time.monotonic()
     answer = post(obedient, machine | {"name": "hang"})
     assert (answer.status_code, answer.json()["type"]) == (504, "urn:shoal:timeout")
-    assert 0.9 < time.monotonic() - begin < 2.0
+    # Not before its time, which `hang` outlasts by an hour.
+    assert time.monotonic() - begin > 3.9
     eventually(lambda: post(obedient, machine).status_code == 200)
 
 

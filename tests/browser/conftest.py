@@ -42,7 +42,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Desk]:
             environment |= {"SHOAL_HOME": str(home)}
             pages = subprocess.Popen(command, env=environment, stdout=out, stderr=subprocess.STDOUT)
         try:
-            deadline = time.monotonic() + 120
+            deadline = time.monotonic() + 600
             while "MLflow:" not in log.read_text():
                 assert pages.poll() is None, log.read_text()
                 assert time.monotonic() < deadline, log.read_text()
@@ -50,7 +50,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Desk]:
             yield Desk(home, at, f"http://127.0.0.1:{port}")
         finally:
             pages.terminate()
-            pages.wait(30)
+            pages.wait(300)
 
 
 @pytest.fixture(scope="session")
@@ -61,7 +61,7 @@ def browser() -> Iterator[Any]:
     with api.sync_playwright() as playwright:
         # A container often runs as root and lacks what Chromium's sandbox needs; the pages are this machine's.
         started = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        api.expect.set_options(timeout=30_000)
+        api.expect.set_options(timeout=180_000)
         yield started
         started.close()
 

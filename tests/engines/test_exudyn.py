@@ -342,3 +342,47 @@ def test_thinned_record_is_read_between_its_kept_steps() -> None:
     q, v = record.at_wanted()
     np.testing.assert_allclose(q[:, 0], steps.wanted**2, atol=1e-14)
     np.testing.assert_allclose(v[:, 0], 2 * steps.wanted, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("scale", "expected"),
+    [
+        ("step(t - 0.3001) - step(t - 0.3002)", 1e-4),
+        ("step(0.01 - t)", 0.01),
+        ("exp(-((t - 0.3)/1e-4)**2)", 1e-4 * np.sqrt(np.pi)),
+        ({"table": [[0.0, 0.0], [0.3, 0.0], [0.30001, 1.0], [0.30002, 0.0]], "smooth": False}, 1e-5),
+    ],
+)
+@pytest.mark.parametrize("integrator", ["auto", "generalized-alpha"])
+def test_no_pulse_is_lost(scale, expected, integrator):
+    scene = Scene.parse(
+        {
+            "name": "pushed",
+            "gravity": [0.0, 0.0],
+            "bodies": {"m": {"kind": "point-mass", "mass": 2.0}},
+            "loads": {"F": {"kind": "force", "at": {"body": "m"}, "force": [100.0, 0.0], "scale": scale}},
+            "markers": {"m": {"body": "m"}},
+            "initial": {"m": {"position": [0.0, 0.0]}},
+            "solver": {"duration": 1.0, "samples": 2, "integrator": integrator},
+        }
+    )
+    trajectory = ExudynEngine().simulate(scene)
+    assert trajectory.ok, trajectory.message
+    speed = np.diff(trajectory.points[:, 0, 0, 0])[0] / 0.5
+    assert speed == pytest.approx(50.0 * expected, rel=1e-8)
+
+
+def test_a_rate_that_jumps_is_refused_and_a_smooth_one_followed():
+    drive = {"kind": "driven-angle", "first": ORIGIN, "second": {"body": "R"}, "angle": "3*max(t - 0.5, 0)"}
+    data = {
+        "name": "crank",
+        "bodies": {"R": {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 1000.0}},
+        "joints": {"O": {"first": ORIGIN, "second": {"body": "R"}}, "D": drive},
+        "markers": {"E": {"body": "R", "point": "end"}},
+        "solver": {"duration": 1.0, "samples": 4},
+    }
+    with pytest.raises(InputError, match=r"^joints\.D\.angle: .* rate jumps, at t = 0\.5; use gauss"):
+        ExudynEngine().simulate(Scene.parse(data))
+    smooth = Scene.parse(data).with_values({"joints.D.angle": "3*max(t - 0.5, 0)**2"})
+    trajectory = ExudynEngine().simulate(smooth)
+    assert trajectory.angles[-1, 0, 0] == pytest.approx(0.75, abs=1e-6)

@@ -78,7 +78,7 @@ def test_a_service_without_a_second_run_leaves_the_first(url: str) -> None:
         asked.append(request)
         if len(asked) > 1:
             return httpx.Response(504, json={"type": "urn:shoal:timeout", "detail": "ended after 60 s"})
-        return httpx.post(url + request.url.path, content=request.content, headers=request.headers, timeout=30)
+        return httpx.post(url + request.url.path, content=request.content, headers=request.headers, timeout=300)
 
     run = verified(RemoteEngine(url, httpx.MockTransport(answer)), load_scene("single-pendulum"))
     assert run.ok

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sqlite3
 import time
 from collections.abc import Callable, Mapping
@@ -56,10 +57,10 @@ def comes_by_itself(prefect: str, name: str, parameters: Mapping[str, object]) -
     (schedule,) = call(schedules, [{"schedule": rule, "active": True, "parameters": parameters}])
 
     def begun() -> list[dict[str, Any]]:
-        runs = call(f"{prefect}/api/flow_runs/filter", {"flow_runs": {"start_time": {"after_": first.isoformat()}}})
+        runs = call(f"{prefect}/api/flow_runs/filter", {"flow_runs": {"start_time": {"is_null_": False}}})
         return [run for run in runs if run["auto_scheduled"] and run["created_by"]["id"] == schedule["id"]]
 
-    (run,) = until(begun, "a run of the schedule")
+    run = until(begun, "a run of the schedule")[0]
     urlopen(Request(f"{schedules}/{schedule['id']}", method="DELETE"), timeout=30).close()
     return dict(run)
 
@@ -114,6 +115,14 @@ def _end(at: Mapping[str, str], home: Path, run: str, when: datetime) -> None:
     ):
         cursor.execute("UPDATE flow_run SET end_time = %s WHERE id = %s", (f"{text}+00", run))
         assert cursor.rowcount == 1
+
+
+def fails_aloud(home: Path) -> None:
+    """A scheduler that cannot read its schedules says so in the output of `make up`. Nothing is scheduled any more."""
+    with closing(sqlite3.connect(home / "prefect" / "prefect.db", timeout=60)) as database, database:
+        database.execute("ALTER TABLE deployment_schedule RENAME TO deployment_schedule_away")
+    line = re.compile(r"ERROR.* schedule_deployments\(\)")
+    until(lambda: line.search((home / "up.log").read_text(errors="replace")), "the scheduler's failure is told")
 
 
 def slots_taken(prefect: str) -> int:

@@ -12,4 +12,4 @@ def test_program_ends_with_the_process_that_started_it() -> None:
         assert b"Serving HTTP" in process.stdout.readline()
         assert process.poll() is None
         process.stdin.close()
-        assert process.wait(timeout=10) != 0
+        assert process.wait(timeout=60) != 0

@@ -128,7 +128,7 @@ def mlflow_server(folder: Path, port: int) -> Iterator[subprocess.Popen[bytes]]:
         command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     ) as made:
         try:
-            deadline = time.monotonic() + 90
+            deadline = time.monotonic() + 600
             while True:
                 with suppress(OSError), urlopen(f"http://127.0.0.1:{port}/health", timeout=2):
                     break

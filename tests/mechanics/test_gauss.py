@@ -45,7 +45,11 @@ LOOP = Scene.parse(
             "E": _joint(("third", "end"), ("load", "start"), friction=0.3),
         },
         "markers": {"A": {"body": "crank", "point": "end"}, "L": {"body": "load"}},
-        "initial": {"crank": {"angle": 1.2, "rate": 1.0}, "coupler": {"angle": 0.2}, "third": {"angle": -1.0}},
+        "initial": {
+            "crank": {"angle": 1.2, "rate": 1.0},
+            "coupler": {"angle": 0.2, "guess": ["angle"]},
+            "third": {"angle": -1.0},
+        },
     }
 )
 PENDULUM = load_scene("rigid-double-pendulum").with_values(

@@ -50,7 +50,7 @@ FOUR_BAR = Scene.parse(
             "C": {"first": {"body": "ground", "point": [2.2, 0]}, "second": {"body": "rocker"}},
         },
         "markers": {"A": {"body": "crank", "point": "end"}, "B": {"body": "rocker", "point": "end"}},
-        "initial": {"crank": {"angle": 1.1}, "coupler": {"angle": 0.272}},
+        "initial": {"crank": {"angle": 1.1}, "coupler": {"angle": 0.272, "guess": ["angle"]}},
     }
 )
 DAMPED = Scene.parse(

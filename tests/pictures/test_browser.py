@@ -44,6 +44,14 @@ class Opened:
         """What the first animation shows as its time [s]."""
         return float(self.page.locator("output").first.inner_text().split()[2])
 
+    def until(self, met: Callable[[], bool]) -> None:
+        """Wait until something is so, five minutes at most."""
+        for _ in range(6000):
+            if met():
+                return
+            self.page.wait_for_timeout(50)
+        raise AssertionError("it did not come to that in time")
+
     def picture(self) -> Any:
         """The first canvas as it looks now."""
         return self.page.evaluate("document.querySelector('canvas').toDataURL()")
@@ -85,15 +93,12 @@ def test_animation_plays_pauses_and_is_scrubbed(browser: Any, pages: Callable[[s
     page, button, slider = opened.page, opened.page.locator("button").first, opened.page.locator("input").first
     still = opened.picture()
     button.click()
-    page.wait_for_timeout(600)
+    opened.until(lambda: opened.clock > 0 and opened.picture() != still)
     assert button.inner_text() == "Pause"
-    assert opened.clock > 0
-    assert opened.picture() != still
     page.keyboard.press("Space")
-    page.wait_for_timeout(50)
+    opened.until(lambda: button.inner_text() == "Play")
     paused = opened.clock
     page.wait_for_timeout(200)
-    assert button.inner_text() == "Play"
     assert opened.clock == paused
     # By keyboard.
     slider.focus()

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from shoal.errors import InputError
 from shoal.scene import RigidBody, Rod, Scene, load_scene
 
 SCENE = load_scene("flexible-double-pendulum")
@@ -45,13 +46,29 @@ def test_with_values_starts_a_body_of_which_the_scene_says_nothing() -> None:
         ("bodies.AB.length", 2.0),
         ("solver.integrator", "leapfrog"),
         ("gravity", (0.0, -9.81)),
-        ("initial.OA.rate", 0.0),
+        ("initial.OA.angle", np.pi / 4),
         ("joints.O.first.body", "ground"),
     ],
 )
 def test_value_reads_what_with_values_writes(path: str, expected: object) -> None:
     assert SCENE.value(path) == expected
     assert SCENE.with_values({path: expected}) == SCENE
+
+
+def test_what_is_set_last_makes_guesses_of_the_rest_that_it_may_move() -> None:
+    scene = SCENE.with_values({"initial.OA.angle": 0.5})
+    assert scene.initial["OA"].guess == ()
+    assert scene.initial["AB"].guess == ("angle",)
+    later = scene.with_values({"initial.AB.rate": 1.0, "gravity": [0.0, 0.0]})
+    assert later.initial["AB"].guess == ("angle",)
+    assert later.with_values({"bodies.OA.length": 1.1}).initial["OA"].guess == ("angle",)
+    assert Scene.parse(later.model_dump(mode="json")) == later
+
+
+def test_zero_is_a_statement() -> None:
+    assert SCENE.initial["OA"].rate is None
+    assert SCENE.start("OA").rate == 0.0
+    assert SCENE.with_values({"initial.OA.rate": 0.0}).initial["OA"].rate == 0.0
 
 
 def test_lanes_broadcast_through_the_derived_properties() -> None:
@@ -111,3 +128,23 @@ def test_every_rigid_body_is_accepted(mass: float, inertia: float, x: float, y: 
     body = RigidBody(mass=mass, inertia=inertia, centre_of_mass=(x, y), named_points={"tip": (y, x)})
     assert body.points == {"start": (0.0, 0.0), "tip": (y, x)}
     assert RigidBody.model_validate_json(body.model_dump_json()) == body
+
+
+def test_an_element_that_nobody_stated_stays_unstated() -> None:
+    data = load_scene("rigid-double-pendulum").model_dump()
+    del data["bodies"]["OA"]["element"]
+    scene = Scene.parse(data)
+    assert scene.with_values({"bodies.OA.height": 0.03}).bodies["OA"].element == "rigid"
+    with pytest.raises(InputError, match=r"bodies\.OA: element is missing, and a rigid rod has no elements"):
+        scene.with_values({"bodies.OA.elements": 8})
+    flexible = {"bodies.OA.elements": 8, "bodies.OA.youngs_modulus": 2e9, "bodies.OA.element": "ancf-cable"}
+    assert scene.with_values(flexible).bodies["OA"].element == "ancf-cable"
+
+
+def test_a_rigid_rod_may_count_its_height() -> None:
+    rod = Rod(length=1.0, height=0.3, width=0.1, density=1000.0, rotary_inertia=True)
+    assert rod.inertia == pytest.approx(rod.mass * (1.0**2 + 0.3**2) / 12, rel=1e-14)
+    tapered = Rod(length=1.0, height=0.2, end_height=0.1, width=0.1, density=1000.0, rotary_inertia=True)
+    slender = tapered.model_copy(update={"rotary_inertia": False})
+    # The integral of rho w h^3 / 12 over the length, with h = 0.2 - 0.1 x: a mean cube of (0.2^4 - 0.1^4) / 0.4.
+    assert tapered.inertia - slender.inertia == pytest.approx(1000 * 0.1 / 12 * (0.2**4 - 0.1**4) / 0.4, rel=1e-13)

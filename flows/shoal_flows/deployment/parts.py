@@ -15,7 +15,7 @@ from shoal.errors import ComputationError
 
 from shoal_flows.deployment import processes
 
-PATIENCE = 180.0
+PATIENCE = 600.0
 TRIES = 3
 """Starts in a row that may fail, as when a server and its database died together."""
 _GRACE = 20.0

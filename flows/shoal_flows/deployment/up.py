@@ -79,7 +79,7 @@ def _environment(stores: Mapping[str, str]) -> dict[str, str]:
         "MLFLOW_DEFAULT_ARTIFACT_ROOT": settings.artifact_folder().as_uri(),
         # Results are in MLflow; Prefect's entries are of use for a while (90 days).
         "PREFECT_SERVER_SERVICES_DB_VACUUM_ENABLED": "events,flow_runs",
-        # Who holds the slot of the nights outlives the server: a night that was broken off leaves it after five minutes.
+        # Who holds the slot of the nights outlives the server: one that was broken off leaves it after five minutes.
         "PREFECT_SERVER_CONCURRENCY_LEASE_STORAGE": "prefect.server.concurrency.lease_storage.filesystem",
         # Here nobody shows progress: what goes wrong in the servers, their background services and the flows is seen.
         "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "ERROR",

@@ -13,6 +13,11 @@ class Printed:
     theta2: str
     fitness: str
 
+    @property
+    def value(self) -> float:
+        """The fitness as a number."""
+        return float(self.fitness.replace(" × 10", "e").translate(str.maketrans("⁻⁶⁷⁸", "-678")))
+
 
 TABLES: dict[str, tuple[str, dict[str, Printed]]] = {
     "paper-case-1": (
@@ -34,7 +39,7 @@ TABLES: dict[str, tuple[str, dict[str, Printed]]] = {
 
 AS = {
     "afsa": {"afsa": "as published"},
-    "iafsa": {"iafsa-printed": "as printed", "iafsa": "repaired", "iafsa-unseeded": "repaired, no seeds"},
+    "iafsa": {"iafsa-printed": "as printed", "iafsa": "repaired", "iafsa-unseeded": "without seeds"},
 }
 """By row of the paper: the methods that stand for it, and what each is."""
 NAMES = {"afsa": "AFSA", "iafsa": "IAFSA"}

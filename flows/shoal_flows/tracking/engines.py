@@ -77,7 +77,8 @@ def tip(scene: Scene) -> str:
 
 
 def _log_engine(run: Run, scene: Scene, motion: Trajectory) -> None:
-    run.params({**_scene(scene), "engine": motion.engine, **{f"model.{k}": v for k, v in motion.model.items()}})
+    made = {f"model.{name}": value for name, value in motion.model.items() if not name.startswith("initial")}
+    run.params({**_scene(scene), "engine": motion.engine, **made})
     x, y = motion.marker(tip(scene))[-1]
     run.metric("final/x", float(x))
     run.metric("final/y", float(y))

@@ -18,6 +18,7 @@ from shoal.engines.casadi_fixed_step import runge_kutta
 from shoal.engines.casadi_model import CasadiModel, casadi_model
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
 from shoal.mechanics.reach import MARGIN, stretch
+from shoal.mechanics.start import started
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 
@@ -87,6 +88,7 @@ class CasadiEngine:
 
     def _run(self, scene: Scene, times: Array) -> _Run:
         model = casadi_model(scene)
+        scene = started(scene).scene
         starts = [scene.start(name) for name in model.bodies]
         x0 = model.start([start.angle for start in starts], [start.rate for start in starts])
         grid, wanted = _check_grid(times)

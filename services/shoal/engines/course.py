@@ -15,11 +15,28 @@ from shoal.mechanics.halts import narrow
 from shoal.scene import Function
 from shoal.scene.branches import Branches, branches
 from shoal.scene.enclosure import at
-from shoal.scene.formula import value
+from shoal.scene.formula import Node, value
 from shoal.trajectory import Array
 
 SLOPE_JUMP = 1e-9
 """A slope that changes by less than this, or than this relative to itself, does not jump."""
+
+
+_SOON = 1e-6
+"""[s]"""
+
+
+def slope_after(f: Function, t: float) -> float:
+    """The derivative of a function on the right side of one instant [s]. Raises InputError where it has none."""
+    if f.formula is None:
+        return f.table_slope(t, left=False)
+    return float(_bounded(branches(f.formula, t, t + _SOON).nodes[0], t)[1])
+
+
+def _bounded(node: Node, t: float) -> Array:
+    """Value and slope of a smooth tree by bounds as narrow as rounding."""
+    low, high = at(node, np.array([t]))
+    return np.asarray(low[:, 0] + high[:, 0]) / 2
 
 
 @dataclass
@@ -69,8 +86,7 @@ class Course:
 
     def _slope(self, t: float, left: bool) -> float:
         if self.pieces is not None:
-            low, high = at(self.pieces.around(t, left), np.array([t]))
-            return float(low[1, 0] + high[1, 0]) / 2
+            return float(_bounded(self.pieces.around(t, left), t)[1])
         return self.function.table_slope(t, left)
 
     def __call__(self, t: Array) -> Array:
@@ -84,4 +100,8 @@ class Course:
         for number in np.unique(which):
             chosen: Any = which == number
             out[chosen] = value(nodes[number], t[chosen])
+        if not np.all(known := np.isfinite(out)):
+            # sin(t)/t at 0
+            gaps = t[~known].tolist()
+            out[~known] = [_bounded(self.pieces.around(gap, False), gap)[0] for gap in gaps]
         return out

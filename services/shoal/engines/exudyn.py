@@ -16,6 +16,7 @@ from shoal.engines.exudyn_build import Beam, Machine, build, library
 from shoal.engines.exudyn_checks import judge
 from shoal.engines.exudyn_record import Record, Steps, choose_steps
 from shoal.errors import InputError
+from shoal.mechanics.start import facts
 from shoal.scene import Rod, Scene
 from shoal.trajectory import Array, Status, Trajectory
 
@@ -80,7 +81,7 @@ class ExudynEngine:
             steps=steps.count,
             wall_s=time.perf_counter() - started,
             message=f"{verdict.message}{WEAK}" if weak else verdict.message,
-            model=self._model(exu, machine, steps),
+            model=self._model(exu, machine, steps) | facts(scene, machine.scene.initial, machine.span),
         )
 
     def simulate_many(

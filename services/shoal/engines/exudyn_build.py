@@ -20,6 +20,7 @@ from shoal.engines.exudyn_loads import add_load
 from shoal.engines.exudyn_record import Indices
 from shoal.engines.poses import initial_poses, span
 from shoal.errors import InputError
+from shoal.mechanics.start import complete
 from shoal.scene import GROUND, DrivenAngle, Rod, Scene
 from shoal.trajectory import Array
 
@@ -94,6 +95,7 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None) -> Machi
     end [s]: of the run, beyond the scene's duration if at all.
     """
     items = importlib.import_module("exudyn.itemInterface")
+    scene = complete(scene).scene
     poses = initial_poses(scene)
     container = exu.SystemContainer()
     mbs = container.AddSystem()

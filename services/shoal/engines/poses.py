@@ -1,24 +1,23 @@
-"""Where every body of a scene starts: a walk along the joints from the ground, and from bodies that say it."""
+"""Where every body of a scene starts, for engines that give each body a pose of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.engines.course import slope_after
 from shoal.errors import InputError
+from shoal.mechanics.closure import Closure
+from shoal.mechanics.start import complete
 from shoal.scene import (
     GROUND,
     Attachment,
     Coupling,
-    Distance,
-    DrivenAngle,
     Function,
     MovingPoint,
     Parallel,
     Perpendicular,
-    Revolute,
     Rod,
     Scene,
     Slider,
@@ -28,8 +27,8 @@ from shoal.scene.joints import Joint, places
 from shoal.scene.loads import sides as load_sides
 from shoal.trajectory import Array
 
-CLOSURE = 1e-6
-"""Gap [m] and relative speed [m/s] per metre of machine (and rad, rad/s) that a joint may have at the start."""
+SLIP = 1e-6
+"""Relative speed [m/s] per metre of machine (and rad/s) that a joint may have at the start."""
 
 
 @dataclass(frozen=True)
@@ -100,11 +99,8 @@ def value(f: Function, time: float) -> float:
 
 
 def slope(f: Function, time: float) -> float:
-    """Its derivative, by differences of fourth order that reach to both sides, or forward at the start."""
-    step = 1e-4
-    at = time + step * (np.array([-2, -1, 1, 2]) if time >= 2 * step else np.arange(5))
-    weights = np.array([1, -8, 8, -1]) if time >= 2 * step else np.array([-25, 48, -36, 16, -3])
-    return float(weights @ f(at)) / (12 * step)
+    """Its derivative from then on."""
+    return slope_after(f, time)
 
 
 def kept_turn(scene: Scene, joint: Joint) -> float | None:
@@ -125,71 +121,28 @@ def kept_turn(scene: Scene, joint: Joint) -> float | None:
 
 
 def initial_poses(scene: Scene) -> dict[str, Pose]:
-    """Pose of every body, of the ground and its moving points, undeformed. Raises InputError if a joint is open."""
-    angles = _angles(scene)
+    """Pose of every body, of the ground and its moving points, undeformed. Raises InputError where joints forbid it."""
     poses = {GROUND: FIXED}
     for name, path in scene.ground_points.items():
         position, velocity = moving_point(path)
         poses[f"{GROUND}.{name}"] = Pose(position, 0.0, velocity, 0.0)
-    while waiting := [name for name in scene.bodies if name not in poses]:
-        name, position, speed, place = _next(scene, waiting, poses)
-        loose = Pose(np.zeros(2), angles[name][0], np.zeros(2), angles[name][1])
-        origin, velocity = position - loose.position(place), speed - loose.speed(place)
-        poses[name] = Pose(origin, loose.angle, velocity, loose.rate)
-    _check(scene, poses)
+    scene = complete(scene).scene
+    for name in scene.bodies:
+        begin = scene.start(name)
+        poses[name] = Pose(np.array(begin.position), begin.angle, np.array(begin.velocity), begin.rate)
+    _check_speeds(scene, poses)
     return poses
 
 
-def _next(scene: Scene, waiting: list[str], poses: dict[str, Pose]) -> tuple[str, Array, Array, tuple[float, float]]:
-    """A body whose start is known: position, velocity and which of its places has them."""
-    for kind in (Revolute | Weld, None, Slider):
-        if kind is None:
-            for name in waiting:
-                start = scene.start(name)
-                if start.position is not None:
-                    return name, np.array(start.position), np.array(start.velocity), (0.0, 0.0)
-            continue
-        for joint in scene.joints.values():
-            if isinstance(joint, kind) and not isinstance(joint, Coupling):
-                both = ((joint.first, joint.second), (joint.second, joint.first))
-                for known, new in both[:1] if isinstance(joint, Slider) else both:
-                    if owner(known) in poses and new.body in waiting:
-                        pose, place = poses[owner(known)], local(scene, known)
-                        return new.body, pose.position(place), pose.speed(place), local(scene, new)
-    raise InputError(f"initial.{waiting[0]}.position: say where {waiting[0]} starts; no joint point tells it")
-
-
-def _angles(scene: Scene) -> dict[str, tuple[float, float]]:
-    """Angle [rad] and rate [rad/s] of every body: the ground's, the scene's, or those a rigid neighbour passes on."""
-    found = {GROUND: (0.0, 0.0)}
-
-    def spread() -> None:
-        frontier = list(found)
-        while frontier:
-            here = frontier.pop()
-            for first, second, turn in _rigid_turns(scene):
-                for known, new, sign in ((first, second, 1), (second, first, -1)):
-                    if known == here and new not in found:
-                        angle = found[here][0] + sign * turn
-                        turns = np.round((scene.start(new).angle - angle) / (2 * np.pi))
-                        found[new] = (angle + 2 * np.pi * turns, found[here][1])
-                        frontier.append(new)
-
-    spread()
-    for name in (*scene.initial, *scene.bodies):
-        if name not in found:
-            found[name] = (scene.start(name).angle, scene.start(name).rate)
-            spread()
-    return found
-
-
-def _rigid_turns(scene: Scene) -> Iterator[tuple[str, str, float]]:
-    for joint in scene.joints.values():
-        turn = kept_turn(scene, joint)
-        if turn is not None and not isinstance(joint, Coupling):
-            names = joint.first.body, joint.second.body
-            if all(name == GROUND or scene.bodies[name].element == "rigid" for name in names):
-                yield (*names, turn)
+def _check_speeds(scene: Scene, poses: dict[str, Pose]) -> None:
+    """Raises InputError where a joint moves at once what only an elastic rod that gives way could follow."""
+    u = np.concatenate([[*poses[name].origin, poses[name].angle] for name in scene.bodies])[None]
+    v = np.concatenate([[*poses[name].velocity, poses[name].rate] for name in scene.bodies])
+    rows = Closure(scene, u).rows(u)
+    slip = np.abs(rows.slope[0] @ v + rows.rate[0])
+    for name, speed in zip(rows.names, slip, strict=True):
+        if speed > SLIP * max(1.0, span(scene, poses)):
+            raise InputError(f"joints.{name}: its places start at {speed:.3g} m/s apart; change a rate under initial")
 
 
 def extent(scene: Scene, body: str) -> float:
@@ -216,42 +169,3 @@ def span(scene: Scene, poses: dict[str, Pose]) -> float:
     used = (*joined, *loaded, *scene.markers.values())
     at = np.array([poses[owner(end)].position(local(scene, end)) for end in used])
     return max(size(scene), float(np.max(np.linalg.norm(at[:, None] - at[None], axis=-1)))) or 1.0
-
-
-def _check(scene: Scene, poses: dict[str, Pose]) -> None:
-    """Raises InputError where a joint does not hold at the start."""
-    metres = CLOSURE * max(1.0, span(scene, poses))
-    for name, joint in scene.joints.items():
-        if isinstance(joint, Coupling):
-            continue
-        first, second = (poses[owner(end)] for end in (joint.first, joint.second))
-        one, other = local(scene, joint.first), local(scene, joint.second)
-        apart = second.position(other) - first.position(one)
-        moving = second.speed(other) - first.speed(one)
-        if isinstance(joint, Slider):
-            line = Pose(np.zeros(2), first.angle + joint.direction, np.zeros(2), 0.0)
-            moving = moving - first.rate * normal(apart)
-            apart, moving = (np.array([normal(line.axis) @ part]) for part in (apart, moving))
-        elif isinstance(joint, Distance):
-            length = np.linalg.norm(apart)
-            moving = np.array([apart @ moving / max(float(length), 1e-300)])
-            held = length if joint.length is None else value(joint.length, 0.0)
-            apart = np.array([length - held])
-        elif not isinstance(joint, Revolute | Weld):
-            apart, moving = np.zeros(2), np.zeros(2)
-        gap, slip = float(np.linalg.norm(apart)), float(np.linalg.norm(moving))
-        if gap > metres:
-            raise InputError(f"joints.{name}: its places start {gap:.3g} m apart; change an angle under initial")
-        if slip > metres:
-            raise InputError(f"joints.{name}: its places start at {slip:.3g} m/s apart; change a rate under initial")
-        turn, rate = kept_turn(scene, joint), 0.0
-        if isinstance(joint, DrivenAngle):
-            turn, rate = value(joint.angle, 0.0), slope(joint.angle, 0.0)
-        if turn is not None:
-            ahead = second.angle + lead(scene, joint.second) - first.angle - lead(scene, joint.first)
-            off = abs(np.angle(np.exp(1j * (ahead - turn))))
-            faster = abs(second.rate - first.rate - rate)
-            if off > CLOSURE:
-                raise InputError(f"joints.{name}: starts {off:.3g} rad off; change an angle under initial")
-            if faster > CLOSURE:
-                raise InputError(f"joints.{name}: starts {faster:.3g} rad/s off; change a rate under initial")

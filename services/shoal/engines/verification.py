@@ -30,6 +30,8 @@ from shoal.trajectory import Array, Status, Trajectory, plain
 
 WRONG = 0.1
 """A run whose estimated error is beyond this fraction of the machine's scale is rejected."""
+WORTH = 0.01
+"""What the model leaves out is worth a warning beyond this fraction of the scale."""
 SPAN = 100.0
 """Factor between the tolerances of two adaptive runs; the error falls at least tenfold with it."""
 LOOSE = 1e-8
@@ -59,8 +61,8 @@ class Verification:
     """Estimated errors of a run at its markers [m], None where they were not estimated and `note` says why.
 
     time_error: against a more careful run of the same mesh; mesh_error: against twice as many elements;
-    left_out: what the rods' theory leaves out, friction: what dry friction smoothed over a tenth of the speed changes,
-    both None where there is nothing of the kind; scale: how far the markers get from the ground [m];
+    theory_error: what the rods' theory leaves out, friction_error: how far what should stick creeps, as dry friction is
+    smoothed, both None where there is nothing of the kind; scale: how far the markers get from the ground [m];
     rejected: why the more careful run is itself not to be trusted
     """
 
@@ -69,8 +71,8 @@ class Verification:
     scale: float
     note: str = ""
     rejected: str = ""
-    left_out: float | None = None
-    friction: float | None = None
+    theory_error: float | None = None
+    friction_error: float | None = None
 
     @property
     def complaint(self) -> str:
@@ -86,6 +88,16 @@ class Verification:
             return f"the mesh error is about {self.mesh_error:.2g} m: use more elements, or --tolerance to find them"
         return ""
 
+    @property
+    def warning(self) -> str:
+        """What a user must know of a run that is not rejected; empty if there is nothing."""
+        found = [self.note] if self.time_error is None and self.note else []
+        if (self.theory_error or 0.0) > WORTH * self.scale:
+            found.append(f"shear and rotary inertia that slender rods leave out are worth {self.theory_error:.2g} m")
+        if (self.friction_error or 0.0) > WORTH * self.scale:
+            found.append(f"what dry friction should hold creeps by {self.friction_error:.2g} m; lower coulomb_speed")
+        return "; ".join(found)
+
 
 def verified(engine: Engine, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
     """Run a scene and verify it; `model["verification"]` holds the estimates. Raises InputError."""
@@ -96,8 +108,7 @@ def verified(engine: Engine, scene: Scene, times: Sequence[float] | Array | None
     model = {**trajectory.model, "verification": dict(plain(asdict(verification)))}
     if verification.complaint:
         return replace(trajectory, model=model, status=(Status.FAILED,), message=verification.complaint)
-    unknown = verification.note if verification.time_error is None else ""
-    return replace(trajectory, model=model, message=unknown)
+    return replace(trajectory, model=model, message=verification.warning)
 
 
 def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -> Verification:
@@ -116,12 +127,10 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
     if any(_flexible(scene)):
         mesh_error, note = _mesh_error(trajectory, scene, scale, second)
         notes.append(note)
-    theory = left_out(trajectory, scene, native)
-    friction, note = _friction(trajectory, scene, second)
-    notes.append(note)
-    return Verification(
-        time_error, mesh_error, scale, "; ".join(note for note in notes if note), left_out=theory, friction=friction
-    )
+    friction_error, note = _friction_error(trajectory, scene, second)
+    told = "; ".join(note for note in [*notes, note] if note)
+    theory_error = left_out(trajectory, scene, native)
+    return Verification(time_error, mesh_error, scale, told, theory_error=theory_error, friction_error=friction_error)
 
 
 def _mesh_error(trajectory: Trajectory, scene: Scene, scale: float, second: Second) -> tuple[float | None, str]:
@@ -137,7 +146,7 @@ def _mesh_error(trajectory: Trajectory, scene: Scene, scale: float, second: Seco
     return mesh_error, ""
 
 
-def _friction(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[float | None, str]:
+def _friction_error(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[float | None, str]:
     """How far the markers are from where dry friction brings them that holds ten times better [m]: blocks creep."""
     rubbing = [
         name for name, joint in scene.joints.items() if isinstance(joint, Revolute | Slider) and joint.coulomb > 0

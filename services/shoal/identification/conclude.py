@@ -15,6 +15,7 @@ from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel, accepts
 from shoal.identification.judge import Judgement, few, judge
 from shoal.identification.methods import Outcome
+from shoal.identification.methods.lanes import Descent
 from shoal.identification.model_error import Corrections, ModelError, model_error, rms_of
 from shoal.identification.problem import RESERVED
 from shoal.identification.profiles import Profile, profiles
@@ -104,12 +105,14 @@ def conclude(
         message = "no parameter set could be simulated; look at the bounds and the scene"
         judgement = Judgement(Verdict.FAILED, message)
     if judgement.better is not None and rounds > 0:
-        better = _going_on(outcome, *judgement.better)
+        better = _moved(outcome, judgement.better)
         return conclude(searched, better, method, seed, wall, stages, wishes, rounds - 1)
     correlation = autocorrelation(seen.residual, blocks)
     draws = wishes.bootstrap if possible and looked else 0
     rng = np.random.default_rng(seed)
-    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, None if stages else mesh, tests))
+    # Away from the minimum the mesh is not what limits the fit.
+    limits = judgement.verdict is not Verdict.UNFINISHED and not stages
+    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, mesh if limits else None, tests))
     notes += (_slender(parameters, tests, theory),)
     return Estimate(
         problem=model.problem.name,
@@ -196,6 +199,15 @@ def _coarse(model: ForwardModel, mesh: float | None, tests: ResidualTests) -> st
     return f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted / 3:.1g} finds a better mesh"
 
 
+def _moved(outcome: Outcome, better: Descent) -> Outcome:
+    """The outcome at a better minimum; where it was is left as another one."""
+    choice = "; then ".join(part for part in (outcome.choice, "least squares from a refit for a suspect") if part)
+    minima = [(outcome.point, outcome.fitness), *outcome.minima]
+    message = "" if better.converged else "no convergence"
+    moved = replace(outcome, point=better.point, fitness=better.fitness, minima=minima, choice=choice)
+    return replace(moved, message=message, converged=better.converged)
+
+
 def _by_thing(model: ForwardModel, rows: Array | None) -> float | None:
     """Root mean square per observed thing."""
     return None if rows is None else float(np.sqrt(np.sum(rows**2) / model.samples / model.things))
@@ -206,8 +218,8 @@ def _slender(parameters: dict[str, Value], tests: ResidualTests, theory: float |
     limited = [n for n, v in parameters.items() if abs(v.theory or 0.0) > _NOTICED * (v.upper - v.lower) / 2]
     if theory is None or not limited:
         return ""
-    size = f"about {tests.sized(theory)} of the motion"
-    return f"shear and rotary inertia, which slender beams neglect, are {size} and widen the interval of {', '.join(limited)}"
+    change = f"change the motion by about {tests.sized(theory)} and widen the interval of {', '.join(limited)}"
+    return f"shear and rotary inertia, which slender beams neglect, {change}"
 
 
 def _better(profiled: dict[str, Profile]) -> str:
@@ -246,13 +258,6 @@ def _spanning(ends: list[dict[str, Value]]) -> dict[str, Value]:
     upper = {name: max(end[name].upper for end in ends) for name in first}
     return {name: replace(value, lower=lower[name], upper=upper[name]) for name, value in first.items()}
 
-
-def _going_on(outcome: Outcome, point: Array, fitness: float) -> Outcome:
-    """The outcome at a better minimum than its own, which is then one of the others."""
-    rows = [*outcome.iterations, (len(outcome.iterations), fitness, fitness)]
-    choice = f"{outcome.choice}; then on from a better minimum, met on the way to the cause of the misfit"
-    minima = [(outcome.point, outcome.fitness), *outcome.minima]
-    return replace(outcome, point=point, fitness=fitness, minima=minima, iterations=rows, choice=choice.lstrip("; "))
 
 
 def _covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:

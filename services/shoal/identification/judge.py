@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shoal.identification.deadline import unless_late
+from shoal.identification.deadline import TimeIsUp
 from shoal.identification.estimate import Value, Verdict
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods import Outcome
+from shoal.identification.methods.lanes import Descent
 from shoal.identification.residual_tests import ResidualTests
 from shoal.identification.rivals import relation, rivals_of, within
 from shoal.identification.sensitivity import Sensitivity
@@ -32,16 +33,16 @@ _FEWEST = 3
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict, why, what to do next, and the properties of the measurement that would explain a misfit.
+    """The verdict, why, what to do next, and what would explain a misfit.
 
-    better: a point (parameters,) that fits better, if one was met, and its fitness
+    better: a minimum that fits better, if the search for suspects met one: go on from there
     """
 
     verdict: Verdict
     message: str = ""
     advice: list[str] = field(default_factory=list)
     suspects: list[Suspect] = field(default_factory=list)
-    better: tuple[Array, float] | None = None
+    better: Descent | None = None
 
 
 def judge(
@@ -63,18 +64,14 @@ def judge(
     if unfinished := _unfinished(model, outcome.point, seen):
         advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
         return Judgement(Verdict.UNFINISHED, unfinished, advice)
-    found: list[Suspect] = []
+    looked = Findings()
     if (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal:
-        findings = unless_late(
-            lambda: suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained), Findings()
-        )
-        found = findings.suspects
-        if findings.better is not None:
-            place = findings.better
-            fitness = unless_late(lambda: float(model.cost(model.uncounted(place[None]))[0]), outcome.fitness)
-            reason = f"a better minimum was met, of fitness {fitness:.3g} instead of {outcome.fitness:.3g}"
-            advice = ["look for another minimum (--method multi-start)"]
-            return Judgement(Verdict.FAILED, reason, advice, found, (place, fitness))
+        looked = suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained)
+    if looked.better is not None:
+        reason = f"a better minimum was met, of fitness {looked.better.fitness:.3g} instead of {outcome.fitness:.3g}"
+        advice = ["look for another minimum (--method multi-start)"]
+        return Judgement(Verdict.FAILED, reason, advice, looked.suspects, looked.better)
+    found = looked.suspects
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
     if not outcome.converged:
@@ -95,7 +92,10 @@ def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
     if np.any(outside):
         names = ", ".join(name for name, out in zip(model.names, outside, strict=True) if out)
         return f"{names} ended outside the bounds of the search"
-    better = downhill(model, point, seen)
+    try:
+        better = downhill(model, point, seen)
+    except TimeIsUp:
+        return "no time was left to see whether the answer is a minimum"
     return "" if better is None else sentence(model, point, better)
 
 

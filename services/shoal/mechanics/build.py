@@ -48,9 +48,11 @@ _SPRING_RANGE = 100.0
 def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     """The same model with the initial state of a scene that differs in nothing else."""
     placement = place(scene)
+    scene = placement.scene
     return replace(
         model,
         scene=scene,
+        failed=placement.failed,
         lanes=lanes,
         q0=_stack(placement.positions),
         v0=_stack(placement.velocities),
@@ -64,6 +66,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     horizon [s]: functions of time are fitted up to it, and at least up to the end of the scene's duration.
     """
     placement = place(scene)
+    scene = placement.scene
     horizon = max(horizon, scene.solver.duration)
     rows = _Rows(len(placement.positions))
     masses = _Masses(scene, placement, rows)
@@ -77,7 +80,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     held = constraints.assemble(terms, rows.of, _stack, len(loads.fitted))
     for one in terms.held:
         if one.drive is not None:
-            with _naming(one.name):
+            stated = f"joints.{one.name}" if one.name in scene.joints else one.name.replace(GROUND, "ground_points", 1)
+            with _naming(stated):
                 fitting.require_no_jump(one.drive.function, horizon)
                 loads.fitted.append(fitting.fit(one.drive, horizon, one.drive.knots, steep=False))
     held_rows = rows.size
@@ -87,6 +91,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
         marker_rows.append([*rows.of(point), *rows.of(direction)])
     return Model(
         scene=scene,
+        failed=placement.failed,
+        frames=placement.frames,
         lanes=lanes,
         q0=_stack(placement.positions),
         v0=_stack(placement.velocities),

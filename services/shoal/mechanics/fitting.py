@@ -35,6 +35,9 @@ _NOTHING = 1e-13
 """Beside a root such as sqrt(t) at 0 no bound holds; there a piece may vary over its width by so much of the function's
 size times the range."""
 
+_BESIDE = 1e-6
+"""How near that is, as a fraction of the range."""
+
 _CANCELLED, _SHORT = 1e-14, 1 / 16
 """What is as good as this, relative to the function's size, is good enough for pieces as short as that."""
 
@@ -128,8 +131,7 @@ def _stretches(
         ]
         return found, pieces.edges[1:-1]
     edges = np.unique(np.array([begin, *(knot for knot in knots if begin < knot < horizon), horizon], dtype=float))
-    kinks = np.array([kink for kink in getattr(function, "kinks", knots) if begin < kink < horizon])
-    return [_Stretch(function, None, edges[:-1], edges[1:])], kinks
+    return [_Stretch(function, None, edges[:-1], edges[1:])], edges[1:-1]
 
 
 def _bisected(part: _Stretch, begin: float, horizon: float, scale: float, steep: bool) -> list[tuple[Array, Array]]:
@@ -152,11 +154,13 @@ def _bisected(part: _Stretch, begin: float, horizon: float, scale: float, steep:
         good = error <= tolerance
         rough = np.zeros_like(good)
         if node is not None:
-            good[good] = _bounds(node, lower[good], upper[good])[0] <= np.maximum(
-                _CERTAIN * scale, 4.0 * tolerance[good]
-            )
-            narrow = ~good & (width <= 1e-6 * whole) & steep
+            sampled, proven = good.copy(), np.maximum(_CERTAIN * scale, 4.0 * tolerance)
+            good[good] = _bounds(node, lower[good], upper[good])[0] <= proven[good]
+            # Beside a root nothing is proven but that what is left is little.
+            narrow = ~good & (width <= _BESIDE * whole)
             rough[narrow] = _bounds(node, lower[narrow], upper[narrow])[1] * width[narrow] <= _NOTHING * scale * whole
+            good |= rough & sampled
+            rough &= ~sampled & steep
         if lower.size >= _CROWD and not good.all():
             # A function that fails at most places in the shortest pieces that the bound allows will not be met.
             few = lower[~good][:: max(1, np.count_nonzero(~good) // _TRIED)]

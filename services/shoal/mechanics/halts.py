@@ -17,7 +17,9 @@ from shoal.mechanics.model import Model
 from shoal.mechanics.tile import Array, Index, Tile
 
 NARROW = 0.25
-"""Pieces narrower than this fraction of the longest step are not left to the step."""
+"""Pieces narrower than this fraction of the longest step are not left to a step that sees its error, ..."""
+PARTS = 8
+"""... and fixed steps pass pieces narrower than themselves in so many."""
 GRADED = 1.9
 """Neighbouring pieces whose widths differ by more than this factor lead to something narrow."""
 CROSSED = 0.5
@@ -54,20 +56,34 @@ def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
 
 
 def narrow(breaks: Array, longest: float, adaptive: bool) -> Array:
-    """Breaks beside narrow pieces: all of them for fixed steps; where widths change for those that see the error."""
+    """Places at narrow pieces: for steps that see their error where widths change, for fixed ones PARTS to a piece."""
     widths = np.diff(breaks)
+    if not adaptive:
+        chosen = np.flatnonzero(widths < longest)
+        inside = breaks[chosen, None] + widths[chosen, None] * np.linspace(0.0, 1.0, PARTS + 1)
+        return np.unique(np.concatenate([inside[:, 1:].ravel(), breaks[chosen]]))
     least, most = np.minimum(widths[1:], widths[:-1]), np.maximum(widths[1:], widths[:-1])
-    chosen = least < NARROW * longest
-    if adaptive:
-        chosen &= most > GRADED * least
-    return breaks[1:-1][chosen]
+    return breaks[1:-1][(least < NARROW * longest) & (most > GRADED * least)]
 
 
 def _marks(model: Model, number: int) -> Array:
-    """Places on the elongation between which a force law is smooth and of one width; none for no law."""
+    """Places on the elongation between which a force law is smooth and of one width; none for no law.
+
+    Pieces that get narrower towards a kink and the force with them, as those of max(t, 0)**1.5, are no places to stop.
+    """
     if number < 0:
         return np.zeros(0)
-    return np.union1d(model.kinks[number], narrow(model.breaks(number), np.inf, True))
+    breaks, kinks = model.breaks(number), model.kinks[number]
+    widths, sizes = np.diff(breaks), model.sizes(number)
+    fading = np.zeros(len(breaks), dtype=bool)
+    for kink in np.searchsorted(breaks, kinks):
+        for step, first in ((1, kink), (-1, kink - 1)):
+            k = first
+            while 0 <= k + step < len(widths) and widths[k + step] >= widths[k] and sizes[k + step] >= sizes[k]:
+                k += step
+                fading[k if step > 0 else k + 1] = True
+    chosen = narrow(breaks, np.inf, True)
+    return np.union1d(kinks, chosen[~fading[np.searchsorted(breaks, chosen)]])
 
 
 @njit(cache=True, error_model="numpy")

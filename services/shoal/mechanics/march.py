@@ -33,7 +33,8 @@ class Record(NamedTuple):
     [rad/s]; the rest: (lanes,).
 
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest kinetic + elastic energy [J];
-    drift: largest violation of a constraint; correction: largest change that made the start consistent.
+    drift: largest violation of a constraint; begin: coordinates and rates at the start, made consistent,
+    (2 * unknowns, lanes).
     Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
 
@@ -41,7 +42,7 @@ class Record(NamedTuple):
     energy_error: Array
     energy_scale: Array
     drift: Array
-    correction: Array
+    begin: Array
     steps: Array
     evaluations: Array
     reached: Array
@@ -81,18 +82,16 @@ def march(
         np.zeros(width),
         np.zeros(width),
         np.zeros(width),
-        np.zeros(width),
+        np.zeros(2 * end),
         np.zeros(width),
         np.zeros(width),
         np.zeros(width),
     )
     past = np.empty(3 * end)
     inside_q, inside_v = np.zeros(m.rows * width), np.zeros(m.rows * width)
-    for i in range(end):
-        past[i] = w.z[i]
     dynamics.settle(tile, m, w, 0.0, tolerance, ASSEMBLY)
     for i in range(end):
-        record.correction[i % width] = max(record.correction[i % width], abs(w.z[i] - past[i]))
+        record.begin[i], record.begin[end + i] = w.z[i], w.zdot[i]
     dynamics.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
 
     energy, start, dissipated = np.zeros(width), np.zeros(width), np.zeros(width)

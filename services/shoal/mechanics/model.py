@@ -24,6 +24,7 @@ from shoal.mechanics.elements.ancf_cable import AncfCables
 from shoal.mechanics.elements.ancf_full import AncfFull
 from shoal.mechanics.elements.beam import Beams
 from shoal.mechanics.forces import Forces
+from shoal.mechanics.frames import Frame
 from shoal.mechanics.functions import Functions
 from shoal.mechanics.saddle import Saddle
 from shoal.mechanics.tile import Array, Index, Tile, pack
@@ -144,10 +145,13 @@ class Model:
     q0, v0: initial coordinates and rates, (unknowns, lanes). Arrays of lane-dependent numbers are
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
     their turns from [rad], (forces, lanes) or (forces, 1). kinks: of every function, where it or a derivative jumps.
-    owners: for each family of elements the body of every element.
+    owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
+    (lanes,) or (1,). frames: how bodies hang on the coordinates.
     """
 
     scene: Scene
+    failed: Array
+    frames: dict[str, Frame]
     lanes: int
     q0: Array
     v0: Array
@@ -195,6 +199,12 @@ class Model:
         """Where the pieces of a function begin and end."""
         first, last = self.functions.start[number : number + 2]
         return self.functions.breaks[first + number : last + number + 1]
+
+    def sizes(self, number: int) -> Array:
+        """A bound on the size of a function on each of its pieces."""
+        first, last = self.functions.start[number : number + 2]
+        coefficients = self.functions.coefficients.reshape(self.functions.start[-1], -1)
+        return np.asarray(np.abs(coefficients[first:last]).sum(axis=1))
 
     @property
     def flexible(self) -> int:

@@ -29,6 +29,8 @@ from shoal.mechanics.groups import (
     place_of,
 )
 from shoal.mechanics.pose import Pose, as_complex, unit
+from shoal.mechanics.start import started
+from shoal.mechanics.tile import Array
 from shoal.scene import (
     GROUND,
     Attachment,
@@ -46,8 +48,13 @@ from shoal.scene import (
 
 @dataclass
 class Placement:
-    """All unknowns with their initial values, the frame of every body, and the constraints."""
+    """All unknowns with their initial values, the frame of every body, and the constraints.
 
+    scene: with the start that agrees with its joints. failed: lanes that have none, (lanes,) or (1,).
+    """
+
+    scene: Scene
+    failed: Array
     positions: list[Number] = field(default_factory=list)
     velocities: list[Number] = field(default_factory=list)
     frames: dict[str, Frame] = field(default_factory=dict)
@@ -94,7 +101,9 @@ class Placement:
 
 def place(scene: Scene) -> Placement:
     """Give every body its coordinates and initial state, and state what they must satisfy. Raises InputError."""
-    result = Placement()
+    stated = scene
+    scene, failed = started(scene)
+    result = Placement(scene, failed)
     points, turning = joint_points(scene), orientations(scene)
     for name, path in scene.ground_points.items():
         _place_driver(name, path.x, path.y, points, result)
@@ -104,7 +113,7 @@ def place(scene: Scene) -> Placement:
             touching[owner].append(point)
     waiting = list(scene.bodies)
     while waiting:
-        name = _next(scene, waiting, touching, result)
+        name = _next(stated, waiting, touching, result)
         waiting.remove(name)
         mine = touching[name]
         pose = _pose(scene, name, mine, turning, result)
@@ -156,7 +165,7 @@ def _next(scene: Scene, waiting: list[str], touching: dict[str, list[JointPoint]
         for name in waiting:
             if is_known(name):
                 return name
-    raise InputError(f"initial.{waiting[0]}.position: say where {waiting[0]} starts; no joint point tells it")
+    return waiting[0]
 
 
 def _rail(scene: Scene, name: str, result: Placement) -> tuple[Number, Number, Number] | None:
@@ -173,19 +182,8 @@ def _rail(scene: Scene, name: str, result: Placement) -> tuple[Number, Number, N
 def _pose(scene: Scene, name: str, mine: list[JointPoint], turning: Orientations, result: Placement) -> Pose:
     start = scene.start(name)
     root, relative = turning.root(name)
-    stated = [body for body in scene.bodies if turning.root(body)[0] == root and body in scene.initial]
-    leader = stated[0] if stated and name not in scene.initial else name
-    if root == GROUND and np.any(start.rate):
-        raise InputError(
-            f"initial.{name}.rate: joints keep {name} from turning, found {np.max(np.abs(start.rate)):g} rad/s"
-        )
-    rate = 0.0 if root == GROUND else scene.start(leader).rate
-    if root == GROUND:
-        direction = relative
-    elif leader == name:
-        direction = unit(start.angle)
-    else:
-        direction = unit(scene.start(leader).angle) * np.conj(turning.root(leader)[1]) * relative
+    rate = 0.0 if root == GROUND else start.rate
+    direction = relative if root == GROUND else unit(start.angle)
     known = [point for point in mine if point.where is not None]
     if known:
         assert known[0].where is not None

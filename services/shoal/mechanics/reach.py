@@ -34,6 +34,12 @@ def size(scene: Scene) -> float:
     return total
 
 
+def span(scene: Scene) -> float:
+    """All bodies stretched out in a line, or the distance between places on the ground if that is more [m]."""
+    sides = [side for joint in scene.joints.values() for side in places(joint) if side.body == GROUND]
+    return max(size(scene), *(math.dist(scene.location(a), scene.location(b)) for a in sides for b in sides), 0.0)
+
+
 def reach(scene: Scene, energy: Array) -> Array:
     """Reach of a machine [m] whose kinetic and elastic energy is at most `energy` [J], of its shape, (lanes,).
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import forces, stability, swarm_motion
+from shoal.mechanics import forces, stability, start, swarm_motion
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.build import build, with_start
 from shoal.mechanics.dynamics import derived_rows, work_space
@@ -21,6 +21,7 @@ from shoal.mechanics.integrators import Choice, choose, facts, halting, pick
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.march import SAMPLED, Record, march
 from shoal.mechanics.model import Model
+from shoal.mechanics.redundancy import redundant_joints
 from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import Array, pack, tiles, unpack
 from shoal.scene import Scene, Solver
@@ -102,7 +103,7 @@ def simulate(
         steps=int(np.max(record.steps)),
         wall_s=time.perf_counter() - begin,
         message=message,
-        model=_facts(scene, model, choice, record) | evidence,
+        model=_facts(scene, model, choice, record, not values) | evidence,
     )
 
 
@@ -157,7 +158,7 @@ def _model_and_choice(scene: Scene, values: Mapping[str, Array], lanes: int, end
 
     Where nothing moves (end [s] is 0) no step is limited.
     """
-    if all(path.startswith("initial.") for path in values):
+    if all(path.startswith("initial.") for path in values) and not (values and start.gives_numbers(scene)):
         key = _key(scene, end)
         model = _model(*key)
         choice = pick(scene.solver, model, lambda _, integrator: _limit(*key, integrator) if end > 0 else np.inf)
@@ -181,8 +182,8 @@ def _angles(scene: Scene, model: Model, directions: Array) -> Array:
     near = directions[:, :, 2]
     angle += 2 * np.pi * np.rint((near - angle) / (2 * np.pi))
     for index, marker in enumerate(scene.markers.values()):
-        start = start_angle(model.scene, marker)
-        angle[:, index] += 2 * np.pi * np.rint((start - np.angle(np.exp(1j * np.asarray(start)))) / (2 * np.pi))
+        begin = start_angle(model.scene, marker)
+        angle[:, index] += 2 * np.pi * np.rint((begin - np.angle(np.exp(1j * np.asarray(begin)))) / (2 * np.pi))
     return angle
 
 
@@ -193,7 +194,7 @@ def _relative(error: Array, scale: Array, scene: Scene, model: Model) -> Array:
     rods set the scale, as far as round-off goes.
     """
     stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
-    floor = 1e-9 * float(np.max(np.abs(model.weight), initial=0.0)) * reaches.size(scene) + 1e-12 * float(stiff)
+    floor = 1e-9 * float(np.max(np.abs(model.weight), initial=0.0)) * reaches.span(scene) + 1e-12 * float(stiff)
     relative: Array = error / np.maximum(scale, floor + 1e-300)
     return relative
 
@@ -207,9 +208,12 @@ def _verdict(
     adaptive = facts(choice.name).adaptive
     drift, steps, reached = record.drift[0], record.steps[0], record.reached[0]
     statuses, message = [], ""
+    failed = np.broadcast_to(model.failed, model.lanes)
     for lane in range(model.lanes):
         finite = np.isfinite(farthest[lane]) and np.isfinite(energy_drift[lane])
-        if not finite and np.isfinite(energy_drift[lane]) and adaptive and steps[lane] >= scene.solver.max_steps:
+        if failed[lane]:
+            status, reason = Status.FAILED, "no start agrees with the joints and with what is stated"
+        elif not finite and np.isfinite(energy_drift[lane]) and adaptive and steps[lane] >= scene.solver.max_steps:
             status = Status.FAILED
             reason = (
                 f"{steps[lane]:.0f} steps of {choice.name} led to {reached[lane]:.4g} s only; "
@@ -234,8 +238,22 @@ def _verdict(
     return tuple(statuses), message
 
 
-def _facts(scene: Scene, model: Model, choice: Choice, record: Record) -> dict[str, Any]:
-    """What was computed, for the record."""
+def _start(scene: Scene, model: Model, record: Record) -> dict[str, Any]:
+    """The start as it was used, what of it was stated otherwise, and joints whose forces are not unique."""
+    q, v = np.split(record.begin[:, 0], 2)
+    used = start.begun(model.frames, model.scene, q, v)
+    redundant = {"redundant_joints": list(_redundant(scene.model_dump_json()))}
+    return start.facts(scene, used, reaches.size(scene)) | redundant
+
+
+@lru_cache(maxsize=64)
+def _redundant(scene_json: str) -> tuple[str, ...]:
+    scene = Scene.model_validate_json(scene_json)
+    return () if start.is_direct(scene) else redundant_joints(start.complete(scene).scene)
+
+
+def _facts(scene: Scene, model: Model, choice: Choice, record: Record, plain: bool) -> dict[str, Any]:
+    """What was computed, for the record; plain: one scene without lanes."""
     return {
         "unknowns": model.unknowns,
         "elements": model.flexible,
@@ -245,7 +263,7 @@ def _facts(scene: Scene, model: Model, choice: Choice, record: Record) -> dict[s
         "step": scene.solver.step,
         "stability_limit": choice.limit if np.isfinite(choice.limit) else None,
         "evaluations": int(np.max(record.evaluations)),
-        "initial_correction": float(np.max(record.correction)),
+        **(_start(scene, model, record) if plain else {}),
         "bodies": {
             name: {"element": body.element, **({"elements": body.elements} if body.element != "rigid" else {})}
             for name, body in scene.bodies.items()

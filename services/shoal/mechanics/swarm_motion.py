@@ -211,9 +211,9 @@ def march(
     """March one lane from the state in `room`, as `march.march` does, with accelerations that a swarm finds.
 
     marker_rows: (markers, 4). stops: times that steps are cut short to end at [s]. The second result says what the
-    swarm did: evaluations of Gauss's function counted, accelerations sought, mean and worst `excess` of G above its true
-    minimum [kg m^2/s^4], mean and worst `error` of the acceleration relative to the true one, both measured in the mass
-    metric.
+    swarm did: evaluations of Gauss's function counted, accelerations sought, mean and worst `excess` of G above its
+    true minimum [kg m^2/s^4], mean and worst `error` of the acceleration relative to the true one, both measured in
+    the mass metric.
     """
     n, step, markers = arrays.unknowns, solver.step, len(marker_rows)
     q, v = room.z[:n], room.zdot[:n]
@@ -228,7 +228,7 @@ def march(
     sample = 0
     before = q.copy(), v.copy()
     _arrive(SINGLE, arrays, room, 0.0, solver.rank_tolerance, ASSEMBLY, gap, record.drift)
-    record.correction[0] = np.max(np.abs(q - before[0]), initial=0.0)
+    record = record._replace(begin=np.concatenate([q, v]))
     directions = marker_rows[:, 2], marker_rows[:, 3]
     turned = np.arctan2(room.z[directions[1]], room.z[directions[0]])
     instants = _instants(steps, step, float(times[-1]), stops)

@@ -13,13 +13,13 @@ def estimates(verification: Mapping[str, Any]) -> Iterator[str]:
         yield f"estimated error at the markers: {known}"
     if verification["note"]:
         yield verification["note"]
-    if verification["left_out"] is not None:
+    if verification.get("theory_error") is not None:
         yield (
             "left out by the theory of slender rods: shear and rotary inertia of the section, about "
-            f"{verification['left_out']:.1e} m (rotary_inertia: true counts it in rigid rods, ancf-full has both)"
+            f"{verification['theory_error']:.1e} m (rotary_inertia: true counts it in rigid rods, ancf-full has both)"
         )
-    if verification["friction"] is not None:
+    if verification.get("friction_error") is not None:
         yield (
             f"dry friction is smoothed below coulomb_speed, so that what should stick creeps: about "
-            f"{verification['friction']:.1e} m at the markers (proportional to coulomb_speed)"
+            f"{verification['friction_error']:.1e} m at the markers (proportional to coulomb_speed)"
         )

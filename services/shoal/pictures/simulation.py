@@ -16,6 +16,7 @@ from shoal.pictures.numbers import length
 from shoal.pictures.pages import animation, render, settings, software
 from shoal.pictures.paths import paths
 from shoal.pictures.poses import poses
+from shoal.pictures.start import remarks
 from shoal.pictures.titles import ends
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
@@ -41,7 +42,7 @@ def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None
         lead=_lead(trajectory, selection),
         motion=animation(moving, "The machine"),
         rows=[[name, *_end(trajectory, name)] for name in trajectory.markers],
-        remarks=_remarks(trajectory, selection),
+        remarks=remarks(trajectory.model) + _remarks(trajectory, selection),
         pictures=[one.embedded() for one in pictures],
         models=[] if selection is None else rows(selection),
         provenance=_provenance(trajectory, scene),
@@ -102,7 +103,11 @@ def _paths(scene: Scene, moving: Motion) -> Drawn:
 
 
 def _provenance(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
-    model = {name: value for name, value in trajectory.model.items() if name not in ("verification", "selection")}
+    model = {
+        name: value
+        for name, value in trajectory.model.items()
+        if not isinstance(value, dict | list) or name == "bodies"
+    }
     return [
         ("engine", trajectory.engine),
         ("model", settings(model)),

@@ -129,7 +129,9 @@ class Rod(Record):
         x, y = self.centre_of_mass
         total: float = sum(mass * abs(place - x - 1j * y) ** 2 for mass, place in self._pieces())
         if self.rotary_inertia:
-            total += sum(mass * height**2 / 12 for (mass, _), height in zip(self._pieces(), self._heights(), strict=True))
+            total += sum(
+                mass * height**2 / 12 for (mass, _), height in zip(self._pieces(), self._heights(), strict=True)
+            )
         return total
 
     @property

@@ -24,7 +24,7 @@ _MOST_INTERVALS = 2**17
 """Intervals looked at for one argument: a bound on time."""
 _MOST_SWITCHES = 20_000
 _ULP = 2.0**-52
-_NOWHERE = 2.0**-66
+_NOWHERE = 2.0**-100
 """Fraction of the range that is too short to be bisected further, beside the spacing of numbers."""
 
 

@@ -92,11 +92,6 @@ class Function(Record):
         """Times between which a table is one polynomial [s]; none for an expression."""
         return tuple(time for time, _ in self.table or ())
 
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """Those of the knots at which a table's slope jumps [s]: all of straight lines, the ends of a spline."""
-        return self.knots[:: len(self.knots) - 1] if self.smooth and self.table else self.knots
-
     def through(self, *operations: str) -> Composed:
         """Operations of `formula` on the function's value, in their order."""
         return Composed(self, operations)
@@ -152,11 +147,6 @@ class Composed:
     def knots(self) -> tuple[float, ...]:
         """As of `Function`."""
         return self.function.knots
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """As of `Function`."""
-        return self.function.kinks
 
     def __call__(self, t: Array) -> Array:
         """As of `Function`."""

@@ -144,3 +144,12 @@ def sides(joint: Joint) -> dict[str, Attachment]:
 def places(joint: Joint) -> tuple[Attachment, ...]:
     """The attachments of a joint."""
     return tuple(sides(joint).values())
+
+
+def turned(joint: Joint) -> dict[str, Attachment]:
+    """The attachments of whose bodies' directions a joint speaks, by the path of their field."""
+    if isinstance(joint, Parallel | Perpendicular | DrivenAngle) or (
+        isinstance(joint, Weld) and joint.angle is not None
+    ):
+        return {"first": joint.first, "second": joint.second}
+    return {"first": joint.first} if isinstance(joint, Slider) else {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -114,9 +115,15 @@ def read_named(name: str, folder: Traversable, what: str) -> Any:
     if path.suffix in (".yaml", ".yml"):
         return read_yaml(_text(path), name)
     if name not in names(folder):
-        known = ", ".join(names(folder))
-        raise InputError(f"{name}: no such {what}; give a .yaml file or one of {known}")
+        known = names(folder) if what != "scene" else scene_names()
+        raise InputError(f"{unknown(name, what, known)}; give a .yaml file or one of {', '.join(known)}")
     return read_yaml((folder / f"{name}.yaml").read_text(encoding="utf-8"), name)
+
+
+def unknown(name: str, what: str, known: list[str]) -> str:
+    """That there is no such thing, and which names are like it."""
+    near = list(dict.fromkeys(get_close_matches(name, known, 3) + [one for one in known if name and name in one][:3]))
+    return f"{name}: no such {what}" + (f" (did you mean {' or '.join(near)}?)" if near else "")
 
 
 def _text(path: Path) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -16,25 +16,45 @@ from shoal.scene import joints as joint_types
 from shoal.scene import loads as load_types
 from shoal.scene.bodies import Body
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
-from shoal.scene.loads import DistributedForce, Load
+from shoal.scene.loads import DistributedForce, Force, Load
 from shoal.scene.record import Angle, Record, Vector, one_line
 from shoal.scene.solver import Solver
 
 _FEW = 4
 """So many names are listed."""
+Quantity = Literal["angle", "rate", "position", "velocity"]
+POSES: tuple[Quantity, ...] = ("angle", "position")
+RATES: tuple[Quantity, ...] = ("rate", "velocity")
+_SHAPES = ("length", "curvature", "named_points")
+"""Fields of a body that place its joints."""
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
 
 
 class InitialState(Record):
     """Absolute angle [rad], counter-clockwise from +X, and rate [rad/s] of a body at time zero.
 
-    position [m] and velocity [m/s] of its frame's origin are for bodies that no joint places.
+    position [m] and velocity [m/s] are those of its frame's origin. What is None is not stated: it follows from what
+    is, and is zero where nothing tells it. guess: the quantities that may change where the joints demand it.
     """
 
-    angle: Angle = 0.0
-    rate: float = 0.0
+    angle: Angle | None = None
+    rate: float | None = None
     position: Vector | None = None
-    velocity: Vector = (0.0, 0.0)
+    velocity: Vector | None = None
+    guess: tuple[Quantity, ...] = ()
+
+    def stated(self, quantity: Quantity) -> bool:
+        """Whether the user gave this quantity a value."""
+        return getattr(self, quantity) is not None
+
+
+class Begin(NamedTuple):
+    """Initial state of one body with zeros for what is not stated; without a position, joints place it."""
+
+    angle: float
+    rate: float
+    position: Vector | None
+    velocity: Vector
 
 
 class Scene(Record):
@@ -82,6 +102,7 @@ class Scene(Record):
         for name in self.initial:
             if name not in self.bodies:
                 raise ValueError(f"initial.{name}: no such body; the bodies are {', '.join(self.bodies)}")
+        self._check_directions()
         placed = self._placed()
         loose = [name for name in self.bodies if name not in placed]
         if loose:
@@ -116,6 +137,26 @@ class Scene(Record):
                     f"use [s, 0] with 0 <= s <= {body.length:g}"
                 )
 
+    def _check_directions(self) -> None:
+        """A point mass has no direction: nothing can hold or turn it."""
+        points = {name for name, body in self.bodies.items() if body.kind == "point-mass"}
+        for name, joint in self.joints.items():
+            turned = joint_types.turned(joint)
+            for field in (field for field, side in turned.items() if side.body in points):
+                raise ValueError(
+                    f"joints.{name}.{field}: {turned[field].body} is a point mass, which has no direction that a "
+                    f"{joint.kind} joint could hold; use a rigid-body"
+                )
+        for name, load in self.loads.items():
+            if isinstance(load, Force) and load.follows and load.at.body in points:
+                raise ValueError(f"loads.{name}.follows: {load.at.body} is a point mass, which does not turn")
+        for name in points & self.initial.keys():
+            for field in ("angle", "rate"):
+                if value := getattr(self.initial[name], field):
+                    raise ValueError(
+                        f"initial.{name}.{field}: {name} is a point mass, which does not turn; found {value:g}"
+                    )
+
     def _placed(self) -> set[str]:
         """Bodies whose start the joints tell, from the ground or from a body that says its position."""
         joined: dict[str, set[str]] = {}
@@ -147,22 +188,32 @@ class Scene(Record):
             return self.bodies[attachment.body].points[attachment.point]
         return attachment.point
 
-    def start(self, body: str) -> InitialState:
+    def start(self, body: str) -> Begin:
         """Initial state of `body`; at angle zero and at rest where the scene says nothing."""
-        return self.initial.get(body, InitialState())
+        stated = self.initial.get(body, InitialState())
+        return Begin(
+            0.0 if stated.angle is None else stated.angle,
+            0.0 if stated.rate is None else stated.rate,
+            stated.position,
+            (0.0, 0.0) if stated.velocity is None else stated.velocity,
+        )
 
     def with_values(self, values: Mapping[str, Any]) -> Scene:
-        """This scene with fields replaced, by dotted path (`bodies.OA.length`). Raises InputError."""
-        data = self.model_dump(mode="json")
+        """This scene with fields replaced, by dotted path (`bodies.OA.length`). Raises InputError.
+
+        What is set last is kept: where a path moves the start or a joint, the other initial values become guesses.
+        """
+        fresh = [path for path, value in values.items() if not self._has(path, value)]
+        data = self._guessing(fresh).model_dump(mode="json")
         for path, value in values.items():
             place: Any = data
             *parents, leaf = path.split(".")
             for depth, part in enumerate(parents):
                 if parents[: depth + 1] == ["initial", part] and part in self.bodies:
-                    place.setdefault(part, {})
+                    place.setdefault(part, InitialState().model_dump(mode="json"))
+                if parents[:1] == ["initial"] and part == "velocity" and place.get(part) is None:
+                    place[part] = [0.0, 0.0]
                 place = place[_key(place, part, path, ".".join(parents[:depth]))]
-            if parents[:1] == ["initial"] and leaf in InitialState.model_fields:
-                place.setdefault(leaf, None)
             place[_key(place, leaf, path, ".".join(parents))] = value
         for name, body in self.bodies.items():
             said = {"bodies", f"bodies.{name}", f"bodies.{name}.element"} & set(values)
@@ -176,10 +227,34 @@ class Scene(Record):
         Every derived property broadcasts over the lanes. The extremes of each array are what
         `with_values` should have accepted first; `engines` does so.
         """
-        scene = self
+        scene = self._guessing(values)
         for path, lanes in values.items():
             scene = _replace(scene, path.split("."), np.asarray(lanes, dtype=float))
         return scene
+
+    def _has(self, path: str, value: Any) -> bool:
+        """Whether the scene states this value there already."""
+        head, *rest = path.split(".")
+        if head == "initial" and len(rest) > 1 and getattr(self.initial.get(rest[0]), rest[1], None) is None:
+            return False
+        try:
+            return bool(self.value(path) == value)
+        except InputError:
+            return False
+
+    def _guessing(self, paths: Iterable[str]) -> Scene:
+        """This scene with the initial values that `paths` leave alone as guesses, if a path moves the start."""
+        split = [path.split(".") for path in paths]
+        fresh = {(p[1], p[2]) for p in split if p[0] == "initial" and len(p) > 2}
+        moved = {quantity for _, quantity in fresh} | {POSES[0] for p in split if _places(p)}
+        loose = (*POSES, *RATES) if moved & {*POSES} else RATES if moved & {*RATES} else ()
+        if not loose:
+            return self
+        initial = {}
+        for name, start in self.initial.items():
+            guess = {*start.guess, *(q for q in loose if start.stated(q))} - {q for body, q in fresh if body == name}
+            initial[name] = start.model_copy(update={"guess": tuple(q for q in (*POSES, *RATES) if q in guess)})
+        return self.model_copy(update={"initial": initial})
 
     def value(self, path: str) -> Any:
         """The field at a dotted path. Raises InputError."""
@@ -189,7 +264,9 @@ class Scene(Record):
                 place = self.start(part)
             elif isinstance(place, Mapping) and part in place:
                 place = place[part]
-            elif isinstance(place, Record) and part in type(place).model_fields:
+            elif (isinstance(place, Begin) and part in Begin._fields) or (
+                isinstance(place, Record) and part in type(place).model_fields
+            ):
                 place = getattr(place, part)
             elif isinstance(place, tuple):
                 place = place[_key(place, part, path, "")]
@@ -212,6 +289,12 @@ def _counted(one: str, many: str, names: Mapping[str, Any]) -> str:
     return f"{len(names)} {one if len(names) == 1 else many}{listed}"
 
 
+def _places(path: list[str]) -> bool:
+    """Whether a field places joints."""
+    shape = path[0] == "bodies" and len(path) > 2 and path[2] in _SHAPES
+    return shape or path[0] in ("joints", "ground_points")
+
+
 def _replace(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any:
     head, *rest = path
     if isinstance(place, tuple):
@@ -219,7 +302,10 @@ def _replace(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any
     if isinstance(place, Mapping):
         inner = place.get(head, InitialState())
         return {**place, head: _replace(inner, rest, lanes)}
-    value = _replace(getattr(place, head), rest, lanes) if rest else lanes
+    inside = getattr(place, head)
+    if inside is None and head == "velocity":
+        inside = (0.0, 0.0)
+    value = _replace(inside, rest, lanes) if rest else lanes
     return place.model_copy(update={head: value})
 
 
@@ -235,6 +321,8 @@ def _key(place: Any, part: str, path: str, parent: str) -> Any:
 def _unknown(path: str, parent: str, place: Any) -> InputError:
     if isinstance(place, Record):
         place = type(place).model_fields
+    if isinstance(place, Begin):
+        place = InitialState.model_fields
     if isinstance(place, list | tuple):
         place = {str(k): entry for k, entry in enumerate(place)}
     known = ", ".join(place) if isinstance(place, Mapping) else "nothing below it"

@@ -17,7 +17,7 @@ from shoal_validation.nightly.result import Night, Result, Verdict
 NIGHTS = 7
 SLOWER, SLOWER_BY = 1.5, 5e-3
 """A line is slower beyond both this factor and so many seconds [s]."""
-LESS_ACCURATE, ROUND_OFF = 3.0, 1e-10
+LESS_ACCURATE = 3.0
 """A line is less accurate beyond this factor, if its error is above what round-off may do."""
 
 
@@ -78,7 +78,7 @@ def compare(line: Result, nights: Sequence[Night]) -> Result:
     line = replace(line, usual_error=usual_error, usual_seconds=usual_seconds)
     if line.verdict is not Verdict.PASSED:
         return line
-    if line.error and usual_error is not None and line.error > max(LESS_ACCURATE * usual_error, ROUND_OFF):
+    if line.error and usual_error is not None and line.error > max(LESS_ACCURATE * usual_error, line.noise):
         expected = f"about {usual_error:.1e} {line.unit}, the median of {len(errors)} nights"
         return replace(line, verdict=Verdict.LESS_ACCURATE, expected=expected)
     if line.seconds and usual_seconds and line.seconds > max(SLOWER * usual_seconds, usual_seconds + SLOWER_BY):

@@ -78,7 +78,7 @@ def _show(out: Console, night: Night, page: Path) -> None:
         refused = sum(line.verdict is Verdict.NOT_POSSIBLE for line in lines)
         longest = max((line.seconds or 0.0 for line in lines), default=0.0)
         counts = (str(count) if count else "" for count in (passed, refused, len(lines) - passed - refused))
-        table.add_row(problem, *counts, f"{max(parts):.2g}" if parts else "", time_text(longest))
+        table.add_row(problem, *counts, f"{max(parts):.3g}" if parts else "", time_text(longest))
     out.print(table)
     out.print(headline(night))
     out.print(f"page: {page}", soft_wrap=True)

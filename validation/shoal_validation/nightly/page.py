@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from shoal_validation.nightly.chart import trend
 from shoal_validation.nightly.history import NIGHTS, track
-from shoal_validation.nightly.result import Night, Result, Verdict
+from shoal_validation.nightly.result import Night, Result, Verdict, apart
 from shoal_validation.problems import PROBLEMS
 
 SHOWN = 60
@@ -62,10 +62,11 @@ def _group(name: str, night: Night, nights: Sequence[Night]) -> dict[str, Any]:
 
 
 def _line(line: Result, nights: Sequence[Night]) -> dict[str, Any]:
+    digits = apart(line.error, line.limit)
     return {
         "result": line,
-        "error": _number(line.error, line.unit),
-        "limit": _number(line.limit, line.unit),
+        "error": _number(line.error, line.unit, digits),
+        "limit": _number(line.limit, line.unit, digits),
         "usual_error": _number(line.usual_error, line.unit),
         "time": time_text(line.seconds) if line.verdict is not Verdict.NOT_POSSIBLE else "",
         "usual_time": time_text(line.usual_seconds) if line.verdict is not Verdict.NOT_POSSIBLE else "",
@@ -95,8 +96,8 @@ def _past(night: Night) -> dict[str, Any]:
     return {"night": night, "file": f"night-{night.started.replace(':', '')}.json"}
 
 
-def _number(value: float | None, unit: str) -> str:
-    return "" if value is None else f"{value:.1e} {unit}"
+def _number(value: float | None, unit: str, digits: int = 1) -> str:
+    return "" if value is None else f"{value:.{digits}e} {unit}"
 
 
 def time_text(seconds: float | None) -> str:

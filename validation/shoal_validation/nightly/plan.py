@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from shoal.errors import InputError
 
 from shoal_validation.nightly.measure import Measured, angles, motion, selection
 from shoal_validation.nightly.methods import FLEXIBLE, RIGID, Method
+from shoal_validation.nightly.result import ROUND_OFF
 from shoal_validation.problems import PROBLEMS
 
 IDENTIFICATION = {
@@ -27,7 +28,8 @@ class Line:
     """One line of the plan.
 
     limit: largest error in `unit`, None where no answer is expected; reason: why; run: what the worker process calls;
-    source: the reference, None for that of the problem of this name; quick: whether a quick night has it
+    source: the reference, None for that of the problem of this name; quick: whether a quick night has it;
+    noise: error below which a larger one than usual is no loss of accuracy
     """
 
     problem: str
@@ -39,6 +41,7 @@ class Line:
     source: str | None = None
     unit: str = "m"
     quick: bool = True
+    noise: float = ROUND_OFF
 
     def reference(self) -> str:
         """Who says what is right."""
@@ -59,9 +62,9 @@ def _motions() -> Iterator[Line]:
         for method in FLEXIBLE if problem.flexible else RIGID:
             if name in method.limits:
                 limit = method.limits[name]
-                yield Line(
-                    name, method.engine, method.name, limit, method.reason, _call(name, method), quick=method.quick
-                )
+                run, noise = _call(name, method), (limit or ROUND_OFF) if method.by_theory else ROUND_OFF
+                line = Line(name, method.engine, method.name, limit, method.reason, run, noise=noise)
+                yield replace(line, quick=method.quick)
 
 
 def _call(problem: str, method: Method) -> Callable[[], Measured]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -12,6 +13,8 @@ from shoal.trajectory import plain
 
 SCHEMA = "shoal-night"
 VERSION = 1
+ROUND_OFF = 1e-10
+"""Errors below this are noise."""
 
 
 class Verdict(StrEnum):
@@ -34,7 +37,8 @@ class Result:
     """One line of a night.
 
     expected, found: in words; error, limit: in `unit`, None where there is none; seconds: median of whole calls;
-    reason: why this limit; usual_error, usual_seconds: medians of the nights before, None on the first one.
+    reason: why this limit; noise: error below which more than usual is no loss; usual_error, usual_seconds: medians of
+    the nights before, None on the first one.
     """
 
     problem: str
@@ -49,6 +53,7 @@ class Result:
     status: str
     verdict: Verdict
     reason: str
+    noise: float = ROUND_OFF
     usual_error: float | None = None
     usual_seconds: float | None = None
 
@@ -103,3 +108,10 @@ class Night:
             return cls(**{name: data[name] for name in known}, lines=lines)
         except (KeyError, TypeError) as error:
             raise ValueError(f"a night with other fields: {error}") from None
+
+
+def apart(found: float | None, allowed: float | None) -> int:
+    """Decimals of a mantissa that show the difference of two unlike numbers."""
+    if found is None or allowed is None or not math.isfinite(found):
+        return 1
+    return next((digits for digits in range(1, 16) if f"{found:.{digits}e}" != f"{allowed:.{digits}e}"), 16)

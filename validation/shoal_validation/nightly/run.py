@@ -15,7 +15,7 @@ from shoal.versions import versions
 from shoal_validation.nightly.history import compare
 from shoal_validation.nightly.measure import Measured
 from shoal_validation.nightly.plan import Line
-from shoal_validation.nightly.result import Night, Result, Verdict
+from shoal_validation.nightly.result import Night, Result, Verdict, apart
 from shoal_validation.nightly.worker import Worker
 
 TIMEOUT = 300.0
@@ -56,6 +56,7 @@ def run(
 def judged(line: Line, measured: Measured) -> Result:
     """A line against its own limit."""
     answered = measured.status == Status.OK
+    digits = apart(measured.error, line.limit)
     if line.limit is None:
         verdict = Verdict.FAILED if answered else Verdict.NOT_POSSIBLE
         if measured.status in ("crashed", "timeout"):
@@ -63,13 +64,13 @@ def judged(line: Line, measured: Measured) -> Result:
         expected = f"no answer: {line.reason}"
     else:
         verdict = Verdict.PASSED if answered and measured.error <= line.limit else Verdict.FAILED
-        expected = f"at most {line.limit:.1e} {line.unit} from {line.reference()}"
+        expected = f"at most {line.limit:.{digits}e} {line.unit} from {line.reference()}"
     return Result(
         problem=line.problem,
         engine=line.engine,
         method=line.method,
         expected=expected,
-        found=_words(line, measured),
+        found=_words(line, measured, digits),
         error=_number(measured.error),
         limit=line.limit,
         unit=line.unit,
@@ -77,6 +78,7 @@ def judged(line: Line, measured: Measured) -> Result:
         status=measured.status,
         verdict=verdict,
         reason=line.reason,
+        noise=line.noise,
     )
 
 
@@ -85,10 +87,10 @@ def machine() -> str:
     return f"{processor()}, {os.cpu_count()} cores"
 
 
-def _words(line: Line, measured: Measured) -> str:
+def _words(line: Line, measured: Measured, digits: int) -> str:
     if measured.status != Status.OK:
         return f"{measured.status}: {measured.message}" if measured.message else measured.status
-    return f"{measured.error:.1e} {line.unit} in {measured.seconds * 1e3:.3g} ms"
+    return f"{measured.error:.{digits}e} {line.unit} in {measured.seconds * 1e3:.3g} ms"
 
 
 def _seconds(result: Result) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import descend_many
+from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.starts import starting_points
 from shoal.identification.suspects.candidate import Candidate, extended, with_parameters
@@ -49,10 +49,10 @@ _FAR = 3.0
 
 @dataclass(frozen=True)
 class Findings:
-    """The suspects, those that explain most first; better: a point of the model itself that fits better, if met."""
+    """The suspects, those that explain most first; better: a minimum of the model itself that fits better, if met."""
 
     suspects: list[Suspect] = field(default_factory=list)
-    better: Array | None = None
+    better: Descent | None = None
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class _Search:
         self.inverse = (right[seen].T / singular[seen]) @ left[:, seen].T
         self.found: list[Suspect] = []
         self.ends: list[tuple[float, Array]] = []
-        self.better: Array | None = None
+        self.better: Descent | None = None
 
     def run(self) -> None:
         """Candidates near the answer, other readings, candidates far from it; then whether a better minimum was met."""
@@ -176,7 +176,7 @@ class _Search:
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
-        begun: list[tuple[float, int, Reading, Array]] = []
+        begun = []
         for reading in of_data(self.model):
             starts = starting_points(reading.model)
             costs = reading.model.cost(reading.model.uncounted(starts))
@@ -197,7 +197,7 @@ class _Search:
         ends = descend_many(self.model, np.array(promising), patience=_PATIENCE)
         best = min(ends, key=lambda end: end.fitness)
         if misfit(best.residual) < _BETTER * self.before:
-            self.better = best.point
+            self.better = best
 
 
 def _of_reading(reading: Reading, before: float, after: float, unit: str) -> Suspect:

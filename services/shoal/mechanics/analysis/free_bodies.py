@@ -67,7 +67,7 @@ def _without_joints(scene: Scene, placement: Placement) -> Scene:
     """The scene with every body flying free from where the joints placed it."""
     initial = {}
     for name in scene.bodies:
-        pose, start = placement.poses[name], scene.start(name)
+        pose, start = placement.poses[name], placement.scene.start(name)
         angle = start.angle + float(np.angle(pose.direction * np.exp(-1j * start.angle)))
         where, speed = complex(pose.position), complex(pose.velocity)
         initial[name] = InitialState.model_construct(

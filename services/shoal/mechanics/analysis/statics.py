@@ -132,8 +132,9 @@ class _Search:
     """One search for an equilibrium."""
 
     def __init__(self, scene: Scene, evaluator: Evaluator, time: float) -> None:
-        self.scene, self.evaluator, self.time = scene, evaluator, time
         self.placement = place(scene)
+        scene = self.placement.scene
+        self.scene, self.evaluator, self.time = scene, evaluator, time
         unknowns = evaluator.model.unknowns
         self.directions = points(_directions(self.placement), unknowns)
         self.marker_points = points([self.placement.point(scene, at) for at in scene.markers.values()], unknowns)
