@@ -112,8 +112,8 @@ def conclude(
     rng = np.random.default_rng(seed)
     # Away from the minimum the mesh is not what limits the fit.
     limits = judgement.verdict is not Verdict.UNFINISHED and not stages
-    notes = (judgement.message or outcome.message, _better(profiled), _coarse(model, mesh if limits else None, tests))
-    notes += (_slender(parameters, tests, theory),)
+    coarse = _coarse(model, mesh if limits else None, tests)
+    notes = (judgement.message or outcome.message, _better(profiled), coarse, _slender(parameters, tests, theory))
     return Estimate(
         problem=model.problem.name,
         method=method,
@@ -257,7 +257,6 @@ def _spanning(ends: list[dict[str, Value]]) -> dict[str, Value]:
     lower = {name: min(end[name].lower for end in ends) for name in first}
     upper = {name: max(end[name].upper for end in ends) for name in first}
     return {name: replace(value, lower=lower[name], upper=upper[name]) for name, value in first.items()}
-
 
 
 def _covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:

@@ -18,10 +18,10 @@ Run = Callable[[Scene, Array], Trajectory]
 
 _OVER, _GRACE = 0.1, 1.0
 """Of the limit, and seconds: what the answer may take beyond it once the search was stopped."""
-_PROBE, _TOLD = 1.0 / 256.0, 0.02
-"""Of a record, simulated first to see its pace; and how long [s] such a run takes to tell it."""
-_STEPS = 1000
-"""Of an adaptive integrator, that any run may take."""
+_PROBE, _LONGEST, _SHARE = 1.0 / 256.0, 0.25, 0.25
+"""Of a record, simulated first to see its pace; at most; and of the time left, what a longer probe may take."""
+_STEPS, _MORE = 1000, 4.0
+"""Of an adaptive integrator, that any run may take; and times those by the pace of the runs before."""
 
 
 class TimeIsUp(Exception):  # noqa: N818 - an end that is expected, not an error
@@ -47,7 +47,7 @@ class Deadline:
         self.cost = 0.0
         self._end = time.monotonic() + limit
         self._extended = False
-        self._paces: dict[object, tuple[float, float]] = {}
+        self._paces: dict[object, tuple[float, float, float]] = {}
 
     @property
     def remaining(self) -> float:
@@ -80,31 +80,40 @@ class Deadline:
         end = float(times[-1])
         if end <= 0.0:
             return run(scene, times)
-        part = _PROBE
-        while kind not in self._paces and part < 0.5:
-            begin = time.monotonic()
-            probe = run(scene, times[-1:] * part)
-            if (spent := time.monotonic() - begin) > _TOLD:
-                self._learn(kind, spent, part * end, probe)
-            part *= 4
-            self.check()
-        if kind in self._paces:
-            pace, each = self._paces[kind]
-            self.cost = max(self.cost, pace * end)
-            if pace * end > self.remaining:
-                raise TimeIsUp
-            # Other values of the parameters may need shorter steps.
-            most = int(self.remaining / each) + _STEPS
-            if most < scene.solver.max_steps:
-                scene = scene.model_copy(update={"solver": scene.solver.model_copy(update={"max_steps": most})})
+        if kind not in self._paces:
+            self._probe(kind, scene, times, run)
+        pace, each, taken = self._paces[kind]
+        self.cost = max(self.cost, pace * end)
+        if pace * end > self.remaining:
+            raise TimeIsUp
+        # Other values of the parameters may need shorter steps.
+        most = int(max(self.remaining / each, _MORE * taken * end)) + _STEPS
+        if most < scene.solver.max_steps:
+            scene = scene.model_copy(update={"solver": scene.solver.model_copy(update={"max_steps": most})})
         begin = time.monotonic()
         found = run(scene, times)
         self._learn(kind, time.monotonic() - begin, end, found)
         return found
 
+    def _probe(self, kind: object, scene: Scene, times: Array, run: Run) -> None:
+        """See the pace by the beginning of a record, a longer one while what every run costs may be most of it."""
+        part = _PROBE
+        while True:
+            begin = time.monotonic()
+            found = run(scene, times[-1:] * part)
+            spent = time.monotonic() - begin
+            self._paces.pop(kind, None)
+            self._learn(kind, spent, part * float(times[-1]), found)
+            if spent / part <= self.remaining or part >= _LONGEST or 4 * spent > _SHARE * self.remaining:
+                return
+            part *= 4
+
     def _learn(self, kind: object, spent: float, simulated: float, found: Trajectory) -> None:
-        """Note seconds for a simulated second, and for a step."""
-        self._paces[kind] = (spent / simulated, max(spent / max(found.steps, 1), 1e-9))
+        """Note seconds for a simulated second and for a step, and steps a second; a single slow run counts for half."""
+        pace, each, taken = spent / simulated, max(spent / max(found.steps, 1), 1e-9), found.steps / simulated
+        before = self._paces.get(kind, (pace, each, taken))
+        halfway = (min(pace, (pace + before[0]) / 2), min(each, (each + before[1]) / 2))
+        self._paces[kind] = (*halfway, max(taken, before[2]))
 
 
 def unless_late(function: Callable[[], T], otherwise: T) -> T:

@@ -117,9 +117,10 @@ def _fault(kind: str, scene: Scene, seen: list[tuple[str, str]], size: Size, rng
             density = scene.value(f"bodies.{body}.density") * _ratio(rng, 1.2, 1.8)
             return _Fault({f"bodies.{body}.density": float(density)}, f"mass of {body}")
         case "pivot" if scene.name == "four-bar":
-            axis = int(rng.integers(2))
-            place = scene.value(f"joints.C.first.point.{axis}") + _signed(rng, 0.01, 0.05)
-            return _Fault({f"joints.C.first.point.{axis}": float(place)}, f"{'xy'[axis]} of the pivot C")
+            number = int(rng.integers(2))
+            path = f"joints.C.first.point.{number}"
+            place = float(scene.value(path) + _signed(rng, 0.01, 0.05))
+            return _Fault({path: place}, f"{'xy'[number]} of the pivot C")
         case "bending":
             rod = scene.bodies[body]
             sag = float(rng.uniform(0.005, 0.03))

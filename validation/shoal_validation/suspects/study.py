@@ -76,7 +76,7 @@ def summary(trials: list[Trial]) -> tuple[tuple[str, ...], list[tuple[str, ...]]
     wrong = [t for t in trials if t.kind != "right"]
     right = [t for t in trials if t.kind == "right"]
     head = ("fault", "models", "rejected", "misfit seen", "named first", "named instead")
-    rows = []
+    rows = list[tuple[str, ...]]()
     for kind in sorted({t.kind for t in wrong}):
         mine = [t for t in wrong if t.kind == kind]
         instead = Counter(t.named[0] if t.named else "nothing" for t in mine if t.noticed and not t.first)

@@ -94,7 +94,7 @@ def _scaled(quantities: set[str], factor: float) -> Callable[[Recording], Record
 
 def _exchanged(run: Recording) -> Recording:
     """With x and y of each marker that has both exchanged."""
-    order = {(channel.marker, channel.quantity): k for k, channel in enumerate(run.channels)}
+    order: dict[tuple[str, str], int] = {(c.marker, c.quantity): k for k, c in enumerate(run.channels)}
     other = {"x": "y", "y": "x"}
     columns: list[int] = [
         order.get((channel.marker, other.get(channel.quantity, "")), k) for k, channel in enumerate(run.channels)

@@ -81,10 +81,10 @@ def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
     for name, body in scene.bodies.items():
         if isinstance(body, RigidBody) and body.inertia > 0:
             yield _ratio(f"inertia of {name}", f"bodies.{name}.inertia", body.inertia)
-            for axis, place in enumerate(body.centre_of_mass):
-                if place:
+            for axis, where in enumerate(body.centre_of_mass):
+                if where:
                     path = f"bodies.{name}.centre_of_mass.{axis}"
-                    yield _ratio(f"centre of mass of {name}", path, place)
+                    yield _ratio(f"centre of mass of {name}", path, where)
 
 
 def _lengths(scene: Scene) -> Iterator[Candidate]:

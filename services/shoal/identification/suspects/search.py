@@ -176,7 +176,7 @@ class _Search:
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
-        begun = []
+        begun: list[tuple[float, int, Reading, Array]] = []
         for reading in of_data(self.model):
             starts = starting_points(reading.model)
             costs = reading.model.cost(reading.model.uncounted(starts))
