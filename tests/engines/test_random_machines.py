@@ -5,6 +5,7 @@ Judged by Exudyn on the same mesh at a step ten times shorter.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ def machine(seed: int) -> Scene:
     drive = rng.choice(["none", "point", "angle"], p=[0.5, 0.25, 0.25])
     base: dict[str, Any] = {"body": "ground", "point": "P" if drive == "point" else [0.0, 0.0]}
     joints: dict[str, Any] = {"O": {"first": base, "second": _at("a", "start")}}
-    for one, other in zip(names, names[1:], strict=False):
+    for one, other in pairwise(names):
         end = "end" if loop and other == "c" else "start"
         joints[f"{one}{other}"] = {"first": _at(one, "end"), "second": _at(other, end)}
     initial: dict[str, Any] = {name: {"angle": float(rng.uniform(-3, 3))} for name in names}

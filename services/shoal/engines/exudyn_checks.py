@@ -42,7 +42,7 @@ def judge(machine: Machine, record: Record, failure: str) -> Verdict:
     # Motion that is prescribed feeds energy through constraints, which is not followed: there is no such check.
     drift = float("nan") if machine.driven else _energy_drift(machine, record, rows, energy, moving)
     status, message = Status.OK, ""
-    furthest = float(reach(machine.scene, np.max(moving)))
+    furthest = float(reach(machine.scene, np.asarray(np.max(moving))))
     far = float(np.max(distance_to_ground(machine.scene, points[..., None])))
     tolerance = machine.scene.solver.energy_tolerance
     if failure:

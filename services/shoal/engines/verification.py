@@ -5,7 +5,8 @@ digit in time, a coarse mesh of a thin rod locks. So the run is held against the
 another tolerance, if its integrator is adaptive), the usual treatment of constraints and singular positions, and then
 against twice as many elements. A second run that fails says nothing about the first: others are made until one can be
 believed. What the stated model leaves out is told beside, as it is no error of the run: shear and rotary inertia of
-slender rods, and the sticking of dry friction that is smoothed. A service of the native solver makes these runs too; those of other engines' are local.
+slender rods, and the sticking of dry friction that is smoothed. A service of the native solver makes these runs too;
+those of other engines' are local.
 """
 
 from __future__ import annotations

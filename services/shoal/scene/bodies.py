@@ -35,8 +35,8 @@ class Rod(Record):
     rod has. `rotary_inertia`: whether a rigid rod has that of its height; the paper's has not, nor
     have cables and quintic elements, while ancf-full always has. `quadrature` of a cable is `full`
     (Gauss, 5 points axial and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points
-    bending). `law` is that of ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature of the unstrained axis over
-    its arc length. `end_height`, `end_width`: the section at the far end of a tapered rod (each
+    bending). `law` is that of ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature of
+    the unstrained axis over its arc length. `end_height`, `end_width`: the section at the far end of a tapered rod (each
     element has the section of its middle). `retardation` [s]: Kelvin-Voigt damping, stress
     E (strain + retardation * strain rate).
     """
@@ -125,7 +125,7 @@ class Rod(Record):
 
     @property
     def inertia(self) -> float:
-        """Moment of inertia about the centre of mass [kg m^2]; of the slender rod, unless `rotary_inertia` says more."""
+        """Moment of inertia about the centre of mass [kg m^2], of a slender rod unless `rotary_inertia` says more."""
         x, y = self.centre_of_mass
         total: float = sum(mass * abs(place - x - 1j * y) ** 2 for mass, place in self._pieces())
         if self.rotary_inertia:

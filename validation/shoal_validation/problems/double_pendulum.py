@@ -14,7 +14,7 @@ from shoal_validation.problems.one_angle import TOLERANCE, G
 def settle(times: Array) -> Reference:
     """Tip of the scene `rigid-double-pendulum` from Lagrange's equations in two absolute angles."""
     scene = load_scene("rigid-double-pendulum")
-    start = (scene.initial["OA"].angle, scene.initial["AB"].angle)
+    start = (scene.value("initial.OA.angle"), scene.value("initial.AB.angle"))
     return Reference(lagrange(start, times)[1], "Lagrange's equations in two angles, scipy DOP853", 1e-9)
 
 
