@@ -35,9 +35,9 @@ class Rod(Record):
     rod has. `rotary_inertia`: whether a rigid rod has that of its height; the paper's has not, nor
     have cables and quintic elements, while ancf-full always has. `quadrature` of a cable is `full`
     (Gauss, 5 points axial and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points
-    bending). `law` is that of ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature of
-    the unstrained axis over its arc length. `end_height`, `end_width`: the section at the far end of a tapered rod (each
-    element has the section of its middle). `retardation` [s]: Kelvin-Voigt damping, stress
+    bending). `law` is that of ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature
+    of the unstrained axis over its arc length. `end_height`, `end_width`: the section at the far end of
+    a tapered rod (each element has the section of its middle). `retardation` [s]: Kelvin-Voigt damping, stress
     E (strain + retardation * strain rate).
     """
 
