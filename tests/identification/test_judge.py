@@ -120,6 +120,7 @@ def test_steps_of_the_digits_alone_are_no_wrong_model() -> None:
         assert judged(None, np.round(exact, digits) - exact).verdict is Verdict.IDENTIFIED
 
 
+@pytest.mark.slow
 def test_what_explains_no_more_than_a_constant_is_rejected() -> None:
     stated = problem(None)
     measurement = recorded(stated, np.zeros((150, 2)))

@@ -82,6 +82,7 @@ def test_a_late_start() -> None:
     assert named["delay"].value == pytest.approx(0.1, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_release_after_the_recording_began() -> None:
     """The machine is held for 0.3 s."""
     times = np.arange(1, 181) / 100
@@ -107,6 +108,7 @@ def test_a_heavier_rod() -> None:
         assert named[name].value == pytest.approx(density, rel=2e-2)
 
 
+@pytest.mark.slow
 def test_millimetres() -> None:
     named = found(1e3 * TIP, TIMES)
     assert next(iter(named)) == "unit of the positions"
