@@ -40,7 +40,7 @@ def _mixed(friction: float = 0.0) -> Scene:
         "name": "mixed",
         "bodies": {
             "C": rod | {"length": 1.0, "element": "ancf-cable", "elements": 2},
-            "R": rod | {"length": 0.8},
+            "R": rod | {"length": 0.8, "element": "rigid"},
             "D": rod | {"length": 0.7, "element": "ancf-cable", "elements": 2, "quadrature": "reduced"},
             "W": {"kind": "rigid-body", "mass": 0.5, "inertia": 0.02, "centre_of_mass": [0.1, 0.05]},
         },

@@ -41,7 +41,7 @@ def every_joint(friction=0.2):
             "bodies": {
                 "A": CABLE,
                 "B": {**CABLE, "length": 1.5, "elements": 3, "youngs_modulus": 2e7},
-                "C": ROD,
+                "C": {**ROD, "element": "rigid"},
                 "D": {"kind": "rigid-body", "mass": 2.0, "inertia": 0.1, "centre_of_mass": [0.2, 0.1]},
             },
             "joints": {
@@ -188,7 +188,7 @@ def test_closed_loop_moves_as_a_parallelogram():
 
 
 def test_open_loop_is_bad_input_and_a_refused_lane():
-    with pytest.raises(InputError, match=r"joints\.R: its places start 0\.\d+ m apart"):
+    with pytest.raises(InputError, match=r"initial\.c\.angle: 1\.1 rad contradicts initial\.a\.angle = 1: joint R"):
         ExudynEngine().simulate(four_bar(c=1.1))
     lanes = ExudynEngine().simulate_many(four_bar(), {"initial.c.angle": np.array([1.0, 1.1])})
     assert lanes.status == (Status.OK, Status.REFUSED)
@@ -295,7 +295,7 @@ def test_numerical_damping_and_drift_are_caught():
     assert ExudynEngine().simulate(coarse).status == (Status.DRIFTED,)
 
 
-@pytest.mark.parametrize(("shift", "status"), [(10.0, Status.OUT_OF_REACH), (np.nan, Status.DIVERGED)])
+@pytest.mark.parametrize(("shift", "status"), [(100.0, Status.OUT_OF_REACH), (np.nan, Status.DIVERGED)])
 def test_success_with_nonsense_is_not_believed(shift, status):
     machine = build(library(), load_scene("flexible-double-pendulum"), "ancf-cable")
     record = Record(choose_steps(np.array([0.0]), 1e-3, machine.unknowns), machine.reference)

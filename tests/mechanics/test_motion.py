@@ -109,7 +109,7 @@ def test_four_bar_linkage_against_multipliers(uniform_rods: Rods) -> None:
         {
             "name": "four-bar",
             "bodies": {
-                name: ROD | {"length": length}
+                name: ROD | {"length": length, "element": "rigid"}
                 for name, length in zip(("crank", "coupler", "rocker"), lengths, strict=True)
             },
             "joints": {
@@ -212,7 +212,7 @@ def _mixed(name: str, friction: float) -> Scene:
     weight = {"kind": "rigid-body", "mass": 0.5, "inertia": 0.02, "centre_of_mass": [0.1, 0.05]}
     ground = ("ground", [0.3, -0.2])
     rod_then_cable = (
-        {"R": ROD | {"length": 0.8}, "C": cable | {"length": 1.0}},
+        {"R": ROD | {"length": 0.8, "element": "rigid"}, "C": cable | {"length": 1.0}},
         {"O": _joint(ground, ("R", "start"), friction), "A": _joint(("R", "end"), ("C", "start"), friction)},
         {"R": {"body": "R", "point": [0.4, 0.0]}, "C": {"body": "C", "point": "end"}},
     )
@@ -224,7 +224,7 @@ def _mixed(name: str, friction: float) -> Scene:
     branched = (
         {
             "C": cable | {"length": 1.0},
-            "R": ROD | {"length": 0.8},
+            "R": ROD | {"length": 0.8, "element": "rigid"},
             "D": cable | {"length": 0.8, "quadrature": "reduced"},
             "W": weight,
         },

@@ -25,7 +25,7 @@ from shoal.mechanics.redundancy import redundant_joints
 from shoal.mechanics.tangent import ready
 from shoal.mechanics.tile import Array, pack, tiles, unpack
 from shoal.scene import Scene, Solver
-from shoal.trajectory import Status, Trajectory
+from shoal.trajectory import Status, Trajectory, plain
 
 DRIFT_TOLERANCE = 1e-6
 STEP_MARGIN = 0.95
@@ -243,7 +243,7 @@ def _start(scene: Scene, model: Model, record: Record) -> dict[str, Any]:
     q, v = np.split(record.begin[:, 0], 2)
     used = start.begun(model.frames, model.scene, q, v)
     redundant = {"redundant_joints": list(_redundant(scene.model_dump_json()))}
-    return start.facts(scene, used, reaches.size(scene)) | redundant
+    return dict(plain(start.facts(scene, used, reaches.size(scene)) | redundant))
 
 
 @lru_cache(maxsize=64)
@@ -252,8 +252,8 @@ def _redundant(scene_json: str) -> tuple[str, ...]:
     return () if start.is_direct(scene) else redundant_joints(start.complete(scene).scene)
 
 
-def _facts(scene: Scene, model: Model, choice: Choice, record: Record, plain: bool) -> dict[str, Any]:
-    """What was computed, for the record; plain: one scene without lanes."""
+def _facts(scene: Scene, model: Model, choice: Choice, record: Record, single: bool) -> dict[str, Any]:
+    """What was computed, for the record; single: one scene without lanes."""
     return {
         "unknowns": model.unknowns,
         "elements": model.flexible,
@@ -263,7 +263,7 @@ def _facts(scene: Scene, model: Model, choice: Choice, record: Record, plain: bo
         "step": scene.solver.step,
         "stability_limit": choice.limit if np.isfinite(choice.limit) else None,
         "evaluations": int(np.max(record.evaluations)),
-        **(_start(scene, model, record) if plain else {}),
+        **(_start(scene, model, record) if single else {}),
         "bodies": {
             name: {"element": body.element, **({"elements": body.elements} if body.element != "rigid" else {})}
             for name, body in scene.bodies.items()
