@@ -214,7 +214,7 @@ MISTAKES = {
     f"sweep {PENDULUM} --vary initial.OA.angle=0:1": "such as initial.OA.angle=0:1.5:31",
     f"reactions {PENDULUM}": "--at",
     "design paper-case-1 --noise 1e-3 --rate 0": "rate: needed, and positive",
-    "scenes missing": "there are andrews-squeezer",
+    "scenes missing": "missing: no such scene or problem; see `shoal scenes`",
 }
 
 

@@ -18,8 +18,8 @@ from shoal.scene.joints import places
 
 MARGIN = 1.1
 """A run is rejected beyond so many times the reach, which bending and the samples of the energy round off."""
-BREAKS = 10.0
-"""No rod stretches by so many times its length: rubber breaks before."""
+BREAKS = 5.0
+"""No rod stretches by more than so many times its length: rubber breaks there."""
 TETHERS = Revolute | Weld
 
 
