@@ -106,6 +106,7 @@ def test_servers_are_as_quiet_as_on_a_desk(tmp_path: Path) -> None:
 def test_the_server_keeps_the_same_and_as_long_as_on_a_desk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Who holds the slot of the nights is written to a folder that outlives the server, as its database does."""
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
+    monkeypatch.delenv("PREFECT_HOME", raising=False)
     desk, stated = up._environment({}), SERVICES["prefect"]["environment"]
     for name in ("PREFECT_SERVER_CONCURRENCY_LEASE_STORAGE", "PREFECT_SERVER_SERVICES_DB_VACUUM_ENABLED"):
         assert stated[name] == desk[name]
@@ -118,6 +119,7 @@ def test_what_goes_wrong_in_a_server_is_printed(monkeypatch: pytest.MonkeyPatch,
     """A background service of Prefect logs its failures as errors, to the console alone."""
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
     name = "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL"
+    monkeypatch.delenv(name, raising=False)
     assert up._environment({})[name] == "ERROR"
     assert all(name not in service.get("environment", {}) for service in SERVICES.values())
 

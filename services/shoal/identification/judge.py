@@ -121,7 +121,10 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
 
 def _against(tests: ResidualTests) -> str:
     if tests.explains_nothing:
-        return f"no less than from a constant: the data vary by {tests.sized(tests.signal)}"
+        spread = f"the data vary by {tests.sized(tests.signal)}"
+        return f"hardly less than a constant: {spread}" + (
+            "" if tests.noise_stated else " (state the noise if it is so large)"
+        )
     if tests.noise_stated:
         kind = "which is like white noise" if tests.white else "which is not white noise"
         return f"{tests.ratio:.2g} times the noise of {tests.sized(tests.noise)}, {kind}"
@@ -155,7 +158,7 @@ def _identifiable(
         known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"
         notes.append(f"the motion is chaotic, or its steps coarse: the intervals {known}")
         advice.append("shorten the motion, or tighten the solver's tolerances")
-    if tests.limited and tests.size > _NEGLIGIBLE * tests.signal:
+    if tests.limited and tests.size > _NEGLIGIBLE * tests.signal > 0.0:
         share = 100 * tests.excess / tests.signal
         size = f"{tests.sized(tests.excess)} ({share:.2g} % of the signal)"
         notes.append(f"a systematic residual of {size} widens the intervals: the model, not the noise, limits them")

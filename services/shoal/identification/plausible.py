@@ -112,7 +112,8 @@ def check_constant(model: ForwardModel) -> None:
     for name, recording in model.measurement.recordings.items():
         seen_often = np.isfinite(recording.values).sum(axis=0) >= _FEWEST
         still = [k for k in np.flatnonzero(seen_often) if _spread(recording.values[:, k]) <= _STILL]
-        if not still:
+        # A machine that rests shows in all channels; that a single one stands still tells no rest.
+        if not still or 1 < len(still) == len(seen_often):
             continue
         seen = model.observe(model.parameters.start[None], name)[0]
         for k in still:

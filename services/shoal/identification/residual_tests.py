@@ -26,6 +26,8 @@ _NO_FIT = 0.05
 """Of the signal: a systematic residual above this is a wrong model, one below it an imperfect one."""
 _HARDLY = 0.3
 """Of the signal: a residual above this that is not white is none of a right model, whatever the noise may be."""
+_MOSTLY = 0.5
+"""Of the signal: a residual above this may be noise, but nobody said so."""
 _OUTLIER = 5.0
 _DIGITS = 1e-12
 """Of the data: no deviation below is held against a model, as a motion is computed to this tolerance by default."""
@@ -94,15 +96,17 @@ class ResidualTests:
 
     @property
     def explains_nothing(self) -> bool:
-        """Whether a constant would fit as well."""
-        return self.size >= self.signal > 0.0 and not (self.noise_stated and not self.too_large)
+        """Whether a constant would fit as well, or hardly worse where nobody said that the noise is so large."""
+        if self.noise_stated:
+            return self.too_large and self.size >= self.signal > 0.0
+        return self.size >= _MOSTLY * self.signal > 0.0
 
     @property
     def wrong_model(self) -> bool:
         """Whether the model is refuted: against a stated noise, against a good part of the signal, or a constant."""
         if self.noise_stated:
             return self.systematic or self.explains_nothing
-        hardly = not self.white and self.size > _HARDLY * self.signal
+        hardly = not self.white and self.ratio > 1.0 and self.size > _HARDLY * self.signal
         return hardly or self.explains_nothing or (self.systematic and self.size > _NO_FIT * self.signal)
 
     def sized(self, size: float) -> str:

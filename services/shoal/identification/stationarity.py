@@ -25,6 +25,8 @@ _KEPT = 0.1
 """Of the gain that the linear model promises, what has to come true."""
 _NOTHING = 1e-6
 """Of the spread of the data: no step that changes the motion by less is held against an answer."""
+_DIGITS = 1e-12
+"""Of the largest number in the data: what a machine at rest, whose data do not spread, leaves of its motion."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,9 @@ def downhill(model: ForwardModel, point: Array, seen: Sensitivity) -> Downhill |
     as they are. The model is run along the step: a promise of derivatives that does not come true is none.
     """
     step = _step(model, point, seen)
-    if np.sqrt(np.mean((seen.jacobian @ step) ** 2)) < _NOTHING * model.spread:
+    largest = max(float(np.nanmax(np.abs(r.values))) for r in model.measurement.recordings.values())
+    nothing = max(_NOTHING * model.spread, _DIGITS * largest * float(np.max(model.rows.weight)))
+    if np.sqrt(np.mean((seen.jacobian @ step) ** 2)) < nothing:
         return None
     low, high = _reach(model, point)
     places = np.clip(point + _PARTS[:, None] * step, low, high)

@@ -19,7 +19,7 @@ def _spinning_arm() -> Scene:
     return Scene.parse(
         {
             "name": "arm",
-            "bodies": {"rod": rod | {"element": "ancf-cable", "elements": 2}, "bar": rod},
+            "bodies": {"rod": rod | {"element": "ancf-cable", "elements": 2}, "bar": rod | {"element": "rigid"}},
             "joints": {
                 "O": {"first": GROUND, "second": {"body": "rod"}},
                 "A": {"first": {"body": "rod", "point": "end"}, "second": {"body": "bar"}},

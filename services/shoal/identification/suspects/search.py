@@ -104,7 +104,7 @@ class _Search:
         ]
         self._fit(self._scored(candidates), _FITTED)
         gross = _GROSS * self.model.spread
-        if min([self.before, *(suspect.after for suspect in self.found)]) > gross:
+        if gross > 0.0 and min([self.before, *(suspect.after for suspect in self.found)]) > gross:
             self._read()
         # What lies near an answer that leaves little shows in the regression.
         if not self.found and self.before > gross:
@@ -178,6 +178,8 @@ class _Search:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
         begun: list[tuple[float, int, Reading, Array]] = []
         for reading in of_data(self.model):
+            if reading.model.spread == 0.0:  # at rest every reading is the same
+                continue
             starts = starting_points(reading.model)
             costs = reading.model.cost(reading.model.uncounted(starts))
             begun.append(
