@@ -187,6 +187,7 @@ def test_a_night_that_was_broken_off_does_not_block_the_next(tmp_path: Path) -> 
     assert len(list((tmp_path / "validation").glob("night-*.json"))) == 2
 
 
+@pytest.mark.slow
 @installed
 def test_a_study_outlives_postgresql(undisturbed: Mapping[str, Fit], monkeypatch: pytest.MonkeyPatch) -> None:
     """kill -9 of all its processes in the middle: it is started again, and Prefect and MLflow find it."""

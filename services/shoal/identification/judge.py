@@ -121,10 +121,9 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
 
 def _against(tests: ResidualTests) -> str:
     if tests.explains_nothing:
-        spread = f"the data vary by {tests.sized(tests.signal)}"
-        return f"hardly less than a constant: {spread}" + (
-            "" if tests.noise_stated else " (state the noise if it is so large)"
-        )
+        less = "no less" if tests.size >= tests.signal else "hardly less"
+        advice = "" if tests.noise_stated else " (state the noise if it is so large)"
+        return f"{less} than a constant: the data vary by {tests.sized(tests.signal)}{advice}"
     if tests.noise_stated:
         kind = "which is like white noise" if tests.white else "which is not white noise"
         return f"{tests.ratio:.2g} times the noise of {tests.sized(tests.noise)}, {kind}"
