@@ -45,10 +45,12 @@ def with_mirror_images(model: ForwardModel, outcome: Outcome) -> Outcome:
     good = [k for k in np.argsort(values, kind="stable") if left[k] < _FITS * model.spread][:_FOLLOWED]
     if not good:
         return outcome
-    known = [outcome.point, *(point for point, _ in outcome.minima)]
+    *descents, own = descend_many(looking, np.vstack([points[good], outcome.point]))
+    # What a descent from the answer itself reaches is no image of it: there the method has not ended.
+    known = [outcome.point, own.point, *(point for point, _ in outcome.minima)]
     ends = [
         descent
-        for descent in descend_many(looking, points[good])
+        for descent in descents
         if np.isfinite(descent.fitness) and all(apart(model, descent.point, other) for other in known)
     ]
     minima = [*outcome.minima, *((descent.point, descent.fitness) for descent in ends)]
