@@ -99,7 +99,7 @@ def demo_tables(console: Console, result: DemoResult) -> None:
     for case, study in result.studies.items():
         for fit in study.fits:
             if not fit.estimate.verdict.trusted:
-                console.print(f"{case}, {fit.cell.method}: {fit.estimate.message}", soft_wrap=True)
+                console.print(f"{case}, {fit.cell.method}: {fit.estimate.verdict}: {fit.estimate.message}", soft_wrap=True)
     console.print(_paper_table(result))
     _differences(console, list(result.comparisons.values()))
     for doubt in result.doubts():

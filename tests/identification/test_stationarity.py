@@ -135,7 +135,7 @@ def test_the_verdict_says_so_and_names_the_way_down() -> None:
         estimate = conclude(model, outcome, "afsa", 0, 0.0, [], NOTHING)
         assert estimate.verdict is verdict, estimate.message
     assert estimate.status == "failed"
-    assert estimate.message.startswith("not at a minimum: one Gauss-Newton step lowers the fitness from ")
+    assert estimate.message.startswith("one Gauss-Newton step lowers the fitness from ")
     assert estimate.advice
 
 

@@ -70,7 +70,7 @@ def sentence(model: ForwardModel, point: Array, better: Downhill) -> str:
     moved = int(np.argmax(np.abs(better.point - point) / model.sizes(point)))
     old, new = (model.parameters.to_values(place)[moved] for place in (point, better.point))
     return (
-        f"not at a minimum: one Gauss-Newton step lowers the fitness from {better.before:.3g} to {better.fitness:.3g} "
+        f"one Gauss-Newton step lowers the fitness from {better.before:.3g} to {better.fitness:.3g} "
         f"and takes {model.names[moved]} from {old:.6g} to {new:.6g}"
     )
 
