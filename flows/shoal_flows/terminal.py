@@ -98,8 +98,9 @@ def demo_tables(console: Console, result: DemoResult) -> None:
     console.print(table)
     for case, study in result.studies.items():
         for fit in study.fits:
-            if not fit.estimate.verdict.trusted:
-                console.print(f"{case}, {fit.cell.method}: {fit.estimate.verdict}: {fit.estimate.message}", soft_wrap=True)
+            e = fit.estimate
+            if not e.verdict.trusted:
+                console.print(f"{case}, {fit.cell.method}: {e.verdict}: {e.message}", soft_wrap=True)
     console.print(_paper_table(result))
     _differences(console, list(result.comparisons.values()))
     for doubt in result.doubts():
