@@ -63,7 +63,7 @@ def scatter(candidate: Candidate) -> Array:
         model = ForwardModel(stated, scene, get_engine("gauss"), measurement)
         descent = descend(model, model.parameters.to_vector(np.array(list(TRUTH.values()))), lambda *_: None)
         assert descent.converged
-        found.append(descent.point)
+        found.append(model.parameters.to_values(descent.point))
     return np.std(found, axis=0, ddof=1)
 
 

@@ -77,7 +77,13 @@ def test_a_prior_is_information() -> None:
         "name": "prior",
         "scene": "single-pendulum",
         "parameters": {
-            "m": {"path": "bodies.OA.mass", "lower": 0.1, "upper": 10.0, "prior": {"mean": 1.0, "std": 0.02}},
+            "m": {
+                "path": "bodies.OA.mass",
+                "lower": 0.1,
+                "upper": 10.0,
+                "scale": "linear",
+                "prior": {"mean": 1.0, "std": 0.02},
+            },
         },
         "channels": [{"marker": "A", "quantity": "x", "column": "x"}],
         "noise": 1e-3,
