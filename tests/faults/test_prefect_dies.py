@@ -47,6 +47,7 @@ def figures(study: Any) -> list[Any]:
 
 
 @pytest.mark.usefixtures("nothing_kept")
+@pytest.mark.slow
 def test_a_study_outlives_its_server() -> None:
     """kill -9: another takes its place, and knows of the whole study; the figures are those of an undisturbed one."""
     undisturbed = run.run_flow("identify", STUDY)
