@@ -29,15 +29,15 @@ def paper_rows(case: str, same: Study, study: Study) -> list[list[str]]:
 
 
 def method_rows(study: Study) -> list[list[str]]:
-    """Every method: angles, errors, fitness, RMS, evaluations, time, whether the interval holds, verdict."""
+    """Every method: verdict, angles, errors, fitness, RMS, evaluations, time, whether the interval holds."""
     rows = []
     for fit in study.fits:
         e = fit.estimate
         angles = [f"{np.degrees(value.value):.4f}" for value in e.parameters.values()]
         numbers = [power(e.fitness), length(e.rms), f"{e.evaluations}", f"{e.wall_s:.1f}"]
         off = [degrees(error) for error in errors(fit).values()]
-        rows.append([fit.cell.method, *angles, *off, *numbers, "yes" if covered(fit) else "no", str(e.verdict)])
-    return [*rows, *([name, *[""] * 9, f"failed: {reason}"] for name, reason in study.failures.items())]
+        rows.append([fit.cell.method, str(e.verdict), *angles, *off, *numbers, "yes" if covered(fit) else "no"])
+    return [*rows, *([name, f"failed: {reason}", *[""] * 9] for name, reason in study.failures.items())]
 
 
 def mesh_rows(study: Study) -> list[list[str]]:
