@@ -22,7 +22,7 @@ from shoal.errors import ComputationError
 
 from shoal_flows import events, settings
 
-_PATIENCE = 120.0
+_PATIENCE = 300.0
 _started: list[_Kept] = []
 
 

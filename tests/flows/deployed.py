@@ -27,7 +27,7 @@ def call(address: str, data: dict[str, Any] | None = None) -> Any:
     """What a server answers; one that has too much to do (503) is asked again, as Prefect's own client does."""
     body = None if data is None else json.dumps(data).encode()
     request = Request(address, body, {"Content-Type": "application/json"})
-    for pause in (0.5, 1, 2, 4, 0):
+    for pause in (0.5, 1, 2, 4, 8, 16, 0):
         try:
             with urlopen(request, timeout=30) as answer:
                 return json.load(answer)
