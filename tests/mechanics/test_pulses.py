@@ -22,13 +22,13 @@ EXACT = ("dop853", "radau5")
 
 
 def pushed(scale: Any, duration: float = 1.0, integrator: str = "auto", **solver: Any) -> Scene:
-    """A free mass of 2 kg under a force of 1 MN times a function of time."""
+    """A free mass of 2 kg under a force of 1 N times a function of time."""
     return Scene.parse(
         {
             "name": "pushed",
             "gravity": [0.0, 0.0],
             "bodies": {"m": {"kind": "point-mass", "mass": 2.0}},
-            "loads": {"F": {"kind": "force", "at": {"body": "m"}, "force": [1e6, 0.0], "scale": scale}},
+            "loads": {"F": {"kind": "force", "at": {"body": "m"}, "force": [1.0, 0.0], "scale": scale}},
             "markers": {"m": {"body": "m"}},
             "initial": {"m": {"position": [0.0, 0.0]}},
             "solver": {"duration": duration, "samples": 10, "integrator": integrator, **solver},
@@ -46,7 +46,7 @@ def run(scene: Scene) -> Trajectory:
 
 def impulse(scene: Scene) -> float:
     """Of the function alone [s]."""
-    return float(2e-6 * run(scene).velocities[-1, 0, 0, 0])
+    return float(2.0 * run(scene).velocities[-1, 0, 0, 0])
 
 
 def integral(function: Any, places: list[float]) -> float:
@@ -99,8 +99,10 @@ def pulse(draw: np.random.Generator, *, plain: bool) -> tuple[str, float, float]
 
 def error(integrator: str, draw: np.random.Generator, *, plain: bool) -> float:
     text, duration, expected = pulse(draw, plain=plain)
-    allowed = 1e-2 if integrator in EXACT else 1.0
-    scene = pushed(text, duration, integrator, step=duration / 1000, energy_tolerance=allowed)
+    # Symplectic Euler knows its power to the first order of the step only, of which a pulse may have eight.
+    allowed = 0.2 if integrator == "semi-implicit-euler" else 1e-2
+    settings = {"step": duration / 1000, "energy_tolerance": allowed, "absolute_tolerance": 1e-18}
+    scene = pushed(text, duration, integrator, **settings)
     return abs(impulse(scene) / expected - 1)
 
 
@@ -148,7 +150,7 @@ def test_brothers(integrator: str, scale: Any, duration: float, expected: float)
     smooth = {"exp": 1e-9 if exact else 1e-4, "1/(": 1e-4, "sqr": 1e-3}.get(str(scale)[:3], 1e-9)
     if integrator == "implicit-gauss":  # of first order, and its energy falls
         smooth = {"exp": 0.1, "1/(": 0.1, "sqr": 1e-2}.get(str(scale)[:3], 0.6 if isinstance(scale, dict) else 1e-9)
-    allowed = 1.0 if integrator == "implicit-gauss" else 1e-2
+    allowed = 1e-2
     found = impulse(pushed(scale, duration, integrator, step=duration / 1000, energy_tolerance=allowed))
     assert found == pytest.approx(expected, rel=smooth)
 
@@ -156,7 +158,7 @@ def test_brothers(integrator: str, scale: Any, duration: float, expected: float)
 def test_a_position_is_known_at_a_jump() -> None:
     trajectory = run(pushed("step(t - 0.5)"))
     times = trajectory.times
-    np.testing.assert_allclose(trajectory.points[:, 0, 0, 0], 1e6 * np.maximum(times - 0.5, 0) ** 2 / 4, atol=1e-6)
+    np.testing.assert_allclose(trajectory.points[:, 0, 0, 0], np.maximum(times - 0.5, 0) ** 2 / 4, atol=1e-12)
 
 
 @pytest.mark.parametrize(

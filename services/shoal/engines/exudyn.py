@@ -16,6 +16,7 @@ from shoal.engines.exudyn_build import Beam, Machine, build, library
 from shoal.engines.exudyn_checks import judge
 from shoal.engines.exudyn_record import Record, Steps, choose_steps
 from shoal.errors import InputError
+from shoal.mechanics.halts import CROSSED
 from shoal.mechanics.start import facts
 from shoal.scene import Rod, Scene
 from shoal.trajectory import Array, Status, Trajectory
@@ -23,6 +24,8 @@ from shoal.trajectory import Array, Status, Trajectory
 WEAK = "; generalized-alpha is only weakly stable at solver.spectral_radius 1, use 0.9"
 DENSE_LIMIT = 60
 """Unknowns beyond which the sparse linear solver is the faster one."""
+MOST = 1e5
+"""Most steps that a run takes because of narrow parts of a force law."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +70,14 @@ class ExudynEngine:
         machine = build(exu, scene, self.beam, float(wanted[-1]))
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
         record = Record(steps, machine.reference)
-        verdict = judge(machine, record, self._run(exu, machine, record))
+        failure = self._run(exu, machine, record)
+        if (much := _too_far(machine, record)) > 1.0:
+            # As the native solver does, but with all steps.
+            shorter = scene.solver.step / 2 ** np.ceil(np.log2(much))
+            if wanted[-1] <= MOST * shorter:
+                return self.simulate(scene.with_values({"solver.step": float(shorter)}), wanted)
+            failure = f"exudyn: a step leaps over a narrow part of an elastic law; solver.step needs {shorter:.3g} s"
+        verdict = judge(machine, record, failure)
         weak = self._damped(scene) and scene.solver.spectral_radius == 1.0 and verdict.message
         return Trajectory(
             engine=self.name,
@@ -204,6 +214,13 @@ def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
         message=next((f"lane {lane}: {run.message}" for lane, run in enumerate(runs) if not run.ok), ""),
         model=next((run.model for run in runs if run.model), {}),
     )
+
+
+def _too_far(machine: Machine, record: Record) -> float:
+    """How many times too far the steps went across narrow parts of force laws."""
+    kept = record.steps.kept
+    one_step = (np.diff(kept) == 1) & np.isfinite(record.q[1:]).all(axis=1)
+    return float(np.max(machine.crossed(record.q, record.v)[one_step], initial=0.0)) / CROSSED
 
 
 @contextmanager

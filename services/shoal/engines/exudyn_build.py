@@ -18,8 +18,9 @@ from shoal.engines.exudyn_ground import GroundPart, add_moving_point
 from shoal.engines.exudyn_joints import Gap, add_friction, add_joint
 from shoal.engines.exudyn_loads import add_load
 from shoal.engines.exudyn_record import Indices
-from shoal.engines.poses import initial_poses, span
+from shoal.engines.poses import initial_poses
 from shoal.errors import InputError
+from shoal.mechanics.reach import span
 from shoal.mechanics.start import complete
 from shoal.scene import GROUND, DrivenAngle, Rod, Scene
 from shoal.trajectory import Array
@@ -50,7 +51,7 @@ class Machine:
     exchanges: list[Exchange]
     """Springs, friction and applied loads."""
     span: float
-    """Size of the machine at the start [m]."""
+    """Size of the machine [m]."""
     reference: Array
     """Coordinates [m or rad] of the undeformed start, from which Exudyn counts, (unknowns,)."""
 
@@ -82,6 +83,11 @@ class Machine:
         moving = moving + sum((exchange.stored(t, q, v)[rows] for exchange in self.exchanges), np.zeros(len(rows)))
         height = np.sum([share.moment for share in shares], axis=0) @ np.array(self.scene.gravity)
         return moving - height, moving
+
+    def crossed(self, q: Array, v: Array) -> Array:
+        """The largest fraction of a narrow part of a force law that each step crosses, (rows - 1,)."""
+        fractions = [exchange.crossed(q, v) for exchange in self.exchanges if exchange.crossed is not None]
+        return np.max(fractions, axis=0, initial=0.0) if fractions else np.zeros(len(q) - 1)
 
     def lost_power(self, t: Array, q: Array, v: Array) -> Array:
         """Power lost in friction, dampers and materials less that of applied loads [W] at times t [s], (rows,)."""
@@ -121,4 +127,4 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None) -> Machi
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    return Machine(scene, mbs, container, clock, parts, gaps, exchanges, span(scene, poses), np.array(reference))
+    return Machine(scene, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference))

@@ -10,6 +10,8 @@ import numpy as np
 
 from shoal.engines.exudyn_chain import cross
 from shoal.engines.exudyn_ends import Ends
+from shoal.mechanics.fitting import fit_law
+from shoal.mechanics.halts import marks
 from shoal.scene import Attachment, Function
 from shoal.trajectory import Array
 
@@ -18,10 +20,12 @@ class Exchange(NamedTuple):
     """What a force element does with energy, from times [s] (rows,), q and v (rows, unknowns).
 
     stored: energy [J], (rows,); lost: power it takes out of the machine [W], negative where it feeds it, (rows,).
+    crossed: of the narrowest part of its law that each step crosses, how much at once, (rows - 1,); from q and v.
     """
 
     stored: Callable[[Array, Array, Array], Array]
     lost: Callable[[Array, Array, Array], Array]
+    crossed: Callable[[Array, Array], Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -138,4 +142,15 @@ def _exchange(law: Law, measure: Callable[[Array, Array], tuple[Array, Array]]) 
         x, rate = measure(q, v)
         return law.resisting(x, rate) * rate
 
-    return Exchange(lambda t, q, v: law.stored(measure(q, v)[0]), lost)
+    places = np.zeros(0) if law.elastic is None else marks(fit_law(law.elastic))
+    crossed = (lambda q, v: _crossed(places, measure(q, v)[0])) if places.size > 1 else None
+    return Exchange(lambda t, q, v: law.stored(measure(q, v)[0]), lost, crossed)
+
+
+def _crossed(places: Array, x: Array) -> Array:
+    """Lengths of the steps of x, each as a fraction of the narrowest interval between places that it touches."""
+    low, high = np.minimum(x[1:], x[:-1]), np.maximum(x[1:], x[:-1])
+    first, last = (np.searchsorted(places, edge, side="right") for edge in (low, high))
+    widths = np.concatenate([[np.inf], np.diff(places), [np.inf]])
+    narrowest = np.array([widths[a : b + 1].min() for a, b in zip(first, last, strict=True)])
+    return np.asarray((high - low) / narrowest)

@@ -9,6 +9,7 @@ import numpy as np
 from shoal.engines.course import slope_after
 from shoal.errors import InputError
 from shoal.mechanics.closure import Closure
+from shoal.mechanics.reach import span
 from shoal.mechanics.start import complete
 from shoal.scene import (
     GROUND,
@@ -23,8 +24,7 @@ from shoal.scene import (
     Slider,
     Weld,
 )
-from shoal.scene.joints import Joint, places
-from shoal.scene.loads import sides as load_sides
+from shoal.scene.joints import Joint
 from shoal.trajectory import Array
 
 SLIP = 1e-6
@@ -141,31 +141,5 @@ def _check_speeds(scene: Scene, poses: dict[str, Pose]) -> None:
     rows = Closure(scene, u).rows(u)
     slip = np.abs(rows.slope[0] @ v + rows.rate[0])
     for name, speed in zip(rows.names, slip, strict=True):
-        if speed > SLIP * max(1.0, span(scene, poses)):
+        if speed > SLIP * max(1.0, span(scene)):
             raise InputError(f"joints.{name}: its places start at {speed:.3g} m/s apart; change a rate under initial")
-
-
-def extent(scene: Scene, body: str) -> float:
-    """Largest distance [m] between two places of a body that have a name or that joints or markers use."""
-    ends = [end for joint in scene.joints.values() for end in places(joint)]
-    used = [scene.location(place) for place in (*ends, *scene.markers.values()) if place.body == body]
-    used += scene.bodies[body].points.values()
-    at = np.array(used)
-    return float(np.max(np.linalg.norm(at[:, None] - at[None], axis=-1)))
-
-
-def size(scene: Scene) -> float:
-    """Sum of the bodies' extents [m]: how far a machine reaches from the ground that holds it."""
-    return sum(extent(scene, body) for body in scene.bodies)
-
-
-def span(scene: Scene, poses: dict[str, Pose]) -> float:
-    """Largest distance [m] between two places of joints, loads and markers at the start, or the size if larger.
-
-    One metre where they all coincide.
-    """
-    joined = [end for joint in scene.joints.values() for end in places(joint)]
-    loaded = [end for load in scene.loads.values() for end in load_sides(load).values()]
-    used = (*joined, *loaded, *scene.markers.values())
-    at = np.array([poses[owner(end)].position(local(scene, end)) for end in used])
-    return max(size(scene), float(np.max(np.linalg.norm(at[:, None] - at[None], axis=-1)))) or 1.0

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from shoal.engines.contract import Engine
+from shoal.errors import InputError
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, plain
+from shoal.trajectory import Array, Status, Trajectory, plain
+
+LONE = 4
+"""So many of the points that failed are tried alone."""
 
 
 @dataclass(frozen=True)
@@ -95,9 +100,36 @@ def sweep(scene: Scene, vary: Mapping[str, Array], engine: Engine, time: float |
     grid = {path: axis.ravel() for path, axis in zip(vary, axes, strict=True)}
     # Time zero as a second instant gives the start, from which displacements count.
     times = np.array([0.0, instant]) if instant > 0 else np.array([0.0])
-    trajectory = engine.simulate_many(scene, grid, times)
+    trajectory = _gone_on(engine, scene, grid, engine.simulate_many(scene, grid, times))
     positions = {name: trajectory.points[-1, k].T for k, name in enumerate(trajectory.markers)}
     displacements = {name: positions[name] - trajectory.points[0, k].T for k, name in enumerate(trajectory.markers)}
     return Sweep(
         scene, trajectory.engine, instant, grid, positions, displacements, trajectory.status, trajectory.wall_s
     )
+
+
+def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Trajectory) -> Trajectory:
+    """Points that failed side by side go on as a scene alone does: one finds the settings, the others take them."""
+    from shoal.mechanics.persist import as_run
+
+    started = perf_counter()
+    points, status = found.points.copy(), list(found.status)
+    left = np.flatnonzero([one is not Status.OK for one in status])
+    for _ in range(LONE):
+        if scene.solver.integrator != "auto" or not left.size:
+            break
+        (first, *_), left = left, left[1:]
+        values = {path: float(at[first]) for path, at in grid.items()}
+        try:
+            alone = engine.simulate(scene.with_values(values), found.times)
+        except InputError:
+            continue
+        points[..., first], status[first] = alone.points[..., 0], alone.status[0]
+        if left.size and alone.ok:
+            run = engine.simulate_many(as_run(scene, alone), {path: at[left] for path, at in grid.items()}, found.times)
+            points[..., left] = run.points
+            for number, one in zip(left, run.status, strict=True):
+                status[number] = one
+            left = left[[one is not Status.OK for one in run.status]]
+    wall_s = found.wall_s + perf_counter() - started
+    return replace(found, points=points, status=tuple(status), wall_s=wall_s)

@@ -50,8 +50,8 @@ GENEROUS = 5.0
 """or than so many times the run itself, if that is longer."""
 HALVINGS = 3
 """So often the step of a second run that is unstable is halved, before an implicit method is asked."""
-TOLERANCE = 1e-8
-"""Of the second run by radau5, where the others fail."""
+CLOSE = {"solver.relative_tolerance": 1e-8, "solver.absolute_tolerance": 1e-9}
+"""Tolerances of second runs by integrators that choose their steps."""
 
 Second = Callable[[str, Callable[[], Iterator[Scene]], int], tuple[Trajectory | None, str]]
 """Makes a second run of a scene; see `_second`."""
@@ -178,7 +178,7 @@ def _second(
     try:
         for scene in make():
             name = "dop853" if scene.solver.integrator == "auto" else scene.solver.integrator
-            if scene.solver.integrator == "radau5" and not _adaptive(trajectory):
+            if facts(name).adaptive and any(_flexible(scene)) and not _adaptive(trajectory):
                 most = min(scene.solver.max_steps, expense.affordable(model, name, budget))
                 scene = scene.with_values({"solver.max_steps": most})
             else:
@@ -217,6 +217,11 @@ def _adaptive(trajectory: Trajectory) -> bool:
     return trajectory.engine == "gauss" and facts(trajectory.model["integrator"]).adaptive
 
 
+def _cut(trajectory: Trajectory, scene: Scene) -> bool:
+    """Whether a run of fixed steps had to cut some."""
+    return trajectory.engine == "gauss" and (trajectory.steps - 1) * scene.solver.step > trajectory.times[-1]
+
+
 def _flexible(scene: Scene) -> dict[str, Rod]:
     """The flexible rods of a scene."""
     return {n: body for n, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
@@ -235,7 +240,11 @@ def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) 
     elif not any(_flexible(scene)):
         yield scene.with_values({**settings, "solver.integrator": "auto"})
     else:
-        yield from _able(scene.with_values(settings), 0.5 * scene.solver.step)
+        scene = scene.with_values(settings)
+        if _cut(trajectory, scene):
+            # Steps that were cut at what is narrow are cut alike at half the step, and their error stays.
+            yield scene.with_values({"solver.integrator": "dop853", **CLOSE})
+        yield from _able(scene, 0.5 * scene.solver.step)
 
 
 def _finer(scene: Scene, times: int) -> Iterator[Scene]:
@@ -258,8 +267,7 @@ def _able(scene: Scene, step: float) -> Iterator[Scene]:
         yield scene.with_values({"solver.integrator": "leapfrog", "solver.step": 0.5**halvings * longest})
     implicit = {"solver.integrator": "generalized-alpha", "solver.spectral_radius": DAMPED, "solver.step": step}
     yield scene.with_values(implicit)
-    tolerances = {"solver.relative_tolerance": TOLERANCE, "solver.absolute_tolerance": 0.1 * TOLERANCE}
-    yield scene.with_values({"solver.integrator": "radau5", **tolerances})
+    yield scene.with_values({"solver.integrator": "radau5", **CLOSE})
 
 
 def _scale(trajectory: Trajectory, scene: Scene) -> float:

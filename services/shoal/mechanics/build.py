@@ -41,9 +41,6 @@ from shoal.scene import (
     TorsionSpring,
 )
 
-_SPRING_RANGE = 100.0
-"""An elastic function is fitted over elongations of so many times the scene's size [m], or so many radians."""
-
 
 def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     """The same model with the initial state of a scene that differs in nothing else."""
@@ -364,9 +361,8 @@ class _Loads:
     ) -> None:
         table = energy = -1
         if elastic is not None and self.horizon > 0.0:
-            size = _SPRING_RANGE
             with _naming(f"loads.{name}.elastic"):
-                fitted = fitting.fit(elastic, size, elastic.knots, begin=-size)
+                fitted = fitting.fit_law(elastic)
             self.fitted += [fitted, fitting.antiderivative(fitted)]
             table, energy = len(self.fitted) - 2, len(self.fitted) - 1
         driven = -1

@@ -51,6 +51,9 @@ _CROWD, _TRIED, _MOST_OF = 2**10, 64, 0.6
 """From so many pieces on, so many of the shortest that the bound allows are tried before all the others; where they
 fail on that part of the range, halving the rest would go beyond the bound."""
 
+_LAW = 100.0
+"""A force law is known for elongations up to so many metres or radians."""
+
 Extended = npt.NDArray[Any]
 
 
@@ -231,6 +234,11 @@ def _sample(function: Callable[[Any], Any], points: Extended) -> Extended:
     if not finite.all():
         raise InputError(f"function: has no finite value at {float(points[~finite][0]):g}")
     return values
+
+
+def fit_law(elastic: Function) -> Piecewise:
+    """The force of a spring as a function of its elongation [m or rad]. Raises InputError; see `fit`."""
+    return fit(elastic, _LAW, elastic.knots, begin=-_LAW)
 
 
 def require_no_jump(function: Function, horizon: float) -> None:

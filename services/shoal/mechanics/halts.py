@@ -13,6 +13,7 @@ from numba import njit
 
 from shoal.mechanics import forces
 from shoal.mechanics.forces import Forces
+from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.model import Model
 from shoal.mechanics.tile import Array, Index, Tile
 
@@ -43,16 +44,17 @@ def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
     laws = {int(number) for kind in (model.forces.table, model.forces.energy) for number in kind}
     found = []
     for number in (k for k in range(model.functions.size) if k not in laws):
-        found += [model.kinks[number], narrow(model.breaks(number), longest, adaptive)]
+        function = model.function(number)
+        found += [function.kinks, narrow(function.breaks, longest, adaptive)]
     times = np.unique(np.concatenate([np.zeros(0), *found]))
     times = times[(times > RESOLUTION * end) & (times <= end)]
     times = times[np.diff(times, prepend=0.0) > RESOLUTION * end]
     if found and not adaptive and np.ceil(end / longest - EDGE) * longest > end * (1 + EDGE):
         # Functions of time are known up to the end of the run.
         times = np.append(times[times < end * (1 - RESOLUTION)], end)
-    marks = [_marks(model, int(number)) for number in model.forces.table]
-    start = np.cumsum([0, *(len(part) for part in marks)], dtype=np.int64)
-    return Halts(times, start, np.concatenate([np.zeros(0), *marks]))
+    found = [marks(model.function(int(number))) if number >= 0 else np.zeros(0) for number in model.forces.table]
+    start = np.cumsum([0, *(len(part) for part in found)], dtype=np.int64)
+    return Halts(times, start, np.concatenate([np.zeros(0), *found]))
 
 
 def narrow(breaks: Array, longest: float, adaptive: bool) -> Array:
@@ -66,15 +68,13 @@ def narrow(breaks: Array, longest: float, adaptive: bool) -> Array:
     return breaks[1:-1][(least < NARROW * longest) & (most > GRADED * least)]
 
 
-def _marks(model: Model, number: int) -> Array:
-    """Places on the elongation between which a force law is smooth and of one width; none for no law.
+def marks(law: Piecewise) -> Array:
+    """Places on the elongation between which a force law is smooth and of one width.
 
     Pieces that get narrower towards a kink and the force with them, as those of max(t, 0)**1.5, are no places to stop.
     """
-    if number < 0:
-        return np.zeros(0)
-    breaks, kinks = model.breaks(number), model.kinks[number]
-    widths, sizes = np.diff(breaks), model.sizes(number)
+    breaks, coefficients, kinks = law
+    widths, sizes = np.diff(breaks), np.abs(coefficients).sum(axis=1)
     fading = np.zeros(len(breaks), dtype=bool)
     for kink in np.searchsorted(breaks, kinks):
         for step, first in ((1, kink), (-1, kink - 1)):

@@ -26,7 +26,7 @@ from shoal.mechanics.elements.ancf_full import AncfFull
 from shoal.mechanics.elements.beam import Beams
 from shoal.mechanics.forces import Forces
 from shoal.mechanics.frames import Frame
-from shoal.mechanics.functions import Functions
+from shoal.mechanics.functions import Functions, Piecewise
 from shoal.mechanics.saddle import Saddle
 from shoal.mechanics.tile import Array, Index, Tile, pack
 from shoal.mechanics.vector import pointer
@@ -196,16 +196,12 @@ class Model:
         """Unknowns plus derived rows."""
         return self.unknowns + len(self.derived.start) - 1
 
-    def breaks(self, number: int) -> Array:
-        """Where the pieces of a function begin and end."""
+    def function(self, number: int) -> Piecewise:
+        """One of the functions."""
         first, last = self.functions.start[number : number + 2]
-        return self.functions.breaks[first + number : last + number + 1]
-
-    def sizes(self, number: int) -> Array:
-        """A bound on the size of a function on each of its pieces."""
-        first, last = self.functions.start[number : number + 2]
+        breaks = self.functions.breaks[first + number : last + number + 1]
         coefficients = self.functions.coefficients.reshape(self.functions.start[-1], -1)
-        return np.asarray(np.abs(coefficients[first:last]).sum(axis=1))
+        return Piecewise(breaks, coefficients[first:last], self.kinks[number])
 
     @property
     def flexible(self) -> int:

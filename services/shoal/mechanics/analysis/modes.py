@@ -17,8 +17,9 @@ import scipy.linalg
 from shoal.errors import ComputationError
 from shoal.mechanics.analysis.balance import Balance, zero_level
 from shoal.mechanics.analysis.evaluate import Evaluator, points
-from shoal.mechanics.analysis.statics import Equilibrium, machine_size, statics
+from shoal.mechanics.analysis.statics import Equilibrium, statics
 from shoal.mechanics.placement import place
+from shoal.mechanics.reach import span
 from shoal.mechanics.tile import Array
 from shoal.scene import Scene
 from shoal.trajectory import plain
@@ -157,7 +158,7 @@ def modes_about(equilibrium: Equilibrium, *, count: int = 10) -> Modes:
 
 def _balance(scene: Scene, evaluator: Evaluator, time: float) -> Balance:
     mass = sum(float(body.mass) for body in scene.bodies.values())
-    return Balance(evaluator, time, machine_size(scene), mass)
+    return Balance(evaluator, time, span(scene), mass)
 
 
 def _modes(scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int, about: str, message: str) -> Modes:

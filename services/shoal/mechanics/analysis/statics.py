@@ -21,6 +21,7 @@ from shoal.mechanics.analysis.reactions import Reactions, reactions_of
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.groups import start_angle
 from shoal.mechanics.placement import Placement, place
+from shoal.mechanics.reach import span
 from shoal.mechanics.tile import Array
 from shoal.scene import Scene
 from shoal.trajectory import plain
@@ -141,7 +142,7 @@ class _Search:
         self.marker_lines = points([self.placement.direction(scene, at) for at in scene.markers.values()], unknowns)
         self.angles = np.array([float(start_angle(scene, at)) for at in scene.markers.values()])
         mass = sum(float(body.mass) for body in scene.bodies.values())
-        self.balance = Balance(evaluator, time, machine_size(scene), mass)
+        self.balance = Balance(evaluator, time, span(scene), mass)
         self.iterations = self.steps = 0
 
     def run(self, leave_unstable: bool) -> Equilibrium:
@@ -329,18 +330,6 @@ class _Search:
         largest = max(sizes.values())
         ranked = sorted((name for name in sizes if sizes[name] > 0.1 * largest), key=lambda name: -sizes[name])
         return ", ".join(ranked[:4]) + (", ..." if len(ranked) > 4 else "")
-
-
-def machine_size(scene: Scene) -> float:
-    """A length [m] that displacements are compared with: all bodies in a line, or the distances between places."""
-    total = 0.0
-    for body in scene.bodies.values():
-        places = [complex(*point) for point in body.points.values()]
-        total += max(abs(a - b) for a in places for b in places)
-    if total > 0:
-        return float(total)
-    starts = [complex(*(start.position or (0.0, 0.0))) for start in scene.initial.values()]
-    return float(max((abs(a - b) for a in starts for b in starts), default=0.0)) or 1.0
 
 
 def _directions(placement: Placement) -> list[Any]:

@@ -31,14 +31,13 @@ class EnergyMomentum(NamedTuple):
     """Settings and room.
 
     middle: the midpoint, change: what the step changes, both (rows, lanes). elastic: energy at its beginning [J],
-    power: dissipated minus supplied by loads at the midpoint [W], both (lanes,).
+    (lanes,).
     """
 
     newton: Newton
     middle: Array
     change: Array
     elastic: Array
-    power: Array
     evaluations: Array
 
 
@@ -55,7 +54,7 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> EnergyMo
     """Settings for one tile of lanes."""
     rows, width = model.rows * len(tile), len(tile)
     room = newton_room(solver, model, tile, lanes)
-    return EnergyMomentum(room, np.zeros(rows), np.zeros(rows), np.zeros(width), np.zeros(width), np.zeros(1))
+    return EnergyMomentum(room, np.zeros(rows), np.zeros(rows), np.zeros(width), np.zeros(1))
 
 
 @njit(cache=True, error_model="numpy")
@@ -66,7 +65,6 @@ def _raw(s: EnergyMomentum) -> EnergyMomentum:
         pointer(s.middle),
         pointer(s.change),
         pointer(s.elastic),
-        pointer(s.power),
         pointer(s.evaluations),
     )
 
@@ -81,9 +79,7 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
     width = len(tile)
     end = m.unknowns * width
     middle, change = scheme.middle, scheme.change
-    for i in range(end):
-        middle[i] = 0.5 * (w.before[i] + w.z[i])
-        change[i] = w.z[i] - w.before[i]
+    _halve(tile, scheme, m, w)
     dynamics.elastic_force(tile, m, w, middle, f, True)
     dynamics.derive(tile, m, w.before, m.force_rows, False)
     dynamics.derive(tile, m, w.z, m.force_rows, False)
@@ -105,14 +101,20 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
     for i in range(end):
         change[i] /= h
     dynamics.force(tile, m, w, t + 0.5 * h, middle, change, w.stage)
-    for lane in range(width):
-        scheme.power[lane] = w.power[lane]
     for i in range(end):
         change[i] *= h
         f[i] += w.stage[i]
     dynamics.elastic_force(tile, m, w, middle, w.stage, False)
     for i in range(end):
         f[i] -= w.stage[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _halve(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work) -> None:
+    """The midpoint of the step that led from w.before to w.z, and what it changed."""
+    for i in range(m.unknowns * len(tile)):
+        scheme.middle[i] = 0.5 * (w.before[i] + w.z[i])
+        scheme.change[i] = w.z[i] - w.before[i]
 
 
 @njit(cache=True, error_model="numpy")
@@ -152,10 +154,13 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
         w.zdot[i] = 2.0 * (w.z[i] - w.before[i]) / h - w.zdot[i]
     room.evaluations[0] += 1
     dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, room.newton.rank_tolerance, w.a)
-    for lane in range(width):
-        w.power[lane] = room.power[lane]
-    if m.driven:
-        _count_drives(tile, m, w, room.newton, t, h)
+    if dynamics.loaded(m):
+        _halve(tile, room, m, w)
+        for i in range(end):
+            change[i] /= h
+        dynamics.force(tile, m, w, t + 0.5 * h, room.middle, change, w.stage)
+        if m.driven:
+            _count_drives(tile, m, w, room.newton, t, h)
     return h
 
 

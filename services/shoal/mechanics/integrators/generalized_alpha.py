@@ -71,7 +71,9 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
         w.zdot[i] += h * ((1 - gamma) * auxiliary[i] + gamma * predicted)
         auxiliary[i] = predicted
         w.a[i] = 0.0
-    scheme.evaluations[0] += newton.solve(tile, m, w, newton.raw(scheme.newton), t + h, mass_factor, damping_factor)
+    room = newton.raw(scheme.newton)
+    scheme.evaluations[0] += newton.solve(tile, m, w, room, t + h, mass_factor, damping_factor)
+    newton.take_power(tile, m, w, room, t + h)
     for i in range(end):
         auxiliary[i] += (1 - alpha_f) / (1 - alpha_m) * w.a[i]
     if m.constraints.size > 0:

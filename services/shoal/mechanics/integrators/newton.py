@@ -135,7 +135,7 @@ def solve(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, mass_factor:
     """Find the end of a step at the time t: M a + C_q' lambda = Q(q, v, t), C(q) = 0; returns the iterations.
 
     The method ties rates and accelerations to coordinates: dv = damping_factor dq, da = mass_factor dq. w holds the
-    first guess, then the solution, and the power of loads and of the drives that hold it.
+    first guess, then the solution. The power that is left in w is that of the last guess; see `take_power`.
     """
     residual = newton.residual
     end = m.unknowns * len(tile)
@@ -156,7 +156,18 @@ def solve(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, mass_factor:
             w.a[i] += mass_factor * residual[i]
         if largest_change(tile, m, newton) <= newton.tolerance:
             break
-    if m.driven:
-        constraints.add_power(tile, m.constraints, m.functions, t, newton.multiplier, w.power)
     mark_failures(tile, m, w, newton)
     return iterations
+
+
+@njit(cache=True, error_model="numpy")
+def take_power(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float) -> None:
+    """w.power [W] of loads and drives at the end of a step at the time t; uses w.stage.
+
+    The last correction, however small beside the machine, may be all that small forces did in a short step.
+    """
+    if dynamics.loaded(m):
+        t = dynamics.instant(w, t)
+        dynamics.force(tile, m, w, t, w.z, w.zdot, w.stage)
+        if m.driven:
+            constraints.add_power(tile, m.constraints, m.functions, t, newton.multiplier, w.power)
