@@ -43,7 +43,7 @@ class Trajectory:
     status: one per lane; message: why the first lane that is not ok is not
     energy_drift: largest |E(t) + dissipated - E(0)| relative to the largest kinetic plus
         elastic energy, (lanes,)
-    constraint_drift: largest violation of a position constraint, (lanes,)
+    constraint_drift: largest violation of a position constraint, relative to the machine's size, (lanes,)
     steps: time steps taken by each lane; wall_s: wall-clock time of the whole call [s]
     model: what was computed, for the record (unknowns, elements, integrator, step, ...)
     velocities: of the markers [m/s], (samples, markers, 2, lanes); rates: of the angles [rad/s],

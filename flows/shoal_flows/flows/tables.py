@@ -16,7 +16,7 @@ def of_motion(motion: Trajectory) -> str:
     """Where the markers end, and the evidence."""
     ends = [(name, *motion.marker(name)[-1]) for name in motion.markers]
     evidence = f"{motion.status[0]}; energy drift {motion.energy_drift[0]:.1e}, constraint drift "
-    evidence += f"{motion.constraint_drift[0]:.1e} m, {motion.steps} steps, {motion.wall_s:.3f} s"
+    evidence += f"{motion.constraint_drift[0]:.1e}, {motion.steps} steps, {motion.wall_s:.3f} s"
     return table(("marker", "x [m]", "y [m]"), ends) + f"\n\n{evidence}"
 
 

@@ -22,12 +22,16 @@ from shoal.mechanics.tile import Array, Index, Tile
 from shoal.mechanics.vector import pointer
 from shoal.scene.function import Composed
 
+POWERS = 3
+"""Constraints are measured in 1 (directions), m or m^2."""
+
 
 class Constraints(NamedTuple):
     """Product p of constraint k in start[k]:start[k+1] is factor[p] * z[left[p]] * z[right[p]]; left = -1 stands for 1.
 
-    constant: c, (constraints, lanes). drive: number of the function f of every constraint (-1: none). Part r of the
-    Jacobian adds coefficient[r] * z[source[r]] to the entry target[r]; source = -1 stands for 1.
+    constant: c, (constraints, lanes). lengths: C is in m to that power. drive: number of the function f of every
+    constraint (-1: none). Part r of the Jacobian adds coefficient[r] * z[source[r]] to the entry target[r]; source = -1
+    stands for 1.
     """
 
     size: int
@@ -36,6 +40,7 @@ class Constraints(NamedTuple):
     right: Index
     factor: Array
     constant: Array
+    lengths: Index
     drive: Index
     entry: Index
     column: Index
@@ -47,7 +52,10 @@ class Constraints(NamedTuple):
 
 @dataclass(frozen=True)
 class Held:
-    """One constraint before it has rows: Re or Im of conj(u) w, plus a constant and a function of time."""
+    """One constraint before it has rows: Re or Im of conj(u) w, plus a constant and a function of time.
+
+    lengths: the power of a length that it is measured in.
+    """
 
     name: str
     u: Affine
@@ -55,6 +63,7 @@ class Held:
     crossed: bool
     constant: Number
     drive: Composed | None
+    lengths: int
 
     def products(self, rows: Callable[[Affine], tuple[int, int]]) -> list[tuple[int, int, Number, Affine, Affine]]:
         """(left row, right row, factor, left vector, right vector); left row -1 for a linear term.
@@ -85,18 +94,20 @@ class Terms:
     def __init__(self) -> None:
         self.held: list[Held] = []
 
-    def dot(self, name: str, u: Affine, w: Affine, constant: Number = 0.0, drive: Composed | None = None) -> None:
-        """u . w + constant + drive(t) = 0."""
-        self.held.append(Held(name, u, w, False, constant, drive))
+    def dot(
+        self, name: str, u: Affine, w: Affine, lengths: int, constant: Number = 0.0, drive: Composed | None = None
+    ) -> None:
+        """u . w + constant + drive(t) = 0, measured in m to the power of `lengths`."""
+        self.held.append(Held(name, u, w, False, constant, drive, lengths))
 
-    def cross(self, name: str, u: Affine, w: Affine, constant: Number = 0.0, drive: Composed | None = None) -> None:
-        """u x w + constant + drive(t) = 0."""
-        self.held.append(Held(name, u, w, True, constant, drive))
+    def cross(self, name: str, u: Affine, w: Affine, lengths: int, drive: Composed | None = None) -> None:
+        """u x w + drive(t) = 0, measured in m to the power of `lengths`."""
+        self.held.append(Held(name, u, w, True, 0.0, drive, lengths))
 
     def vanish(self, name: str, vector: Affine, drives: tuple[Composed, Composed] | None = None) -> None:
         """vector + drives(t) = 0, two linear constraints [m]."""
         for axis, part in enumerate((1.0, 1j)):
-            self.dot(name, Affine({}, part), vector, 0.0, drives[axis] if drives else None)
+            self.dot(name, Affine({}, part), vector, 1, drive=drives[axis] if drives else None)
 
 
 def assemble(
@@ -143,6 +154,7 @@ def assemble(
         index(rights),
         stack(factors),
         stack([held.constant for held in terms.held]),
+        index([held.lengths for held in terms.held]),
         index(drive),
         index(entry),
         index(column),
@@ -164,6 +176,7 @@ def raw(constraints: Constraints) -> Constraints:
         pointer(c.right),
         pointer(c.factor),
         pointer(c.constant),
+        pointer(c.lengths),
         pointer(c.drive),
         pointer(c.entry),
         pointer(c.column),
@@ -274,8 +287,13 @@ def subtract_transposed(tile: Tile, constraints: Constraints, matrix: Array, mul
 def drift(
     tile: Tile, constraints: Constraints, drives: Functions, t: float, z: Array, gap: Array, worst: Array
 ) -> None:
-    """Raise worst (lanes,) to the largest |C(q, t)|; gap is work space, (constraints, lanes)."""
+    """Raise worst (POWERS, lanes) to the largest |C(q, t)| of each power of a length.
+
+    gap is work space, (constraints, lanes).
+    """
     width = len(tile)
     residual(tile, constraints, drives, t, z, gap)
-    for k in range(constraints.size * width):
-        worst[k % width] = max(worst[k % width], abs(gap[k]))
+    for k in range(constraints.size):
+        row = constraints.lengths[k] * width
+        for lane in range(width):
+            worst[row + lane] = max(worst[row + lane], abs(gap[k * width + lane]))

@@ -33,8 +33,8 @@ class Record(NamedTuple):
     [rad/s]; the rest: (lanes,).
 
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest kinetic + elastic energy [J];
-    drift: largest violation of a constraint; begin: coordinates and rates at the start, made consistent,
-    (2 * unknowns, lanes).
+    drift: largest violation of a constraint by its power of a length, (POWERS * lanes,);
+    begin: coordinates and rates at the start, made consistent, (2 * unknowns, lanes).
     Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
 
@@ -81,7 +81,7 @@ def march(
         np.full(len(times) * per_sample, np.nan),
         np.zeros(width),
         np.zeros(width),
-        np.zeros(width),
+        np.zeros(constraints.POWERS * width),
         np.zeros(2 * end),
         np.zeros(width),
         np.zeros(width),

@@ -128,7 +128,7 @@ def place(scene: Scene) -> Placement:
     for point in points:
         if point.line and not point.on_line and point.where is not None:
             joint, base, direction = point.line
-            result.terms.cross(joint, fixed(direction), point.where - fixed(base))
+            result.terms.cross(joint, fixed(direction), point.where - fixed(base), 1)
     _add_joints(scene, result)
     return result
 
@@ -237,7 +237,7 @@ def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, turning: Orienta
         else:
             axis = result.new_pair(pose.direction, 1j * pose.rate * pose.direction)
         turning.axis[root] = axis * np.conj(relative)
-        result.terms.dot(name, axis, axis, -1.0)
+        result.terms.dot(name, axis, axis, 0, -1.0)
     frame = RigidFrame(where + turning.axis[root] * (-relative * p), turning.axis[root] * relative)
     result.frames[name] = frame
     for point in ranked:
@@ -325,28 +325,28 @@ def _add_joints(scene: Scene, result: Placement) -> None:
             for term in joint.terms:
                 axis = 1.0 if term.axis == "x" else -1j
                 total = total + result.point(scene, term.at) * (term.factor * axis)
-            terms.dot(name, fixed(1.0), total, 0.0, joint.value.through("neg"))
+            terms.dot(name, fixed(1.0), total, 1, drive=joint.value.through("neg"))
             continue
         first, second = joint.first, joint.second
         if isinstance(joint, Slider) and (first.body != GROUND or isinstance(first.point, str)):
             line = result.direction(scene, first) * unit(joint.direction)
-            terms.cross(name, line, result.point(scene, second) - result.point(scene, first))
+            terms.cross(name, line, result.point(scene, second) - result.point(scene, first), 1)
         elif isinstance(joint, Distance):
             gap = result.point(scene, second) - result.point(scene, first)
             if joint.length is None:
-                terms.dot(name, gap, gap, -(np.abs(result.start_of(gap)[0]) ** 2))
+                terms.dot(name, gap, gap, 2, -(np.abs(result.start_of(gap)[0]) ** 2))
             else:
-                terms.dot(name, gap, gap, 0.0, joint.length.through("square", "neg"))
+                terms.dot(name, gap, gap, 2, drive=joint.length.through("square", "neg"))
         elif isinstance(joint, DrivenAngle):
             if not (is_stiff(scene, first.body) and is_stiff(scene, second.body)):
                 raise InputError(f"joints.{name}: drives the angle of a flexible rod; weld a rigid body to it instead")
             a, b = result.direction(scene, first), result.direction(scene, second)
-            terms.dot(name, a, b, 0.0, joint.angle.through("cos", "neg"))
-            terms.cross(name, a, b, 0.0, joint.angle.through("sin", "neg"))
+            terms.dot(name, a, b, 0, drive=joint.angle.through("cos", "neg"))
+            terms.cross(name, a, b, 0, joint.angle.through("sin", "neg"))
         turn = kept_turn(scene, joint)
         flexible = [side for side in (first, second) if not is_stiff(scene, side.body)]
         if turn is not None and flexible and not (isinstance(joint, Weld) and _is_clamp(scene, joint, result)):
-            terms.cross(name, result.direction(scene, first) * turn, result.direction(scene, second))
+            terms.cross(name, result.direction(scene, first) * turn, result.direction(scene, second), 0)
 
 
 def _is_clamp(scene: Scene, joint: Weld, result: Placement) -> bool:

@@ -88,7 +88,8 @@ def simulate(
     points = samples[:, :, :2]
     angles = _angles(scene, model, samples[:, :, 2:5])
     energy_drift = _relative(record.energy_error[0], record.energy_scale[0], scene, model)
-    status, message = _verdict(scene, model, record, choice, points, energy_drift)
+    constraint_drift = _of_the_size(record.drift, scene, points)
+    status, message = _verdict(scene, model, record, choice, points, energy_drift, constraint_drift)
     return Trajectory(
         engine="gauss",
         times=times,
@@ -99,7 +100,7 @@ def simulate(
         rates=samples[:, :, 7],
         status=status,
         energy_drift=energy_drift,
-        constraint_drift=record.drift[0],
+        constraint_drift=constraint_drift,
         steps=int(np.max(record.steps)),
         wall_s=time.perf_counter() - begin,
         message=message,
@@ -199,14 +200,30 @@ def _relative(error: Array, scale: Array, scene: Scene, model: Model) -> Array:
     return relative
 
 
+def _of_the_size(drift: Array, scene: Scene, points: Array) -> Array:
+    """The largest of the violations of constraints (POWERS, lanes), relative to the machine's size; (lanes,).
+
+    Bodies that are points have none; there the farthest marker tells it.
+    """
+    size = reaches.span(scene) or float(np.nanmax(np.abs(points), initial=0.0)) or 1.0
+    relative: Array = np.max(drift / size ** np.arange(len(drift))[:, None], axis=0)
+    return relative
+
+
 def _verdict(
-    scene: Scene, model: Model, record: Record, choice: Choice, points: Array, energy_drift: Array
+    scene: Scene,
+    model: Model,
+    record: Record,
+    choice: Choice,
+    points: Array,
+    energy_drift: Array,
+    constraint_drift: Array,
 ) -> tuple[tuple[Status, ...], str]:
     """Status of every lane, and the reason for the first that is not ok."""
     reach = reaches.MARGIN * reaches.reach(scene, record.energy_scale[0])
     farthest = np.max(reaches.distance_to_ground(scene, points), axis=(0, 1))
     adaptive = facts(choice.name).adaptive
-    drift, steps, reached = record.drift[0], record.steps[0], record.reached[0]
+    steps, reached = record.steps[0], record.reached[0]
     statuses, message = [], ""
     failed = np.broadcast_to(model.failed, model.lanes)
     for lane in range(model.lanes):
@@ -229,8 +246,9 @@ def _verdict(
         elif energy_drift[lane] > scene.solver.energy_tolerance:
             status = Status.ENERGY
             reason = f"energy is off by {energy_drift[lane]:.2g}, allowed {scene.solver.energy_tolerance:g} (relative)"
-        elif not drift[lane] <= DRIFT_TOLERANCE:
-            status, reason = Status.DRIFTED, f"constraints are violated by {drift[lane]:.2g}"
+        elif not constraint_drift[lane] <= DRIFT_TOLERANCE:
+            status = Status.DRIFTED
+            reason = f"constraints are violated by {constraint_drift[lane]:.2g} of the machine's size"
         else:
             status, reason = Status.OK, ""
         statuses.append(status)

@@ -218,6 +218,7 @@ def march(
     n, step, markers = arrays.unknowns, solver.step, len(marker_rows)
     q, v = room.z[:n], room.zdot[:n]
     record = Record(np.full(len(times) * markers * SAMPLED, np.nan), *(np.zeros(1) for _ in Record._fields[1:]))
+    record = record._replace(drift=np.zeros(constraints.POWERS))
     samples = record.samples.reshape(len(times), markers, SAMPLED)
     lower = cholesky(_dense_mass(arrays), lower=True)
     inside = np.zeros(arrays.rows)
