@@ -87,7 +87,7 @@ class ExudynEngine:
             angles=verdict.angles[..., None],
             status=(verdict.status,),
             energy_drift=np.array([verdict.energy_drift]),
-            constraint_drift=np.array([verdict.gap / (machine.span or 1.0)]),
+            constraint_drift=np.array([verdict.gap / machine.span]),
             steps=steps.count,
             wall_s=time.perf_counter() - started,
             message=f"{verdict.message}{WEAK}" if weak else verdict.message,

@@ -88,7 +88,7 @@ def simulate(
     points = samples[:, :, :2]
     angles = _angles(scene, model, samples[:, :, 2:5])
     energy_drift = _relative(record.energy_error[0], record.energy_scale[0], scene, model)
-    constraint_drift = _of_the_size(record.drift, scene, points)
+    constraint_drift = _of_the_size(record.drift, scene)
     status, message = _verdict(scene, model, record, choice, points, energy_drift, constraint_drift)
     return Trajectory(
         engine="gauss",
@@ -200,13 +200,9 @@ def _relative(error: Array, scale: Array, scene: Scene, model: Model) -> Array:
     return relative
 
 
-def _of_the_size(drift: Array, scene: Scene, points: Array) -> Array:
-    """The largest of the violations of constraints (POWERS, lanes), relative to the machine's size; (lanes,).
-
-    Bodies that are points have none; there the farthest marker tells it.
-    """
-    size = reaches.span(scene) or float(np.nanmax(np.abs(points), initial=0.0)) or 1.0
-    relative: Array = np.max(drift / size ** np.arange(len(drift))[:, None], axis=0)
+def _of_the_size(drift: Array, scene: Scene) -> Array:
+    """The largest of the violations of constraints (POWERS, lanes), relative to the machine's size; (lanes,)."""
+    relative: Array = np.max(drift / reaches.span(scene) ** np.arange(len(drift))[:, None], axis=0)
     return relative
 
 
