@@ -7,6 +7,7 @@ values, so that it leaves saddles and maxima (Dauphin et al. 2014), and shortens
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,9 @@ STALLED = 1e-7
 ZERO = 1e-12
 """Squared frequencies below this times the largest one (at least 1 rad^2/s^2) are zero."""
 LONGEST = 0.2
-"""Longest step of the descent, as a fraction of the machine's size."""
+"""Longest step of the descent, as a fraction of the machine's size,"""
+WIDEST = 1.5
+"""and its largest turn [rad] of any body or section, so that turns can be counted."""
 FAR = 30.0
 """A machine that has moved by so many times its own size falls for ever."""
 STRAINED = 1e-9
@@ -125,13 +128,18 @@ class Balance:
             last = correction
         return Found(q, False, iteration, last, "Newton's method does not converge")
 
-    def descend(self, q: Array, load: float = 1.0, most: int = 400) -> Found:
-        """Go down in the potential until nothing pulls any more (which is so on a summit, too)."""
+    def descend(
+        self, q: Array, turn: Callable[[Array, Array], float], follow: Callable[[Array], None], most: int = 400
+    ) -> Found:
+        """Go down in the potential until nothing pulls any more (which is so on a summit, too).
+
+        turn: the largest turn [rad] of a body between two states; follow: counts the turns, called after every step.
+        """
         q, _ = self.restore(q)
         begin, shift, correction = q, 0.0, np.inf
-        view = self.look(q, load)
+        view = self.look(q)
         for iteration in range(1, most + 1):
-            curvature, modes = scipy.linalg.eigh(self.hessian(q, view, load))
+            curvature, modes = scipy.linalg.eigh(self.hessian(q, view))
             pull = modes.T @ view.unbalanced
             zero = zero_level(curvature)
             # What nothing pulls and nothing holds stays where it is.
@@ -148,22 +156,22 @@ class Balance:
                     y *= LONGEST * self.unit / length
                 trial, gap = self.restore(q + view.freedom.basis @ (modes @ y))
                 correction = float(np.linalg.norm(y)) / self.unit
-                ahead = self.look(trial, load)
+                ahead = self.look(trial)
                 change = ahead.evaluation.potential - potential
                 if gap < 1e-10 and not change <= noise:
                     # Turning along straight lines stretches: take the stiff directions back before judging.
                     active = np.abs(y) > 0.03 * np.max(np.abs(y))
-                    trial, gap = self._relax(trial, 10.0 * float(np.max(np.abs(curvature[active]))), load)
-                    ahead = self.look(trial, load)
+                    trial, gap = self._relax(trial, 10.0 * float(np.max(np.abs(curvature[active]))))
+                    ahead = self.look(trial)
                     change = ahead.evaluation.potential - potential
-                if gap < 1e-10 and change <= noise:
+                if gap < 1e-10 and change <= noise and turn(q, trial) < WIDEST:
                     break
                 if correction < CLOSE:
                     good = self.residual(view) < np.sqrt(SEEN)
                     return Found(q, good, iteration, correction, "" if good else "the descent of the potential stalls")
                 shift = max(4.0 * shift, float(np.linalg.norm(pull)) / max(float(np.linalg.norm(y)), 1e-300))
             held = bool(np.all((curvature > zero) | idle))
-            self.evaluator.remember(trial)
+            follow(trial)
             q, view, shift = trial, ahead, shift / 8.0 if correction > 1e-6 else 0.0
             if held and correction < CLOSE:
                 return Found(q, True, iteration, correction)
@@ -171,12 +179,12 @@ class Balance:
                 return Found(q, False, iteration, correction, "falls without end")
         return Found(q, False, most, correction, f"not at rest after {most} steps downhill")
 
-    def _relax(self, q: Array, stiff: float, load: float) -> tuple[Array, float]:
+    def _relax(self, q: Array, stiff: float) -> tuple[Array, float]:
         """Newton's method in the directions stiffer than `stiff` [rad^2/s^2] alone."""
         gap = 0.0
         for _ in range(4):
-            view = self.look(q, load)
-            curvature, modes = scipy.linalg.eigh(self.hessian(q, view, load))
+            view = self.look(q)
+            curvature, modes = scipy.linalg.eigh(self.hessian(q, view))
             pull = modes.T @ view.unbalanced
             y = np.where(curvature > stiff, pull / np.where(curvature > stiff, curvature, 1.0), 0.0)
             q, gap = self.restore(q + view.freedom.basis @ (modes @ y))

@@ -28,6 +28,8 @@ from shoal.trajectory import plain
 
 TURN = 0.8
 """Largest turn [rad] of any body or section in one load step."""
+STILL = 1e-3
+"""A machine that turns by less [rad] was put into its equilibrium."""
 WAY = 0.3
 """Longest way (rms) of the bodies in one load step, relative to the machine's size."""
 SMALLEST = 1.0 / 1024
@@ -152,7 +154,7 @@ class _Search:
             return self._ending(q, Held.FAILED, f"the joints cannot be closed: they gape by {gap:.2g}")
         has_potential = not self.evaluator.follows
         message = ""
-        found = self._loaded(q)
+        found = self._at(q) or self._loaded(q)
         if (found is None or not found.converged) and not leave_unstable:
             start = q if found is None else found.q
             straight = self._count(self.balance.newton(start))
@@ -162,8 +164,7 @@ class _Search:
             if has_potential:
                 if found is not None:
                     message = "snapped or buckled on the way; "
-                found = self._count(self.balance.descend(q if found is None else found.q))
-                self._follow(found.q)
+                found = self._descended(q if found is None else found.q)
             elif found is None:
                 found = self._count(self.balance.newton(q))
         for attempt in range(4):
@@ -175,8 +176,7 @@ class _Search:
                 break
             message = "left an unstable equilibrium; "
             kick = 1e-3 * self.balance.size / np.max(np.abs(lowest)) * (1 + attempt)
-            found = self._count(self.balance.descend(found.q + kick * lowest))
-            self._follow(found.q)
+            found = self._descended(found.q + kick * lowest)
         if found.converged:
             refined = self._count(self.balance.newton(found.q, most=6))
             if refined.converged and self._turn(found.q, refined.q) < 1e-3:
@@ -246,6 +246,17 @@ class _Search:
                 self._follow(q)
         self.balance.t = self.time
         return q
+
+    def _at(self, q: Array) -> Found | None:
+        """The stable equilibrium in which the machine is put already, but for a thousandth of a turn."""
+        found = self.balance.newton(q)
+        if not found.converged or self._turn(q, found.q) > STILL or not self._firm(found.q, 1.0):
+            return None
+        return self._count(found)
+
+    def _descended(self, q: Array) -> Found:
+        """Where the potential is lowest, downhill from q."""
+        return self._count(self.balance.descend(q, self._turn, self._follow))
 
     def _loaded(self, q: Array) -> Found | None:
         """Load step by step; None if the unloaded machine has no stiffness that holds it."""
