@@ -386,3 +386,30 @@ def test_a_rate_that_jumps_is_refused_and_a_smooth_one_followed():
     smooth = Scene.parse(data).with_values({"joints.D.angle": "3*max(t - 0.5, 0)**2"})
     trajectory = ExudynEngine().simulate(smooth)
     assert trajectory.angles[-1, 0, 0] == pytest.approx(0.75, abs=1e-6)
+
+
+@pytest.mark.parametrize(("width", "shorter"), [(1e-2, 1), (1e-3, 2)])
+def test_a_narrow_law_of_a_spring_is_not_leapt_over(width, shorter):
+    """A mass passes at 1 m/s through a law that takes 0.2 J from it on its way."""
+    law = f"{float(0.2 / width / np.sqrt(np.pi))!r}*exp(-((t - 0.3)/{width!r})**2)"
+    spring = {"kind": "spring", "first": {"body": "ground", "point": [-1.0, 0.0]}, "second": {"body": "m"}}
+    scene = Scene.parse(
+        {
+            "name": "law",
+            "gravity": [0.0, 0.0],
+            "bodies": {"m": {"kind": "point-mass", "mass": 2.0}},
+            "loads": {"S": spring | {"elastic": law}},
+            "markers": {"m": {"body": "m"}},
+            "initial": {"m": {"position": [0.0, 0.0], "velocity": [1.0, 0.0]}},
+            "solver": {"duration": 1.0, "step": 1e-3},
+        }
+    )
+    run = ExudynEngine().simulate(scene, [0.9, 1.0])
+    assert run.ok, run.message
+    assert run.model["step"] == 1e-3 / shorter
+    speed = (run.marker("m")[1, 0] - run.marker("m")[0, 0]) / 0.1
+    assert speed == pytest.approx(np.sqrt(0.8), rel=1e-5)
+    narrow = scene.with_values({"loads.S.elastic": "exp(-((t - 0.3)/1e-6)**2)"})
+    refused = ExudynEngine().simulate(narrow, [0.9, 1.0])
+    assert not refused.ok
+    assert "narrow part of an elastic law; solver.step needs" in refused.message

@@ -58,6 +58,11 @@ def bar(length: float, rng: np.random.Generator) -> dict[str, Any]:
             "centre_of_mass": centre, "named_points": {"end": [length, 0.0]}}  # fmt: skip
 
 
+def rod(length: float, rng: np.random.Generator) -> dict[str, Any]:
+    return {"kind": "rod", "length": length, "height": 0.01, "width": 0.02, "density": 2700.0, "element": "ancf-cable",
+            "youngs_modulus": float(10 ** rng.uniform(8, 11)), "elements": int(rng.integers(1, 4))}  # fmt: skip
+
+
 def pin(first: str, at: Any, second: str, point: str = "start") -> dict[str, Any]:
     return {"first": {"body": first, "point": at}, "second": {"body": second, "point": point}}
 
@@ -80,13 +85,14 @@ def dyad(lengths: tuple[float, float], a: complex, va: complex, p: complex, vp: 
     return found
 
 
-def four_bar(rng: np.random.Generator, equal: bool = False, joint: str = "bar") -> Machine:
+def four_bar(rng: np.random.Generator, equal: bool = False, joint: str = "bar", made: Any = (bar,)) -> Machine:
     """Crank a, coupler c, rocker b; equal: a parallelogram. joint: the coupler is a bar, or a distance."""
     l1, l2, l3 = rng.uniform(0.4, 2.0, 3)
     d = float(rng.uniform(0.5, 2.5))
     if equal:
         l2, l3 = d, l1
-    bodies = {"a": bar(l1, rng), "c": bar(l2, rng), "b": bar(l3, rng)}
+    bodies = {name: made[rng.integers(len(made))](float(length), rng)
+              for name, length in (("a", l1), ("c", l2), ("b", l3))}  # fmt: skip
     joints: dict[str, Any] = {"O": pin("ground", [0.0, 0.0], "a"), "P": pin("ground", [d, 0.0], "b")}
     if joint == "bar":
         joints |= {"A": pin("a", "end", "c"), "B": pin("b", "end", "c", "end")}
@@ -195,6 +201,7 @@ def coupled(rng: np.random.Generator) -> Machine:
 KINDS: dict[str, Callable[[np.random.Generator], Machine]] = {
     "four-bar": four_bar,
     "parallelogram": lambda rng: four_bar(rng, equal=True),
+    "flexible": lambda rng: four_bar(rng, made=(rod, rod, bar)),
     "distance": lambda rng: four_bar(rng, joint="distance"),
     "six-bar": six_bar,
     "slider-crank": slider_crank,
@@ -305,6 +312,22 @@ def test_a_contradiction_is_refused_by_name(kind: str) -> None:
         assert text.startswith("initial.b.")
         assert "joint" in text
         assert "\n" not in text
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_flexible_rods_of_a_loop_start_straight_where_the_linkage_puts_them(seed: int) -> None:
+    machine, states = drawn("flexible", np.random.default_rng(seed))
+    markers = {name: {"body": name, "point": "end"} for name in states}
+    start = {"a": {"angle": states["a"].angle, "rate": states["a"].rate}, "c": {"angle": states["c"].angle}}
+    run = simulate(Scene.parse({**machine.scene, "markers": markers, "initial": start}), np.zeros(1))
+    for number, name in enumerate(markers):
+        body, told = machine.scene["bodies"][name], states[name]
+        length = body["length"] if body["kind"] == "rod" else body["named_points"]["end"][0]
+        end = told.place + length * cmath.exp(1j * told.angle)
+        speed = told.speed + 1j * told.rate * length * cmath.exp(1j * told.angle)
+        assert complex(*run.points[0, number, :, 0]) == pytest.approx(end, abs=1e-9)
+        assert complex(*run.velocities[0, number, :, 0]) == pytest.approx(speed, abs=1e-8)
+        assert run.rates[0, number, 0] == pytest.approx(told.rate, abs=1e-7)
 
 
 @pytest.mark.slow

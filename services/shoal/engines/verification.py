@@ -24,6 +24,7 @@ from shoal.errors import ShoalError
 from shoal.mechanics import expense
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.persist import DAMPED, as_run
+from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import STEP_MARGIN, stable_step
 from shoal.scene import GROUND, Revolute, Rod, Scene, Slider, Solver
 from shoal.scene.joints import places
@@ -41,6 +42,9 @@ TIGHTER, TIGHTEST = 0.1, 1e-14
 """Factor on the tolerance of the run that tells whether a chaotic motion is still known; the smallest tolerance."""
 HALVING = 4.0 / 3.0
 """The error of a method of second order in terms of its distance from the run with half the step."""
+SHARPER, CREEP = 0.1, 0.01
+"""Factor on the speed over which dry friction is smoothed, for the run that tells the creep, and how far that one may
+creep itself: a fraction of the machine's size, or rad."""
 COARSE = 0.03
 """A mesh error beyond this fraction of the scale is looked at with four times the elements, which locks less."""
 UNTRUSTED = (Status.DIVERGED, Status.ENERGY, Status.DRIFTED, Status.OUT_OF_REACH)
@@ -148,18 +152,23 @@ def _mesh_error(trajectory: Trajectory, scene: Scene, scale: float, second: Seco
 
 
 def _friction_error(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[float | None, str]:
-    """How far the markers are from where dry friction brings them that holds ten times better [m]: blocks creep."""
-    rubbing = [
-        name for name, joint in scene.joints.items() if isinstance(joint, Revolute | Slider) and joint.coulomb > 0
-    ]
+    """How far the markers are from where dry friction brings them that holds ten times better [m]: blocks creep.
+
+    It holds better still where even so it would creep far in the time of the run.
+    """
+    rubbing = {n: joint for n, joint in scene.joints.items() if isinstance(joint, Revolute | Slider) and joint.coulomb}
     if not rubbing:
         return None, ""
-    sharper = {f"joints.{name}.coulomb_speed": 0.1 * scene.value(f"joints.{name}.coulomb_speed") for name in rubbing}
-    sharp, note = second("friction", lambda: _able(scene.with_values(sharper), scene.solver.step), 1)
-    if sharp is None or not sharp.ok:
+    sharp = SHARPER
+    for joint in rubbing.values():
+        far = CREEP * (span(scene) if isinstance(joint, Slider) else 1.0)
+        sharp = min(sharp, far / (joint.coulomb_speed * max(float(trajectory.times[-1]), scene.solver.step)))
+    sharper = {f"joints.{name}.coulomb_speed": sharp * joint.coulomb_speed for name, joint in rubbing.items()}
+    held, note = second("friction", lambda: _able(scene.with_values(sharper), scene.solver.step), 1)
+    if held is None or not held.ok:
         return None, note or "effect of the smoothed friction not estimated: the run with a sharper one is rejected"
-    # Creep is proportional to the speed, of which nine tenths are gone.
-    return trajectory.distance(sharp) / 0.9, ""
+    # Creep is proportional to the speed, of which this part is gone.
+    return trajectory.distance(held) / (1.0 - sharp), ""
 
 
 def _second(

@@ -20,7 +20,8 @@ from shoal.mechanics.tile import Array, Index, Tile
 NARROW = 0.25
 """Pieces narrower than this fraction of the longest step are not left to a step that sees its error, ..."""
 PARTS = 8
-"""... and fixed steps pass pieces narrower than themselves in so many."""
+"""... and fixed steps pass pieces narrower than themselves in so many, and in no fewer what is short beside its
+neighbours."""
 GRADED = 1.9
 """Neighbouring pieces whose widths differ by more than this factor lead to something narrow."""
 CROSSED = 0.5
@@ -60,12 +61,14 @@ def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
 def narrow(breaks: Array, longest: float, adaptive: bool) -> Array:
     """Places at narrow pieces: for steps that see their error where widths change, for fixed ones PARTS to a piece."""
     widths = np.diff(breaks)
+    least, most = np.minimum(widths[1:], widths[:-1]), np.maximum(widths[1:], widths[:-1])
+    uneven = most > GRADED * least
     if not adaptive:
-        chosen = np.flatnonzero(widths < longest)
+        beside = np.append(uneven, True) | np.insert(uneven, 0, True)
+        chosen = np.flatnonzero(widths < longest * np.where(beside, PARTS, 1.0))
         inside = breaks[chosen, None] + widths[chosen, None] * np.linspace(0.0, 1.0, PARTS + 1)
         return np.unique(np.concatenate([inside[:, 1:].ravel(), breaks[chosen]]))
-    least, most = np.minimum(widths[1:], widths[:-1]), np.maximum(widths[1:], widths[:-1])
-    return breaks[1:-1][(least < NARROW * longest) & (most > GRADED * least)]
+    return breaks[1:-1][(least < NARROW * longest) & uneven]
 
 
 def marks(law: Piecewise) -> Array:
