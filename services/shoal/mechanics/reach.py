@@ -23,21 +23,28 @@ BREAKS = 5.0
 TETHERS = Revolute | Weld
 
 
-def size(scene: Scene) -> float:
-    """All undeformed bodies stretched out in a line [m]."""
+def size(scene: Scene) -> Array:
+    """All undeformed bodies stretched out in a line [m], (lanes,) where their lengths differ between lanes."""
     sides = [side for joint in scene.joints.values() for side in places(joint)]
     attached = [*sides, *scene.markers.values()]
-    total = 0.0
+    total = np.zeros(())
     for name, body in scene.bodies.items():
-        used = {*(scene.location(place) for place in attached if place.body == name), *body.points.values()}
-        total += max((math.dist(a, b) for a, b in combinations(used, 2)), default=0.0)
+        used = [*(scene.location(place) for place in attached if place.body == name), *body.points.values()]
+        longest = np.zeros(())
+        for (x, y), (other_x, other_y) in combinations(used, 2):
+            longest = np.maximum(longest, np.hypot(np.subtract(x, other_x), np.subtract(y, other_y)))
+        total = total + longest
     return total
 
 
 def span(scene: Scene) -> float:
     """All bodies stretched out in a line, or the distance between places on the ground if that is more [m]."""
     sides = [side for joint in scene.joints.values() for side in places(joint) if side.body == GROUND]
-    return max(size(scene), *(math.dist(scene.location(a), scene.location(b)) for a in sides for b in sides), 0.0)
+    return max(
+        float(np.max(size(scene))),
+        *(math.dist(scene.location(a), scene.location(b)) for a in sides for b in sides),
+        0.0,
+    )
 
 
 def reach(scene: Scene, energy: Array) -> Array:
