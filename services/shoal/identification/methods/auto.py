@@ -96,9 +96,10 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
     A modulus, a mass or a length that is wrong by a factor leads a fit to a false minimum with every pose, and a small
     motion on a large one hides it in the noise: so what is positive is looked at even where the fit explains the data.
     """
-    free = model.parameters.logarithmic.copy()
+    free = model.parameters.logarithmic
     if not explains(model, outcome):
-        free |= [not (e.parameter.path or "").startswith("initial.") for e in model.parameters.entries.values()]
+        others = [not (e.parameter.path or "").startswith("initial.") for e in model.parameters.entries.values()]
+        free = free | np.array(others)
     points = _others(model, outcome.point, np.flatnonzero(free))
     if not len(points):
         return outcome
@@ -109,12 +110,12 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
         if len(chosen) <= _DESCENTS and all(np.max(np.abs((points[k] - p)[free])) > spacing for p in chosen):
             chosen.append(points[k])
     ends = distinct(model, descend_many(model, np.array(chosen), progress, patience=PATIENCE))
-    others = [d for d in ends if d.converged and _apart(model, d.point, outcome.point)]
+    rivals = [d for d in ends if d.converged and _apart(model, d.point, outcome.point)]
     best = min(ends, key=lambda d: d.fitness, default=None)
     if best is None or best.fitness >= outcome.fitness * (1.0 - _GAINED):
-        return replace(outcome, minima=[*outcome.minima, *((d.point, d.fitness) for d in others)])
+        return replace(outcome, minima=[*outcome.minima, *((d.point, d.fitness) for d in rivals)])
     rows = [(len(outcome.iterations) + i, value, mean) for i, value, mean in best.rows]
-    rest = [(outcome.point, outcome.fitness), *outcome.minima, *((d.point, d.fitness) for d in others if d is not best)]
+    rest = [(outcome.point, outcome.fitness), *outcome.minima, *((d.point, d.fitness) for d in rivals if d is not best)]
     names = ", ".join(model.names[k] for k in np.flatnonzero(free))
     choice = f"{outcome.choice}; then from other values of {names}"
     message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
