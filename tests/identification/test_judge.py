@@ -174,7 +174,7 @@ def test_a_false_minimum_is_left(noise: float | None) -> None:
     estimate = concluded(model, Outcome(end.point, end.fitness, [], ""))
     assert estimate.verdict is Verdict.IDENTIFIED
     assert all(known.lower <= TRUTH[name] <= known.upper for name, known in estimate.parameters.items())
-    assert "from a refit for a suspect" in estimate.choice
+    assert "from a refit" in estimate.choice
 
 
 def test_a_search_that_has_not_ended_has_failed() -> None:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from shoal.engines.casadi_fixed_step import runge_kutta
 from shoal.engines.casadi_model import casadi_model
-from shoal.engines.casadi_shooting import OPTIONS, ShootingResult, box, calls, initial_state, record, shot
+from shoal.engines.casadi_shooting import OPTIONS, ShootingResult, box, calls, initial_state, left, record, shot
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status
@@ -40,6 +40,7 @@ def identify_by_segments(
     *,
     segments: int = 10,
     step: float | None = None,
+    limit: float | None = None,
 ) -> ShootingResult:
     """Fit the initial state named by `paths` as `identify_initial_angles` does, by IPOPT on `segments` segments.
 
@@ -53,7 +54,7 @@ def identify_by_segments(
     longest = scene.solver.step if step is None else step
     whole = shot(scene, paths, instants, marker, longest, 0)
     nlp = _Segments.of(scene, paths, instants, marker, target, longest, min(segments, instants.size))
-    optimise = nlp.optimiser()
+    optimise = nlp.optimiser(left(limit, began))
     built = time.perf_counter()
     free = np.full(nlp.unknowns - len(paths), _UNBOUNDED)
     solution = optimise(x0=nlp.guess(first), lbx=np.append(low, -free), ubx=np.append(high, free), lbg=0.0, ubg=0.0)
@@ -154,8 +155,8 @@ class _Segments:
         slope = self.seen(np.append(q, v))[1].full()
         return np.append(q, v + _smallest(slope, velocity - slope @ v))
 
-    def optimiser(self) -> Any:
-        """IPOPT on the programme, with exact first derivatives and the Gauss-Newton Hessian."""
+    def optimiser(self, more: dict[str, Any]) -> Any:
+        """IPOPT on the programme, with exact first derivatives, the Gauss-Newton Hessian, and more options."""
         z, none = ca.MX.sym("z", self.unknowns), ca.MX.sym("p", 0)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", (self.segments - 1) * self.size)
         states, _ = self._states(z)
@@ -163,7 +164,7 @@ class _Segments:
         fit, gradient, hessian, gap, slope = self._linearised(z)
         inputs = [z, none]
         options = OPTIONS["ipopt"] | {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
-        options |= {
+        options |= more | {
             "grad_f": ca.Function("nlp_grad_f", inputs, [fit, gradient]),
             "jac_g": ca.Function("nlp_jac_g", inputs, [gap, slope]),
             "hess_lag": ca.Function("nlp_hess_l", [*inputs, lam_f, lam_g], [ca.triu(lam_f * hessian)]),

@@ -38,6 +38,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
 }
 
 
+_LEAST = 1e-3
+"""Seconds that IPOPT is given at least: it takes no zero."""
+
+
 @dataclass(frozen=True)
 class ShootingResult:
     """What shooting found, and what it cost.
@@ -61,6 +65,11 @@ class ShootingResult:
     status: Status
     message: str
 
+    @property
+    def out_of_time(self) -> bool:
+        """Whether the limit ended it."""
+        return "WallTime" in self.message
+
 
 def identify_initial_angles(
     scene: Scene,
@@ -74,11 +83,13 @@ def identify_initial_angles(
     *,
     solver: Literal["ipopt", "sqpmethod"] = "ipopt",
     step: float | None = None,
+    limit: float | None = None,
 ) -> ShootingResult:
     """Fit the initial state named by `paths` (`initial.OA.angle`, `initial.AB.rate`) to a marker's path.
 
     start, lower, upper: of each path [rad or rad/s], (parameters,); times: [s], (samples,);
     measured: positions of `marker` [m], (samples, 2); step: longest Runge-Kutta step [s], else the scene's
+    limit: after which IPOPT stops [s], the time to derive the model included
 
     Minimises the fitness with the Gauss-Newton Hessian. Raises InputError.
     """
@@ -87,7 +98,7 @@ def identify_initial_angles(
     began = time.perf_counter()
     longest = scene.solver.step if step is None else step
     plain, linearised = (shot(scene, paths, instants, marker, longest, count) for count in (0, len(paths)))
-    optimise, fitness_at = _least_squares(plain, linearised, target, solver)
+    optimise, fitness_at = _least_squares(plain, linearised, target, solver, left(limit, began))
     built = time.perf_counter()
     values = optimise(x0=first, lbx=low, ubx=high)["x"].full().ravel()
     wall = time.perf_counter() - built
@@ -108,6 +119,11 @@ def identify_initial_angles(
         status=Status.OK if trusted else Status.FAILED,
         message="" if trusted else f"{solver}: {stats['return_status']}",
     )
+
+
+def left(limit: float | None, began: float) -> dict[str, Any]:
+    """What tells IPOPT the rest of a limit [s] that began at a time of `perf_counter`."""
+    return {} if limit is None else {"ipopt.max_wall_time": max(limit - (time.perf_counter() - began), _LEAST)}
 
 
 def calls(stats: dict[str, Any], *names: str) -> int:
@@ -176,7 +192,7 @@ def initial_state(model: CasadiModel, scene: Scene, paths: Sequence[str], p: Any
     return model.start(ca.vertcat(*angles), ca.vertcat(*rates))
 
 
-def _least_squares(plain: Any, linearised: Any, measured: Array, solver: str) -> tuple[Any, Any]:
+def _least_squares(plain: Any, linearised: Any, measured: Array, solver: str, more: dict[str, Any]) -> tuple[Any, Any]:
     """The optimiser of the fitness, with its exact gradient and Gauss-Newton Hessian, and the fitness itself."""
     samples, parameters = len(measured), plain.numel_in(0)
     x, p = ca.MX.sym("x", parameters), ca.MX.sym("p", 0)
@@ -191,6 +207,7 @@ def _least_squares(plain: Any, linearised: Any, measured: Array, solver: str) ->
     none = ca.MX(0, 1)
     options = OPTIONS[solver] | {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
     if solver == "ipopt":
+        options |= more
         options["grad_f"] = ca.Function("nlp_grad_f", [x, p], [value, gradient])
         options["hess_lag"] = ca.Function("nlp_hess_l", [x, p, lam_f, lam_g], [ca.triu(hessian)])
     else:

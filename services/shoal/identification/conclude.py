@@ -10,12 +10,13 @@ import numpy as np
 from shoal.identification.adapt import Stage
 from shoal.identification.bootstrap import bootstrap
 from shoal.identification.covariance import blocks_of
+from shoal.identification.curvature import bent, by_profile
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate, Value, Verdict
 from shoal.identification.forward import ForwardModel, accepts
 from shoal.identification.judge import Judgement, few, judge
 from shoal.identification.methods import Outcome
-from shoal.identification.methods.lanes import Descent
+from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.model_error import Corrections, ModelError, model_error, rms_of
 from shoal.identification.problem import RESERVED
 from shoal.identification.profiles import Profile, profiles
@@ -23,7 +24,7 @@ from shoal.identification.rank import combinations
 from shoal.identification.residual_tests import ResidualTests, residual_tests
 from shoal.identification.rivals import valley
 from shoal.identification.sensitivity import Sensitivity, believed
-from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
+from shoal.identification.uncertainty import HIDDEN, Linearisation, Spread, autocorrelation, linearise, spread
 from shoal.identification.units import unit
 from shoal.scene import Rod, Scene, expression
 from shoal.trajectory import Array
@@ -34,6 +35,8 @@ _ALIKE = 3.0
 """A residual within this factor of the mesh error is explained by it."""
 
 
+_LOWER = 1e-6
+"""Of the fitness: an answer that is better by more is another one."""
 _ROUNDS = 2
 """How often an answer moves on to a better minimum that was met."""
 
@@ -82,21 +85,29 @@ def conclude(
     at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks)
     predicted = {name: _predicted(model, point, name) for name in measurement.recordings}
     nothing = ModelError(None, None)
-    error = unless_late(lambda: model_error(model, point, predicted), nothing) if possible and looked else nothing
+    error = (
+        unless_late(lambda: model_error(model, point, predicted, seen.residual), nothing)
+        if possible and looked
+        else nothing
+    )
     correction = error.corrections(at.pseudo_inverse)
     mesh, theory = (
         None if part is None else rms_of(part[: len(model.rows.time)]) for part in (error.mesh, error.theory)
     )
     refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
     tests = residual_tests(model, seen.residual, blocks, at.noise, float(np.hypot(mesh or 0.0, theory or 0.0)), refined)
-    at = replace(at, systematic=tests.excess * float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1)))))
+    told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
+    at = replace(at, systematic=min(tests.excess, HIDDEN * tests.noise) * told)
     alone: tuple[Outcome, list[Array]] = (outcome, [])
     found, beside = unless_late(lambda: valley(model, outcome, at), alone) if looked and possible else alone
     ends = [point, *beside]
     parameters = _spanning([_parameters(model, end, at, correction) for end in ends])
     if looked is None:
         parameters = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in parameters.items()}
-    profiled = profiles(model, point, at) if wishes.profiles and possible and looked else {}
+    curved = _curved(model, outcome, at, seen, tests) if possible and looked else []
+    parameters, profiled = by_profile(model, ends, at, parameters, curved)
+    if wishes.profiles and possible and looked:
+        profiled = profiles(model, point, at, profiled)
     parameters |= {n: replace(parameters[n], identifiable=False) for n, p in profiled.items() if p.open}
     unknown = combinations(model, point, at) if possible and looked else []
     if possible:
@@ -104,16 +115,18 @@ def conclude(
     else:
         message = "no parameter set could be simulated; look at the bounds and the scene"
         judgement = Judgement(Verdict.FAILED, message)
-    if judgement.better is not None and rounds > 0:
-        better = _moved(outcome, judgement.better)
-        return conclude(searched, better, method, seed, wall, stages, wishes, rounds - 1)
+    ended = outcome.ended and judgement.verdict is not Verdict.UNFINISHED
+    better = judgement.better or (unless_late(lambda: _lower(model, outcome, profiled), None) if ended else None)
+    if better is not None and rounds > 0:
+        return conclude(searched, _moved(outcome, better), method, seed, wall, stages, wishes, rounds - 1)
     correlation = autocorrelation(seen.residual, blocks)
     draws = wishes.bootstrap if possible and looked else 0
     rng = np.random.default_rng(seed)
     # Away from the minimum the mesh is not what limits the fit.
     limits = judgement.verdict is not Verdict.UNFINISHED and not stages
     coarse = _coarse(model, mesh if limits else None, tests)
-    notes = (judgement.message or outcome.message, _better(profiled), coarse, _slender(parameters, tests, theory))
+    remarks = (_better(profiled), _bent(model, curved), coarse, _slender(parameters, tests, theory))
+    notes = (judgement.message or outcome.message, *remarks)
     return Estimate(
         problem=model.problem.name,
         method=method,
@@ -124,7 +137,7 @@ def conclude(
         advice=judgement.advice,
         choice=outcome.choice,
         parameters=parameters,
-        quantities=_spanning([_quantities(model, end, at, correction) for end in ends]),
+        quantities=_spanning([_quantities(model, end, at, correction, curved) for end in ends]),
         combinations=unknown,
         fitness=outcome.fitness,
         rms=float(np.sqrt(outcome.fitness / model.things)),
@@ -201,11 +214,19 @@ def _coarse(model: ForwardModel, mesh: float | None, tests: ResidualTests) -> st
 
 def _moved(outcome: Outcome, better: Descent) -> Outcome:
     """The outcome at a better minimum; where it was is left as another one."""
-    choice = "; then ".join(part for part in (outcome.choice, "least squares from a refit for a suspect") if part)
+    choice = "; then ".join(part for part in (outcome.choice, "least squares from a refit") if part)
     minima = [(outcome.point, outcome.fitness), *outcome.minima]
     message = "" if better.converged else "no convergence"
     moved = replace(outcome, point=better.point, fitness=better.fitness, minima=minima, choice=choice)
     return replace(moved, message=message, converged=better.converged)
+
+
+def _lower(model: ForwardModel, outcome: Outcome, profiled: dict[str, Profile]) -> Descent | None:
+    """Where a descent ends from what profiles found below the answer; None if nothing was."""
+    places = [found.place for found in profiled.values() if found.better]
+    ends = descend_many(model, np.array(places)) if places else []
+    best = min(ends, key=lambda end: end.fitness, default=None)
+    return best if best is not None and best.fitness < outcome.fitness * (1.0 - _LOWER) else None
 
 
 def _by_thing(model: ForwardModel, rows: Array | None) -> float | None:
@@ -220,6 +241,20 @@ def _slender(parameters: dict[str, Value], tests: ResidualTests, theory: float |
         return ""
     change = f"change the motion by about {tests.sized(theory)} and widen the interval of {', '.join(limited)}"
     return f"shear and rotary inertia, which slender beams neglect, {change}"
+
+
+def _curved(
+    model: ForwardModel, outcome: Outcome, at: Linearisation, seen: Sensitivity, tests: ResidualTests
+) -> list[int]:
+    """Parameters whose intervals linear theory does not tell; where the model limits them they are wider anyway."""
+    if not outcome.ended or not outcome.converged or tests.limited or not seen.reliable:
+        return []
+    return unless_late(lambda: bent(model, outcome.point, at, seen), [])
+
+
+def _bent(model: ForwardModel, curved: list[int]) -> str:
+    names = ", ".join(model.names[k] for k in curved)
+    return f"the misfit is no parabola within the interval of {names}, which is that of the profile" if names else ""
 
 
 def _better(profiled: dict[str, Profile]) -> str:
@@ -265,8 +300,11 @@ def _covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:
     return np.asarray(slope[:, None] * at.covariance * slope)
 
 
-def _quantities(model: ForwardModel, point: Array, at: Linearisation, correction: Corrections) -> dict[str, Value]:
-    found = {}
+def _quantities(
+    model: ForwardModel, point: Array, at: Linearisation, correction: Corrections, curved: list[int]
+) -> dict[str, Value]:
+    found, entries = {}, list(model.parameters.entries.values())
+    doubtful = {entries[k].key for k in curved}
     for name, text in model.problem.quantities.items():
         for recording in model.measurement.recordings if _own(model, text) else [None]:
 
@@ -276,9 +314,8 @@ def _quantities(model: ForwardModel, point: Array, at: Linearisation, correction
 
             about = spread(value_at, point, at)
             shift = correction.of(value_at, point)
-            found[f"{recording}.{name}" if recording else name] = _value(
-                value_at(point), about, about.fixed, shift, False
-            )
+            told = about.fixed and not doubtful & set(expression.names(text))
+            found[f"{recording}.{name}" if recording else name] = _value(value_at(point), about, told, shift, False)
     return found
 
 

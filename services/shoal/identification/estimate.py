@@ -43,7 +43,7 @@ class Value:
 
     correction: what a mesh twice as fine would add to the value, None if not computed; it is not added, but is in
     the interval
-    theory: what shear and rotary inertia would add, by order of magnitude, where slender beams neglect them; likewise
+    theory: what shear and rotary inertia would add where slender beams neglect them; likewise
     unit: of all of them, empty where there is none or none is known
     """
 

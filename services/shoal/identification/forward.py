@@ -222,7 +222,7 @@ class ForwardModel:
         if self.deadline is None:
             return run(scene, times)
         sized = [(name, getattr(body, "elements", 0)) for name, body in scene.bodies.items()]
-        kind = (str(sized), scene.solver.integrator, scene.solver.step, lanes == 1)
+        kind = (self.engine.name, str(sized), scene.solver.integrator, scene.solver.step, lanes == 1)
         return self.deadline.run(kind, scene, times, run)
 
     def warm_up(self) -> None:

@@ -1,8 +1,9 @@
 """Mirror images of an answer: other starts of the machine that the measured channels may not tell apart.
 
 A height alone is the same for the machine reflected about the axis of gravity, a tip is the same for both elbows. From
-the answer such starts follow by reflections and half turns of its angles, and by the poses of its first samples.
-Those whose channels begin alike are simulated, and those that fit are followed to their minimum.
+the answer such starts follow by reflections and half turns of its angles, and by other poses that show what its own
+shows. Those whose channels begin alike are simulated, and those that fit are followed to their minimum. An image that a
+descent from the answer itself reaches is none.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _SIMULATED, _FOLLOWED = 16, 4
 _ALIKE = 0.05
 """Of the spread of the data: deviation of an image's first channels from those of the answer."""
 _FITS = 0.3
-"""Of the spread of the data: deviation (RMS) of an image that is followed."""
+"""Of the spread of the data: deviation (RMS) of an image that is followed, beyond that of the answer."""
 
 
 def with_mirror_images(model: ForwardModel, outcome: Outcome) -> Outcome:
@@ -41,7 +42,7 @@ def with_mirror_images(model: ForwardModel, outcome: Outcome) -> Outcome:
     if not len(points):
         return outcome
     values = looking.cost(looking.uncounted(points))
-    left = np.sqrt(values * model.samples / len(model.rows.time))
+    left = np.sqrt(np.maximum(values - outcome.fitness, 0.0) * model.samples / len(model.rows.time))
     good = [k for k in np.argsort(values, kind="stable") if left[k] < _FITS * model.spread][:_FOLLOWED]
     if not good:
         return outcome
@@ -72,7 +73,7 @@ def images(model: ForwardModel, point: Array) -> Array:
 
 
 def _candidates(model: ForwardModel, point: Array) -> Iterator[Array]:
-    """Images by reflections of the start, by the poses of the first samples, by changed signs and exchanged values."""
+    """Images by reflections of the start, by poses that show the same, by changed signs and exchanged values."""
     recordings = tuple(model.measurement.recordings)
     groups = [recordings, *((name,) for name in recordings)] if len(recordings) > 1 else [recordings]
     for group in groups:

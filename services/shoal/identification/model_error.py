@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shoal.engines.theory import slender_share
+from shoal.engines import get_engine
+from shoal.engines.theory import WITH_SHEAR, slender_share
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.mechanics.simulate import stable_step
@@ -16,6 +17,8 @@ from shoal.trajectory import Array
 
 _STABLE = 0.9
 """Of the stable step at the start: it varies by a few percent along the motion."""
+_MATTERS = 0.1
+"""Of the mesh error and of what noise leaves uncertain: a theory error from here on is computed, not just estimated."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,8 @@ class Corrections:
 class ModelError:
     """Motion of a better model minus that of the one that was fitted, (rows,), with zeros for priors.
 
-    mesh: by twice as many elements; theory: by shear and rotary inertia. None for scenes without any of it, and where
-    the better model cannot be run.
+    mesh: by twice as many elements; theory: by shear and rotary inertia, beyond what the mesh does. None for scenes
+    without any of it, and where the better model cannot be run.
     """
 
     mesh: Array | None
@@ -58,19 +61,41 @@ class ModelError:
         return np.asarray(residual + changed - jacobian @ (pseudo_inverse @ changed))
 
 
-def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array]) -> ModelError:
-    """At a point whose channels by recording are known."""
+def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array], residual: Array) -> ModelError:
+    """At a point whose channels by recording, and residuals (rows,), are known."""
     flexible = {
         name: body for name, body in model.scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"
     }
     if not flexible:
         return ModelError(None, None)
-    slender = {name: rod for name, rod in flexible.items() if rod.element != "ancf-full"}
-    # In bending, and by order of magnitude: a rod with shear moves like one of a lower Young's modulus.
-    softer = {f"bodies.{name}.youngs_modulus": 1.0 / (1.0 + slender_share(rod)) for name, rod in slender.items()}
     finer = _finer(model.scene, flexible)
-    mesh = None if finer is None else _difference(model, point, predicted, scene=finer)
-    return ModelError(mesh, _difference(model, point, predicted, factors=softer) if softer else None)
+    mesh = None if finer is None else _difference(model, point, predicted, finer)
+    slender = {name: rod for name, rod in flexible.items() if rod.element != "ancf-full"}
+    if not slender or model.engine.name in WITH_SHEAR:
+        return ModelError(mesh, None)
+    theory = _softened(model, point, predicted, slender)
+    uncertain = rms_of(residual) / np.sqrt(len(residual))
+    matters = theory is None or rms_of(theory) > _MATTERS * max(uncertain, 0.0 if mesh is None else rms_of(mesh))
+    if finer is not None and mesh is not None and matters:
+        sheared = _sheared(model, point, predicted, finer)
+        theory = theory if sheared is None else sheared - mesh
+    return ModelError(mesh, theory)
+
+
+def _softened(
+    model: ForwardModel, point: Array, predicted: Mapping[str, Array], slender: Mapping[str, Rod]
+) -> Array | None:
+    """By order of magnitude: in bending a rod with shear moves like one of a lower Young's modulus."""
+    softer = {f"bodies.{name}.youngs_modulus": 1.0 / (1.0 + slender_share(rod)) for name, rod in slender.items()}
+    return _difference(model, point, predicted, model.scene, softer)
+
+
+def _sheared(model: ForwardModel, point: Array, predicted: Mapping[str, Array], finer: Scene) -> Array | None:
+    """By the geometrically exact beams of another engine; None where it is not installed or cannot run the scene."""
+    try:
+        return _difference(replace(model, engine=get_engine(WITH_SHEAR[0])), point, predicted, finer)
+    except (ImportError, InputError):
+        return None
 
 
 def _finer(scene: Scene, flexible: Mapping[str, Rod]) -> Scene | None:
@@ -88,7 +113,7 @@ def _difference(
     model: ForwardModel,
     point: Array,
     predicted: Mapping[str, Array],
-    scene: Scene | None = None,
+    scene: Scene,
     factors: Mapping[str, float] | None = None,
 ) -> Array | None:
     columns = []

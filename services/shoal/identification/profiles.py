@@ -6,6 +6,7 @@ Bioinformatics 25, 2009).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -24,6 +25,8 @@ _FIRST = 0.5
 """First step outward, in standard deviations; the next ones are longer by _GROWTH."""
 _GROWTH = 1.4
 _ITERATIONS = 8
+_BELOW = 1e-3
+"""Of the threshold: a fit that is better by more is another minimum."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Profile:
     """Values of a parameter, (n,) increasing, and the rise of the misfit over that of the 95 % threshold, (n,).
 
     lower, upper: where the rise crosses one; at a side that is open the bound, which the data do not exclude
-    better: whether a better fit than the answer was found on the way
+    better: whether a better fit than the answer was found on the way; place: where, (parameters,) as sought
     """
 
     values: Array
@@ -41,6 +44,7 @@ class Profile:
     lower_open: bool
     upper_open: bool
     better: bool
+    place: Array
 
     @property
     def open(self) -> bool:
@@ -48,17 +52,17 @@ class Profile:
         return self.lower_open or self.upper_open
 
     def to_json(self) -> dict[str, Any]:
-        """All fields."""
-        return plain(vars(self))  # type: ignore[no-any-return]
+        """All fields but the place."""
+        return plain({name: value for name, value in vars(self).items() if name != "place"})  # type: ignore[no-any-return]
 
 
-def profiles(model: ForwardModel, point: Array, at: Linearisation) -> dict[str, Profile]:
-    """The profile of every parameter about an answer, as far as time allows."""
+def profiles(model: ForwardModel, point: Array, at: Linearisation, known: Mapping[str, Profile]) -> dict[str, Profile]:
+    """The profile of every parameter about an answer, as far as time allows; known: those made before."""
     found: dict[str, Profile] = {}
     with suppress(TimeIsUp):
         for k, name in enumerate(model.names):
-            found[name] = profile(model, point, at, k)
-    return found
+            found[name] = known[name] if name in known else profile(model, point, at, k)
+    return {**known, **found}
 
 
 def profile(model: ForwardModel, point: Array, at: Linearisation, k: int) -> Profile:
@@ -82,16 +86,23 @@ def profile(model: ForwardModel, point: Array, at: Linearisation, k: int) -> Pro
     sides = [_side(model, point, k, direction * step, threshold) for direction in (-1.0, 1.0)]
     values = np.concatenate([sides[0][0][::-1], [point[k]], sides[1][0]])
     rise = np.concatenate([sides[0][1][::-1], [0.0], sides[1][1]])
-    ends = [_crossing(point[k], *side) for side in sides]
+    ends = [_crossing(point[k], *side[:2]) for side in sides]
     own = np.exp(values) if model.parameters.logarithmic[k] else values
     low, high = (float(np.exp(end)) if model.parameters.logarithmic[k] else end for end, _ in ends)
-    return Profile(own, rise, low, high, ends[0][1], ends[1][1], bool(np.min(rise) < -1e-3))
+    place = min(sides, key=lambda side: side[3])[2]
+    return Profile(own, rise, low, high, ends[0][1], ends[1][1], bool(np.min(rise) < -_BELOW), place)
 
 
-def _side(model: ForwardModel, point: Array, k: int, step: float, threshold: float) -> tuple[Array, Array]:
-    """Values of parameter k outward and the rises there, until the rise passes one or the bound is reached."""
+def _side(
+    model: ForwardModel, point: Array, k: int, step: float, threshold: float
+) -> tuple[Array, Array, Array, float]:
+    """Values of parameter k outward and the rises there, until the rise passes one or the bound is reached.
+
+    The last two are where the misfit is lowest, and the rise there.
+    """
     base = _cost(model.uncounted(point[None])[0])
     values, rises, last = list[float](), list[float](), point.copy()
+    lowest, place = 0.0, point
     for _ in range(_POINTS):
         moved = last.copy()
         moved[k] = np.clip(last[k] + step, model.lower[k], model.upper[k])
@@ -100,10 +111,12 @@ def _side(model: ForwardModel, point: Array, k: int, step: float, threshold: flo
         last, cost = _settle(model, moved, k)
         values.append(float(last[k]))
         rises.append(min((cost - base) / threshold, 1e6))
+        if rises[-1] < lowest:
+            lowest, place = rises[-1], last
         if rises[-1] > 1.0:
             break
         step *= _GROWTH
-    return np.array(values), np.array(rises)
+    return np.array(values), np.array(rises), place, lowest
 
 
 def _settle(model: ForwardModel, point: Array, k: int) -> tuple[Array, float]:

@@ -34,9 +34,11 @@ def starting_points(model: ForwardModel) -> Array:
 
 
 def poses_at(model: ForwardModel, point: Array, name: str) -> Array:
-    """The point with every pose that a recording's first samples allow, its rates unchanged, (points, parameters)."""
+    """The point with every pose that shows in a recording what its own shows, rates unchanged, (points, parameters)."""
     angles = model.parameters.indices(name, ".angle")
-    return _poses(model, name, point, list(angles.values()), _first_pose(model, name)[0]) if angles else point[None]
+    return (
+        _poses(model, name, point, list(angles.values()), model.poses(point[None], name)[0]) if angles else point[None]
+    )
 
 
 def _of_recording(model: ForwardModel, point: Array, name: str) -> Array:
@@ -94,8 +96,10 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
     damping = np.full(count, 1e-3)
     error, jacobian = _pose_error(model, name, points, angles, pose)
     cost = np.sum(error**2, axis=1)
-    going = np.arange(count)
-    for _ in range(_ITERATIONS):
+    # Not every pose of a closed loop can be assembled.
+    cost[~np.isfinite(cost)] = np.inf
+    going = np.flatnonzero(np.isfinite(cost))
+    for _ in range(_ITERATIONS if going.size else 0):
         step = _damped_step(error[going], jacobian[going], damping[going])
         trial = points[going]
         trial[:, angles] -= step
@@ -160,7 +164,8 @@ def _pose_error(model: ForwardModel, name: str, points: Array, angles: list[int]
     channels = model.measurement.recordings[name].channels
     counted = np.isfinite(pose) & np.array([channel.quantity != "rate" for channel in channels])
     error = np.where(counted, seen[0] - np.where(counted, pose, 0.0), 0.0)
-    return error, np.where(counted[:, None], np.moveaxis((seen[1:] - seen[0]) / h, 0, -1), 0.0)
+    slope = np.moveaxis((seen[1:] - seen[0]) / h, 0, -1)
+    return error, np.where(counted[:, None] & np.isfinite(slope), slope, 0.0)
 
 
 def _with_rates(

@@ -27,14 +27,17 @@ A run that gained energy without bound would else have no reach.
 TETHERS = Revolute | Weld
 
 
-def size(scene: Scene) -> float:
-    """All undeformed bodies stretched out in a line [m]."""
+def size(scene: Scene) -> Array:
+    """All undeformed bodies stretched out in a line [m], (lanes,) where their lengths differ between lanes."""
     sides = [side for joint in scene.joints.values() for side in places(joint)]
     attached = [*sides, *scene.markers.values()]
-    total = 0.0
+    total = np.zeros(())
     for name, body in scene.bodies.items():
-        used = {*(scene.location(place) for place in attached if place.body == name), *body.points.values()}
-        total += max((math.dist(a, b) for a, b in combinations(used, 2)), default=0.0)
+        used = [*(scene.location(place) for place in attached if place.body == name), *body.points.values()]
+        longest = np.zeros(())
+        for (x, y), (other_x, other_y) in combinations(used, 2):
+            longest = np.maximum(longest, np.hypot(np.subtract(x, other_x), np.subtract(y, other_y)))
+        total = total + longest
     return total
 
 
@@ -47,7 +50,7 @@ def span(scene: Scene) -> float:
     loaded = [side for load in scene.loads.values() for side in load_sides(load).values()]
     fixed = {scene.location(side) for side in (*joined, *loaded) if side.body == GROUND}
     fixed |= {start.position for start in scene.initial.values() if start.position is not None}
-    return max(size(scene), *(math.dist(a, b) for a, b in combinations(fixed, 2)), 0.0) or 1.0
+    return max(float(np.max(size(scene))), *(math.dist(a, b) for a, b in combinations(fixed, 2)), 0.0) or 1.0
 
 
 def reach(scene: Scene, energy: Array) -> Array:

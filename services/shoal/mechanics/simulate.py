@@ -222,8 +222,9 @@ def _verdict(
     constraint_drift: Array,
 ) -> tuple[tuple[Status, ...], str]:
     """Status of every lane, and the reason for the first that is not ok."""
-    reach = reaches.MARGIN * reaches.reach(scene, record.energy_scale[0])
-    farthest = np.max(reaches.distance_to_ground(scene, points), axis=(0, 1))
+    # Lanes may be machines of different lengths.
+    reach = reaches.MARGIN * reaches.reach(model.scene, record.energy_scale[0])
+    farthest = np.max(reaches.distance_to_ground(model.scene, points), axis=(0, 1))
     adaptive = facts(choice.name).adaptive
     steps, reached = record.steps[0], record.reached[0]
     statuses, message = [], ""
@@ -263,7 +264,7 @@ def _start(scene: Scene, model: Model, record: Record) -> dict[str, Any]:
     q, v = np.split(record.begin[:, 0], 2)
     used = start.begun(model.frames, model.scene, q, v)
     redundant = {"redundant_joints": list(_redundant(scene.model_dump_json()))}
-    return dict(plain(start.facts(scene, used, reaches.size(scene)) | redundant))
+    return dict(plain(start.facts(scene, used, float(reaches.size(scene))) | redundant))
 
 
 @lru_cache(maxsize=64)

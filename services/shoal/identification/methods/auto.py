@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
@@ -29,7 +30,7 @@ _UNEXPLAINED = 0.05
 _NOISES = 3.0
 _SWINGS = 3
 """A record that swings more often may be fitted with another phase: false minima."""
-_FACTOR, _ELSEWHERE, _DESCENTS = 5.0, 31, 4
+_FACTOR, _ELSEWHERE, _DESCENTS = 5.0, 31, 6
 """Positive quantities are tried within this factor, at so many points, and the best of them are followed."""
 _GAINED = 1e-3
 _LINE, _WIDTH, _LOOKED_AT = 41, 0.05, 2
@@ -54,7 +55,7 @@ def auto(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> O
         del methods["least-squares"]
     reason = f"a deviation grows {max(grown, 1.0):.2g}-fold over {model.measurement.end:.3g} s"
     outcome = _first_that_explains(model, methods, reason)
-    if not explains(model, outcome) and np.isfinite(outcome.fitness):
+    if np.isfinite(outcome.fitness):
         outcome = _elsewhere(model, outcome, progress)
     if swings(model) < _SWINGS or grown > FRACTAL or not np.isfinite(outcome.fitness):
         return outcome
@@ -90,31 +91,50 @@ def _first_that_explains(model: ForwardModel, methods: dict[str, Callable[[], Ou
 
 
 def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Outcome:
-    """The outcome, or where descents end from other values of what is no initial state: a modulus or a mass that is
-    wrong by a factor leads a fit to a false minimum with every pose.
+    """The outcome, or where descents end from other values of what is no initial state.
+
+    A modulus, a mass or a length that is wrong by a factor leads a fit to a false minimum with every pose, and a small
+    motion on a large one hides it in the noise: so what is positive is looked at even where the fit explains the data.
     """
-    states = np.array([(e.parameter.path or "").startswith("initial.") for e in model.parameters.entries.values()])
-    free = np.flatnonzero(~states)
-    if not free.size:
+    free = model.parameters.logarithmic
+    if not explains(model, outcome):
+        others = [not (e.parameter.path or "").startswith("initial.") for e in model.parameters.entries.values()]
+        free = free | np.array(others)
+    points = _others(model, outcome.point, np.flatnonzero(free))
+    if not len(points):
         return outcome
-    width = np.minimum(np.log(_FACTOR), (model.upper - model.lower)[free] / 2)
-    width = np.where(model.parameters.logarithmic[free], width, (model.upper - model.lower)[free] / 2)
-    points = np.repeat(outcome.point[None], _ELSEWHERE, axis=0)
-    points[:, free] += (2 * scatter(_ELSEWHERE, len(free)) - 1) * width
-    points = np.clip(points, model.lower, model.upper)
     values = model.fitness(points)
-    chosen = points[np.argsort(values, kind="stable")[:_DESCENTS]]
-    ends = [d for d in descend_many(model, chosen, progress, patience=PATIENCE) if np.isfinite(d.fitness)]
+    spacing = 2 * np.log(_FACTOR) / _ELSEWHERE
+    chosen = [outcome.point]
+    for k in np.argsort(values, kind="stable"):
+        if len(chosen) <= _DESCENTS and all(np.max(np.abs((points[k] - p)[free])) > spacing for p in chosen):
+            chosen.append(points[k])
+    ends = distinct(model, descend_many(model, np.array(chosen), progress, patience=PATIENCE))
+    rivals = [d for d in ends if d.converged and _apart(model, d.point, outcome.point)]
     best = min(ends, key=lambda d: d.fitness, default=None)
     if best is None or best.fitness >= outcome.fitness * (1.0 - _GAINED):
-        return outcome
+        return replace(outcome, minima=[*outcome.minima, *((d.point, d.fitness) for d in rivals)])
     rows = [(len(outcome.iterations) + i, value, mean) for i, value, mean in best.rows]
-    rest = [(outcome.point, outcome.fitness), *outcome.minima]
-    choice = f"{outcome.choice}; then from other values of {', '.join(model.names[k] for k in free)}"
+    rest = [(outcome.point, outcome.fitness), *outcome.minima, *((d.point, d.fitness) for d in rivals if d is not best)]
+    names = ", ".join(model.names[k] for k in np.flatnonzero(free))
+    choice = f"{outcome.choice}; then from other values of {names}"
     message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
     return Outcome(
         best.point, best.fitness, [*outcome.iterations, *rows], message, rest, choice, converged=best.converged
     )
+
+
+def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> Array:
+    """Other values of these parameters within the bounds, each alone and all together, (points, parameters)."""
+    width = (model.upper - model.lower) / 2
+    width = np.where(model.parameters.logarithmic, np.minimum(np.log(_FACTOR), width), width)
+    moves = [shift * np.eye(len(point))[k] for k in free for shift in np.linspace(-1.0, 1.0, _ELSEWHERE)]
+    if len(free) > 1:
+        together = np.zeros((len(free) * _ELSEWHERE, len(point)))
+        together[:, free] = 2 * scatter(len(together), len(free)) - 1
+        moves += list(together)
+    points = point + np.array(moves).reshape(-1, len(point)) * width
+    return np.unique(np.clip(points, model.lower, model.upper), axis=0)
 
 
 def explains(model: ForwardModel, outcome: Outcome) -> bool:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.recording import Clocked
@@ -37,8 +38,12 @@ def _shoot(model: ForwardModel, search: Callable[..., ShootingResult], progress:
     starts = starting_points(model)
     # Shooting from a wrong elbow branch ends in a false minimum: one run of each start tells which is right.
     start = starts[int(np.argmin(model.fitness(starts)))]
-    result = search(model.scene, paths, start, model.lower, model.upper, recording.times, marker, recording.values)
+    limit = None if model.deadline is None else model.deadline.remaining
+    box = (model.lower, model.upper)
+    result = search(model.scene, paths, start, *box, recording.times, marker, recording.values, limit=limit)
     model.counter.charge(result.evaluations, result.values, result.fitness)
+    if result.out_of_time:
+        raise TimeIsUp
     rows = [(result.iterations, result.fitness, result.fitness)]
     progress(*rows[0])
     return Outcome(result.values, result.fitness, rows, result.message)
