@@ -29,8 +29,8 @@ from shoal.trajectory import Status, Trajectory, plain
 
 DRIFT_TOLERANCE = 1e-6
 SINKING = 30.0
-"""A weight that nothing holds yet falls for as long as the error of its rate is below the absolute tolerance; by then it
-is 14 times as fast as that."""
+"""A weight that nothing holds yet falls for as long as the error of its rate is below the absolute tolerance; it is 14
+times as fast as that by then."""
 STEP_MARGIN = 0.95
 """Of the stable step, which is that of the start and varies by a few percent along the motion."""
 
