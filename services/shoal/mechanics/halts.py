@@ -64,8 +64,8 @@ def narrow(breaks: Array, longest: float, adaptive: bool) -> Array:
     least, most = np.minimum(widths[1:], widths[:-1]), np.maximum(widths[1:], widths[:-1])
     uneven = most > GRADED * least
     if not adaptive:
-        beside = np.append(uneven, True) | np.insert(uneven, 0, True)
-        chosen = np.flatnonzero(widths < longest * np.where(beside, PARTS, 1.0))
+        near = np.convolve(np.pad(uneven, 2), np.ones(4), "valid") > 0  # a change of width at most two pieces away
+        chosen = np.flatnonzero(widths < longest * np.where(near, PARTS, 1.0))
         inside = breaks[chosen, None] + widths[chosen, None] * np.linspace(0.0, 1.0, PARTS + 1)
         return np.unique(np.concatenate([inside[:, 1:].ravel(), breaks[chosen]]))
     return breaks[1:-1][(least < NARROW * longest) & uneven]
