@@ -20,7 +20,7 @@ from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
 from shoal.identification.measurement import Measurement, measure
-from shoal.identification.methods import Outcome, get_method
+from shoal.identification.methods import Outcome, get_method, prepare
 from shoal.identification.mirrors import with_mirror_images
 from shoal.identification.plausible import check_constant
 from shoal.identification.problem import Problem
@@ -73,6 +73,7 @@ def identify(
     if deadline is not None:
         with deadline.paused():
             model.warm_up()
+            prepare(name)
     unless_late(lambda: check_constant(model), None)
     if checkpoint is not None:
         model.memory = Memory(checkpoint, _fingerprint(model, name, seed, tolerance))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from importlib import import_module
+
 from shoal.errors import InputError
 from shoal.identification.methods.auto import auto
 from shoal.identification.methods.black_box import cma_es, differential_evolution
@@ -32,6 +35,23 @@ METHODS: dict[str, Method] = {
 }
 
 
+_LATE = {
+    "multi-start": "scipy.stats",
+    "cma-es": "cma",
+    "casadi": "shoal.engines.casadi_shooting",
+    "casadi-multiple": "shoal.engines.casadi_multiple_shooting",
+}
+"""Modules that take a second or more to import, by the method that does so when it begins."""
+
+
+def prepare(name: str) -> None:
+    """Import what a method and the verdict import late, so that no clock counts it."""
+    for module in ("scipy.optimize", _LATE.get(name, "scipy.optimize")):
+        # The method itself says what is missing.
+        with suppress(ImportError, InputError):
+            import_module(module)
+
+
 def get_method(name: str) -> Method:
     """The method of that name. Raises InputError."""
     if name not in METHODS:
@@ -39,4 +59,4 @@ def get_method(name: str) -> Method:
     return METHODS[name]
 
 
-__all__ = ["METHODS", "Method", "Outcome", "get_method"]
+__all__ = ["METHODS", "Method", "Outcome", "get_method", "prepare"]
