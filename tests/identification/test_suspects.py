@@ -121,7 +121,7 @@ def test_causes_are_named_first() -> None:
     wrong = [trial(seed) for seed in range(1000, 1040)]
     assert sum(t.first for t in wrong) >= 0.85 * sum(t.noticed for t in wrong)
     right = [trial(seed, "right") for seed in range(40)]
-    assert sum(t.verdict is Verdict.REJECTED for t in right) <= 1
+    assert sum(t.verdict == Verdict.REJECTED for t in right) <= 1
 
 
 def test_what_is_sought_is_no_suspect() -> None:

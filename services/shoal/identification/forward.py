@@ -25,6 +25,10 @@ from shoal.trajectory import Array, Status, Trajectory
 _AT_ONCE = 2 * len(WIDE)
 """Lanes of a call where the time is limited: whole tiles, enough for two threads."""
 
+_HARDLY = 0.1
+"""Of their length: runs that differ by less are simulated at once, at the instants of all; so many of them, at most."""
+_PACES = 16
+
 Progress = Callable[[int, float, float], None]
 """Called with (iteration, best fitness, mean fitness of the iteration)."""
 
@@ -182,14 +186,21 @@ class ForwardModel:
         seen = np.full((len(points), len(times), len(recording.channels)), np.nan)
         pace = np.column_stack([seen_by.pop("clock"), seen_by.pop("delay")])
         possible = self._possible(points, values, scene)
-        for clock, delay in np.unique(pace[possible], axis=0):
-            lanes = np.flatnonzero(possible & np.all(pace == (clock, delay), axis=1))
-            instants, shown = np.unique(np.maximum(times / clock + delay, 0.0), return_inverse=True)
+        paces, numbers_of = np.unique(pace, axis=0, return_inverse=True)
+        own = numbers_of.ravel()
+        moments = np.maximum(times / paces[:, :1] + paces[:, 1:], 0.0)
+        for together in _alike(moments[:, -1]):
+            lanes = np.flatnonzero(np.logical_and(possible, np.isin(own, together)))
+            if not lanes.size:
+                continue
+            instants, shown = np.unique(moments[together], return_inverse=True)
             inputs = {path: numbers[lanes] for path, numbers in values.items()}
             shared = {path: float(x[0]) for path, x in inputs.items() if _same_in_all(path, x)}
             inputs = {path: x for path, x in inputs.items() if path not in shared}
             view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
-            seen[lanes] = self._simulate(scene.with_values(shared), inputs, instants, view, name)[:, shown]
+            found = self._simulate(scene.with_values(shared), inputs, instants, view, name)
+            rows = shown.reshape(len(together), -1)[np.searchsorted(together, own[lanes])]
+            seen[lanes] = np.take_along_axis(found, rows[:, :, None], axis=1)
         return seen
 
     def _simulate(self, scene: Scene, values: dict[str, Array], times: Array, view: Camera, name: str) -> Array:
@@ -342,6 +353,15 @@ class ForwardModel:
         priors = [(k, entry.parameter.prior) for k, entry in enumerate(self.parameters.entries.values())]
         rows = [(values[:, k] - prior.mean) / prior.std for k, prior in priors if prior is not None]
         return (self.noise or 1.0) * np.array(rows).reshape(len(rows), len(points)).T
+
+
+def _alike(ends: Array) -> Iterator[Array]:
+    """Numbers of runs by their ends [s], those together that hardly differ: by clocks in a difference, for instance."""
+    left = np.arange(len(ends))
+    while left.size:
+        near = np.abs(ends[left] - ends[left[0]]) <= _HARDLY * ends[left[0]]
+        yield left[near][:_PACES]
+        left = np.sort(np.concatenate([left[near][_PACES:], left[~near]]))
 
 
 def _same_in_all(path: str, numbers: Array) -> bool:

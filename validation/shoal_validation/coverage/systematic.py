@@ -93,12 +93,11 @@ def astray(model: ForwardModel, rng: np.random.Generator) -> Iterator[tuple[floa
 
 def _effects(model: ForwardModel, truth: Array, residual: Array) -> Iterator[Array]:
     """What each fault changes of the rows, to first order."""
-    sought = {parameter.path for parameter in model.problem.parameters.values()}
-    candidates = [
-        c for c in (*of_measurement(model), *of_machine(model)) if c.parameter.path not in sought and not c.inverse
-    ]
-    for candidate in candidates:
-        point = np.append(truth, candidate.vector(candidate.probe))
+    sought = {str(parameter.path) for parameter in model.problem.parameters.values()}
+    for candidate in (*of_measurement(model), *of_machine(model)):
+        if candidate.paths & sought:
+            continue
+        point = np.append(truth, candidate.vector(candidate.probes[0, 0]))
         effect = with_parameters(model, [candidate]).uncounted(point[None])[0] - residual
         if np.all(np.isfinite(effect)) and np.any(effect):
             yield effect

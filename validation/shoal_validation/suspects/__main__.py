@@ -1,14 +1,19 @@
-"""`python -m shoal_validation.suspects [--wrong N] [--right N] [--first SEED] [--kind KIND]`.
+"""`python -m shoal_validation.suspects [--seeds A:B] [--kind KIND] [--file FILE]`.
 
-Draws N wrong models (200) and N right ones (100), identifies each, and counts how often the cause is named first
-(alone, or with others that explain the recording equally well) and how often a right model is rejected.
+Draws wrong models by seed (0:200), identifies each, and counts how often the cause is named first: alone, with
+causes of the same effect, or with others that explain the recording equally well. `--kind right` draws right models
+and counts those that are rejected. With a FILE the trials are added to it, one a line, and those it holds are not run
+again; the table is of all that it holds.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
-import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
 from shoal_validation.document import table
 from shoal_validation.suspects.cases import KINDS
@@ -18,21 +23,26 @@ from shoal_validation.suspects.study import Trial, summary, trial
 def main(arguments: list[str]) -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.suspects", description=__doc__)
-    parser.add_argument("--wrong", type=int, default=200)
-    parser.add_argument("--right", type=int, default=100)
-    parser.add_argument("--first", type=int, default=0, help="seed of the first case")
-    parser.add_argument("--kind", choices=KINDS, help="draw this kind of fault only")
+    parser.add_argument("--seeds", default="0:200", help="the first, and the one after the last")
+    parser.add_argument("--kind", choices=(*KINDS, "right"), help="draw this kind of fault only; right: none")
+    parser.add_argument("--file", type=Path, help="of trials, one a line")
     chosen = parser.parse_args(arguments)
-    seeds = range(chosen.first, chosen.first + max(chosen.wrong, chosen.right))
-    trials = list[Trial]()
-    for kind, count in ((chosen.kind, chosen.wrong), ("right", chosen.right)):
-        for seed in seeds[:count]:
-            begin = time.process_time()
-            trials.append(found := trial(seed, kind))
-            print(f"{seed:4d} {found} {time.process_time() - begin:.1f} s", file=sys.stderr, flush=True)
-    head, rows, last = summary(trials)
-    print(table(head, rows))
-    print(last)
+    first, last = map(int, chosen.seeds.split(":"))
+    trials = dict[tuple[int, bool], Trial]()
+    for line in chosen.file.read_text().splitlines() if chosen.file and chosen.file.exists() else ():
+        known: dict[str, Any] = {k: tuple(x) if isinstance(x, list) else x for k, x in json.loads(line).items()}
+        found = Trial(**known)
+        trials[found.seed, found.kind == "right"] = found
+    for seed in range(first, last):
+        if (seed, chosen.kind == "right") in trials:
+            continue
+        trials[seed, chosen.kind == "right"] = found = trial(seed, chosen.kind)
+        print(found, file=sys.stderr, flush=True)
+        if chosen.file:
+            with chosen.file.open("a") as file:
+                file.write(json.dumps(asdict(found)) + "\n")
+    head, rows, told = summary(list(trials.values()))
+    print("\n".join([table(head, rows), *told] if rows else told))
 
 
 if __name__ == "__main__":

@@ -91,4 +91,4 @@ def four_bar(rng: np.random.Generator) -> tuple[dict[str, Any], list[str], list[
     return scene, ["crank"], [("B", "x"), ("B", "y")]
 
 
-MACHINES = (pendulum, double_pendulum, double_pendulum, four_bar)
+MACHINES = (*3 * (pendulum,), *4 * (double_pendulum,), four_bar)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import betaincinv
 from shoal.engines import get_engine
 from shoal.identification import Verdict
 from shoal.identification.conclude import NOTHING, conclude
@@ -18,19 +20,33 @@ from shoal_validation.suspects.cases import case
 
 @dataclass(frozen=True)
 class Trial:
-    """What came out. named: the suspects that explain the recording best, equals together; first: the cause is there
+    """What came out. named: the suspects that explain the recording best, equals together
 
+    alike: those of them of which a small fault has the same effect as the cause (cosine above 0.999)
     covered: of the sought parameters, how many intervals hold the truth; noticed: whether a misfit was seen at all
+    ratio: of the misfit to the noise; seconds: of the processor
     """
 
+    seed: int
     machine: str
     kind: str
     cause: str
-    verdict: Verdict
+    verdict: str
     named: tuple[str, ...]
+    alike: tuple[str, ...]
     noticed: bool
     covered: float
     ratio: float
+    seconds: float
+
+    @property
+    def place(self) -> str:
+        """Where the cause is: named alone, with those of the same effect, with others that fit as well, or nowhere."""
+        if self.cause not in self.named:
+            return "missed" if self.noticed else "unseen"
+        if len(self.named) == 1:
+            return "alone"
+        return "same effect" if {*self.named} <= {self.cause, *self.alike} else "fits as well"
 
     @property
     def first(self) -> bool:
@@ -38,13 +54,15 @@ class Trial:
         return self.cause in self.named
 
     def __str__(self) -> str:
-        mark = "first" if self.first else ("-" if not self.noticed else "MISSED")
         told = f"{self.verdict}, {self.ratio:.3g} times the noise, {100 * self.covered:.0f} % held"
-        return f"{self.machine:15s} {self.cause:24s} {mark:6s} {told} [{', '.join(self.named)}]"
+        named = ", ".join(self.named)
+        case = f"{self.seed:4d} {self.machine:15s} {self.cause:30s} {self.place:12s}"
+        return f"{case} {told} [{named}] {self.seconds:.1f} s"
 
 
 def trial(seed: int, kind: str | None = None) -> Trial:
     """Identify the case of a seed by least squares."""
+    begin = time.process_time()
     drawn = case(seed, kind)
     model = ForwardModel(drawn.problem, drawn.scene, get_engine("gauss"), drawn.measurement)
     outcome = get_method("least-squares")(model, np.random.default_rng(seed), lambda *_: None)
@@ -54,15 +72,19 @@ def trial(seed: int, kind: str | None = None) -> Trial:
         for name, truth in drawn.truth.items()
     ]
     tests = estimate.residual_tests
+    named = first_of(estimate.suspects, tests.rows)
     return Trial(
+        seed,
         drawn.scene.name,
         drawn.kind,
         drawn.cause,
-        estimate.verdict,
-        first_of(estimate.suspects, tests.rows),
-        tests.limited,
+        str(estimate.verdict),
+        named,
+        next((s.alike for s in estimate.suspects if s.name == drawn.cause), ()),
+        tests.limited or tests.wrong_model,
         float(np.mean(held)),
         tests.ratio,
+        time.process_time() - begin,
     )
 
 
@@ -71,27 +93,50 @@ def first_of(suspects: list[Suspect], rows: int) -> tuple[str, ...]:
     return tuple(suspect.name for suspect in suspects if suspect.equals(suspects[0], rows))
 
 
-def summary(trials: list[Trial]) -> tuple[tuple[str, ...], list[tuple[str, ...]], str]:
-    """Head and rows of a table by kind of fault, and the shares in a sentence."""
+def at_most(count: int, total: int) -> float:
+    """The largest chance of an event that was seen so often, at 95 % (Clopper and Pearson 1934, one-sided)."""
+    return 1.0 if count >= total else float(betaincinv(count + 1, total - count, 0.95))
+
+
+def at_least(count: int, total: int) -> float:
+    """The smallest such chance."""
+    return 1.0 - at_most(total - count, total)
+
+
+def summary(trials: list[Trial]) -> tuple[tuple[str, ...], list[tuple[str, ...]], list[str]]:
+    """Head and rows of a table by kind of fault, and the shares in sentences."""
     wrong = [t for t in trials if t.kind != "right"]
     right = [t for t in trials if t.kind == "right"]
-    head = ("fault", "models", "rejected", "misfit seen", "named first", "named instead")
+    head = ("fault", "models", "rejected", "misfit seen", "named first", "alone", "same effect", "named instead")
     rows = list[tuple[str, ...]]()
     for kind in sorted({t.kind for t in wrong}):
         mine = [t for t in wrong if t.kind == kind]
-        instead = Counter(t.named[0] if t.named else "nothing" for t in mine if t.noticed and not t.first)
-        rows.append(
-            (
-                kind,
-                str(len(mine)),
-                str(sum(t.verdict is Verdict.REJECTED for t in mine)),
-                str(sum(t.noticed for t in mine)),
-                str(sum(t.first for t in mine)),
-                ", ".join(f"{name} {count}" for name, count in instead.most_common()),
-            )
+        instead = Counter(t.named[0] if t.named else "nothing" for t in mine if t.place == "missed")
+        counts = (
+            len(mine),
+            sum(t.verdict == Verdict.REJECTED for t in mine),
+            sum(t.noticed for t in mine),
+            sum(t.first for t in mine),
+            sum(t.place == "alone" for t in mine),
+            sum(t.place == "same effect" for t in mine),
         )
-    seen = [t for t in wrong if t.noticed]
-    named = sum(t.first for t in wrong)
-    last = f"cause named first: {named} of {len(wrong)} ({named} of {len(seen)} whose misfit is seen)"
-    rejected = sum(t.verdict is Verdict.REJECTED for t in right)
-    return head, rows, f"{last}; right models rejected: {rejected} of {len(right)}"
+        words = ", ".join(f"{name} {count}" for name, count in instead.most_common())
+        rows.append((kind, *map(str, counts), words))
+    told = []
+    if wrong:
+        places = Counter(t.place for t in wrong)
+        first, seen = sum(t.first for t in wrong), sum(t.noticed or t.first for t in wrong)
+        ways = ", ".join(f"{name} {places[name]}" for name in ("alone", "same effect", "fits as well"))
+        whole = _share(first, len(wrong))
+        told.append(f"cause named first: {_share(first, seen)} whose misfit is seen, {whole} of all")
+        told.append(f"of these: {ways}")
+    if right:
+        rejected = sum(t.verdict == Verdict.REJECTED for t in right)
+        bound = 100 * at_most(rejected, len(right))
+        told.append(f"right models rejected: {rejected} of {len(right)} (at most {bound:.2g} % at 95 %)")
+        told.append(f"verdicts on them: {dict(Counter(t.verdict for t in right))}")
+    return head, rows, told
+
+
+def _share(count: int, total: int) -> str:
+    return f"{count} of {total} ({100 * count / max(total, 1):.1f} %, at least {100 * at_least(count, total):.1f} %)"

@@ -7,7 +7,7 @@ squares problems, 2004).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,17 +57,42 @@ def descend_many(
     converged.
     """
     searches = [_Search(model, *at) for at in zip(starts, *(first or linearise_many(model, starts)), strict=True)]
-    active = searches
+
+    def linearise(_: Sequence[int], trials: Sequence[Array]) -> tuple[Sequence[Array], Sequence[Array]]:
+        residuals, jacobians = linearise_many(model, np.array(trials))
+        return list(residuals), list(jacobians)
+
+    return _descend(searches, linearise, progress, patience)
+
+
+Linearise = Callable[[Sequence[int], Sequence[Array]], tuple[Sequence[Array], Sequence[Array]]]
+"""Residuals and Jacobians at points of some of several models, which are told by their numbers."""
+
+
+def descend_each(
+    models: Sequence[ForwardModel], starts: Sequence[Array], linearise: Linearise, *, patience: float, most: int
+) -> list[Descent]:
+    """As `descend_many`, of several models with as many rows, from a start of each side by side; most: iterations."""
+    first = linearise(range(len(models)), starts)
+    searches = [_Search(*at) for at in zip(models, starts, *first, strict=True)]
+    return _descend(searches, linearise, lambda *_: None, patience, most)
+
+
+def _descend(
+    searches: list[_Search], linearise: Linearise, progress: Progress, patience: float, most: int = _ITERATIONS
+) -> list[Descent]:
+    """Take steps until all have converged or left."""
+    active, number = searches, {id(search): k for k, search in enumerate(searches)}
     _report(0, searches, searches, progress)
-    for iteration in range(1, _ITERATIONS):
+    for iteration in range(1, most):
         limit = patience * min(search.fitness for search in searches) if iteration > 2 else np.inf
         asked = [(search, trial) for search in _apart(active) if (trial := search.ask()) is not None]
         going = [(search, trial) for search, trial in asked if search.promise <= limit]
         if not going:
             break
-        active = [search for search, _ in going]
-        trials = np.array([trial for _, trial in going])
-        for search, trial, residual, jacobian in zip(active, trials, *linearise_many(model, trials), strict=True):
+        active, trials = [search for search, _ in going], [trial for _, trial in going]
+        seen = linearise([number[id(search)] for search in active], trials)
+        for search, trial, residual, jacobian in zip(active, trials, *seen, strict=True):
             search.tell(trial, residual, jacobian)
         _report(iteration, searches, active, progress)
     return [search.descent() for search in searches]
@@ -206,7 +231,7 @@ def _apart(searches: Sequence[_Search]) -> list[_Search]:
     """The searches without those that came to where a better one is."""
     kept: list[_Search] = []
     for search in sorted(searches, key=lambda s: s.cost):
-        if all(_distance(search.model, search, other) > _SAME for other in kept):
+        if all(other.model is not search.model or _distance(search.model, search, other) > _SAME for other in kept):
             kept.append(search)
     return kept
 

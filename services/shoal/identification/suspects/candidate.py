@@ -1,8 +1,10 @@
-"""One number that was taken as known and is freed, with the machine in which it can be."""
+"""What was taken as known and is freed: its numbers, the machine that has them, and how their effect is probed."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -13,73 +15,106 @@ from shoal.scene import Scene
 from shoal.trajectory import Array
 
 _TINY = 1e-9
+_NEAR = 1.04
+"""An effect that goes with one over a number is followed by this factor from where it was probed."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Its name, the value stated, the parameter that frees it, and the value by which its effect is measured.
+    """Its name, its numbers as parameters, and their stated values, at which it is no fault (or infinite).
 
-    scene: the machine that has its path, None for the model's own; kind: of the suspect that it may become
-    factor: whether a change of it is told as a factor; inverse: whether its effect goes with one over it, so that
-    the value stated is infinite
+    probes: values whose effects are measured, (ways, effects, numbers): the residual is regressed on the effects of
+        each way, and the best counts; bases: where the effects of each way vanish, (ways, numbers)
+    law: how the effect grows: with a number, with its logarithm, or with one over it
+    kind: of the suspect that it may become; scene: the machine that has its paths, None for the model's own
+    alone: whether no other number may be freed beside it; factor: whether its change is told as a factor
+    tell: its size and its change in words, from its numbers; None for the usual words
     """
 
     name: str
-    stated: float
-    parameter: Parameter
-    probe: float
     kind: str
+    parameters: tuple[Parameter, ...]
+    stated: tuple[float, ...]
+    probes: Array
+    bases: Array
+    law: Literal["linear", "log", "inverse"] = "linear"
     scene: Scene | None = None
+    alone: bool = False
     factor: bool = False
-    inverse: bool = False
+    tell: Callable[[Array], tuple[float, str]] | None = None
+
+    @classmethod
+    def single(
+        cls,
+        name: str,
+        stated: float,
+        parameter: Parameter,
+        probe: float,
+        kind: str = "machine",
+        *,
+        scene: Scene | None = None,
+        alone: bool = False,
+        factor: bool = False,
+    ) -> Candidate:
+        """One number, whose effect is measured at one other value."""
+        law: Literal["linear", "log"] = "log" if parameter.logarithmic else "linear"
+        probes, bases = np.array([[[probe]]]), np.array([[stated]])
+        return cls(name, kind, (parameter,), (stated,), probes, bases, law, scene, alone, factor)
 
     @property
-    def key(self) -> str:
-        """Name of its parameter in a problem."""
-        return f"suspect {self.name}"
+    def keys(self) -> tuple[str, ...]:
+        """Names of its parameters in a problem."""
+        return tuple(f"suspect {self.name} {k}" for k in range(len(self.parameters)))
+
+    @property
+    def paths(self) -> set[str]:
+        """Of its numbers."""
+        return {str(parameter.path) for parameter in self.parameters}
 
     def freed(self, model: ForwardModel) -> ForwardModel:
-        """The model with it as one more parameter, at the end."""
+        """The model with its numbers as further parameters, at the end."""
         return with_parameters(model, [self])
 
-    def vector(self, value: float) -> float:
-        """A value as the component of a point."""
-        return float(np.log(max(value, _TINY * self.parameter.upper))) if self.parameter.logarithmic else value
+    def vector(self, values: Array) -> Array:
+        """Values as the components of a point, (numbers,)."""
+        both = zip(values, self.parameters, strict=True)
+        return np.array([np.log(max(x, _TINY * p.upper)) if p.logarithmic else x for x, p in both])
 
-    def at(self, amount: float) -> float:
-        """The value within its bounds at which the effect is so many times that of the probe, to first order."""
-        if self.inverse:
-            value = self.probe / max(amount, 1e-6)
-        elif self.parameter.logarithmic:
-            value = self.stated * (self.probe / self.stated) ** np.clip(amount, -1e5, 1e5)
+    def at(self, way: int, amounts: Array) -> Array:
+        """The values within their bounds at which the effects are so many times those of the probes, (numbers,)."""
+        base, probes = self.bases[way], self.probes[way]
+        if self.law == "inverse":
+            values = probes[0] / np.clip(amounts[0], 1 / _NEAR, _NEAR)
+        elif self.law == "log":
+            values = base * (probes[0] / base) ** np.clip(amounts[0], -1e5, 1e5)
         else:
-            value = self.stated + amount * (self.probe - self.stated)
-        return float(np.clip(value, self.parameter.lower, self.parameter.upper))
+            values = base + amounts @ (probes - base)
+        lower, upper = (np.array([getattr(p, end) for p in self.parameters]) for end in ("lower", "upper"))
+        return np.asarray(np.clip(values, lower, upper))
 
-    def amount(self, value: float) -> float:
-        """The inverse of `at`."""
-        if self.inverse:
-            return self.probe / value
-        if self.parameter.logarithmic:
-            return float(np.log(value / self.stated) / np.log(self.probe / self.stated))
-        return (value - self.stated) / (self.probe - self.stated)
+    def amounts(self, way: int, values: Array) -> Array:
+        """The inverse of `at` for one number; of several, that of their nearest combination, (effects,)."""
+        base, probes = self.bases[way], self.probes[way]
+        if self.law == "inverse":
+            return np.asarray(probes[0] / values)
+        if self.law == "log":
+            return np.asarray(np.log(values / base) / np.log(probes[0] / base))
+        return np.asarray(np.linalg.lstsq((probes - base).T, values - base)[0])
 
-    def change(self, value: float) -> str:
-        """Stated and other value in words."""
+    def told(self, values: Array) -> tuple[float, str]:
+        """The value that a suspect tells, and stated and other value in words."""
+        if self.tell is not None:
+            return self.tell(values)
+        value, stated = float(values[0]), self.stated[0]
         if self.factor:
-            return f"a factor of {value / self.stated:.4g}"
-        stated = "infinitely much" if self.inverse else f"{self.stated:g}"
-        return f"a value of {value:.4g} instead of {stated} {unit(self.parameter.path or '')}".rstrip()
+            return value, f"a factor of {value / stated:.4g}"
+        known = "infinitely much" if np.isinf(stated) else f"{stated:g}"
+        return value, f"a value of {value:.4g} instead of {known} {unit(self.parameters[0].path or '')}".rstrip()
 
 
 def with_parameters(model: ForwardModel, candidates: list[Candidate]) -> ForwardModel:
     """The model with candidates of one and the same machine as further parameters, at the end."""
-    more = {candidate.key: candidate.parameter for candidate in candidates}
+    more = {key: p for c in candidates for key, p in zip(c.keys, c.parameters, strict=True)}
     problem = model.problem.model_copy(update={"parameters": {**model.problem.parameters, **more}})
     scene = candidates[0].scene or model.scene
     return replace(model, problem=problem, scene=scene, memory=None, whole=None)
-
-
-def extended(point: Array, candidate: Candidate, value: float) -> Array:
-    """A point with a value of the candidate at its end."""
-    return np.append(point, candidate.vector(value))

@@ -1,8 +1,9 @@
-"""What a scene states or leaves out of a machine: friction, masses, lengths, pivots, rates at the start, bending."""
+"""What a scene states or leaves out of a machine: friction, masses, lengths, pivots, rates at the start."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 
@@ -11,17 +12,17 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import Parameter
 from shoal.identification.suspects.candidate import Candidate
 from shoal.identification.suspects.size import Size, size_of
+from shoal.mechanics.start import is_direct
 from shoal.scene import PointMass, RigidBody, Rod, Scene
-from shoal.scene.joints import GROUND, Revolute, Slider
+from shoal.scene.joints import GROUND, Attachment, Revolute, Slider, places
 
 _FACTORS = 2.0
 _STEP = 1e-3
 """Of the largest value that is looked for: the change by which an effect is measured."""
 _SHIFT = 0.2
 """Of the size of the machine, how far off a pivot is looked for."""
-_SAG = 1e-2
-"""Deflection over length of the rod whose bending is the probe."""
-_ELEMENTS = 2
+_NOTHING = 1e-6
+"""Of the machine: a further mass that is none."""
 
 
 def of_machine(model: ForwardModel) -> Iterator[Candidate]:
@@ -32,12 +33,7 @@ def of_machine(model: ForwardModel) -> Iterator[Candidate]:
     yield from _masses(scene, size)
     yield from _lengths(scene)
     yield from _pivots(scene, size)
-    for name, body in scene.bodies.items():
-        if not isinstance(body, PointMass):
-            rate, most = scene.start(name).rate, 10.0 * size.rate
-            free = Parameter(path=f"initial.{name}.rate", lower=rate - most, upper=rate + most, scale="linear")
-            yield Candidate(f"rate of {name} at the start", rate, free, rate + _STEP * size.rate, "machine")
-    yield from _bending(scene, size)
+    yield from _rates(scene, size)
 
 
 def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
@@ -55,26 +51,25 @@ def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
             stated = float(getattr(joint, field))
             free = Parameter(path=f"joints.{name}.{field}", lower=0.0, upper=max(upper, 4 * stated), scale="linear")
             words = "friction" if field == "friction" else "dry friction"
-            yield Candidate(f"{words} of {name}", stated, free, stated + _STEP * upper, "machine")
+            yield Candidate.single(f"{words} of {name}", stated, free, stated + _STEP * upper)
 
 
 def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
     """A further mass at each marker, and the mass of each body."""
-    seen = set()
+    loaded, seen = scene.model_dump(mode="json"), dict[str, str]()
     for name, marker in scene.markers.items():
-        place = (marker.body, scene.location(marker))
-        if place in seen:
+        place = str((marker.body, scene.location(marker)))
+        if place in seen.values():
             continue
-        seen.add(place)
-        data = scene.model_dump(mode="json")
-        data["bodies"]["further"] = {"kind": "point-mass", "mass": 1e-6 * size.mass}
-        data["joints"]["further"] = {"first": data["markers"][name], "second": {"body": "further"}}
-        try:
-            with_mass = Scene.parse(data)
-        except InputError:
-            continue
-        free = Parameter(path="bodies.further.mass", lower=1e-6 * size.mass, upper=size.mass, scale="linear")
-        yield Candidate(f"mass at {name}", 0.0, free, _STEP * size.mass, "machine", with_mass)
+        further, seen[name] = f"further-{name}", place
+        loaded["bodies"][further] = {"kind": "point-mass", "mass": _NOTHING * size.mass}
+        loaded["joints"][further] = {"first": loaded["markers"][name], "second": {"body": further}}
+    with suppress(InputError):
+        with_masses = Scene.parse(loaded)
+        for name in seen:
+            path = f"bodies.further-{name}.mass"
+            free = Parameter(path=path, lower=_NOTHING * size.mass, upper=size.mass, scale="linear")
+            yield Candidate.single(f"mass at {name}", 0.0, free, _STEP * size.mass, scene=with_masses)
     for name, body in scene.bodies.items() if len(scene.bodies) > 1 else ():
         field = "density" if isinstance(body, Rod) else "mass"
         yield _ratio(f"mass of {name}", f"bodies.{name}.{field}", float(getattr(body, field)))
@@ -103,7 +98,7 @@ def _ratio(name: str, path: str, stated: float) -> Candidate:
     """A number known to within a factor."""
     lower, upper = sorted((stated / _FACTORS, stated * _FACTORS))
     free = Parameter(path=path, lower=lower, upper=upper, scale="log" if stated > 0 else "linear")
-    return Candidate(name, stated, free, stated * (1 + _STEP), "machine", factor=True)
+    return Candidate.single(name, stated, free, stated * (1 + _STEP), factor=True)
 
 
 def _pivots(scene: Scene, size: Size) -> Iterator[Candidate]:
@@ -119,16 +114,40 @@ def _pivots(scene: Scene, size: Size) -> Iterator[Candidate]:
         for axis, stated in enumerate(place):
             path, width = f"joints.{name}.{field}.point.{axis}", _SHIFT * size.length
             free = Parameter(path=path, lower=stated - width, upper=stated + width, scale="linear")
-            yield Candidate(f"{'xy'[axis]} of the pivot {name}", stated, free, stated + _STEP * width, "machine")
+            yield Candidate.single(f"{'xy'[axis]} of the pivot {name}", stated, free, stated + _STEP * width)
+    yield from _joints_on_bodies(scene)
 
 
-def _bending(scene: Scene, size: Size) -> Iterator[Candidate]:
-    """Rigid rods that bend: Young's modulus, by what it is at a sag of a hundredth of the length."""
+def _joints_on_bodies(scene: Scene) -> Iterator[Candidate]:
+    """Places of joints on rigid rods, along the rod."""
+    explicit, found = scene.model_dump(mode="json"), list[tuple[str, str, float, float]]()
+    for name, joint in scene.joints.items():
+        for field in ("first", "second") if isinstance(joint, Revolute) else ():
+            side: Attachment = getattr(joint, field)
+            body = scene.bodies.get(side.body)
+            if not isinstance(body, Rod) or body.element != "rigid":
+                continue
+            along, across = scene.location(side)
+            explicit["joints"][name][field]["point"] = [along, across]
+            found.append((name, field, along, body.length))
+    with suppress(InputError):
+        stated = Scene.parse(explicit)
+        for name, field, along, length in found:
+            path, width = f"joints.{name}.{field}.point.0", _SHIFT * length
+            free = Parameter(path=path, lower=along - width, upper=along + width, scale="linear")
+            words = f"place of {name} on {getattr(scene.joints[name], field).body}"
+            yield Candidate.single(words, along, free, along + _STEP * width, scene=stated)
+
+
+def _rates(scene: Scene, size: Size) -> Iterator[Candidate]:
+    """Rates at the start; in a closed loop of what stands on the ground only, as those of others follow."""
+    direct = is_direct(scene)
+    grounded = {side.body for joint in scene.joints.values() if (on := places(joint)) for side in on
+                if any(other.body == GROUND for other in on)}  # fmt: skip
     for name, body in scene.bodies.items():
-        if not isinstance(body, Rod) or body.element != "rigid":
+        if isinstance(body, PointMass) or not (direct or name in grounded):
             continue
-        probe = body.mass * size.gravity * body.length**2 / (8 * body.width * body.height**3 / 12 * _SAG)
-        free = Parameter(path=f"bodies.{name}.youngs_modulus", lower=probe / 30, upper=probe * 30, scale="log")
-        fields = {"youngs_modulus": probe, "element": "ancf-cable", "elements": _ELEMENTS}
-        bent = scene.with_values({f"bodies.{name}.{field}": value for field, value in fields.items()})
-        yield Candidate(f"bending of {name}", np.inf, free, probe, "machine", bent, inverse=True)
+        rate, most = scene.start(name).rate, 10.0 * size.rate
+        free = Parameter(path=f"initial.{name}.rate", lower=rate - most, upper=rate + most, scale="linear")
+        words = f"rate of {name} at the start"
+        yield Candidate.single(words, rate, free, rate + _STEP * size.rate, alone=not direct)

@@ -28,17 +28,17 @@ def of_measurement(model: ForwardModel) -> Iterator[Candidate]:
     for name in ("clock", "scale") if positions else ("clock",):
         stated = float(getattr(first.stated, name))
         free = Parameter(path=f"{RESERVED}.{name}", lower=stated / _FACTORS, upper=stated * _FACTORS, scale="log")
-        yield Candidate(name, stated, free, stated * (1 + _STEP), "measurement", factor=True)
+        yield Candidate.single(name, stated, free, stated * (1 + _STEP), "measurement", factor=True)
     shifts = {"tilt": np.pi / 2} | ({"x": reach, "y": reach} if positions else {})
     for name, width in shifts.items():
         stated = float(getattr(first.stated, name))
         free = Parameter(path=f"{RESERVED}.{name}", lower=stated - width, upper=stated + width, scale="linear")
-        yield Candidate(name, stated, free, stated + _STEP * width, "measurement")
+        yield Candidate.single(name, stated, free, stated + _STEP * width, "measurement")
     stated = first.stated.delay
     free = Parameter(path=f"{RESERVED}.delay", lower=stated - _EARLY * end, upper=stated + _LATE * end, scale="linear")
-    yield Candidate("delay", stated, free, stated + _STEP * end, "measurement")
+    yield Candidate.single("delay", stated, free, stated + _STEP * end, "measurement")
     size = model.scene.gravity[1]
     if size != 0.0 and model.scene.gravity[0] == 0.0:
         lower, upper = sorted((size / _FACTORS, size * _FACTORS))
         free = Parameter(path="gravity.1", lower=lower, upper=upper, scale="linear")
-        yield Candidate("gravity", size, free, size * (1 + _STEP), "measurement", factor=True)
+        yield Candidate.single("gravity", size, free, size * (1 + _STEP), "measurement", factor=True)

@@ -15,7 +15,8 @@ class Suspect:
     """Something taken as known, the value it was given, the fitted one, and the misfit (RMS) with either.
 
     change: the two values in words; unit: of the misfits, empty where channels of different units are taken together
-    kind: `measurement`, `machine` or `data` (another reading of the recorded numbers)
+    kind: `measurement`, `machine` or `data` (another reading of the recorded numbers); numbers: how many were fitted
+    alike: other candidates of which a small fault has the same effect, whatever is measured by these channels
     """
 
     name: str
@@ -26,6 +27,8 @@ class Suspect:
     change: str
     unit: str = ""
     kind: str = "measurement"
+    numbers: int = 1
+    alike: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
@@ -37,9 +40,19 @@ class Suspect:
         misfit = f"the misfit from {self.before:.2g} to {self.after:.2g} {self.unit}".rstrip()
         return f"the {self.words}: {self.change} would lower {misfit}"
 
+    def cost(self, rows: int) -> float:
+        """What it leaves of so many rows, squared, and larger by what further numbers fit by chance."""
+        return self.after**2 * penalty(self.numbers, rows)
+
     def equals(self, best: Suspect, rows: int) -> bool:
-        """Whether so many rows cannot tell it from the best one: misfits alike within chance or one per cent."""
-        return self.after**2 <= best.after**2 * max(1.0 + _CHANCE / rows, 1.02)
+        """Whether so many rows cannot tell it from the best one, which has no more numbers: alike within chance."""
+        alike = self.after**2 <= best.after**2 * max(1.0 + _CHANCE / rows, 1.02)
+        return alike and self.numbers <= best.numbers
+
+
+def penalty(numbers: int, rows: int) -> float:
+    """A factor on a mean square, for numbers beyond the first that were fitted to so many rows (Schwarz 1978)."""
+    return float(rows ** ((numbers - 1) / rows))
 
 
 def explains(before: float, after: float, noise: float, rows: int) -> bool:
