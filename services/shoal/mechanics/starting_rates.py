@@ -7,7 +7,7 @@ singular position the second derivative of the joints must vanish along the moti
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from shoal.mechanics.closure import Closure, Flags
 from shoal.mechanics.pose import as_complex, unit
 from shoal.mechanics.tile import Array
 from shoal.scene import PointMass, Scene
+from shoal.scene.record import Record
 
 SINGULAR = 1e-6
 """Part of a row, of its own length, below which it depends on others."""
@@ -105,7 +106,8 @@ class Velocities:
             left = np.linalg.svd(slope / (np.linalg.norm(slope, axis=1, keepdims=True) + 1e-300))
             rank = int(np.sum(left.S > SINGULAR))
             null = left.U[:, rank:].T / (np.linalg.norm(slope, axis=1) + 1e-300)
-            bend = _Bend(self.closure, self.poses[lane], null, keep)
+            closure = Closure(_of_lane(self.scene, int(lane)), self.poses[lane : lane + 1], self.closure.own)
+            bend = _Bend(closure, self.poses[lane], null, keep)
             free = basis.rest(int(lane))
             found = bend.nearest(rates[lane], free, self.speed / self.size)
             ok[lane] = found is not None
@@ -198,6 +200,17 @@ class _Basis:
         split = np.linalg.svd(self.rows[lane])
         rank = int(np.sum(split.S > 0.5))
         return np.asarray(split.Vh[rank:] @ self.inverse[lane])
+
+
+def _of_lane(part: Any, lane: int) -> Any:
+    """A scene, or a part of one, with the numbers of one lane."""
+    if isinstance(part, np.ndarray):
+        return float(part[lane])
+    if isinstance(part, Record):
+        return part.model_copy(update={n: _of_lane(getattr(part, n), lane) for n in type(part).model_fields})
+    if isinstance(part, dict):
+        return {key: _of_lane(value, lane) for key, value in part.items()}
+    return tuple(_of_lane(value, lane) for value in part) if type(part) is tuple else part
 
 
 def _metric(scene: Scene, poses: Array, size: float) -> Array:
