@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -112,7 +112,7 @@ def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Tra
     """Points that failed side by side go on as a scene alone does: one finds the settings, the others take them."""
     from shoal.mechanics.persist import as_run
 
-    started = perf_counter()
+    started = time.perf_counter()
     points, status = found.points.copy(), list(found.status)
     left = np.flatnonzero([one is not Status.OK for one in status])
     for _ in range(LONE):
@@ -131,5 +131,5 @@ def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Tra
             for number, one in zip(left, run.status, strict=True):
                 status[number] = one
             left = left[[one is not Status.OK for one in run.status]]
-    wall_s = found.wall_s + perf_counter() - started
+    wall_s = found.wall_s + time.perf_counter() - started
     return replace(found, points=points, status=tuple(status), wall_s=wall_s)

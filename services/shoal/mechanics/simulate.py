@@ -28,9 +28,9 @@ from shoal.scene import Scene, Solver
 from shoal.trajectory import Status, Trajectory, plain
 
 DRIFT_TOLERANCE = 1e-6
-SINKING = 30.0
+SINKING = 3000.0
 """A weight that nothing holds yet falls for as long as the error of its rate is below the absolute tolerance; by then
-it is 14 times as fast as that."""
+it is 14 times as fast as that. Twice as much is no error by the default tolerance of energies, a hundredth."""
 STEP_MARGIN = 0.95
 """Of the stable step, which is that of the start and varies by a few percent along the motion."""
 
@@ -199,8 +199,8 @@ def _relative(error: Array, scale: Array, scene: Scene, model: Model, end: float
     rates allows: between two bars in one line, which hold it to the second order only, it does until they feel it.
     """
     stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
-    weight, solver = float(np.max(np.abs(model.weight), initial=0.0)), scene.solver
-    sunk = SINKING * solver.absolute_tolerance * end / solver.energy_tolerance
+    weight = float(np.max(np.abs(model.weight), initial=0.0))
+    sunk = SINKING * scene.solver.absolute_tolerance * end
     floor = weight * (1e-9 * reaches.span(scene) + sunk) + 1e-12 * float(stiff)
     relative: Array = error / np.maximum(scale, floor + 1e-300)
     return relative
