@@ -35,6 +35,7 @@ def test_models_are_chosen_for_the_native_engine_only() -> None:
         identify(load_problem("paper-case-1"), engine="casadi", tolerance=1e-3)
 
 
+@pytest.mark.slow
 def test_stated_noise_decides_what_a_fit_is() -> None:
     """Noise as large as the motion itself is no reason to reject a model that explains the rest."""
     problem = load_problem("paper-case-1-same-mesh")

@@ -144,6 +144,7 @@ def test_a_rigid_model_of_a_flexible_machine_is_rejected() -> None:
     assert estimate.verdict is Verdict.REJECTED
 
 
+@pytest.mark.slow
 def test_exchanged_markers_are_rejected() -> None:
     """Data: Exudyn, with the columns of A and B exchanged in the whole recording."""
     source = {"kind": "engine", "engine": "exudyn", "stop": 1.0, "count": 100, "noise": 1e-3}
