@@ -24,7 +24,7 @@ from shoal.identification.rank import combinations
 from shoal.identification.residual_tests import ResidualTests, residual_tests
 from shoal.identification.rivals import valley
 from shoal.identification.sensitivity import Sensitivity, believed
-from shoal.identification.uncertainty import HIDDEN, Linearisation, Spread, autocorrelation, linearise, spread
+from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
 from shoal.identification.units import unit
 from shoal.scene import Rod, Scene, expression
 from shoal.trajectory import Array
@@ -97,7 +97,7 @@ def conclude(
     refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
     tests = residual_tests(model, seen.residual, blocks, at.noise, float(np.hypot(mesh or 0.0, theory or 0.0)), refined)
     told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
-    at = replace(at, systematic=min(tests.excess, HIDDEN * tests.noise) * told)
+    at = replace(at, systematic=tests.excess * told)
     alone: tuple[Outcome, list[Array]] = (outcome, [])
     found, beside = unless_late(lambda: valley(model, outcome, at), alone) if looked and possible else alone
     ends = [point, *beside]

@@ -17,8 +17,6 @@ LEVEL = 0.95
 """Of the intervals."""
 ABSORBED = 4.0
 """Times the part of a model's error that is left in the residual: the part that the parameters have followed."""
-HIDDEN = 5.0
-"""Times the noise: what is systematic beyond that shows its own correlation, which the covariance knows already."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +25,9 @@ class Linearisation:
 
     unknown: directions the data do not fix, in scaled parameters, (p, k); pseudo_inverse: (p, rows); scale: (p,)
     parts: the share of each block of residuals in the covariance, (blocks, p, p); noise: of each block
-    systematic: norm of what is systematic in the residual, as far as noise hides what it is like. A model error moves
-    the parameters by the part of it that they can follow, which leaves no residual; taken as ABSORBED times what is
-    left, in the worst direction, it holds the truth for 95 % of random wrong models
-    (python -m shoal_validation.coverage.systematic)
+    systematic: norm of what is systematic in the residual. A model error moves the parameters by the part of it that
+    they can follow, which leaves no residual; taken as ABSORBED times what is left, in the worst direction, it holds
+    the truth for 95 % of random wrong models (python -m shoal_validation.coverage.systematic)
     """
 
     unknown: Array

@@ -24,7 +24,7 @@ from shoal.identification.sensitivity import sensitivity
 from shoal.identification.suspects.candidate import with_parameters
 from shoal.identification.suspects.of_machine import of_machine
 from shoal.identification.suspects.of_measurement import of_measurement
-from shoal.identification.uncertainty import HIDDEN, linearise, spread
+from shoal.identification.uncertainty import linearise, spread
 from shoal.scene import Scene
 from shoal.trajectory import Array
 
@@ -83,7 +83,7 @@ def astray(model: ForwardModel, rng: np.random.Generator) -> Iterator[tuple[floa
             at = linearise(seen.jacobian, left, model.sizes(truth), blocks)
             tests = residual_tests(model, left, blocks, at.noise)
             excess = 0.0 if tests.white else np.sqrt(max(float(np.mean(left**2)) - 1.0, 0.0))
-            wider = replace(at, systematic=min(excess, HIDDEN) * np.sqrt(len(left)))
+            wider = replace(at, systematic=excess * np.sqrt(len(left)))
             error, row = at.pseudo_inverse @ wrong, np.linalg.norm(at.pseudo_inverse, axis=1)
             for k in range(len(truth)):
                 halves = [spread(lambda p, k=k: float(p[k]), truth, a).half for a in (at, wider)]  # type: ignore[misc]
