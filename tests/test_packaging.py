@@ -69,15 +69,16 @@ def test_temporary_folder_that_others_can_fill_is_not_trusted(tmp_path: Path, mo
 
 def test_kernel_cache_follows_the_sources_and_the_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path / "home"))
-    shutil.copytree(ROOT / "services/shoal/mechanics", tmp_path / "mechanics")
+    for folder in ("mechanics", "engines/tree"):
+        shutil.copytree(ROOT / "services/shoal" / folder, tmp_path / folder)
     before = home.kernel_cache().name
-    monkeypatch.setattr(home, "_KERNELS", tmp_path / "mechanics")
+    monkeypatch.setattr(home, "_PACKAGE", tmp_path)
     assert home.kernel_cache().name == before
     (tmp_path / "mechanics" / "analysis" / "new.py").write_text("x = 1\n")
     assert home.kernel_cache().name == before, "no kernel imports this file"
     (tmp_path / "mechanics" / "elements" / "new.py").write_text("from numba import njit\n")
     with_new_file = home.kernel_cache().name
-    (tmp_path / "mechanics" / "affine.py").write_text("x = 1\n")
+    (tmp_path / "mechanics" / "numerics" / "tile.py").write_text("x = 1\n")
     with_imported_file = home.kernel_cache().name
     monkeypatch.setattr(home, "_version", lambda package: "0")
     assert len({before, with_new_file, with_imported_file, home.kernel_cache().name}) == 4

@@ -271,7 +271,7 @@ def simulate(
 
 @main.command()
 @click.argument("scene")
-@click.option("--time", default=0.0, show_default=True, metavar="T", help="Drives stand as they are at T [s].")
+@click.option("--time", default=0.0, show_default=True, metavar="T", help="Applied stand as they are at T [s].")
 @option_set
 @option_json
 def statics(scene: str, time: float, values: dict[str, str], as_json: bool) -> None:

@@ -12,8 +12,9 @@ from pathlib import Path
 
 from shoal.errors import InputError
 
-_KERNELS = Path(__file__).parent / "mechanics"
-_IMPORT = re.compile(r"^\s*from shoal\.(mechanics[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
+_PACKAGE = Path(__file__).parent
+_KERNELS = ("mechanics", "engines/tree")
+_IMPORT = re.compile(r"^\s*from shoal\.((?:mechanics|engines\.tree)[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 
 
 def home() -> Path:
@@ -61,10 +62,10 @@ def _fingerprint() -> str:
 
 
 def _kernel_sources() -> dict[str, str]:
-    """Text by module of every file below `mechanics` that holds a kernel, or that such a file imports."""
+    """Text by module of every file in the folders of kernels that holds one, or that such a file imports."""
     texts = {}
-    for source in _KERNELS.rglob("*.py"):
-        module = ".".join(("mechanics", *source.relative_to(_KERNELS).with_suffix("").parts))
+    for source in (file for folder in _KERNELS for file in (_PACKAGE / folder).rglob("*.py")):
+        module = ".".join(source.relative_to(_PACKAGE).with_suffix("").parts)
         texts[module.removesuffix(".__init__")] = source.read_text(encoding="utf-8")
     found: dict[str, str] = {}
     pending = [module for module, text in texts.items() if "njit" in text]

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
-from shoal.mechanics import constraints, dynamics, functions, gauss, model, sparse
+from shoal.mechanics import dynamics, functions, model
 from shoal.mechanics.elements import ancf_cable
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.least import constraints, gauss
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.vector import pointer
 
 Array = Any
 

@@ -10,7 +10,7 @@ import pytest
 from shoal.engines.casadi_element import cable_element
 from shoal.mechanics.elements import ancf_cable
 from shoal.mechanics.elements.ancf_cable import AncfCables
-from shoal.mechanics.tile import SINGLE, WIDE
+from shoal.mechanics.numerics.tile import SINGLE, WIDE
 
 EA, EI, LENGTH = 1.6e5, 5.3, 0.5
 TABLES = {

@@ -10,8 +10,8 @@ from numba import njit
 from scipy.integrate import solve_bvp
 from shoal.mechanics.elements import ancf_full
 from shoal.mechanics.elements.ancf_full import LAWS, AncfFull
-from shoal.mechanics.tile import SINGLE, WIDE
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics.tile import SINGLE, WIDE
+from shoal.mechanics.numerics.vector import pointer
 
 YOUNG, POISSON, SHEAR, LENGTH, HEIGHT, WIDTH, DENSITY = 2e8, 0.3, 0.85, 0.5, 0.06, 0.04, 5540.0
 laws = pytest.mark.parametrize("law", list(LAWS))

@@ -14,8 +14,8 @@ from scipy.special import ellipk, ellipkinc
 from shoal.mechanics.elements import ancf_cable, beam
 from shoal.mechanics.elements.ancf_cable import AncfCables
 from shoal.mechanics.elements.beam import CUBIC, QUINTIC, Beams
-from shoal.mechanics.tile import SINGLE, WIDE
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics.tile import SINGLE, WIDE
+from shoal.mechanics.numerics.vector import pointer
 
 EA, EI, LENGTH, ETA = 1.6e5, 5.3, 0.5, 2e-3
 RULES = [(CUBIC, 5, 3), (CUBIC, 3, 3), (QUINTIC, 4, 4), (QUINTIC, 5, 5)]

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from numba import njit
 from shoal.mechanics import fitting, forces, functions
 from shoal.mechanics.forces import ANGLE, DISTANCE, LAW, PLACE, Forces
-from shoal.mechanics.tile import SINGLE, WIDE, Tile
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
+from shoal.mechanics.numerics.vector import pointer
 
 Array = Any
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shoal.mechanics.build import build
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.model import Model
+from shoal.mechanics.numerics.tile import SINGLE, WIDE
 from shoal.mechanics.simulate import simulate
 from shoal.mechanics.tangent import ready
-from shoal.mechanics.tile import SINGLE, WIDE
 from shoal.scene import Scene, load_scene
 
 ROD = {"kind": "rod", "height": 0.02, "width": 0.05, "density": 1000.0}

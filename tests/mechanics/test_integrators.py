@@ -12,7 +12,7 @@ from scipy.special import ellipj, ellipk
 from shoal.engines.casadi import CasadiEngine
 from shoal.errors import InputError
 from shoal.mechanics import stability
-from shoal.mechanics.build import build
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.mechanics.simulate import simulate
 from shoal.mechanics.warm import WIDE

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.errors import InputError
-from shoal.mechanics.build import build
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.halts import halts
 from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.mechanics.simulate import simulate

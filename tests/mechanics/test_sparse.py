@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from shoal.mechanics import sparse
-from shoal.mechanics.tile import SINGLE, WIDE
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.tile import SINGLE, WIDE
 
 
 @st.composite

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
-from shoal.mechanics.start import complete, is_direct
+from shoal.mechanics.start.start import complete, is_direct
 from shoal.scene import Scene
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shoal.mechanics.start import started
+from shoal.mechanics.start.start import started
 from shoal.scene import load_scene
 
 

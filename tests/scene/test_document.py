@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
-from shoal.mechanics.build import build
+from shoal.mechanics.assembly.build import build
 from shoal.scene import Scene
 from shoal.scene.load import read_yaml
 

@@ -18,7 +18,7 @@ from shoal.engines.casadi_fixed_step import runge_kutta
 from shoal.engines.casadi_model import CasadiModel, casadi_model
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
 from shoal.mechanics.reach import MARGIN, stretch
-from shoal.mechanics.start import started
+from shoal.mechanics.start.start import started
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 

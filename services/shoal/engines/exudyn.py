@@ -17,7 +17,7 @@ from shoal.engines.exudyn_checks import judge
 from shoal.engines.exudyn_record import Record, Steps, choose_steps
 from shoal.errors import InputError
 from shoal.mechanics.halts import CROSSED
-from shoal.mechanics.start import facts
+from shoal.mechanics.start.start import facts
 from shoal.scene import Rod, Scene
 from shoal.trajectory import Array, Status, Trajectory
 

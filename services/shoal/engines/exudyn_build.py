@@ -21,7 +21,7 @@ from shoal.engines.exudyn_record import Indices
 from shoal.engines.poses import initial_poses
 from shoal.errors import InputError
 from shoal.mechanics.reach import span
-from shoal.mechanics.start import complete
+from shoal.mechanics.start.start import complete
 from shoal.scene import GROUND, DrivenAngle, Rod, Scene
 from shoal.trajectory import Array
 

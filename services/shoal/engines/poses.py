@@ -8,9 +8,9 @@ import numpy as np
 
 from shoal.engines.course import slope_after
 from shoal.errors import InputError
-from shoal.mechanics.closure import Closure
 from shoal.mechanics.reach import span
-from shoal.mechanics.start import complete
+from shoal.mechanics.start.closure import Closure
+from shoal.mechanics.start.start import complete
 from shoal.scene import (
     GROUND,
     Attachment,

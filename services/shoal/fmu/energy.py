@@ -7,11 +7,11 @@ import numpy as np
 from shoal.mechanics import stability
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.motion_state import LANE, at_start
-from shoal.mechanics.build import build
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import choose, facts, halting, pick
 from shoal.mechanics.march import SAMPLED, march
 from shoal.mechanics.model import Model
-from shoal.mechanics.tile import SINGLE
+from shoal.mechanics.numerics.tile import SINGLE
 from shoal.scene import Scene
 from shoal.trajectory import Array
 

@@ -17,7 +17,7 @@ from shoal.identification.measurement import Measurement
 from shoal.identification.observation import Camera, observe
 from shoal.identification.parametrization import Parametrization
 from shoal.identification.problem import Problem
-from shoal.mechanics.tile import WIDE
+from shoal.mechanics.numerics.tile import WIDE
 from shoal.scene import Scene
 from shoal.swarm import EvaluationCounter
 from shoal.trajectory import Array, Status, Trajectory

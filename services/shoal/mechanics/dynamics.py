@@ -7,11 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, typeof, types
 
-from shoal.mechanics import constraints, drives, forces, gate, gauss, model, sparse
+from shoal.mechanics import applied, forces, model
 from shoal.mechanics.elements import ancf_cable, ancf_full, beam
+from shoal.mechanics.least import constraints, gauss
 from shoal.mechanics.model import Arrays, Gates
-from shoal.mechanics.tile import Array, Tile
-from shoal.mechanics.vector import add_product, clear, copy, pointer
+from shoal.mechanics.numerics import gate, sparse
+from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.vector import add_product, clear, copy, pointer
 
 ELEMENT_ROWS = 64
 ALL, ELASTIC, SIMPLE, ACCELERATION = 0, 1, 2, 3
@@ -117,7 +119,7 @@ def _fold(tile: Tile, m: Arrays, f: Array) -> None:
 def loaded(m: Arrays) -> bool:
     """Whether forces depend on rates or on time."""
     e = m.elements
-    return m.driven or m.forces.size + m.drives.fixed + m.drives.following > 0 or e.cubics.damped or e.quintics.damped
+    return m.driven or m.forces.size + m.applied.fixed + m.applied.following > 0 or e.cubics.damped or e.quintics.damped
 
 
 @njit(cache=True, error_model="numpy")
@@ -166,7 +168,7 @@ def _force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: A
             w.power[lane] = 0.0
         if moving:
             derive(tile, m, zdot, m.force_rows, True)
-            drives.add_force(tile, m.drives, m.functions, t, z, zdot, f, w.power)
+            applied.add_force(tile, m.applied, m.functions, t, z, zdot, f, w.power)
         forces.add_force(tile, m.forces, m.functions, t, z, zdot, w.memory, f, w.element, w.power, moving)
     ancf_cable.add_force_full(tile, e.cables_full, z, f, w.element)
     ancf_cable.add_force_reduced(tile, e.cables_reduced, z, f, w.element)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from shoal.errors import InputError
 from shoal.mechanics.functions import ORDER, Piecewise, value
-from shoal.mechanics.tile import Array
+from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Function, formula
 from shoal.scene.branches import branches
 from shoal.scene.enclosure import enclose

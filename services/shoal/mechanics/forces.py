@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics.functions import Functions, evaluate, excess
-from shoal.mechanics.tile import Array, Index, Tile
-from shoal.mechanics.vector import add_product, clear, copy, pointer
+from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.vector import add_product, clear, copy, pointer
 
 DISTANCE, ANGLE, PLACE = 0, 1, 2
 """Measures: |b - a| [m] of two points; the angle [rad] from direction a to direction b, over any number of

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics.tile import Array, Index
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics.tile import Array, Index
+from shoal.mechanics.numerics.vector import pointer
 
 ORDER = 16
 """Stored coefficients of a piece; `fitting` leaves the last one zero, so that the antiderivative has room."""

@@ -15,7 +15,7 @@ from shoal.mechanics import forces
 from shoal.mechanics.forces import Forces
 from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.model import Model
-from shoal.mechanics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 NARROW = 0.25
 """Pieces narrower than this fraction of the longest step are not left to a step that sees its error, ..."""

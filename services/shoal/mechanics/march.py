@@ -7,13 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, gauss, model
+from shoal.mechanics import dynamics, model
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
 from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
+from shoal.mechanics.least import constraints, gauss
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.tile import Array, Index, Tile
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.vector import pointer
 
 ASSEMBLY = 30
 """Iterations that may assemble a mechanism whose stated start is only roughly consistent."""

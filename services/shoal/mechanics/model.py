@@ -16,20 +16,22 @@ import numpy as np
 from numba import njit
 
 from shoal.errors import InputError
-from shoal.mechanics import constraints, drives, forces, functions, gate, saddle, sparse
-from shoal.mechanics.closure import Flags
-from shoal.mechanics.constraints import Constraints
-from shoal.mechanics.drives import Drives
+from shoal.mechanics import applied, forces, functions
+from shoal.mechanics.applied import Applied
+from shoal.mechanics.assembly.frames import Frame
 from shoal.mechanics.elements import ancf_cable, ancf_full, beam
 from shoal.mechanics.elements.ancf_cable import AncfCables
 from shoal.mechanics.elements.ancf_full import AncfFull
 from shoal.mechanics.elements.beam import Beams
 from shoal.mechanics.forces import Forces
-from shoal.mechanics.frames import Frame
 from shoal.mechanics.functions import Functions, Piecewise
-from shoal.mechanics.saddle import Saddle
-from shoal.mechanics.tile import Array, Index, Tile, pack
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.least import constraints, saddle
+from shoal.mechanics.least.constraints import Constraints
+from shoal.mechanics.least.saddle import Saddle
+from shoal.mechanics.numerics import gate, sparse
+from shoal.mechanics.numerics.tile import Array, Index, Tile, pack
+from shoal.mechanics.numerics.vector import pointer
+from shoal.mechanics.start.closure import Flags
 from shoal.scene import Scene
 
 
@@ -89,7 +91,7 @@ class Arrays(NamedTuple):
     weight: Array
     elements: Elements
     forces: Forces
-    drives: Drives
+    applied: Applied
     functions: Functions
     constraints: Constraints
     saddle: Saddle
@@ -127,7 +129,7 @@ def raw(m: Arrays) -> Arrays:
             ancf_full.raw(e.two_point_solids),
         ),
         forces.raw(m.forces),
-        drives.raw(m.drives),
+        applied.raw(m.applied),
         functions.raw(m.functions),
         constraints.raw(m.constraints),
         saddle.raw(m.saddle),
@@ -165,7 +167,7 @@ class Model:
     owners: tuple[tuple[str, ...], ...]
     forces: Forces
     start_angles: Array
-    drives: Drives
+    applied: Applied
     functions: Functions
     kinks: tuple[Array, ...]
     constraints: Constraints
@@ -180,7 +182,7 @@ class Model:
     def varies(self) -> bool:
         """Whether lanes differ in more than their initial state."""
         d = self.derived
-        numbers = [self.mass_values, self.weight, self.forces.law, self.drives.coefficient, self.drives.factor]
+        numbers = [self.mass_values, self.weight, self.forces.law, self.applied.coefficient, self.applied.factor]
         numbers += [family.coefficients for family in self.elements]
         numbers += [self.constraints.factor, self.constraints.constant, self.constraints.coefficient]
         numbers += [d.coefficient, d.constant]
@@ -297,7 +299,7 @@ class Model:
                 e.two_point_solids._replace(coefficients=packed(e.two_point_solids.coefficients)),
             ),
             self.forces._replace(law=packed(self.forces.law)),
-            self.drives._replace(coefficient=packed(self.drives.coefficient), factor=packed(self.drives.factor)),
+            self.applied._replace(coefficient=packed(self.applied.coefficient), factor=packed(self.applied.factor)),
             self.functions,
             c._replace(factor=packed(c.factor), constant=packed(c.constant), coefficient=packed(c.coefficient)),
             self._saddle(packed),

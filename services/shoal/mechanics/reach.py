@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from shoal.mechanics.tile import Array
+from shoal.mechanics.numerics.tile import Array
 from shoal.scene import GROUND, Attachment, Revolute, Rod, Scene, Weld
 from shoal.scene.joints import places
 from shoal.scene.loads import sides as load_sides

@@ -12,18 +12,19 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import forces, stability, start, swarm_motion
+from shoal.mechanics import forces, stability, swarm_motion
 from shoal.mechanics import reach as reaches
-from shoal.mechanics.build import build, with_start
+from shoal.mechanics.assembly.build import build, with_start
+from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.dynamics import derived_rows, work_space
-from shoal.mechanics.groups import start_angle
 from shoal.mechanics.integrators import Choice, choose, facts, halting, pick
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.march import SAMPLED, Record, march
 from shoal.mechanics.model import Model
-from shoal.mechanics.redundancy import redundant_joints
+from shoal.mechanics.numerics.tile import Array, pack, tiles, unpack
+from shoal.mechanics.start import start
+from shoal.mechanics.start.redundancy import redundant_joints
 from shoal.mechanics.tangent import ready
-from shoal.mechanics.tile import Array, pack, tiles, unpack
 from shoal.scene import Scene, Solver
 from shoal.trajectory import Status, Trajectory, plain
 

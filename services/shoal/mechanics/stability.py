@@ -14,9 +14,9 @@ import scipy.sparse.linalg
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
-from shoal.mechanics.sparse import Pattern
+from shoal.mechanics.numerics.sparse import Pattern
+from shoal.mechanics.numerics.tile import Array, pack, tiles, unpack
 from shoal.mechanics.tangent import ready, stiffness_at, tangent_tile
-from shoal.mechanics.tile import Array, pack, tiles, unpack
 
 _DENSE = 60
 """Up to so many unknowns the dense eigenproblem is the faster one."""

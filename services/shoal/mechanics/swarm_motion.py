@@ -29,13 +29,14 @@ from numba import njit
 from scipy.linalg import cholesky, solve_triangular
 
 from shoal.errors import InputError
-from shoal.mechanics import constraints, dynamics, model
+from shoal.mechanics import dynamics, model
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.halts import RESOLUTION
+from shoal.mechanics.least import constraints
 from shoal.mechanics.march import ASSEMBLY, SAMPLED, Record
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.tile import SINGLE, Array, Index, Tile
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile
+from shoal.mechanics.numerics.vector import pointer
 from shoal.scene import Scene, Solver
 from shoal.swarm import OPTIMIZERS, Afsa, EvaluationCounter, Iafsa, IafsaPrinted, minimize
 

@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, types
 
-from shoal.mechanics import dynamics, forces, gate, model, sparse
+from shoal.mechanics import dynamics, forces, model
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.elements import ancf_cable, ancf_full, beam
 from shoal.mechanics.model import Arrays, Gates, Model, scatter
-from shoal.mechanics.tile import Array, Index, Tile, pack
-from shoal.mechanics.vector import add_product, pointer, shift
+from shoal.mechanics.numerics import gate, sparse
+from shoal.mechanics.numerics.tile import Array, Index, Tile, pack
+from shoal.mechanics.numerics.vector import add_product, pointer, shift
 
 
 class Tangent(NamedTuple):

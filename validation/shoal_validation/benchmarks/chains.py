@@ -26,12 +26,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from shoal.engines.exudyn_build import library
-from shoal.mechanics.spatial.articulated import accelerate
-from shoal.mechanics.spatial.description import SpatialChain
-from shoal.mechanics.spatial.march import march
-from shoal.mechanics.spatial.simulate import simulate
-from shoal.mechanics.spatial.tableau import RK4
-from shoal.mechanics.spatial.tree import build, room
+from shoal.engines.tree.articulated import accelerate
+from shoal.engines.tree.description import SpatialChain
+from shoal.engines.tree.march import march
+from shoal.engines.tree.simulate import simulate
+from shoal.engines.tree.tableau import RK4
+from shoal.engines.tree.tree import build, room
 
 from shoal_validation.benchmarks.timing import median_time
 

@@ -13,12 +13,12 @@ from shoal.engines.exudyn import ExudynEngine
 from shoal.engines.exudyn_build import build as build_exudyn
 from shoal.engines.exudyn_build import library
 from shoal.engines.exudyn_record import choose_steps
-from shoal.mechanics.build import build
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import choose
 from shoal.mechanics.march import march
+from shoal.mechanics.numerics.tile import Tile, pack, tiles
 from shoal.mechanics.tangent import ready
-from shoal.mechanics.tile import Tile, pack, tiles
 from shoal.scene import Scene, load_scene
 
 from shoal_validation.benchmarks.timing import median_time

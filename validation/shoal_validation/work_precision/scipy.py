@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from shoal.errors import ComputationError
 from shoal.mechanics.analysis.evaluate import Evaluator, points
-from shoal.mechanics.placement import place
+from shoal.mechanics.assembly.placement import place
 from shoal.scene import Scene
 from shoal.trajectory import Array
 

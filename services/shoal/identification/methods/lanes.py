@@ -14,7 +14,7 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.mechanics.integrators import facts
-from shoal.mechanics.tile import WIDE
+from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
 
 DIFFERENCE = 1e-6

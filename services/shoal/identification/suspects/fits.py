@@ -11,7 +11,7 @@ import numpy as np
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import DIFFERENCE, Descent, descend_each
 from shoal.identification.suspects.candidate import Candidate, with_parameters
-from shoal.mechanics.tile import WIDE
+from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
 
 _ITERATIONS = 15

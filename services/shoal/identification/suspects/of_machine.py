@@ -12,7 +12,7 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import Parameter
 from shoal.identification.suspects.candidate import Candidate
 from shoal.identification.suspects.size import Size, size_of
-from shoal.mechanics.start import is_direct
+from shoal.mechanics.start.start import is_direct
 from shoal.scene import PointMass, RigidBody, Rod, Scene
 from shoal.scene.joints import GROUND, Attachment, Revolute, Slider, places
 

@@ -15,7 +15,7 @@ import scipy.linalg
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
-from shoal.mechanics.tile import Array
+from shoal.mechanics.numerics.tile import Array
 
 CLOSE = 1e-11
 """Converged: a correction of the bodies [rms displacement / size of the machine] below this,"""

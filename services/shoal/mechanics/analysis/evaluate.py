@@ -15,15 +15,16 @@ import numpy.typing as npt
 import scipy.sparse
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, forces, functions, model
-from shoal.mechanics.affine import Affine
-from shoal.mechanics.build import build
+from shoal.mechanics import dynamics, forces, functions, model
+from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
+from shoal.mechanics.least import constraints
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.sparse import Pattern
+from shoal.mechanics.numerics.sparse import Pattern
+from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile
+from shoal.mechanics.numerics.vector import pointer
 from shoal.mechanics.tangent import ready, stiffness_at, tangent_tile
-from shoal.mechanics.tile import SINGLE, Array, Index, Tile
-from shoal.mechanics.vector import pointer
 from shoal.scene import Scene
 
 Sparse = scipy.sparse.csr_array
@@ -225,7 +226,7 @@ class Evaluator:
     @property
     def follows(self) -> bool:
         """Whether a load turns with a body, so that there is no potential."""
-        return self._arrays.drives.following > 0
+        return self._arrays.applied.following > 0
 
     def _enter(self, q: Array, v: Array | None) -> None:
         n = self.model.unknowns
@@ -241,11 +242,11 @@ class Evaluator:
             return arrays
         law = arrays.forces.law.copy()
         law[forces.AMPLITUDE :: forces.LAW] *= load
-        drives = arrays.drives
+        applied = arrays.applied
         return arrays._replace(
             weight=arrays.weight * load,
             forces=arrays.forces._replace(law=law),
-            drives=drives._replace(coefficient=drives.coefficient * load, factor=drives.factor * load),
+            applied=applied._replace(coefficient=applied.coefficient * load, factor=applied.factor * load),
         )
 
     def _only(self, body: str, number: int | None = None) -> Arrays:
@@ -262,12 +263,12 @@ class Evaluator:
         law = np.zeros_like(arrays.forces.law)
         law[forces.SPEED :: forces.LAW] = 1.0
         none = np.full_like(arrays.forces.table, -1)
-        drives = arrays.drives
+        applied = arrays.applied
         return arrays._replace(
             weight=0.0 * arrays.weight,
             elements=arrays.elements._replace(**families),
             forces=arrays.forces._replace(law=law, table=none, energy=none),
-            drives=drives._replace(coefficient=0.0 * drives.coefficient, factor=0.0 * drives.factor),
+            applied=applied._replace(coefficient=0.0 * applied.coefficient, factor=0.0 * applied.factor),
         )
 
     def _force(self, q: Array, v: Array | None, arrays: Arrays) -> Array:
@@ -298,11 +299,11 @@ class Evaluator:
 
     def _applied(self, arrays: Arrays, t: float) -> float:
         """Potential of the applied loads [J]; the derived rows must be filled."""
-        drives, z = arrays.drives, self._room.z
-        if drives.following:
+        applied, z = arrays.applied, self._room.z
+        if applied.following:
             return float("nan")
-        strength = self._strengths(arrays, drives.fixed_function, t)
-        total = -float(np.sum(drives.coefficient * strength * z[drives.row])) if drives.fixed else 0.0
+        strength = self._strengths(arrays, applied.fixed_function, t)
+        total = -float(np.sum(applied.coefficient * strength * z[applied.row])) if applied.fixed else 0.0
         rows = arrays.forces.rows.reshape(-1, forces.ROWS)
         for k, torque in self._torques(arrays, t):
             ax, ay, bx, by = z[rows[k, :4]]
@@ -313,14 +314,14 @@ class Evaluator:
 
     def _load_stiffness(self, arrays: Arrays, t: float) -> scipy.sparse.csc_array:
         """-dQ/dq of motors and of forces that turn with a body."""
-        drives, z, n = arrays.drives, self._room.z, self.model.unknowns
+        applied, z, n = arrays.applied, self._room.z, self.model.unknowns
         parts: list[tuple[Index, Index, Array]] = []
-        strength = self._strengths(arrays, drives.following_function, t)
-        for k in range(drives.following):
-            rows = drives.rows[4 * k : 4 * k + 4]
+        strength = self._strengths(arrays, applied.following_function, t)
+        for k in range(applied.following):
+            rows = applied.rows[4 * k : 4 * k + 4]
             dx, dy = z[rows[2:]]
             size = np.hypot(dx, dy)
-            fx, fy = drives.factor[2 * k : 2 * k + 2] * strength[k]
+            fx, fy = applied.factor[2 * k : 2 * k + 2] * strength[k]
             # d/dd of R d/|d| with R = [[fx, -fy], [fy, fx]]: R (I - n n')/|d|
             normal = np.array([[dy * dy, -dx * dy], [-dx * dy, dx * dx]]) / size**3
             parts.append((rows[:2], rows[2:], -np.array([[fx, -fy], [fy, fx]]) @ normal))

@@ -11,13 +11,13 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse
 
-from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.evaluate import Evaluator, Points, points
-from shoal.mechanics.build import build
+from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics.assembly.build import build
+from shoal.mechanics.assembly.frames import BeamFrame, Frame, PointFrame
+from shoal.mechanics.assembly.placement import Placement, place
 from shoal.mechanics.forces import LAW
-from shoal.mechanics.frames import BeamFrame, Frame, PointFrame
-from shoal.mechanics.placement import Placement, place
-from shoal.mechanics.tile import Array
+from shoal.mechanics.numerics.tile import Array
 from shoal.scene import InitialState, RigidBody, Scene
 
 

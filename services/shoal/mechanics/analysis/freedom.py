@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.linalg
 
-from shoal.mechanics.tile import Array
+from shoal.mechanics.numerics.tile import Array
 
 RANK = 1e-8
 """A combination of constraints, each of unit length, that is shorter than this depends on the others."""

@@ -18,9 +18,9 @@ from shoal.errors import ComputationError
 from shoal.mechanics.analysis.balance import Balance, zero_level
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.statics import Equilibrium, statics
-from shoal.mechanics.placement import place
+from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
-from shoal.mechanics.tile import Array
 from shoal.scene import Scene
 from shoal.trajectory import plain
 

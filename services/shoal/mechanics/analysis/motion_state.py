@@ -10,13 +10,13 @@ import numpy as np
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import forces, stability
 from shoal.mechanics.analysis.evaluate import Evaluator
-from shoal.mechanics.build import build
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.integrators import choose, facts, halting, pick
 from shoal.mechanics.march import march
 from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.numerics.tile import SINGLE, Array
 from shoal.mechanics.tangent import ready
-from shoal.mechanics.tile import SINGLE, Array
 from shoal.scene import Scene
 
 LANE = slice(0, 1)

@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies, vectors
 from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.motion_state import states
-from shoal.mechanics.frames import BeamFrame, PointFrame
-from shoal.mechanics.pose import unit
-from shoal.mechanics.tile import Array
+from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics.assembly.frames import BeamFrame, PointFrame
+from shoal.mechanics.assembly.pose import unit
+from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, Coupling, Distance, Revolute, Scene, Slider, Weld
 from shoal.trajectory import plain
 

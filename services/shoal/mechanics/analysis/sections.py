@@ -15,10 +15,10 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
+from shoal.mechanics.assembly.frames import BeamFrame
+from shoal.mechanics.assembly.pose import as_complex
 from shoal.mechanics.elements import ELEMENTS
-from shoal.mechanics.frames import BeamFrame
-from shoal.mechanics.pose import as_complex
-from shoal.mechanics.tile import Array
+from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, DistributedForce, Rod, Scene
 from shoal.scene.joints import places
 from shoal.scene.loads import sides

@@ -18,11 +18,11 @@ import scipy.linalg
 from shoal.mechanics.analysis.balance import Balance, Found, zero_level
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.reactions import Reactions, reactions_of
-from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
-from shoal.mechanics.groups import start_angle
-from shoal.mechanics.placement import Placement, place
+from shoal.mechanics.assembly.frames import BeamFrame, PointFrame, RigidFrame
+from shoal.mechanics.assembly.groups import start_angle
+from shoal.mechanics.assembly.placement import Placement, place
+from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
-from shoal.mechanics.tile import Array
 from shoal.scene import Scene
 from shoal.trajectory import plain
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.mechanics.affine import Number
+from shoal.mechanics.assembly.affine import Number
 from shoal.mechanics.elements import ancf_cable, ancf_full, beam
 from shoal.scene import Rod
 

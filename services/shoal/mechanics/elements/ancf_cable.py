@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics.affine import Number
-from shoal.mechanics.tile import Array, Index, Tile
-from shoal.mechanics.vector import add, copy, pointer
+from shoal.mechanics.assembly.affine import Number
+from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.vector import add, copy, pointer
 
 NODE_COORDINATES = 4
 ROWS = 8

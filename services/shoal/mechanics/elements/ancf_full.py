@@ -19,10 +19,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from shoal.mechanics.affine import Number
+from shoal.mechanics.assembly.affine import Number
 from shoal.mechanics.elements import ancf_cable
-from shoal.mechanics.tile import Array, Index, Tile
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.vector import pointer
 
 NODE_COORDINATES = 6
 ROWS = 12

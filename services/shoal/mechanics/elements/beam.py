@@ -24,9 +24,9 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from shoal.mechanics.affine import Number
-from shoal.mechanics.tile import Array, Index, Tile
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.assembly.affine import Number
+from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.vector import pointer
 
 CUBIC = 4
 QUINTIC = 6

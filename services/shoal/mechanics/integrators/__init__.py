@@ -20,7 +20,7 @@ from shoal.mechanics.integrators import (
 )
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
-from shoal.mechanics.tile import Tile
+from shoal.mechanics.numerics.tile import Tile
 from shoal.scene import Solver
 
 INTEGRATORS: dict[str, Any] = {

@@ -13,8 +13,8 @@ from numba import njit
 
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.tile import Array, Tile
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.vector import pointer
 from shoal.scene import Solver
 
 SAFETY = 0.9

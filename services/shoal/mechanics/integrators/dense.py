@@ -8,7 +8,7 @@ from numba import njit
 
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.tile import Array, Tile
+from shoal.mechanics.numerics.tile import Array, Tile
 
 
 @njit(cache=True, error_model="numpy")

@@ -18,8 +18,8 @@ from shoal.mechanics.integrators import control
 from shoal.mechanics.integrators.control import RESOLUTION, Control, control_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.tile import Array, Tile
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.vector import pointer
 from shoal.scene import Solver
 
 STAGES = 12

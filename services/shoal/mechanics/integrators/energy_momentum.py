@@ -12,16 +12,18 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, sparse
+from shoal.mechanics import dynamics
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.functions import evaluate
 from shoal.mechanics.integrators import newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
+from shoal.mechanics.least import constraints
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.tile import Array, Tile
-from shoal.mechanics.vector import pointer
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.vector import pointer
 from shoal.scene import Solver
 
 ROUND_OFF = 1e-15

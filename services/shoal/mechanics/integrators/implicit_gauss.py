@@ -23,7 +23,7 @@ from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.tile import Array, Tile
+from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
 

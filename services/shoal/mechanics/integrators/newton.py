@@ -7,13 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, gauss, sparse
+from shoal.mechanics import dynamics
 from shoal.mechanics import tangent as tangents
 from shoal.mechanics.dynamics import Work
+from shoal.mechanics.least import constraints, gauss
 from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.vector import pointer
 from shoal.mechanics.tangent import Tangent, tangent_tile
-from shoal.mechanics.tile import Array, Tile
-from shoal.mechanics.vector import pointer
 from shoal.scene import Solver
 
 ITERATIONS = 30

@@ -15,16 +15,18 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics, gauss, sparse
+from shoal.mechanics import dynamics
 from shoal.mechanics import tangent as tangents
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import control
 from shoal.mechanics.integrators.control import RESOLUTION, Control, control_room
 from shoal.mechanics.integrators.scheme import Facts, implement
+from shoal.mechanics.least import gauss
 from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.vector import clear, pointer
 from shoal.mechanics.tangent import Tangent, tangent_tile
-from shoal.mechanics.tile import Array, Tile
-from shoal.mechanics.vector import clear, pointer
 from shoal.scene import Solver
 
 STAGES = 3

@@ -11,7 +11,7 @@ from shoal.mechanics import dynamics
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.tile import Array, Tile
+from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
 

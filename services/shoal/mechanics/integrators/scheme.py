@@ -19,7 +19,7 @@ from numba.extending import overload
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import dense
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.tile import Array, Tile
+from shoal.mechanics.numerics.tile import Array, Tile
 
 
 class Facts(NamedTuple):

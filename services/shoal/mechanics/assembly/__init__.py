@@ -1,0 +1,1 @@
+"""Scene -> Model: coordinates, frames, masses, loads, constraints."""

@@ -1,0 +1,137 @@
+"""Other ways to the acceleration of least constraint, kept to compare with: they agree where C_q has full rank.
+
+In y = D^1/2 L' a the problem is min |y - y_f|^2 / 2 subject to W y = target. `kkt` solves for the multipliers without
+looking at the rank; the augmented Lagrangian (Bayo, Garcia de Jalon and Serna 1988) and the proximal point method
+(Rockafellar 1976) iterate with a regularised matrix and stay solvable where it is singular, but like any minimiser
+they miss the motion's limit there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics.numerics.tile import Array
+
+KKT = 1
+AUGMENTED = 2
+PROXIMAL = 3
+ITERATIONS = 50
+PENALTY = 1e7
+"""Of the augmented Lagrangian, for rows of unit length."""
+PROXIMITY = 1e-6
+
+
+@njit(cache=True, error_model="numpy")
+def correct(method: int, rows: Array, target: Array, matrix: Array, scale: Array, multiplier: Array, y: Array) -> None:
+    """Move y to W y = target by one of the methods. matrix: (constraints, constraints) and scale: work space."""
+    count, n = rows.shape
+    for k in range(count):
+        length = np.sqrt(np.dot(rows[k], rows[k]))
+        scale[k] = 1.0 / length if length > 0.0 else 0.0
+        for i in range(n):
+            rows[k, i] *= scale[k]
+        multiplier[k] = 0.0
+    step = np.zeros(count)
+    shift = 0.0
+    if method == AUGMENTED:
+        shift = 1.0 / PENALTY
+    elif method == PROXIMAL:
+        shift = PROXIMITY
+    for i in range(count):
+        for j in range(count):
+            matrix[i, j] = np.dot(rows[i], rows[j])
+        matrix[i, i] += shift
+    _cholesky(matrix)
+    for _ in range(1 if method == KKT else ITERATIONS):
+        largest = 0.0
+        for k in range(count):
+            step[k] = np.dot(rows[k], y) - scale[k] * target[k]
+            largest = max(largest, abs(step[k]))
+        if not largest > 1e-15:
+            break
+        _substitute(matrix, step)
+        for k in range(count):
+            multiplier[k] += step[k]
+            for i in range(n):
+                y[i] -= step[k] * rows[k, i]
+
+
+@njit(cache=True, error_model="numpy")
+def _cholesky(a: Array) -> None:
+    """Replace a symmetric matrix by its Cholesky factor (lower); nan where it is not positive."""
+    count = a.shape[0]
+    for k in range(count):
+        a[k, k] = np.sqrt(a[k, k])
+        for i in range(k + 1, count):
+            a[i, k] /= a[k, k]
+        for i in range(k + 1, count):
+            for j in range(k + 1, i + 1):
+                a[i, j] -= a[i, k] * a[j, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _substitute(a: Array, x: Array) -> None:
+    count = a.shape[0]
+    for i in range(count):
+        for j in range(i):
+            x[i] -= a[i, j] * x[j]
+        x[i] /= a[i, i]
+    for i in range(count - 1, -1, -1):
+        for j in range(i + 1, count):
+            x[i] -= a[j, i] * x[j]
+        x[i] /= a[i, i]
+
+
+@njit(cache=True, error_model="numpy")
+def solve_semidefinite(
+    count: int, width: int, lane: int, gram: Array, gap: Array, solution: Array, tolerance: float
+) -> None:
+    """Pivoted Cholesky of one lane; directions whose pivot falls below the tolerance are left out.
+
+    The diagonal is scaled to one first, so that the mass of one body says nothing about the rank of another's rows.
+    """
+    if count == 1:
+        solution[lane] = gap[lane] / gram[lane] if gram[lane] > 0 else 0.0
+        return
+    a = np.empty((count, count))
+    b = np.empty(count)
+    order = np.arange(count)
+    scale = np.empty(count)
+    for i in range(count):
+        diagonal = gram[(i * count + i) * width + lane]
+        scale[i] = 1.0 / np.sqrt(diagonal) if diagonal > 0 else 0.0
+    for i in range(count):
+        b[i] = scale[i] * gap[i * width + lane]
+        for j in range(count):
+            a[i, j] = scale[i] * scale[j] * gram[(i * count + j) * width + lane]
+    rank = 0
+    for k in range(count):
+        pivot = k
+        for i in range(k + 1, count):
+            if a[i, i] > a[pivot, pivot]:
+                pivot = i
+        if not a[pivot, pivot] > tolerance:
+            break
+        if pivot != k:
+            order[k], order[pivot] = order[pivot], order[k]
+            b[k], b[pivot] = b[pivot], b[k]
+            for i in range(count):
+                a[k, i], a[pivot, i] = a[pivot, i], a[k, i]
+            for i in range(count):
+                a[i, k], a[i, pivot] = a[i, pivot], a[i, k]
+        for i in range(k + 1, count):
+            ratio = a[i, k] / a[k, k]
+            for j in range(k + 1, count):
+                a[i, j] -= ratio * a[k, j]
+            b[i] -= ratio * b[k]
+        rank += 1
+    for k in range(count):
+        solution[order[k] * width + lane] = 0.0
+    for k in range(rank - 1, -1, -1):
+        total = b[k]
+        for j in range(k + 1, rank):
+            total -= a[k, j] * solution[order[j] * width + lane]
+        solution[order[k] * width + lane] = total / a[k, k]
+    for k in range(count):
+        solution[k * width + lane] *= scale[k]

@@ -1,0 +1,137 @@
+"""Least constraint as an orthogonal projection in the metric of the mass matrix, with rank detection.
+
+With M = L D L' and y = D^1/2 L' a, Gauss's function is 1/2 |y - y_f|^2 and every constraint one row w . y = -g, so the
+minimiser moves y_f by the least norm. The rows are orthonormalised with pivoting (Gram and Schmidt, each row twice);
+what is left of a row when it depends on the others, compared with its own length, is a distance from the singular
+position, not its square. One lane at a time, on contiguous work space.
+
+At a singular position the minimiser is in general not the limit of the motion. Every combination u of rows that
+vanishes (u' C_q = 0) adds the row u' d3C/dt3 = 0, which for quadratic constraints is linear in the acceleration:
+3 u' (C_qq v) a = -u' C_ttt. Rows that are redundant everywhere add nothing, because theirs vanish as well.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics.numerics.tile import Array, Index
+
+
+@njit(cache=True, error_model="numpy")
+def orthonormalise(rows: Array, triangle: Array, norms: Array, order: Index, tolerance: float) -> int:
+    """Replace the leading rows by an orthonormal basis of all of them; returns the rank.
+
+    rows: (constraints, unknowns); row order[k] of the input = norms[order[k]] * sum_j triangle[j, k] * (basis row j).
+    Rows beyond the rank depend on the basis up to the tolerance; a row of zeros depends on anything.
+    """
+    count: int = rows.shape[0]
+    n = rows.shape[1]
+    for k in range(count):
+        order[k] = k
+        norms[k] = np.sqrt(np.dot(rows[k], rows[k]))
+        if norms[k] > 0.0:
+            for i in range(n):
+                rows[k, i] /= norms[k]
+    triangle[:, :] = 0.0
+    for k in range(count):
+        pivot, longest = k, -1.0
+        for j in range(k, count):
+            length = np.dot(rows[j], rows[j])
+            if length > longest:
+                pivot, longest = j, length
+        if not np.sqrt(longest) > tolerance:
+            return k
+        if pivot != k:
+            order[k], order[pivot] = order[pivot], order[k]
+            for i in range(n):
+                rows[k, i], rows[pivot, i] = rows[pivot, i], rows[k, i]
+            for j in range(k):
+                triangle[j, k], triangle[j, pivot] = triangle[j, pivot], triangle[j, k]
+        for j in range(k):  # again, so that round-off of the first time does not stay
+            more = np.dot(rows[j], rows[k])
+            triangle[j, k] += more
+            for i in range(n):
+                rows[k, i] -= more * rows[j, i]
+        length = np.sqrt(np.dot(rows[k], rows[k]))
+        if not length > tolerance:
+            return k
+        triangle[k, k] = length
+        for i in range(n):
+            rows[k, i] /= length
+        for j in range(k + 1, count):
+            part = np.dot(rows[k], rows[j])
+            triangle[k, j] = part
+            for i in range(n):
+                rows[j, i] -= part * rows[k, i]
+    return count
+
+
+@njit(cache=True, error_model="numpy")
+def components(rank: int, triangle: Array, norms: Array, order: Index, target: Array, out: Array) -> None:
+    """out[j]: what (basis row j) . y must be so that row . y = target for the leading rows; target: by constraint."""
+    for k in range(rank):
+        total = target[order[k]] / norms[order[k]]
+        for j in range(k):
+            total -= triangle[j, k] * out[j]
+        out[k] = total / triangle[k, k]
+
+
+@njit(cache=True, error_model="numpy")
+def dependence(number: int, rank: int, triangle: Array, norms: Array, order: Index, out: Array) -> None:
+    """A combination of rows that vanishes: out[k] * row k, summed, = 0; that of the dependent row order[number]."""
+    out[:] = 0.0
+    if norms[order[number]] == 0.0:
+        out[order[number]] = 1.0
+        return
+    out[order[number]] = 1.0 / norms[order[number]]
+    for k in range(rank - 1, -1, -1):
+        total = triangle[k, number]
+        for j in range(k + 1, rank):
+            total += triangle[k, j] * out[order[j]] * norms[order[j]]
+        out[order[k]] = -total / triangle[k, k] / norms[order[k]]
+
+
+@njit(cache=True, error_model="numpy")
+def move(rank: int, rows: Array, wanted: Array, y: Array) -> None:
+    """Change y by the least norm so that (basis row j) . y = wanted[j], which becomes the change along that row."""
+    n = rows.shape[1]
+    for j in range(rank):
+        gap = wanted[j] - np.dot(rows[j], y)
+        wanted[j] = gap
+        for i in range(n):
+            y[i] += gap * rows[j, i]
+
+
+@njit(cache=True, error_model="numpy")
+def multipliers(rank: int, triangle: Array, norms: Array, order: Index, change: Array, out: Array) -> None:
+    """lambda with sum of lambda * row = -(change along the basis), change: from `move`; zero for dependent rows."""
+    out[:] = 0.0
+    for k in range(rank - 1, -1, -1):
+        total = -change[k]
+        for j in range(k + 1, rank):
+            total -= triangle[k, j] * out[order[j]] * norms[order[j]]
+        out[order[k]] = total / triangle[k, k] / norms[order[k]]
+
+
+@njit(cache=True, error_model="numpy")
+def extend(rank: int, rows: Array, wanted: Array, row: Array, target: float, tolerance: float) -> int:
+    """Add row . y = target to the basis if it is independent of it; returns the new rank. Changes `row`."""
+    n = rows.shape[1]
+    length = np.sqrt(np.dot(row, row))
+    if not length > 0.0 or rank >= min(rows.shape[0], n):
+        return rank
+    rest = target
+    for _ in range(2):
+        for j in range(rank):
+            part = np.dot(rows[j], row)
+            rest -= part * wanted[j]
+            for i in range(n):
+                row[i] -= part * rows[j, i]
+    left = np.sqrt(np.dot(row, row))
+    if not left > tolerance * length:
+        return rank
+    for i in range(n):
+        rows[rank, i] = row[i] / left
+    wanted[rank] = rest / left
+    return rank + 1

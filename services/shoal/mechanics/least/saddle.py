@@ -1,0 +1,177 @@
+"""Least constraint as one sparse saddle point problem, for machines with many constraints: linear cost.
+
+[M C_q'; C_q 0] [a; lambda] = [Q; -eta] is factored as L D L' in an order of least fill in which every multiplier
+comes after its coordinates. The pivot of a multiplier is then minus the square of what is left of its row, in the
+mass metric, when the rows before it are taken out; one that vanishes against its first value marks a row that
+depends on the others, and is left out. Its distance from singular enters squared, so the position counts as
+singular earlier than with the orthogonal projection.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics.least.constraints import Constraints
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.vector import copy, pointer, scale
+
+SMALL = 16
+"""Up to so many constraints the orthogonal projection is used, which is more accurate and about as fast."""
+SINGULAR = 1e-10
+"""Pivot against its first value below which a row counts as dependent in an acceleration: 1e-5 from singular."""
+SETTLED = 1e-6
+"""The same for the removal of drift."""
+
+
+class Saddle(NamedTuple):
+    """Pattern of the factor and where its numbers come from; empty (size 0) for machines with few constraints.
+
+    place: position of every coordinate, then of every multiplier. base: the mass matrix in the pattern, (slots, lanes);
+    slot: of every entry of the Jacobian. multiplier: whether a position is that of a multiplier.
+    """
+
+    size: int
+    slots: int
+    pattern: sparse.Pattern
+    place: Index
+    base: Array
+    slot: Index
+    multiplier: Index
+
+
+class SaddleWork(NamedTuple):
+    """Work space: the factor (slots, lanes), first values of the pivots and a right-hand side (size, lanes)."""
+
+    values: Array
+    first: Array
+    x: Array
+
+
+def order(unknowns: int, entries: Iterable[tuple[int, int]], rows: list[list[int]]) -> list[int]:
+    """An order of elimination: greedily of least degree, multipliers (from `unknowns` on) after their coordinates."""
+    neighbours: list[set[int]] = [set() for _ in range(unknowns + len(rows))]
+    for i, j in entries:
+        if i != j:
+            neighbours[i].add(j)
+            neighbours[j].add(i)
+    for k, columns in enumerate(rows):
+        for j in columns:
+            neighbours[unknowns + k].add(j)
+            neighbours[j].add(unknowns + k)
+    missing = [len(columns) for columns in rows]
+    owners: list[list[int]] = [[] for _ in range(unknowns)]
+    for k, columns in enumerate(rows):
+        for j in columns:
+            owners[j].append(k)
+    heap = [(len(neighbours[node]), node) for node in range(unknowns)]
+    heap += [(len(neighbours[unknowns + k]), unknowns + k) for k in range(len(rows)) if not rows[k]]
+    heapq.heapify(heap)
+    done: set[int] = set()
+    found = []
+    while heap:
+        degree, node = heapq.heappop(heap)
+        if node in done or degree != len(neighbours[node]):
+            continue
+        done.add(node)
+        found.append(node)
+        around = neighbours[node]
+        for other in around:
+            neighbours[other] |= around
+            neighbours[other] -= {node, other}
+        ready = set(around)
+        if node < unknowns:
+            for k in owners[node]:
+                missing[k] -= 1
+                if missing[k] == 0:
+                    ready.add(unknowns + k)
+        for other in ready:
+            if other < unknowns or missing[other - unknowns] == 0:
+                heapq.heappush(heap, (len(neighbours[other]), other))
+    return found
+
+
+def analyse(
+    unknowns: int, mass: dict[tuple[int, int], Array], constraints: Constraints
+) -> tuple[sparse.Pattern, dict[tuple[int, int], int], Index, Index]:
+    """Pattern, slots of the mass matrix, places of all unknowns and slots of the Jacobian's entries."""
+    rows = [
+        constraints.column[constraints.entry[k] : constraints.entry[k + 1]].tolist() for k in range(constraints.size)
+    ]
+    place = np.empty(unknowns + constraints.size, dtype=np.int64)
+    place[order(unknowns, mass, rows)] = np.arange(len(place))
+
+    def key(i: int, j: int) -> tuple[int, int]:
+        a, b = int(place[i]), int(place[j])
+        return max(a, b), min(a, b)
+
+    pairs = [(unknowns + k, j) for k, columns in enumerate(rows) for j in columns]
+    pattern, slot = sparse.analyse(len(place), [key(i, j) for i, j in [*mass, *pairs]])
+    masses = {(i, j): slot[key(i, j)] for i, j in mass}
+    return pattern, masses, place, np.array([slot[key(i, j)] for i, j in pairs], dtype=np.int64)
+
+
+@njit(cache=True, error_model="numpy")
+def raw(s: Saddle) -> Saddle:
+    """The same problem with pointers in place of arrays."""
+    return Saddle(
+        s.size,
+        s.slots,
+        sparse.raw(s.pattern),
+        pointer(s.place),
+        pointer(s.base),
+        pointer(s.slot),
+        pointer(s.multiplier),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def factor(tile: Tile, s: Saddle, entries: int, jacobian: Array, w: SaddleWork, tolerance: float) -> int:
+    """Factor the problem for a Jacobian (entries, lanes); returns how many rows were left out in some lane.
+
+    The factors are solved with by `sparse.solve`, the right-hand side ordered by place.
+    """
+    width = len(tile)
+    size = s.size
+    p = s.pattern
+    for row in range(s.slots):
+        copy(tile, w.values, row, s.base, row)
+    for e in range(entries):
+        copy(tile, w.values, s.slot[e], jacobian, e)
+    for i in range(size * width):
+        w.first[i] = 0.0
+    dropped = 0
+    for k in range(size):
+        if s.multiplier[k]:
+            for lane in range(width):
+                pivot = w.values[k * width + lane]
+                if pivot < -tolerance * w.first[k * width + lane]:
+                    w.values[k * width + lane] = 1.0 / pivot
+                else:
+                    w.values[k * width + lane] = 0.0
+                    dropped += 1
+        else:
+            for lane in range(width):
+                w.values[k * width + lane] = 1.0 / w.values[k * width + lane]
+        for u in range(p.update[k], p.update[k + 1]):
+            target = p.target[u] * width
+            left = (size + p.left[u]) * width
+            right = (size + p.right[u]) * width
+            for lane in range(width):
+                w.values[target + lane] -= w.values[left + lane] * w.values[right + lane] * w.values[k * width + lane]
+            if p.target[u] < size and not s.multiplier[k]:
+                for lane in range(width):
+                    w.first[target + lane] += w.values[left + lane] ** 2 * w.values[k * width + lane]
+        for q in range(size + p.column[k], size + p.column[k + 1]):
+            scale(tile, w.values, q, w.values, k)
+    return dropped
+
+
+def room(size: int, slots: int, width: int) -> SaddleWork:
+    """Work space as arrays."""
+    return SaddleWork(np.zeros(slots * width), np.zeros(size * width), np.zeros(size * width))

@@ -1,0 +1,91 @@
+"""Calls through a function's address, so that what many loops share is compiled once and not into each of them.
+
+Compiled code takes in everything it calls by name. The forces and constraints of a machine are large; the integrators
+that call them are small and many. A gate is the address of a compiled kernel that gets its structures from memory: a
+structure is stored once in its own `home`, and a typed pointer to it is passed on.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from shoal.mechanics.numerics.tile import Array
+
+HOME = 8192
+
+
+def home() -> Array:
+    """Memory for one structure, in bytes."""
+    return np.zeros(HOME // 8)
+
+
+@intrinsic
+def store(typing_context, place, structure):  # type: ignore[no-untyped-def]
+    """Write a structure of numbers and pointers into its home (a pointer to float64)."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        where, value = arguments
+        if context.get_abi_sizeof(value.type) > HOME:
+            raise NotImplementedError("gate: the structure is larger than its home")
+        builder.store(value, builder.bitcast(where, value.type.as_pointer()), align=8)
+        return context.get_dummy_value()
+
+    return types.void(place, structure), generate
+
+
+@intrinsic
+def typed(typing_context, place, structure):  # type: ignore[no-untyped-def]
+    """The home as a pointer that carries the structure's type; the structure itself is not looked at."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
+
+    return types.CPointer(structure)(place, structure), generate
+
+
+@intrinsic
+def load(typing_context, pointer):  # type: ignore[no-untyped-def]
+    """The structure at a pointer made by `typed`."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        kind = context.get_value_type(pointer.dtype)
+        return builder.load(builder.bitcast(arguments[0], kind.as_pointer()), align=8)
+
+    return pointer.dtype(pointer), generate
+
+
+@intrinsic
+def call(typing_context, address, arguments):  # type: ignore[no-untyped-def]
+    """Call the kernel at an address with a tuple of arguments; it returns nothing."""
+    kinds = tuple(arguments)
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        where, packed = values
+        parts = [builder.extract_value(packed, k) for k in range(len(kinds))]
+        kind = context.call_conv.get_function_type(types.none, kinds)
+        function = builder.inttoptr(where, ir.PointerType(kind))
+        context.call_conv.call_function(builder, function, types.none, kinds, parts)
+        return context.get_dummy_value()
+
+    return types.void(address, arguments), generate
+
+
+def address(kernel: Any, kinds: tuple[Any, ...]) -> int:
+    """Compile a kernel for these argument types (or take it from the cache) and return where it is."""
+    kernel.compile(kinds)
+    compiled = kernel.overloads[kinds]
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+
+
+def returned(function: Any, *arguments: Any) -> Any:
+    """The type of what a compiled function returns for arguments like these."""
+    from numba import typeof
+
+    kinds = tuple(typeof(argument) for argument in arguments)
+    function.compile(kinds)
+    return function.overloads[kinds].signature.return_type

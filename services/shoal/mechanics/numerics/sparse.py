@@ -1,0 +1,193 @@
+"""Sparse LDL' factorisation of symmetric matrices with a fixed pattern, lane by lane.
+
+The pattern is worked out once in Python (symbolic elimination); the compiled kernels then only
+follow index lists, so factoring and solving cost what the pattern needs: linear in the number of
+elements for chains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.vector import (
+    add_product,
+    copy,
+    pointer,
+    scale,
+    scale_alike,
+    subtract_dot,
+    subtract_dot_alike,
+)
+
+
+class Pattern(NamedTuple):
+    """Lower triangle by columns, fill included. Slots 0..n-1 are the diagonal, then the columns in order.
+
+    size: number of rows, n. column[k]:column[k+1] are the entries of column k, `row` their rows; entry p is slot n + p.
+    update[k]:update[k+1] are the eliminations of column k: slot `target` -= L[left] D L[right].
+    The same entries by rows, for the forward substitution: slot[p] and other[p] (the column) of row i for p in
+    across[i]:across[i+1]. by_column holds the slots in the order of the columns.
+    """
+
+    size: int
+    column: Index
+    row: Index
+    update: Index
+    target: Index
+    left: Index
+    right: Index
+    across: Index
+    slot: Index
+    other: Index
+    by_column: Index
+
+    @property
+    def slots(self) -> int:
+        """Length of a value array, per lane."""
+        return self.size + len(self.row)
+
+
+def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dict[tuple[int, int], int]]:
+    """Pattern of the factor of a matrix with these entries, and the slot of each (row, column), row >= column."""
+    below: list[set[int]] = [set() for _ in range(size)]
+    for i, j in entries:
+        if i != j:
+            below[min(i, j)].add(max(i, j))
+    for k in range(size):
+        if below[k]:
+            parent = min(below[k])
+            below[parent] |= below[k] - {parent}
+    slot = {(k, k): k for k in range(size)}
+    column: list[int] = [0]
+    row: list[int] = []
+    for k in range(size):
+        for i in sorted(below[k]):
+            slot[i, k] = size + len(row)
+            row.append(i)
+        column.append(len(row))
+    update, target, left, right = [0], [], [], []
+    for k in range(size):
+        rows = row[column[k] : column[k + 1]]
+        for a, i in enumerate(rows):
+            for b, j in enumerate(rows[: a + 1]):
+                target.append(slot[i, j])
+                left.append(column[k] + a)
+                right.append(column[k] + b)
+        update.append(len(target))
+    by_row = sorted((i, k, slot[i, k]) for i, k in slot if i != k)
+    across = np.searchsorted([i for i, _, _ in by_row], np.arange(size + 1))
+    slots, others = [p for _, _, p in by_row], [k for _, k, _ in by_row]
+    by_column = np.arange(size, size + len(row))
+
+    def wide(values: list[int]) -> Index:
+        return np.array(values, dtype=np.int64)
+
+    def short(values: Iterable[int]) -> Index:
+        """Long chains are limited by memory traffic."""
+        return np.array(list(values), dtype=np.int32)
+
+    eliminations = (wide(update), wide(target), wide(left), wide(right))
+    by_rows = (np.asarray(across, dtype=np.int64), short(slots), short(others), short(by_column))
+    return Pattern(size, wide(column), short(row), *eliminations, *by_rows), slot
+
+
+@njit(cache=True, error_model="numpy")
+def raw(pattern: Pattern) -> Pattern:
+    """The same pattern with pointers in place of arrays."""
+    p = pattern
+    return Pattern(
+        p.size,
+        pointer(p.column),
+        pointer(p.row),
+        pointer(p.update),
+        pointer(p.target),
+        pointer(p.left),
+        pointer(p.right),
+        pointer(p.across),
+        pointer(p.slot),
+        pointer(p.other),
+        pointer(p.by_column),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def factor(tile: Tile, pattern: Pattern, values: Array) -> None:
+    """Replace the matrix (slots, lanes) by L below the diagonal and 1/D on it. Pointers."""
+    width = len(tile)
+    size = pattern.size
+    for k in range(size):
+        for lane in range(width):
+            values[k * width + lane] = 1.0 / values[k * width + lane]
+        for u in range(pattern.update[k], pattern.update[k + 1]):
+            target = pattern.target[u] * width
+            left = (size + pattern.left[u]) * width
+            right = (size + pattern.right[u]) * width
+            for lane in range(width):
+                values[target + lane] -= values[left + lane] * values[right + lane] * values[k * width + lane]
+        for p in range(size + pattern.column[k], size + pattern.column[k + 1]):
+            scale(tile, values, p, values, k)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def solve(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) -> None:
+    """Replace the right-hand side in the rows of x from `first` on by the solution. Pointers."""
+    size = pattern.size
+    for i in range(size):
+        begin, end = pattern.across[i], pattern.across[i + 1]
+        subtract_dot(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
+    for k in range(size - 1, -1, -1):
+        scale(tile, x, first + k, factors, k)
+        begin, end = pattern.column[k], pattern.column[k + 1]
+        subtract_dot(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def solve_alike(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) -> None:
+    """As `solve` with one factor (slots,) for all lanes, which spares most of the memory traffic. Pointers."""
+    size = pattern.size
+    for i in range(size):
+        begin, end = pattern.across[i], pattern.across[i + 1]
+        subtract_dot_alike(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
+    for k in range(size - 1, -1, -1):
+        scale_alike(tile, x, first + k, factors, k)
+        begin, end = pattern.column[k], pattern.column[k + 1]
+        subtract_dot_alike(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def forward(tile: Tile, pattern: Pattern, factors: Array, root: Array, x: Array, first: int) -> None:
+    """x <- D^-1/2 L^-1 x in the rows of x from `first` on; root: D^-1/2, (n, lanes). Pointers."""
+    size = pattern.size
+    for i in range(size):
+        begin, end = pattern.across[i], pattern.across[i + 1]
+        subtract_dot(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
+    for i in range(size):
+        scale(tile, x, first + i, root, i)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def backward(tile: Tile, pattern: Pattern, factors: Array, root: Array, x: Array, first: int) -> None:
+    """x <- L^-T D^-1/2 x in the rows of x from `first` on; root: D^-1/2, (n, lanes). Pointers."""
+    size = pattern.size
+    for k in range(size - 1, -1, -1):
+        scale(tile, x, first + k, root, k)
+        begin, end = pattern.column[k], pattern.column[k + 1]
+        subtract_dot(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
+
+
+@njit(cache=True, error_model="numpy")
+def multiply(tile: Tile, pattern: Pattern, values: Array, x: Array, y: Array) -> None:
+    """y = A x for the unfactored symmetric matrix (slots, lanes); x, y: (rows, lanes). Pointers."""
+    size = pattern.size
+    for k in range(size):
+        copy(tile, y, k, x, k)
+        scale(tile, y, k, values, k)
+    for k in range(size):
+        for p in range(pattern.column[k], pattern.column[k + 1]):
+            add_product(tile, y, pattern.row[p], values, size + p, x, k)
+            add_product(tile, y, k, values, size + p, x, pattern.row[p])

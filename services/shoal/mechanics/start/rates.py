@@ -1,0 +1,229 @@
+"""Rates of all bodies that keep the joints closed and what is stated of them, one row after the other.
+
+Rows are orthonormalised in the metric of the kinetic energy: joints first, then statements in their order. A row that
+depends on those before it is already told by them. What no row tells stays as near as it can to a first guess. In a
+singular position the second derivative of the joints must vanish along the motion as well, which picks its branch.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shoal.mechanics.assembly.pose import as_complex, unit
+from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.start.closure import Closure, Flags
+from shoal.mechanics.start.poses import ROUNDING, Assembly, Statement, stated
+from shoal.scene import PointMass, Scene
+from shoal.scene.record import Record
+
+SINGULAR = 1e-6
+"""Part of a row, of its own length, below which it depends on others."""
+AGREES = 1e-8
+"""Of the fastest speed: rows that depend on others and differ by less agree with them."""
+BRANCHES = 12
+_LARGEST = 200
+"""Rows up to which a motion is tested for the branches of a singular position."""
+
+
+class Moving(NamedTuple):
+    """Rates (lanes, 3 bodies) [m/s, rad/s]; whether they are allowed (lanes,); statements not met in lane 0."""
+
+    rates: Array
+    ok: Flags
+    broken: list[Statement]
+
+
+class Velocities:
+    """The search for the rates at given poses (lanes, 3 bodies)."""
+
+    def __init__(self, assembly: Assembly, poses: Array) -> None:
+        self.scene, self.lanes, self.poses = assembly.scene, assembly.lanes, poses
+        self.closure = Closure(assembly.scene, poses)
+        self.rows = self.closure.rows(poses)
+        self.statements = stated(assembly.scene, assembly.lanes, ("rate", "velocity"))
+        self.size, self.walk = assembly.size, assembly.walk
+        self.guess = assembly.walk.poses(self.closure, poses[:, 2::3], assembly.rates)[1]
+        self.flexible = any(body.element != "rigid" for body in self.scene.bodies.values())
+        largest = [np.max(np.abs(one.values), initial=0.0) * self._unit(one) for one in self.statements]
+        fastest = max([*largest, float(np.max(np.abs(self.rows.rate), initial=0.0)), float(np.max(np.abs(self.guess)))])
+        self.speed = fastest or 1.0
+
+    def _unit(self, one: Statement) -> float:
+        return self.size if one.quantity == "rate" else 1.0
+
+    def run(self, without: Statement | None = None, joint: str = "") -> Moving:
+        """The rates; without: a statement, or a joint, that is left out."""
+        if without is None and not joint and self._easy():
+            return Moving(self.guess, np.ones(self.lanes, dtype=bool), [])
+        given = [one for one in self.statements if one is not without]
+        keep = [k for k, name in enumerate(self.rows.names) if name != joint]
+        lower = np.asarray(np.linalg.cholesky(_metric(self.scene, self.poses, self.size)), dtype=float)
+        basis = _Basis(lower, self.guess)
+        ok, broken = np.ones(self.lanes, dtype=bool), []
+        for k in keep:
+            length = 1.0 if self.rows.angular[k] else self.size
+            left, told = basis.add(self.rows.slope[:, k], -self.rows.rate[:, k])
+            if not self.flexible:  # an elastic rod gives way
+                ok &= ~told | (left <= 1e2 * AGREES * self.speed * length / self.size)
+        closed = basis.size
+        kept: list[tuple[Statement, Flags]] = []
+        for one in given:
+            good = np.ones(self.lanes, dtype=bool)
+            for column, value in zip(one.columns, one.values.T, strict=True):
+                row = np.zeros_like(self.guess)
+                row[:, column] = 1.0
+                left, told = basis.add(row, value)
+                good &= ~told | (left <= AGREES * self.speed / self._unit(one))
+                missed = told & (left > ROUNDING * self.speed / self._unit(one))
+                if one.firm:
+                    ok &= ~missed
+                    broken += [one] * bool(missed[0] and one not in broken)
+            kept.append((one, good))
+        rates = basis.rates()
+        rates, branch = self._on_branch(rates, basis, closed, keep)
+        for one, good in kept:
+            rates[:, one.columns] = np.where(good[:, None], one.values, rates[:, one.columns])
+        return Moving(rates, ok & branch, broken)
+
+    def _easy(self) -> bool:
+        """Whether the first guess is right: at rest, or too large a machine to look for branches."""
+        missed = self.rows.along(self.guess) + self.rows.rate
+        wrong = [self.guess[:, one.columns] - one.values for one in self.statements]
+        if max(float(np.max(np.abs(part), initial=0.0)) for part in (missed, *wrong)) > 1e-13 * self.speed:
+            return False
+        return not np.any(self.guess) or len(self.rows.names) > _LARGEST
+
+    def _on_branch(self, rates: Array, basis: _Basis, closed: int, keep: list[int]) -> tuple[Array, Flags]:
+        """Rates that a singular position allows: those for which the joints stay closed in second order."""
+        ok = np.ones(self.lanes, dtype=bool)
+        singular = closed < len(keep) or bool(np.any(basis.dependent))
+        if not singular or self.flexible or len(keep) > _LARGEST or np.any(self.rows.rate):
+            return rates, ok
+        for lane in np.flatnonzero(basis.dependent & (np.max(np.abs(rates), axis=1) > AGREES * self.speed / self.size)):
+            slope = self.rows.slope[lane, keep]
+            left = np.linalg.svd(slope / (np.linalg.norm(slope, axis=1, keepdims=True) + 1e-300))
+            rank = int(np.sum(left.S > SINGULAR))
+            null = left.U[:, rank:].T / (np.linalg.norm(slope, axis=1) + 1e-300)
+            closure = Closure(_of_lane(self.scene, int(lane)), self.poses[lane : lane + 1], self.closure.own)
+            bend = _Bend(closure, self.poses[lane], null, keep)
+            free = basis.rest(int(lane))
+            found = bend.nearest(rates[lane], free, self.speed / self.size)
+            ok[lane] = found is not None
+            if found is not None:
+                rates[lane] = found
+        return rates, ok
+
+
+class _Bend(NamedTuple):
+    """Second derivative of dependent joints along a motion, w . d2C/dt2 = v' (w . C_qq) v."""
+
+    closure: Closure
+    poses: Array
+    null: Array
+    keep: list[int]
+
+    def value(self, v: Array) -> Array:
+        """For rates v (3 bodies,)."""
+        step = 1e-4 / max(float(np.max(np.abs(v))), 1e-300)
+        shifts = step * np.array([-2.0, -1.0, 1.0, 2.0])
+        u = self.poses + shifts[:, None] * v
+        own = self.closure
+        begin = np.broadcast_to(self.poses, u.shape)
+        slopes = Closure(own.scene, begin, own.own).rows(u).slope[:, self.keep] @ v
+        return np.asarray(self.null @ (np.array([1.0, -8.0, 8.0, -1.0]) @ slopes / (12 * step)))
+
+    def nearest(self, v: Array, free: Array, scale: float) -> Array | None:
+        """Rates on a branch: of those found from several starts the nearest to v in the given directions."""
+        small = AGREES * 1e2 * scale**2
+        if np.max(np.abs(self.value(v)), initial=0.0) <= small:
+            return v
+        if not free.shape[0]:
+            return None
+        rng = np.random.default_rng(0)
+        best, least = None, np.inf
+        for attempt in range(BRANCHES):
+            z = np.zeros(len(free)) if not attempt else scale * rng.normal(size=len(free))
+            for _ in range(30):
+                value = self.value(v + z @ free)
+                h = 1e-6 * scale
+                slope = np.stack([(self.value(v + (z + h * e) @ free) - self.value(v + (z - h * e) @ free)) / (2 * h)
+                                  for e in np.eye(len(free))], 1)  # fmt: skip
+                move = np.linalg.lstsq(slope, -value)[0]
+                z = z + move
+                if np.max(np.abs(move)) < 1e-13 * scale:
+                    break
+            found = v + z @ free
+            if np.max(np.abs(self.value(found)), initial=0.0) <= small and np.linalg.norm(z) < least * (1 - 1e-6):
+                best, least = found, float(np.linalg.norm(z))
+        return best
+
+
+class _Basis:
+    """Rows made orthonormal in the metric L L', and the rates y = L' v that meet their targets."""
+
+    def __init__(self, lower: Array, guess: Array) -> None:
+        self.inverse = np.linalg.inv(lower)
+        self.y = np.einsum("lij,li->lj", lower, guess)
+        self.rows = np.zeros((len(guess), 0, guess.shape[1]))
+        self.dependent = np.zeros(len(guess), dtype=bool)
+
+    @property
+    def size(self) -> int:
+        """Rows so far."""
+        return self.rows.shape[1]
+
+    def add(self, row: Array, target: Array) -> tuple[Array, Flags]:
+        """What a row misses its target by, and whether those before it told it, (lanes,) each."""
+        a = np.einsum("lij,lj->li", self.inverse, row)
+        length = np.linalg.norm(a, axis=1) + 1e-300
+        a = a / length[:, None]
+        left = target - length * np.einsum("li,li->l", a, self.y)
+        rest = a
+        for _ in range(2):
+            rest = rest - np.einsum("lri,lr->li", self.rows, np.einsum("lri,li->lr", self.rows, rest))
+        size = np.linalg.norm(rest, axis=1)
+        told = size <= SINGULAR
+        unit_row = np.where(told[:, None], 0.0, rest / np.where(told, 1.0, size)[:, None])
+        self.y = self.y + unit_row * np.where(told, 0.0, left / length / np.where(told, 1.0, size))[:, None]
+        self.rows = np.concatenate([self.rows, unit_row[:, None]], axis=1)
+        self.dependent |= told
+        return np.abs(left), told
+
+    def rates(self) -> Array:
+        """v with L' v = y."""
+        return np.asarray(np.einsum("lji,lj->li", self.inverse, self.y))
+
+    def rest(self, lane: int) -> Array:
+        """Directions of v that no row tells, (directions, 3 bodies), orthonormal in the metric."""
+        split = np.linalg.svd(self.rows[lane])
+        rank = int(np.sum(split.S > 0.5))
+        return np.asarray(split.Vh[rank:] @ self.inverse[lane])
+
+
+def _of_lane(part: Any, lane: int) -> Any:
+    """A scene, or a part of one, with the numbers of one lane."""
+    if isinstance(part, np.ndarray):
+        return float(part[lane])
+    if isinstance(part, Record):
+        return part.model_copy(update={n: _of_lane(getattr(part, n), lane) for n in type(part).model_fields})
+    if isinstance(part, dict):
+        return {key: _of_lane(value, lane) for key, value in part.items()}
+    return tuple(_of_lane(value, lane) for value in part) if type(part) is tuple else part
+
+
+def _metric(scene: Scene, poses: Array, size: float) -> Array:
+    """The kinetic energy's matrix, (lanes, 3 bodies, 3 bodies); a body turns with at least a little inertia."""
+    matrix = np.zeros((len(poses), poses.shape[1], poses.shape[1]))
+    for number, body in enumerate(scene.bodies.values()):
+        k = 3 * number
+        point = isinstance(body, PointMass)
+        c = 0.0 if isinstance(body, PointMass) else as_complex(body.centre_of_mass)
+        arm = unit(poses[:, k + 2]) * c
+        inertia = 0.0 if isinstance(body, PointMass) else body.inertia
+        matrix[:, k, k] = matrix[:, k + 1, k + 1] = body.mass
+        matrix[:, k + 2, k + 2] = inertia + body.mass * (np.abs(arm) ** 2 + (1.0 if point else 1e-6 * size**2))
+        matrix[:, k, k + 2] = matrix[:, k + 2, k] = -body.mass * np.imag(arm)
+        matrix[:, k + 1, k + 2] = matrix[:, k + 2, k + 1] = body.mass * np.real(arm)
+    return matrix

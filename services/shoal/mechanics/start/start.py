@@ -1,0 +1,262 @@
+"""The start of a machine: poses and rates of all bodies that agree with the joints and with what the user states.
+
+What is stated is kept exactly if it can be; what is not stated follows from it, or is zero where nothing tells it.
+Stated values that miss by the rounding of their digits are corrected in the order of the scene, and so are guesses
+(`InitialState.guess`). Any other contradiction is refused by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel
+
+from shoal.errors import InputError
+from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics.assembly.frames import Frame
+from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.start.closure import Flags
+from shoal.mechanics.start.poses import Assembly, Statement
+from shoal.mechanics.start.rates import Velocities
+from shoal.scene import GROUND, InitialState, Revolute, Scene
+from shoal.scene.scene import POSES, RATES, Quantity
+
+_MANY = 40
+"""Statements up to which those that contradict each other are sought."""
+ROUND_OFF = 1e-9
+"""Changes below this, relative to the value, 1 rad or the size of the machine, are not spoken of."""
+_UNITS: dict[Quantity, str] = {"angle": "rad", "position": "m", "rate": "rad/s", "velocity": "m/s"}
+
+
+class Start(NamedTuple):
+    """A scene whose initial state is complete and agrees with its joints; failed: lanes that have none, (lanes,)."""
+
+    scene: Scene
+    failed: Flags
+
+
+def started(scene: Scene) -> Start:
+    """The start of a scene. Raises InputError if a single scene has none; of many lanes, says which have none."""
+    return Start(scene, np.zeros(1, dtype=bool)) if is_direct(scene) else complete(scene)
+
+
+def complete(scene: Scene) -> Start:
+    """The same with every quantity of every body filled in."""
+    count = _lanes(scene)
+    lanes = count or 1
+    assembly = Assembly(scene, lanes)
+    placed = assembly.run()
+    if not count and not placed.ok[0]:
+        raise _pose_refused(assembly)
+    velocities = Velocities(assembly, placed.poses)
+    moving = velocities.run()
+    if not count and not moving.ok[0]:
+        # The other ways to put the machine together may have the stated rates.
+        for other in assembly.others(placed.poses):
+            tried = Velocities(assembly, other).run()
+            if tried.ok[0]:
+                placed, moving = placed._replace(poses=other), tried
+                break
+        else:
+            raise _rates_refused(velocities, moving.broken)
+
+    def column(values: Array, k: int) -> Any:
+        return values[:, k] if count else float(values[0, k])
+
+    initial = {}
+    for number, name in enumerate(scene.bodies):
+        x, y, turn = range(3 * number, 3 * number + 3)
+        u, v = placed.poses, moving.rates
+        initial[name] = InitialState.model_construct(
+            angle=column(u, turn),
+            rate=column(v, turn),
+            position=(column(u, x), column(u, y)),
+            velocity=(column(v, x), column(v, y)),
+            guess=(),
+        )
+    return Start(scene.model_copy(update={"initial": initial}), ~(placed.ok & moving.ok))
+
+
+def gives_numbers(scene: Scene) -> bool:
+    """Whether joints or loads take a number of theirs (an angle, a length, a side) from the start."""
+    kept = any(
+        (joint.kind in ("weld",) and joint.angle is None)
+        or (joint.kind == "distance" and joint.length is None)
+        or (joint.kind == "slider" and joint.rotation == "locked")
+        or joint.kind in ("parallel", "perpendicular")
+        for joint in scene.joints.values()
+    )
+    return kept or any(
+        (load.kind == "spring" and load.length is None) or (load.kind == "torsion-spring" and load.angle is None)
+        for load in scene.loads.values()
+    )
+
+
+def is_direct(scene: Scene) -> bool:
+    """Whether the walk along the joints keeps every statement: open chains of revolute joints."""
+    if scene.ground_points:
+        return False
+    group = {name: name for name in (GROUND, *scene.bodies)}
+    for joint in scene.joints.values():
+        if not isinstance(joint, Revolute):
+            return False
+        one, other = group[joint.first.body], group[joint.second.body]
+        if one == other:
+            return False
+        for body, owner in group.items():
+            if owner == other:
+                group[body] = one
+    placed = [group[GROUND]]
+    for name, start in scene.initial.items():
+        if start.position is not None or start.velocity is not None:
+            placed.append(group[name] if start.position is not None else group[GROUND])
+    return len(set(placed)) == len(placed)
+
+
+def _lanes(scene: Scene) -> int | None:
+    """Number of lanes of a scene with arrays in place of numbers; None if there are none."""
+
+    def sizes(value: Any) -> int:
+        if isinstance(value, np.ndarray):
+            return value.size
+        if isinstance(value, BaseModel):
+            return max((sizes(getattr(value, name)) for name in type(value).model_fields), default=0)
+        if isinstance(value, dict):
+            return max((sizes(one) for one in value.values()), default=0)
+        return max((sizes(one) for one in value), default=0) if isinstance(value, tuple) else 0
+
+    return max(sizes(part) for part in (scene.initial, scene.bodies, scene.joints)) or None
+
+
+def _pose_refused(assembly: Assembly) -> InputError:
+    """Which of the stated poses contradict each other, or which joint cannot be closed at all."""
+    none = np.zeros_like(assembly.guess, dtype=bool)
+    if not assembly.seek(none, np.zeros_like(assembly.guess)).ok[0]:
+        name, gap = _gape(assembly, [])
+        return InputError(f"joints.{name}: cannot be assembled; its places stay {gap} apart at best")
+    guilty = [one for one in assembly.statements if one.firm]
+    if len(guilty) <= _MANY:
+        for one in list(guilty):
+            fewer = [other for other in guilty if other is not one]
+            fixed, values = assembly.held(fewer)
+            if not assembly.seek(fixed, values, attempts=FEWER).ok[0]:
+                guilty = fewer
+    name, gap = _gape(assembly, guilty)
+    return _contradiction(guilty, f"joint {name} would stay {gap} apart")
+
+
+FEWER = 8
+"""Guesses while the contradiction is narrowed down."""
+
+
+def _gape(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str]:
+    """The joint that closes a loop, or the first of those that gape, and by how much, with these statements held."""
+    fixed, values = assembly.held(chosen)
+    closing = assembly.walk.closing
+    rows = assembly.closure.rows(assembly.guess)
+    weight = np.where(np.isin(rows.names, closing), 1.0, 1e3)
+    u, _ = assembly.close(assembly.closure, np.where(fixed, values, assembly.guess), fixed, weight)
+    rows = assembly.closure.rows(u)
+    size = np.abs(rows.gap[0])
+    worst = int(np.argmax(size / np.where(rows.angular, 1.0, assembly.size)))
+    name = rows.names[worst]
+    total = float(np.linalg.norm([g for g, n, a in zip(size, rows.names, rows.angular, strict=True)
+                                  if n == name and a == rows.angular[worst]]))  # fmt: skip
+    return name, f"{total:.3g} {'rad' if rows.angular[worst] else 'm'}"
+
+
+def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputError:
+    """Which of the stated rates contradict each other, or which joint cannot move as it is driven."""
+    if not broken:
+        for name in dict.fromkeys(velocities.rows.names):
+            if velocities.run(joint=name).ok[0]:
+                return InputError(
+                    f"joints.{name}: cannot begin to move as it is driven or as the rates are stated; "
+                    "the joints allow no such motion in this position"
+                )
+        return InputError("initial: the joints allow no motion with these rates in this position")
+    last = broken[0]
+    guilty = [one for one in velocities.statements if one is not last and one.firm and _frees(velocities, one, last)]
+    names = dict.fromkeys((*velocities.walk.closing, *velocities.rows.names))
+    joint = next((name for name in names if last not in velocities.run(joint=name).broken), "")
+    told = velocities.run(without=last).rates[0, last.columns]
+    told = np.where(np.abs(told) > ROUND_OFF * velocities.speed, told, 0.0)
+    wants = f"joint {joint} asks for {_written(told)} {_UNITS[last.quantity]}" if joint else "they cannot both hold"
+    return _contradiction([*guilty, last], wants)
+
+
+def _frees(velocities: Velocities, one: Statement, last: Statement) -> bool:
+    return last not in velocities.run(without=one).broken
+
+
+def _contradiction(guilty: list[Statement], why: str) -> InputError:
+    """One line that names the last of the statements and those that it contradicts."""
+    *others, last = guilty
+    value = f"{last.path}: {_written(last.values[0])} {_UNITS[last.quantity]}"
+    if not others:
+        return InputError(f"{value} cannot be kept: {why}; leave it out and it follows from the joints")
+    listed = ", ".join(f"{one.path} = {_written(one.values[0])}" for one in others[:3])
+    more = f" and {len(others) - 3} more" if len(others) > 3 else ""
+    return InputError(f"{value} contradicts {listed}{more}: {why}; leave one of them out and it follows from the rest")
+
+
+def _written(values: Array) -> str:
+    numbers = [f"{value:z.6g}" for value in values]
+    return numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]"
+
+
+def begun(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
+    """The state of every body at the coordinates q and rates v of a machine, each (unknowns,); scene: started."""
+    found = {}
+    for name, frame in frames.items():
+        (place, speed), (axis, turning) = (_at(one, q, v) for one in (frame.point(0.0), frame.direction(0.0)))
+        near = scene.start(name).angle
+        found[name] = InitialState.model_construct(
+            angle=float(near + np.angle(axis * np.exp(-1j * near))),
+            rate=float(np.imag(np.conj(axis) * turning)) / abs(axis) ** 2,
+            position=(place.real, place.imag),
+            velocity=(speed.real, speed.imag),
+            guess=(),
+        )
+    return found
+
+
+def _at(vector: Affine, q: Array, v: Array) -> tuple[complex, complex]:
+    place, speed = complex(vector.constant), 0j
+    for unknown, factor in vector.terms.items():
+        place, speed = place + factor * q[unknown], speed + factor * v[unknown]
+    return place, speed
+
+
+def changes(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:
+    """What was stated and is not what is used: body -> quantity -> stated, used; round-off of any size [m] left out."""
+    found: dict[str, Any] = {}
+    for name, start in scene.initial.items():
+        for quantity, unit in _UNITS.items():
+            stated, now = getattr(start, quantity), getattr(used[name], quantity)
+            if stated is None:
+                continue
+            off = float(np.max(np.abs(np.subtract(now, stated))))
+            scale = max(float(np.max(np.abs(stated))), size if unit.startswith("m") else 1.0)
+            if off > ROUND_OFF * scale:
+                found.setdefault(name, {})[quantity] = {"stated": stated, "used": now, "unit": unit}
+    return found
+
+
+def facts(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:
+    """The start of every body as it was used, and what of it the scene states otherwise; size: of the machine [m]."""
+    found = changes(scene, used, size)
+    return {
+        "initial": {name: one.model_dump(exclude={"guess"}) for name, one in used.items()},
+        "initial_changes": found,
+        "initial_correction": _largest(found, POSES),
+        "initial_rate_correction": _largest(found, RATES),
+    }
+
+
+def _largest(found: Mapping[str, Any], quantities: tuple[Quantity, ...]) -> float:
+    """The largest of the changes of these quantities."""
+    every = (one for body in found.values() for quantity, one in body.items() if quantity in quantities)
+    return float(max((np.max(np.abs(np.subtract(one["used"], one["stated"]))) for one in every), default=0.0))

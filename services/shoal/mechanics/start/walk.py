@@ -1,0 +1,140 @@
+"""A first guess of where bodies are: a walk along the joints from the ground, and from bodies that say it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics.assembly.affine import Number
+from shoal.mechanics.assembly.pose import as_complex, unit
+from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.start.closure import Closure, lead, place_of, rate_of, value_of
+from shoal.scene import (
+    GROUND,
+    Attachment,
+    Coupling,
+    Distance,
+    DrivenAngle,
+    Parallel,
+    Perpendicular,
+    Revolute,
+    Scene,
+    Slider,
+    Weld,
+)
+
+Step = tuple[str, Attachment | None, Attachment | None, Number]
+"""A body, the known attachment it hangs on, its own attachment there, and how far apart they are [m]."""
+
+
+class Walk:
+    """The order in which the joints of a scene place its bodies. Raises InputError where nothing tells a place."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.steps: list[Step] = []
+        known = {GROUND}
+        waiting = dict.fromkeys(scene.bodies)
+        while waiting:
+            step = self._next(waiting, known)
+            self.steps.append(step)
+            known.add(step[0])
+            waiting.pop(step[0])
+
+    def _next(self, waiting: dict[str, None], known: set[str]) -> Step:
+        for kinds in ((Revolute, Weld), None, (Slider,), (Distance,)):
+            if kinds is None:
+                for name in waiting:
+                    if self.scene.start(name).position is not None:
+                        return name, None, None, 0.0
+                continue
+            for joint in self.scene.joints.values():
+                if not isinstance(joint, kinds):
+                    continue
+                for here, there in ((joint.first, joint.second), (joint.second, joint.first)):
+                    if here.body in known and there.body in waiting:
+                        if not isinstance(joint, Distance):
+                            return there.body, here, there, 0.0
+                        if joint.length is not None:
+                            return there.body, here, there, value_of(joint.length)
+        if any(isinstance(joint, Coupling) for joint in self.scene.joints.values()):
+            return next(iter(waiting)), None, None, 0.0
+        name = next(iter(waiting))
+        raise InputError(f"initial.{name}.position: say where {name} starts; no joint point tells it")
+
+    @property
+    def closing(self) -> list[str]:
+        """Joints that the walk does not need: they close loops."""
+        used = {(id(here), id(there)) for _, here, there, _ in self.steps}
+        used |= {(there, here) for here, there in used}
+        return [
+            name
+            for name, joint in self.scene.joints.items()
+            if isinstance(joint, Coupling) or (id(joint.first), id(joint.second)) not in used
+        ]
+
+    def poses(self, closure: Closure, angles: Array, rates: Array) -> tuple[Array, Array]:
+        """Poses and their rates for angles [rad] and rates [rad/s] of all bodies, each (lanes, bodies)."""
+        u, v = np.zeros((2, len(angles), 3 * len(self.scene.bodies)))
+        u[:, 2::3], v[:, 2::3] = angles, rates
+        for name, here, there, away in self.steps:
+            k = closure.column[name]
+            if here is None or there is None:
+                start = self.scene.start(name)
+                position, speed = as_complex(start.position or (0.0, 0.0)), as_complex(start.velocity)
+            else:
+                at = closure.here(u, here)
+                arm = unit(u[:, k + 2]) * place_of(self.scene, there)
+                position = at.value + away - arm
+                speed = closure.speed(at, v, here) - 1j * v[:, k + 2] * arm
+            u[:, k], u[:, k + 1] = np.real(position), np.imag(position)
+            v[:, k], v[:, k + 1] = np.real(speed), np.imag(speed)
+        return u, v
+
+
+def guessed_angles(scene: Scene, lanes: int) -> tuple[Array, Array]:
+    """Angles [rad] and rates [rad/s] of all bodies: as stated, as a neighbour tells, or zero; each (lanes, bodies)."""
+    both, ties = [], [joint for joint in scene.joints.values() if isinstance(joint, _TIES)]
+    for quantity, level in (("angle", 0), ("rate", 1)):
+        found: dict[str, Number] = {
+            name: value for name, start in scene.initial.items() if (value := getattr(start, quantity)) is not None
+        }
+        found[GROUND] = 0.0
+        waiting = [name for name in scene.bodies if name not in found]
+        while waiting:
+            tied = next(_tied(scene, ties, found, level), None)
+            name, value = tied if tied is not None else (waiting[0], 0.0)
+            found[name] = value
+            waiting.remove(name)
+        both.append(np.stack([np.broadcast_to(np.asarray(found[n], dtype=float), lanes) for n in scene.bodies], 1))
+    return both[0], both[1]
+
+
+_Tie = Weld | Slider | Parallel | Perpendicular | DrivenAngle
+_TIES = (Weld, Slider, Parallel, Perpendicular, DrivenAngle)
+
+
+def _tied(scene: Scene, ties: list[_Tie], found: dict[str, Number], level: int) -> Iterator[tuple[str, Number]]:
+    """Bodies whose angle (level 0) or rate (level 1) a joint tells from that of a neighbour."""
+    for joint in ties:
+        if (joint.first.body in found) == (joint.second.body in found):
+            continue
+        sign, here, there = (
+            (1, joint.first, joint.second) if joint.first.body in found else (-1, joint.second, joint.first)
+        )
+        turn: Number = None
+        if isinstance(joint, DrivenAngle):
+            turn = (value_of, rate_of)[level](joint.angle)
+        elif isinstance(joint, Parallel):
+            turn = 0.0
+        elif isinstance(joint, Perpendicular):
+            turn = np.pi / 2 * (1 - level)
+        elif isinstance(joint, Weld) and (level or joint.angle is not None):
+            turn = 0.0 if level else joint.angle
+        elif isinstance(joint, Slider) and joint.rotation == "locked" and level:
+            turn = 0.0
+        if turn is not None and scene.bodies[there.body].kind != "point-mass":
+            shift = 0.0 if level else lead(scene, here) - lead(scene, there)
+            yield there.body, found[here.body] + shift + sign * turn

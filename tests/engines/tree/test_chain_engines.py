@@ -1,0 +1,36 @@
+"""The motion of a chain by MuJoCo and by both formulations of Exudyn, as the benchmark runs them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.engines.tree.simulate import simulate
+from shoal_validation.benchmarks.chains import (
+    STEP,
+    chain,
+    exudyn_bodies_run,
+    exudyn_tree_run,
+    measure,
+    mujoco_run,
+)
+
+
+@pytest.mark.parametrize(
+    ("run", "tolerance"), [(mujoco_run, 1e-12), (exudyn_tree_run, 1e-12), (exudyn_bodies_run, 2e-6)]
+)
+def test_the_tip_of_a_chain_is_where_other_engines_see_it(run: Any, tolerance: float) -> None:
+    """The first two take the same steps of the same method; the third one is implicit and of second order."""
+    steps = 300
+    ours = simulate(chain(6), [steps * STEP], step=STEP)
+    assert ours.ok, ours.message
+    moved = np.linalg.norm(ours.point("tip")[0] - simulate(chain(6), [0.0], step=STEP).point("tip")[0])
+    assert moved > 0.3
+    np.testing.assert_allclose(run(6, steps, 1)[1], ours.point("tip")[0], atol=tolerance)
+
+
+def test_every_row_of_the_benchmark_is_measured() -> None:
+    rows = list(measure((5,), repeats=1))
+    assert len({row.name for row in rows}) == len(rows) == 5
+    assert all(row.seconds > 0 and row.gap < 1e-5 for row in rows)
