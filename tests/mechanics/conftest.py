@@ -10,87 +10,68 @@ import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
-from shoal.mechanics import dynamics, functions, model
-from shoal.mechanics.elements import ancf_cable
-from shoal.mechanics.least import constraints, gauss
+from shoal.mechanics import gates
+from shoal.mechanics.least import constraints, drift
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.vector import pointer
+from shoal.mechanics.numerics.pointers import pointer, raw
 
 Array = Any
 
 
 @njit(cache=True)
-def cable_force(tile, cables, full, z, f, w):
-    if full:
-        ancf_cable.add_force_full(tile, ancf_cable.raw(cables), pointer(z), pointer(f), pointer(w))
-    else:
-        ancf_cable.add_force_reduced(tile, ancf_cable.raw(cables), pointer(z), pointer(f), pointer(w))
-
-
-@njit(cache=True)
-def cable_energy(tile, cables, axial, bending, z, energy, w):
-    ancf_cable.add_energy(tile, ancf_cable.raw(cables), axial, bending, pointer(z), pointer(w), pointer(energy), 0)
-
-
-@njit(cache=True)
-def cable_tangent(tile, cables, axial, bending, z, out, w):
-    ancf_cable.tangent(tile, ancf_cable.raw(cables), axial, bending, pointer(z), pointer(w), pointer(out), 0)
-
-
-@njit(cache=True)
 def solve(tile, pattern, values, x):
-    sparse.factor(tile, sparse.raw(pattern), pointer(values))
-    sparse.solve(tile, sparse.raw(pattern), pointer(values), pointer(x), 0)
+    sparse.factor(tile, raw(pattern), pointer(values))
+    sparse.solve(tile, raw(pattern), pointer(values), pointer(x), 0)
 
 
 @njit(cache=True)
 def multiply(tile, pattern, values, x, y):
-    sparse.multiply(tile, sparse.raw(pattern), pointer(values), pointer(x), pointer(y))
+    sparse.multiply(tile, raw(pattern), pointer(values), pointer(x), pointer(y))
 
 
 @njit(cache=True)
 def residual(tile, held, drives, t, q, out):
-    constraints.residual(tile, constraints.raw(held), functions.raw(drives), t, pointer(q), pointer(out))
+    constraints.residual(tile, raw(held), raw(drives), t, pointer(q), pointer(out))
 
 
 @njit(cache=True)
 def jacobian(tile, held, q, linear, out):
-    constraints.jacobian(tile, constraints.raw(held), pointer(q), linear, pointer(out))
+    constraints.jacobian(tile, raw(held), pointer(q), linear, pointer(out))
 
 
 @njit(cache=True)
 def bias(tile, held, drives, t, v, out):
-    constraints.bias(tile, constraints.raw(held), functions.raw(drives), t, pointer(v), pointer(out))
+    constraints.bias(tile, raw(held), raw(drives), t, pointer(v), pointer(out))
 
 
 @njit(cache=True)
 def acceleration(tile, arrays, room, tolerance):
     """The acceleration of the state in `room`, into room.a."""
-    m, w = model.raw(arrays), dynamics.raw(room)
-    dynamics.enter(m, w)
-    dynamics.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
+    m, w = raw(arrays), raw(room)
+    gates.enter(m, w)
+    gates.acceleration(tile, m, w, 0.0, w.z, w.zdot, tolerance, w.a)
 
 
 @njit(cache=True)
 def force(tile, arrays, room):
     """The generalised force of the state in `room`, into room.a."""
-    m, w = model.raw(arrays), dynamics.raw(room)
-    dynamics.enter(m, w)
-    dynamics.force(tile, m, w, 0.0, w.z, w.zdot, w.a)
+    m, w = raw(arrays), raw(room)
+    gates.enter(m, w)
+    gates.force(tile, m, w, 0.0, w.z, w.zdot, w.a)
 
 
 @njit(cache=True)
 def project(tile, arrays, room, tolerance):
     """Make the state in `room` consistent."""
-    w = dynamics.raw(room)
-    gauss.project(tile, model.raw(arrays), w.gauss, 0.0, w.z, w.zdot, tolerance, 3)
+    w = raw(room)
+    drift.project(tile, raw(arrays), w.gauss, 0.0, w.z, w.zdot, tolerance, 3)
 
 
 @pytest.fixture(scope="session")
 def kernels() -> types.SimpleNamespace:
     """Single kernels, callable on plain arrays."""
     names = (
-        cable_force, cable_energy, cable_tangent, solve, multiply,
+        solve, multiply,
         residual, jacobian, bias, acceleration, force, project,
     )  # fmt: skip
     return types.SimpleNamespace(**{kernel.__name__: kernel for kernel in names})

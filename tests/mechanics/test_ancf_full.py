@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import solve_bvp
-from shoal.mechanics.elements import ancf_full
-from shoal.mechanics.elements.ancf_full import LAWS, AncfFull
-from shoal.mechanics.numerics.tile import SINGLE, WIDE
-from shoal.mechanics.numerics.vector import pointer
+from shoal.mechanics.elements import ancf_full, families
+from shoal.mechanics.elements.ancf_full import LAWS
+from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
 
 YOUNG, POISSON, SHEAR, LENGTH, HEIGHT, WIDTH, DENSITY = 2e8, 0.3, 0.85, 0.5, 0.06, 0.04, 5540.0
 laws = pytest.mark.parametrize("law", list(LAWS))
@@ -19,22 +19,22 @@ laws = pytest.mark.parametrize("law", list(LAWS))
 
 @njit(cache=True)
 def _force_door(tile, family, z, f, w):
-    ancf_full.add_force(tile, ancf_full.raw(family), pointer(z), pointer(f), pointer(w))
+    families.add_force(tile, raw(family), pointer(z), pointer(z), pointer(f), pointer(w), pointer(w), True)
 
 
 @njit(cache=True)
 def _mean_door(tile, family, before, after, f, w):
-    ancf_full.add_mean_force(tile, ancf_full.raw(family), pointer(before), pointer(after), pointer(f), pointer(w))
+    families.add_mean_force(tile, raw(family), pointer(before), pointer(after), pointer(f), pointer(w))
 
 
 @njit(cache=True)
 def _energy_door(tile, family, z, w, energy):
-    ancf_full.add_energy(tile, ancf_full.raw(family), pointer(z), pointer(w), pointer(energy), 0)
+    families.add_energy(tile, raw(family), pointer(z), pointer(w), pointer(energy), 0)
 
 
 @njit(cache=True)
 def _tangent_door(tile, family, z, w, out):
-    ancf_full.tangent(tile, ancf_full.raw(family), pointer(z), pointer(w), pointer(out), 0)
+    families.tangent(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
 
 
 def _family(
@@ -47,13 +47,17 @@ def _family(
     width: float = WIDTH,
     young: float = YOUNG,
     shear: float = SHEAR,
-) -> AncfFull:
+) -> Any:
     """A chain of equal elements."""
-    table = ancf_full.quadrature(LAWS[law])
-    numbers = ancf_full.coefficients(LAWS[law], length, height, width, young, POISSON, shear) * elements
-    rows = np.concatenate([np.arange(12) + 6 * number for number in range(elements)])
-    values = np.repeat(np.array([float(number) for number in numbers]), lanes)
-    return AncfFull(elements, len(table), table, rows, values)
+    found = families.Collected()
+    for number in range(elements):
+        numbers = ancf_full.coefficients(LAWS[law], length, height, width, young, POISSON, shear)
+        part = families.Part(ancf_full.quadrature(LAWS[law]), 0, False, numbers, [])
+        found.add("rod", [*range(6 * number, 6 * number + 12)], part)
+    return packed(found.family(ancf_full.Solids), slice(0, lanes), (0,) * lanes)
+
+
+STRAIGHT = [0j, 1 + 0j, 1j, LENGTH + 0j, 1 + 0j, 1j]
 
 
 def _pairs(vectors: Any) -> Any:
@@ -65,31 +69,31 @@ def _bent(seed: int) -> Any:
     """A random element: everything off by some percent, slopes by some tenths of a radian, turned anyhow."""
     rng = np.random.default_rng(seed)
     turn, first = np.exp(1j * rng.uniform(-np.pi, np.pi)), complex(*rng.normal(size=2))
-    nodal = np.array(ancf_full.straight(LENGTH)) * (1 + rng.uniform(-0.05, 0.05, 6))
+    nodal = np.array(STRAIGHT) * (1 + rng.uniform(-0.05, 0.05, 6))
     nodal[[1, 2, 4, 5]] *= np.exp(1j * rng.uniform(-0.4, 0.4, 4))
     nodal[[0, 3]] += first / turn
     return _pairs(nodal * turn)
 
 
-def _force(family: AncfFull, z: Any) -> Any:
+def _force(family: Any, z: Any) -> Any:
     f = np.zeros(z.size)
     _force_door(SINGLE, family, z.copy(), f, np.zeros(64))
     return f
 
 
-def _mean_force(family: AncfFull, before: Any, after: Any) -> Any:
+def _mean_force(family: Any, before: Any, after: Any) -> Any:
     f = np.zeros(before.size)
     _mean_door(SINGLE, family, before.copy(), after.copy(), f, np.zeros(64))
     return f
 
 
-def _energy(family: AncfFull, z: Any) -> float:
+def _energy(family: Any, z: Any) -> float:
     energy = np.zeros(1)
     _energy_door(SINGLE, family, z.copy(), np.zeros(64), energy)
     return float(energy[0])
 
 
-def _tangent(family: AncfFull, z: Any) -> Any:
+def _tangent(family: Any, z: Any) -> Any:
     """Assembled over the chain."""
     out = np.full(144 * family.size, np.nan)
     _tangent_door(SINGLE, family, z.copy(), np.zeros(64), out)
@@ -165,16 +169,11 @@ def test_mass_is_positive_exact_and_keeps_mass_and_moments() -> None:
     np.testing.assert_allclose(mass, expected, rtol=1e-13, atol=1e-15)
 
 
-def test_slope_shape_is_the_derivative_of_the_position_shape() -> None:
-    change = _differences(lambda at: np.array(ancf_full.position_shape(at[0], 0.01, LENGTH)), np.array([0.3]), 1e-3)
-    np.testing.assert_allclose(ancf_full.slope_shape(0.3, 0.01, LENGTH), change[:, 0] / LENGTH, atol=1e-11)
-
-
 @laws
 @pytest.mark.parametrize("seed", range(3))
 def test_rigid_motion_gives_no_force(law: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    at = np.array(ancf_full.straight(LENGTH)) * np.exp(1j * rng.uniform(-np.pi, np.pi))
+    at = np.array(STRAIGHT) * np.exp(1j * rng.uniform(-np.pi, np.pi))
     swing = _pairs(1j * at)
     at[[0, 3]] += complex(*rng.normal(size=2))
     family, z = _family(law), _pairs(at)
@@ -253,30 +252,6 @@ def test_lanes_equal_singles(law: str) -> None:
             (blocks, _tangent(single, z).ravel()),
         ):
             np.testing.assert_allclose(found[lane::width], expected, rtol=0, atol=1e-13 * np.abs(expected).max())
-
-
-@laws
-def test_section_forces_are_those_a_neighbour_would_exert(law: str) -> None:
-    """Against N = EA eps, Q = G A gamma and M = C11 I kappa of small homogeneous strains, and the work of a stretch."""
-    length, rigidity = LENGTH, _matrices(law)[0][0, 0] * YOUNG * WIDTH * HEIGHT**3 / 12
-    numbers = (LENGTH, HEIGHT, WIDTH, YOUNG, POISSON, SHEAR)
-    small = 1e-6
-    flat = np.array(ancf_full.straight(length))
-    inner, outer = (matrix * YOUNG * WIDTH * HEIGHT for matrix in _matrices(law))
-    stretched = flat.copy()
-    stretched[[1, 3, 4]] *= 1 + small
-    n, q, m = ancf_full.section_forces(LAWS[law], stretched, [0.2, 0.7], *numbers)
-    np.testing.assert_allclose(n, (inner + outer)[0, 0] * small, rtol=1e-4)
-    assert max(np.abs(q).max(), np.abs(m).max()) < 1e-9 * np.abs(n).max()
-    sheared = flat.copy()
-    sheared[[2, 5]] *= np.exp(-1j * small)
-    n, q, m = ancf_full.section_forces(LAWS[law], sheared, [0.2, 0.7], *numbers)
-    np.testing.assert_allclose(q, (inner + outer)[2, 2] * small, rtol=1e-4)
-    # A circle of radius L/small; the slopes and directions turn by `small` over the element.
-    turn = np.exp(1j * small)
-    bent = np.array([0, 1, 1j, LENGTH * (turn - 1) / (1j * small), turn, 1j * turn])
-    n, q, m = ancf_full.section_forces(LAWS[law], bent, [0.2, 0.7], *numbers)
-    np.testing.assert_allclose(m, rigidity * small / LENGTH, rtol=1e-4)
 
 
 @pytest.mark.parametrize("elements", [1, 4])

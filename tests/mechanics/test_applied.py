@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numba import njit
 from shoal.mechanics import applied, fitting, functions
 from shoal.mechanics.applied import Applied
+from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
-from shoal.mechanics.numerics.vector import pointer
 
 Array = Any
 PACKED = functions.pack([fitting.fit(lambda t: 1 + t, 2.0), fitting.fit(lambda t: np.sin(3 * t), 2.0)])
@@ -21,7 +21,7 @@ TIME = 0.7
 
 @njit(cache=True)
 def _force(tile, held, packed, t, z, zdot, f, power):
-    h, p = applied.raw(held), functions.raw(packed)
+    h, p = raw(held), raw(packed)
     applied.add_force(tile, h, p, t, pointer(z), pointer(zdot), pointer(f), pointer(power))
 
 

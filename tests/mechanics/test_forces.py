@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from numba import njit
 from shoal.mechanics import fitting, forces, functions
 from shoal.mechanics.forces import ANGLE, DISTANCE, LAW, PLACE, Forces
+from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
-from shoal.mechanics.numerics.vector import pointer
 
 Array = Any
 
 
 @njit(cache=True)
 def _force(tile, held, packed, t, z, zdot, memory, f, w, power):
-    h, p = forces.raw(held), functions.raw(packed)
+    h, p = raw(held), raw(packed)
     forces.add_force(
         tile, h, p, t, pointer(z), pointer(zdot), pointer(memory), pointer(f), pointer(w), pointer(power), True
     )
@@ -28,24 +28,24 @@ def _force(tile, held, packed, t, z, zdot, memory, f, w, power):
 
 @njit(cache=True)
 def _energy(tile, held, packed, z, memory, w, energy):
-    h, p = forces.raw(held), functions.raw(packed)
+    h, p = raw(held), raw(packed)
     forces.add_energy(tile, h, p, pointer(z), pointer(memory), pointer(w), pointer(energy), 1)
 
 
 @njit(cache=True)
 def _tangent(tile, held, packed, z, memory, w, out):
-    h, p = forces.raw(held), functions.raw(packed)
+    h, p = raw(held), raw(packed)
     forces.tangent(tile, h, p, pointer(z), pointer(memory), pointer(w), pointer(out), 1)
 
 
 @njit(cache=True)
 def _damping(tile, held, z, zdot, w, out):
-    forces.damping(tile, forces.raw(held), pointer(z), pointer(zdot), pointer(w), pointer(out), 1)
+    forces.damping(tile, raw(held), pointer(z), pointer(zdot), pointer(w), pointer(out), 1)
 
 
 @njit(cache=True)
 def _remember(tile, held, z, memory):
-    forces.remember(tile, forces.raw(held), pointer(z), pointer(memory))
+    forces.remember(tile, raw(held), pointer(z), pointer(memory))
 
 
 TABLE = fitting.fit(lambda x: np.sinh(x) + 0.3 * x**2, 2.0, begin=-2.0)
@@ -99,7 +99,7 @@ def bench(
         rows = np.arange(6 * size)
     table, energy, drive = (np.full(size, number) for number in numbers)
     laws = np.tile(np.broadcast_to(np.reshape(law, (LAW, -1)), (LAW, width)), (size, 1))
-    held = Forces(size, np.array(kinds), np.array(rows).ravel(), table, energy, drive, laws.ravel())
+    held = Forces((0, 0), size, np.array(kinds), np.array(rows).ravel(), table, energy, drive, laws.ravel())
     return Bench(tile, held, np.zeros(size * width))
 
 

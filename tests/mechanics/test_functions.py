@@ -13,6 +13,7 @@ from numba import njit
 from scipy.interpolate import CubicSpline
 from shoal.errors import InputError
 from shoal.mechanics import fitting, functions
+from shoal.mechanics.numerics.pointers import raw
 from shoal.scene.function import Function
 
 Array = Any
@@ -22,7 +23,7 @@ TIMES = np.linspace(0.0, HORIZON, 777)
 
 @njit(cache=True)
 def _along(packed, number, times, derivative, out):
-    f = functions.raw(packed)
+    f = raw(packed)
     for k in range(times.size):
         out[k] = functions.evaluate(f, number, times[k], derivative)
 

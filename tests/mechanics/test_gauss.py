@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import work_space
+from shoal.mechanics.gates import ready
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE
 from shoal.mechanics.simulate import simulate
-from shoal.mechanics.tangent import ready
 from shoal.scene import Scene, load_scene
 
 ROD = {"kind": "rod", "height": 0.02, "width": 0.05, "density": 1000.0}

@@ -99,7 +99,7 @@ def test_the_verdict_on_a_record(spoil: dict[str, float], expected: Status, monk
 def test_one_sample_that_is_not_finite_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     def spoilt(*arguments: Any) -> Any:
         record = march.march(*arguments)
-        record.samples[march.SAMPLED] = np.nan
+        record.samples[march.sampled(2)] = np.nan
         return record
 
     monkeypatch.setattr(simulate, "march", spoilt)

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 
 from shoal.api.settings import Settings
+from shoal.engines.swarm_motion import asked_for
 from shoal.errors import InputError
 from shoal.mechanics.integrators import INTEGRATORS, facts
-from shoal.mechanics.swarm_motion import asked_for
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
 

@@ -29,15 +29,20 @@ class GaussEngine:
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene, under `auto` by the first integrator that can; see `Engine`."""
+        from shoal.engines import swarm_motion
         from shoal.mechanics.persist import persist
 
-        return persist(scene, sampling_times(scene, times), self.threads)
+        wanted = sampling_times(scene, times)
+        if swarm_motion.asked_for(scene):
+            return swarm_motion.simulate(scene, wanted)
+        return persist(scene, wanted, self.threads)
 
     def simulate_many(
         self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
     ) -> Trajectory:
         """Run one scene per lane, all in compiled tiles; see `Engine`."""
+        from shoal.engines import swarm_motion
         from shoal.mechanics.simulate import simulate
 
-        check_lanes(scene, values)
+        swarm_motion.refuse_lanes(scene, check_lanes(scene, values))
         return simulate(scene, sampling_times(scene, times), values, threads=self.threads)

@@ -6,12 +6,14 @@ import numpy as np
 
 from shoal.mechanics import stability
 from shoal.mechanics.analysis.evaluate import Evaluator
-from shoal.mechanics.analysis.motion_state import LANE, at_start
+from shoal.mechanics.analysis.motion_state import LANE
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import choose, facts, halting, pick
-from shoal.mechanics.march import SAMPLED, march
+from shoal.mechanics.march import march
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import SINGLE
+from shoal.mechanics.record import sampled
+from shoal.mechanics.simulate import at_start
 from shoal.scene import Scene
 from shoal.trajectory import Array
 
@@ -40,7 +42,7 @@ def _states(model: Model, times: Array) -> tuple[Array, Array]:
     """Coordinates and rates at the times, (times, unknowns) each: the time loop with pairs of unknowns as markers."""
     solver, n = model.scene.solver, model.unknowns
     choice = pick(solver, model, stability.step_limit)
-    arrays, room = at_start(model)
+    arrays, room = at_start(model, SINGLE, LANE)
     scheme = choose(solver, model, SINGLE, LANE, choice.name)
     steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
     first = np.arange(0, n, 2)
@@ -48,6 +50,6 @@ def _states(model: Model, times: Array) -> tuple[Array, Array]:
     rows = np.column_stack([first, second, first, second]).ravel()
     stops = halting(solver, model, choice.name, float(times[-1]))
     record = march(SINGLE, scheme, arrays, room, solver.step, steps, times, rows, solver.rank_tolerance, stops)
-    samples = record.samples.reshape(len(times), len(first), SAMPLED)
-    q, v = (samples[:, :, columns].reshape(len(times), -1)[:, :n] for columns in ([0, 1], [5, 6]))
+    samples = record.samples.reshape(len(times), len(first), sampled(2))
+    q, v = (samples[:, :, columns].reshape(len(times), -1)[:, :n] for columns in (slice(0, 2), slice(5, 7)))
     return q, v

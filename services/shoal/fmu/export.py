@@ -12,10 +12,10 @@ from pathlib import Path
 
 from pythonfmu.builder import FmuBuilder
 
+from shoal.engines.swarm_motion import asked_for
 from shoal.errors import InputError
 from shoal.fmu import machine
 from shoal.fmu.unit import CONTENT, identifier
-from shoal.mechanics.swarm_motion import asked_for
 from shoal.scene import Scene
 from shoal.scene.function import Function
 from shoal.whole import whole

@@ -9,7 +9,6 @@ from numba import njit
 
 from shoal.mechanics.functions import Functions, evaluate
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import pointer
 
 
 class Applied(NamedTuple):
@@ -28,21 +27,6 @@ class Applied(NamedTuple):
     rows: Index
     factor: Array
     following_function: Index
-
-
-@njit(cache=True, error_model="numpy")
-def raw(loads: Applied) -> Applied:
-    """The same loads with pointers in place of arrays."""
-    return Applied(
-        loads.fixed,
-        pointer(loads.row),
-        pointer(loads.coefficient),
-        pointer(loads.fixed_function),
-        loads.following,
-        pointer(loads.rows),
-        pointer(loads.factor),
-        pointer(loads.following_function),
-    )
 
 
 @njit(cache=True, error_model="numpy")

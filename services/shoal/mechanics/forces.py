@@ -11,33 +11,32 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shoal.mechanics import plane
 from shoal.mechanics.functions import Functions, evaluate, excess
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import add_product, clear, copy, pointer
+from shoal.mechanics.numerics.vector import add_product, clear, copy
 
 DISTANCE, ANGLE, PLACE = 0, 1, 2
-"""Measures: |b - a| [m] of two points; the angle [rad] from direction a to direction b, over any number of
+"""Measures: |b - a| [m] of two points; the angle [rad] of the plane from direction a to direction b, over any number of
 turns; where point b lies relative to point a along direction d, (b - a).d/|d| [m]."""
 
-ROWS = 6
 STIFFNESS, CUBIC, DAMPING, NATURAL, COULOMB, SPEED, AMPLITUDE = range(7)
 LAW = 7
 
-# Rows of the work space: coordinates of a, b, d; gradient of g in them; g or x; g'; the elastic force.
-_GRADIENT, VALUE, _RATE, _ELASTIC = 6, 12, 13, 14
 _TURN = 2.0 * np.pi
 
 
 class Forces(NamedTuple):
     """Force elements of one tile.
 
-    kind: DISTANCE, ANGLE or PLACE. rows: six an element, (a, b, d) with x and y; where d is not used, any valid
-    rows. Directions need not be unit vectors. table: function of x, the elastic force [N or N m], and energy, its
-    antiderivative; drive: function of time; -1 for none. law: (7 * elements, lanes), seven rows an element:
-    stiffness k, cubic k3, damping c, natural value g0, Coulomb limit F_c, Coulomb speed v_s (matters and must
-    be positive where F_c is not 0), amplitude of the drive.
+    space: a tuple as long as vectors are, here d. kind: DISTANCE, ANGLE or PLACE. rows: 3 d an element, of (a, b, d);
+    where d is not used, any valid rows. Directions need not be unit vectors. table: function of x, the elastic force
+    [N or N m], and energy, its antiderivative; drive: function of time; -1 for none. law: (7 * elements, lanes), seven
+    rows an element: stiffness k, cubic k3, damping c, natural value g0, Coulomb limit F_c, Coulomb speed v_s (matters
+    and must be positive where F_c is not 0), amplitude of the drive.
     """
 
+    space: tuple[int, ...]
     size: int
     kind: Index
     rows: Index
@@ -47,18 +46,20 @@ class Forces(NamedTuple):
     law: Array
 
 
-@njit(cache=True, error_model="numpy")
-def raw(forces: Forces) -> Forces:
-    """The same elements with pointers in place of arrays."""
-    return Forces(
-        forces.size,
-        pointer(forces.kind),
-        pointer(forces.rows),
-        pointer(forces.table),
-        pointer(forces.energy),
-        pointer(forces.drive),
-        pointer(forces.law),
-    )
+# Rows of the work space: coordinates of a, b, d; gradient of g in them; g or x; g'; the elastic force.
+
+
+@njit(cache=True, forceinline=True)
+def side(forces: Forces) -> int:
+    """Rows of one element, 3 d."""
+    return 3 * len(forces.space)
+
+
+@njit(cache=True, forceinline=True)
+def value_row(forces: Forces) -> int:
+    """Where `measure` leaves x; g' and the elastic force come after it."""
+    rows: int = 2 * side(forces)
+    return rows
 
 
 def initial_memory(tile: Tile, forces: Forces, z: Array, intended: Array) -> Array:
@@ -67,9 +68,11 @@ def initial_memory(tile: Tile, forces: Forces, z: Array, intended: Array) -> Arr
     z: flat coordinates, derived rows filled; intended: angles [rad], flat (elements, lanes), from which the whole
     turns are taken (the rest follows from z), so that a spring can be wound up at the start.
     """
-    rows, at = forces.rows.reshape(-1, ROWS), z.reshape(-1, len(tile))
-    first, second = (at[rows[:, k]] + 1j * at[rows[:, k + 1]] for k in (0, 2))
-    angle = np.angle(second * np.conj(first))
+    d = len(forces.space)
+    rows, at = forces.rows.reshape(-1, 3 * d), z.reshape(-1, len(tile))
+    first, second = ((at[rows[:, k]], at[rows[:, k + 1]]) for k in (0, d))
+    angle = np.asarray(plane.angle(second) - plane.angle(first))
+    angle -= _TURN * np.rint(angle / _TURN)
     memory = angle + _TURN * np.rint((intended.reshape(angle.shape) - angle) / _TURN)
     return np.where(forces.kind[:, None] == ANGLE, memory, 0.0).ravel()
 
@@ -84,11 +87,12 @@ def _angle(ax, ay, bx, by, last):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def remember(tile: Tile, forces: Forces, z: Array, memory: Array) -> None:
     """Follow the angles after a step of less than half a turn; memory: (elements, lanes). Pointers."""
-    width = len(tile)
+    width, d = len(tile), len(forces.space)
     for number in range(forces.size):
         if forces.kind[number] == ANGLE:
-            ax, ay = forces.rows[ROWS * number] * width, forces.rows[ROWS * number + 1] * width
-            bx, by = forces.rows[ROWS * number + 2] * width, forces.rows[ROWS * number + 3] * width
+            first = side(forces) * number
+            ax, ay = forces.rows[first] * width, forces.rows[first + 1] * width
+            bx, by = forces.rows[first + d] * width, forces.rows[first + d + 1] * width
             for lane in range(width):
                 slot = number * width + lane
                 memory[slot] = _angle(z[ax + lane], z[ay + lane], z[bx + lane], z[by + lane], memory[slot])
@@ -97,54 +101,61 @@ def remember(tile: Tile, forces: Forces, z: Array, memory: Array) -> None:
 @njit(cache=True, error_model="numpy")
 def _gradient(tile: Tile, forces: Forces, number: int, z: Array, w: Array) -> None:
     """Coordinates, dg/dz and, but for the turns of an angle, g of an element into w."""
-    width = len(tile)
+    width, d, rows = len(tile), len(forces.space), side(forces)
     kind = forces.kind[number]
-    for k in range(ROWS):
-        copy(tile, w, k, z, forces.rows[ROWS * number + k])
-        clear(tile, w, _GRADIENT + k)
+    for k in range(rows):
+        copy(tile, w, k, z, forces.rows[rows * number + k])
+        clear(tile, w, rows + k)
     for lane in range(width):
-        ax, ay, bx, by = w[lane], w[width + lane], w[2 * width + lane], w[3 * width + lane]
-        dx, dy = w[4 * width + lane], w[5 * width + lane]
-        out = _GRADIENT * width + lane
-        ux, uy = bx - ax, by - ay
-        if kind == DISTANCE:
-            value = np.sqrt(ux * ux + uy * uy)
-            inverse = 1.0 / value if value > 0.0 else 0.0
-            nx, ny = ux * inverse, uy * inverse
-            w[out], w[out + width], w[out + 2 * width], w[out + 3 * width] = -nx, -ny, nx, ny
-        elif kind == ANGLE:
-            value = 0.0
+        out, value = rows * width + lane, 0.0
+        if kind == ANGLE:
+            ax, ay, bx, by = w[lane], w[width + lane], w[d * width + lane], w[(d + 1) * width + lane]
             a, b = 1.0 / (ax * ax + ay * ay), 1.0 / (bx * bx + by * by)
-            w[out], w[out + width], w[out + 2 * width], w[out + 3 * width] = ay * a, -ax * a, -by * b, bx * b
+            w[out], w[out + width] = ay * a, -ax * a
+            w[out + d * width], w[out + (d + 1) * width] = -by * b, bx * b
         else:
-            inverse = 1.0 / np.sqrt(dx * dx + dy * dy)
-            nx, ny = dx * inverse, dy * inverse
-            value = ux * nx + uy * ny
-            w[out], w[out + width], w[out + 2 * width], w[out + 3 * width] = -nx, -ny, nx, ny
-            w[out + 4 * width], w[out + 5 * width] = (ux - value * nx) * inverse, (uy - value * ny) * inverse
-        w[VALUE * width + lane] = value
+            # n is along b - a, or along d.
+            square = 0.0
+            for k in range(d):
+                n = w[(2 * d + k) * width + lane] if kind == PLACE else w[(d + k) * width + lane] - w[k * width + lane]
+                w[out + (d + k) * width] = n
+                square += n * n
+            size = np.sqrt(square)
+            inverse = 1.0 / size if size > 0.0 else 0.0
+            for k in range(d):
+                n = w[out + (d + k) * width] * inverse
+                w[out + k * width], w[out + (d + k) * width] = -n, n
+                value += (w[(d + k) * width + lane] - w[k * width + lane]) * n
+            if kind == DISTANCE:
+                value = size
+            else:
+                for k in range(d):
+                    across = w[(d + k) * width + lane] - w[k * width + lane] - value * w[out + (d + k) * width]
+                    w[out + (2 * d + k) * width] = across * inverse
+        w[value_row(forces) * width + lane] = value
 
 
 @njit(cache=True, error_model="numpy")
 def measure(tile: Tile, forces: Forces, number: int, z: Array, memory: Array, w: Array) -> None:
     """As `_gradient`, with x = g - g0 in place of g."""
-    width = len(tile)
+    width, d = len(tile), len(forces.space)
     _gradient(tile, forces, number, z, w)
-    natural = (LAW * number + NATURAL) * width
+    natural, row = (LAW * number + NATURAL) * width, value_row(forces) * width
     for lane in range(width):
-        value = w[VALUE * width + lane]
+        value = w[row + lane]
         if forces.kind[number] == ANGLE:
             last = memory[number * width + lane]
-            value = _angle(w[lane], w[width + lane], w[2 * width + lane], w[3 * width + lane], last)
-        w[VALUE * width + lane] = value - forces.law[natural + lane]
+            value = _angle(w[lane], w[width + lane], w[d * width + lane], w[(d + 1) * width + lane], last)
+        w[row + lane] = value - forces.law[natural + lane]
 
 
 @njit(cache=True, error_model="numpy")
 def _rate(tile: Tile, forces: Forces, number: int, zdot: Array, w: Array) -> None:
     """g' from the gradient in w."""
-    clear(tile, w, _RATE)
-    for k in range(ROWS):
-        add_product(tile, w, _RATE, w, _GRADIENT + k, zdot, forces.rows[ROWS * number + k])
+    rows, rate = side(forces), value_row(forces) + 1
+    clear(tile, w, rate)
+    for k in range(rows):
+        add_product(tile, w, rate, w, rows + k, zdot, forces.rows[rows * number + k])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -172,10 +183,11 @@ def add_force(
 ) -> None:
     """Add F dg/dz to f (rows, lanes), and dissipated minus supplied power [W] to power (lanes,).
 
-    memory: (elements, lanes); w: work space of 15 rows; moving: whether damping, friction and drives count, or the
+    memory: (elements, lanes); w: work space of 6 d + 3 rows; moving: whether damping, friction and drives count, or the
     elastic part alone. A distance of zero has no direction and exerts no force. Pointers.
     """
-    width = len(tile)
+    width, rows, value = len(tile), side(forces), value_row(forces)
+    at, rating, elastically = value * width, (value + 1) * width, (value + 2) * width
     for number in range(forces.size):
         measure(tile, forces, number, z, memory, w)
         drive = 0.0
@@ -184,48 +196,38 @@ def add_force(
             drive = evaluate(functions, forces.drive[number], t, 0)
         else:
             for lane in range(width):
-                w[_RATE * width + lane] = 0.0
+                w[rating + lane] = 0.0
         law = LAW * number * width
         for lane in range(width):
-            x, rate = w[VALUE * width + lane], w[_RATE * width + lane]
+            x, rate = w[at + lane], w[rating + lane]
             k, k3 = forces.law[law + STIFFNESS * width + lane], forces.law[law + CUBIC * width + lane]
             elastic = (k + k3 * x * x) * x + evaluate(functions, forces.table[number], x, 0)
             limit, speed = forces.law[law + COULOMB * width + lane], forces.law[law + SPEED * width + lane]
             resisting = forces.law[law + DAMPING * width + lane] * rate + _friction(limit, speed, rate)[0]
             resisting -= forces.law[law + AMPLITUDE * width + lane] * drive
             power[lane] += resisting * rate
-            w[_ELASTIC * width + lane] = -elastic - resisting
-        for k in range(ROWS):
-            add_product(tile, f, forces.rows[ROWS * number + k], w, _ELASTIC, w, _GRADIENT + k)
+            w[elastically + lane] = -elastic - resisting
+        for k in range(rows):
+            add_product(tile, f, forces.rows[rows * number + k], w, value + 2, w, rows + k)
 
 
 @njit(cache=True, error_model="numpy")
 def add_energy(
     tile: Tile, forces: Forces, functions: Functions, z: Array, memory: Array, w: Array, energy: Array, row: int
 ) -> None:
-    """Add the elastic energy [J] to a row of energy; w: work space of 15 rows. Pointers."""
+    """Add the elastic energy [J] to a row of energy; w: work space of 6 d + 3 rows. Pointers."""
     width = len(tile)
     for number in range(forces.size):
         measure(tile, forces, number, z, memory, w)
         law = LAW * number * width
         table = forces.table[number]
         for lane in range(width):
-            x = w[VALUE * width + lane]
+            x = w[value_row(forces) * width + lane]
             k, k3 = forces.law[law + STIFFNESS * width + lane], forces.law[law + CUBIC * width + lane]
             stored = evaluate(functions, forces.energy[number], x, 0)
             # Beyond its range the table's force holds, so that the energy grows with the way.
             stored += evaluate(functions, table, x, 0) * excess(functions, table, x)
             energy[row * width + lane] += (0.5 * k + 0.25 * k3 * x * x) * x * x + stored
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _add_block(out, base, width, i, j, scale, xx, xy, yx, yy):  # type: ignore[no-untyped-def]
-    """Add scale * [[xx, xy], [yx, yy]] at pairs (i, j) of the 6 x 6 block that begins at out[base]."""
-    corner = base + (2 * ROWS * i + 2 * j) * width
-    out[corner] += scale * xx
-    out[corner + width] += scale * xy
-    out[corner + ROWS * width] += scale * yx
-    out[corner + (ROWS + 1) * width] += scale * yy
 
 
 @njit(cache=True, error_model="numpy")
@@ -239,76 +241,99 @@ def tangent(
     out: Array,
     first: int,
 ) -> None:
-    """Stiffness d2U/dz2 of every element; rows of out from `first` on: (elements * 36, lanes), 6 x 6 blocks.
+    """Stiffness d2U/dz2 of every element; rows of out from `first` on: (elements * side^2, lanes), square blocks.
 
-    A block refers to the six places of the element's row list, also where rows repeat; it is not positive
-    definite in general. w: work space of 15 rows. Pointers.
+    A block refers to the places of the element's row list, also where rows repeat; it is not positive definite in
+    general. w: work space of 6 d + 3 rows. Pointers.
     """
-    width = len(tile)
+    width, d, rows = len(tile), len(forces.space), side(forces)
     for number in range(forces.size):
         measure(tile, forces, number, z, memory, w)
         kind, table = forces.kind[number], forces.table[number]
         law = LAW * number * width
-        start = (first + ROWS * ROWS * number) * width
+        start = (first + rows * rows * number) * width
         for lane in range(width):
-            x = w[VALUE * width + lane]
+            x = w[value_row(forces) * width + lane]
             k, k3 = forces.law[law + STIFFNESS * width + lane], forces.law[law + CUBIC * width + lane]
             elastic = (k + k3 * x * x) * x + evaluate(functions, table, x, 0)
             slope = k + 3.0 * k3 * x * x + evaluate(functions, table, x, 1)
             base = start + lane
-            for i in range(ROWS):
-                for j in range(ROWS):
-                    product = w[(_GRADIENT + i) * width + lane] * w[(_GRADIENT + j) * width + lane]
-                    out[base + (ROWS * i + j) * width] = slope * product
-            ax, ay, bx, by = w[lane], w[width + lane], w[2 * width + lane], w[3 * width + lane]
-            nx, ny = w[(_GRADIENT + 2) * width + lane], w[(_GRADIENT + 3) * width + lane]
-            if kind == DISTANCE:
-                # (I - nn')/|u|; at |u| = 0 the limit for a spring that is relaxed there, d2U = F' I.
-                distance = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
-                scale = elastic / distance if distance > 0.0 else (slope if elastic == 0.0 else 0.0)
-                xx, xy, yy = scale * (1.0 - nx * nx), -scale * nx * ny, scale * (1.0 - ny * ny)
-                for i in range(2):
-                    for j in range(2):
-                        _add_block(out, base, width, i, j, 1.0 if i == j else -1.0, xx, xy, xy, yy)
-            elif kind == ANGLE:
+            for i in range(rows):
+                for j in range(rows):
+                    product = w[(rows + i) * width + lane] * w[(rows + j) * width + lane]
+                    out[base + (rows * i + j) * width] = slope * product
+            if kind == ANGLE:
                 # Of atan2(y, x): xy/r^4 [[2, .], [., -2]] and (y^2 - x^2)/r^4 off the diagonal.
-                square = ax * ax + ay * ay
-                xx, xy = 2.0 * ax * ay / (square * square), (ay * ay - ax * ax) / (square * square)
-                _add_block(out, base, width, 0, 0, -elastic, xx, xy, xy, -xx)
-                square = bx * bx + by * by
-                xx, xy = 2.0 * bx * by / (square * square), (by * by - bx * bx) / (square * square)
-                _add_block(out, base, width, 1, 1, elastic, xx, xy, xy, -xx)
+                for end in range(2):
+                    vx, vy = w[end * d * width + lane], w[(end * d + 1) * width + lane]
+                    square = vx * vx + vy * vy
+                    scale = (elastic if end == 1 else -elastic) / (square * square)
+                    corner = base + (rows + 1) * end * d * width
+                    out[corner] += 2.0 * scale * vx * vy
+                    out[corner + width] += scale * (vy * vy - vx * vx)
+                    out[corner + rows * width] += scale * (vy * vy - vx * vx)
+                    out[corner + (rows + 1) * width] -= 2.0 * scale * vx * vy
             else:
-                # With n = d/|d|, s the normal on it, b - a = g n + h s: tangent and d-d parts of the Hessian.
-                inverse = 1.0 / np.sqrt(w[4 * width + lane] ** 2 + w[5 * width + lane] ** 2)
-                sx, sy = -ny, nx
-                along = (bx - ax) * nx + (by - ay) * ny
-                across = (bx - ax) * sx + (by - ay) * sy
-                xx, xy, yy = sx * sx * inverse, sx * sy * inverse, sy * sy * inverse
-                for i in range(2):
-                    sign = elastic if i == 1 else -elastic
-                    _add_block(out, base, width, i, 2, sign, xx, xy, xy, yy)
-                    _add_block(out, base, width, 2, i, sign, xx, xy, xy, yy)
-                xx = -(2.0 * across * nx * sx + along * sx * sx) * inverse * inverse
-                xy = -(across * (nx * sy + ny * sx) + along * sx * sy) * inverse * inverse
-                yy = -(2.0 * across * ny * sy + along * sy * sy) * inverse * inverse
-                _add_block(out, base, width, 2, 2, elastic, xx, xy, xy, yy)
+                _bend(width, d, lane, kind, elastic, slope, w, out, base)
+
+
+@njit(cache=True, error_model="numpy")
+def _bend(
+    width: int, d: int, lane: int, kind: int, elastic: float, slope: float, w: Array, out: Array, base: int
+) -> None:
+    """Add F times the second derivatives of a distance, or of a place along a direction, to a block.
+
+    With n the unit vector and P = 1 - n n': of a distance P/|u|, at |u| = 0 the limit for a spring that is relaxed
+    there, F' 1. Of a place g = u.n, n = d/|d|: P/|d| between the points and d, -(r n' + n r' + g P)/|d|^2 in d, with
+    r = u - g n.
+    """
+    rows = 3 * d
+    n = (rows + d) * width + lane
+    size, along = 0.0, 0.0
+    for k in range(d):
+        u = w[(d + k) * width + lane] - w[k * width + lane]
+        part = w[(2 * d + k) * width + lane] if kind == PLACE else u
+        size += part * part
+        along += u * w[n + k * width]
+    size = np.sqrt(size)
+    relaxed = slope if elastic == 0.0 else 0.0
+    inverse = 1.0 / size if size > 0.0 else 0.0
+    for i in range(d):
+        for j in range(d):
+            same = 1.0 if i == j else 0.0
+            normal = same - w[n + i * width] * w[n + j * width]
+            if kind == DISTANCE:
+                value = elastic * inverse * normal if size > 0.0 else relaxed * normal
+                for one in range(2):
+                    for other in range(2):
+                        at = base + (rows * (one * d + i) + other * d + j) * width
+                        out[at] += value if one == other else -value
+            else:
+                value = elastic * inverse * normal
+                for end in range(2):
+                    signed = value if end == 1 else -value
+                    out[base + (rows * (end * d + i) + 2 * d + j) * width] += signed
+                    out[base + (rows * (2 * d + i) + end * d + j) * width] += signed
+                # The gradient in d is r/|d|.
+                first, second = w[(rows + 2 * d + i) * width + lane], w[(rows + 2 * d + j) * width + lane]
+                bent = (first * w[n + j * width] + w[n + i * width] * second) * inverse + along * normal * inverse**2
+                out[base + (rows * (2 * d + i) + 2 * d + j) * width] -= elastic * bent
 
 
 @njit(cache=True, error_model="numpy")
 def damping(tile: Tile, forces: Forces, z: Array, zdot: Array, w: Array, out: Array, first: int) -> None:
-    """Damping -dF/dzdot, [c + F_c/v_s sech^2(g'/v_s)] dg/dz dg/dz', in 6 x 6 blocks as in `tangent`. Pointers."""
-    width = len(tile)
+    """Damping -dF/dzdot, [c + F_c/v_s sech^2(g'/v_s)] dg/dz dg/dz', in blocks as in `tangent`. Pointers."""
+    width, rows = len(tile), side(forces)
     for number in range(forces.size):
         _gradient(tile, forces, number, z, w)
         _rate(tile, forces, number, zdot, w)
         law = LAW * number * width
-        start = (first + ROWS * ROWS * number) * width
+        start = (first + rows * rows * number) * width
         for lane in range(width):
             limit, speed = forces.law[law + COULOMB * width + lane], forces.law[law + SPEED * width + lane]
-            slope = _friction(limit, speed, w[_RATE * width + lane])[1]
+            slope = _friction(limit, speed, w[(value_row(forces) + 1) * width + lane])[1]
             slope += forces.law[law + DAMPING * width + lane]
-            for i in range(ROWS):
-                for j in range(ROWS):
-                    product = w[(_GRADIENT + i) * width + lane] * w[(_GRADIENT + j) * width + lane]
-                    out[start + (ROWS * i + j) * width + lane] = slope * product
+            for i in range(rows):
+                for j in range(rows):
+                    product = w[(rows + i) * width + lane] * w[(rows + j) * width + lane]
+                    out[start + (rows * i + j) * width + lane] = slope * product

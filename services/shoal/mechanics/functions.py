@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics.numerics.tile import Array, Index
-from shoal.mechanics.numerics.vector import pointer
 
 ORDER = 16
 """Stored coefficients of a piece; `fitting` leaves the last one zero, so that the antiderivative has room."""
@@ -49,14 +48,6 @@ def pack(fitted: Sequence[Piecewise]) -> Functions:
     breaks = np.concatenate([np.zeros(0), *(one.breaks for one in fitted)])
     coefficients = np.concatenate([np.zeros((0, ORDER)), *(one.coefficients for one in fitted)])
     return Functions(len(fitted), start, breaks, coefficients.ravel())
-
-
-@njit(cache=True, error_model="numpy")
-def raw(functions: Functions) -> Functions:
-    """The same functions with pointers in place of arrays."""
-    return Functions(
-        functions.size, pointer(functions.start), pointer(functions.breaks), pointer(functions.coefficients)
-    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -102,7 +102,7 @@ def leapt(tile: Tile, held: Forces, halts: Halts, before: Array, z: Array, memor
             continue
         forces.measure(tile, held, number, z, memory, room)
         for lane in range(width):
-            one, other = before[number * width + lane], room[forces.VALUE * width + lane]
+            one, other = before[number * width + lane], room[forces.value_row(held) * width + lane]
             low, high = min(one, other), max(one, other)
             if not (np.isfinite(low) and np.isfinite(high)):
                 continue
@@ -121,4 +121,4 @@ def elongations(tile: Tile, held: Forces, z: Array, memory: Array, room: Array, 
     for number in range(held.size):
         forces.measure(tile, held, number, z, memory, room)
         for lane in range(width):
-            out[number * width + lane] = room[forces.VALUE * width + lane]
+            out[number * width + lane] = room[forces.value_row(held) * width + lane]

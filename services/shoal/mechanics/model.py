@@ -7,72 +7,48 @@ hold, then those of markers).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from shoal.errors import InputError
-from shoal.mechanics import applied, forces, functions
 from shoal.mechanics.applied import Applied
 from shoal.mechanics.assembly.frames import Frame
-from shoal.mechanics.elements import ancf_cable, ancf_full, beam
-from shoal.mechanics.elements.ancf_cable import AncfCables
-from shoal.mechanics.elements.ancf_full import AncfFull
-from shoal.mechanics.elements.beam import Beams
+from shoal.mechanics.derived import Derived
 from shoal.mechanics.forces import Forces
 from shoal.mechanics.functions import Functions, Piecewise
-from shoal.mechanics.least import constraints, saddle
+from shoal.mechanics.least import saddle
 from shoal.mechanics.least.constraints import Constraints
 from shoal.mechanics.least.saddle import Saddle
 from shoal.mechanics.numerics import gate, sparse
-from shoal.mechanics.numerics.tile import Array, Index, Tile, pack
-from shoal.mechanics.numerics.vector import pointer
-from shoal.mechanics.start.closure import Flags
+from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics.tile import Array, Flags, Index, Tile, pack, packed, varies
 from shoal.scene import Scene
 
 
-class Derived(NamedTuple):
-    """Row r (after the unknowns): constant[r] + sum of coefficient[t] z[source[t]] over start[r] <= t < start[r+1]."""
-
-    start: Index
-    source: Index
-    coefficient: Array
-    constant: Array
-
-
-class Elements(NamedTuple):
-    """The flexible elements by family: one line here, in `raw` and in dynamics.py for each kernel."""
-
-    cables_full: AncfCables
-    cables_reduced: AncfCables
-    cubics: Beams
-    quintics: Beams
-    solids: AncfFull
-    two_point_solids: AncfFull
-
-
 class Gates(NamedTuple):
-    """Addresses of the kernels of dynamics.py and tangent.py for one width."""
+    """Addresses of the kernels of `gates` for one width, and of what seeks accelerations instead (0: nobody)."""
 
     motion: int
     settle: int
     energies: int
-    assemble: int
+    tangents: int
+    sought: int = 0
 
 
 class Arrays(NamedTuple):
-    """All a kernel needs of one tile of lanes. method, baumgarte: how accelerations are found.
+    """All a kernel needs of one tile of lanes. space: a tuple as long as vectors are.
 
-    alike: whether all lanes have one mass matrix, whose factor is then alike_factor, (slots,).
+    method, baumgarte: how accelerations are found. elements: one structure a family. alike: whether all lanes have one
+    mass matrix, whose factor is then alike_factor, (slots,).
     """
 
     home: Array
     gates: Gates
-
+    space: tuple[int, ...]
     unknowns: int
     force_rows: int
     held_rows: int
@@ -81,6 +57,7 @@ class Arrays(NamedTuple):
     baumgarte: float
     projects: bool
     driven: bool
+    damped: bool
     derived: Derived
     pattern: sparse.Pattern
     mass: Array
@@ -89,7 +66,7 @@ class Arrays(NamedTuple):
     alike: bool
     alike_factor: Array
     weight: Array
-    elements: Elements
+    elements: tuple[Any, ...]
     forces: Forces
     applied: Applied
     functions: Functions
@@ -97,48 +74,9 @@ class Arrays(NamedTuple):
     saddle: Saddle
 
 
-@njit(cache=True, error_model="numpy")
-def raw(m: Arrays) -> Arrays:
-    """The same numbers with pointers in place of arrays, for use inside the time loop."""
-    d, e = m.derived, m.elements
-    return Arrays(
-        pointer(m.home),
-        m.gates,
-        m.unknowns,
-        m.force_rows,
-        m.held_rows,
-        m.rows,
-        m.method,
-        m.baumgarte,
-        m.projects,
-        m.driven,
-        Derived(pointer(d.start), pointer(d.source), pointer(d.coefficient), pointer(d.constant)),
-        sparse.raw(m.pattern),
-        pointer(m.mass),
-        pointer(m.mass_factor),
-        pointer(m.mass_root),
-        m.alike,
-        pointer(m.alike_factor),
-        pointer(m.weight),
-        Elements(
-            ancf_cable.raw(e.cables_full),
-            ancf_cable.raw(e.cables_reduced),
-            beam.raw(e.cubics),
-            beam.raw(e.quintics),
-            ancf_full.raw(e.solids),
-            ancf_full.raw(e.two_point_solids),
-        ),
-        forces.raw(m.forces),
-        applied.raw(m.applied),
-        functions.raw(m.functions),
-        constraints.raw(m.constraints),
-        saddle.raw(m.saddle),
-    )
-
-
 @njit(cache=True)
 def _factor_mass(tile: Tile, pattern: sparse.Pattern, values: Array) -> None:
-    sparse.factor(tile, sparse.raw(pattern), pointer(values))
+    sparse.factor(tile, raw(pattern), pointer(values))
 
 
 @dataclass(frozen=True)
@@ -153,6 +91,7 @@ class Model:
     """
 
     scene: Scene
+    dimensions: int
     failed: Flags
     frames: dict[str, Frame]
     lanes: int
@@ -163,7 +102,7 @@ class Model:
     derived: Derived
     mass_entries: dict[tuple[int, int], Array]
     weight: Array
-    elements: Elements
+    elements: tuple[Any, ...]
     owners: tuple[tuple[str, ...], ...]
     forces: Forces
     start_angles: Array
@@ -181,12 +120,8 @@ class Model:
     @property
     def varies(self) -> bool:
         """Whether lanes differ in more than their initial state."""
-        d = self.derived
-        numbers = [self.mass_values, self.weight, self.forces.law, self.applied.coefficient, self.applied.factor]
-        numbers += [family.coefficients for family in self.elements]
-        numbers += [self.constraints.factor, self.constraints.constant, self.constraints.coefficient]
-        numbers += [d.coefficient, d.constant]
-        return any(values.shape[1] > 1 for values in numbers)
+        parts = self.derived, self.elements, self.forces, self.applied, self.constraints
+        return varies((self.mass_values, self.weight, *parts))
 
     @property
     def unknowns(self) -> int:
@@ -226,27 +161,16 @@ class Model:
         return scatter(*self.mass_pattern, self.mass_entries)
 
     @cached_property
-    def _saddle_pattern(self) -> tuple[sparse.Pattern, dict[tuple[int, int], int], Index, Index]:
-        return saddle.analyse(self.unknowns, self.mass_entries, self.constraints)
-
-    def _saddle(self, packed: Callable[[Array], Array]) -> Saddle:
+    def _saddle(self) -> Saddle:
         """The sparse saddle point problem, where there are enough constraints to need it."""
-        count = self.constraints.size
         none = np.zeros(0, dtype=np.int64)
-        if count <= saddle.SMALL:
-            return Saddle(0, 0, _EMPTY, none, np.zeros(0), none, none)
-        pattern, slots, place, entries = self._saddle_pattern
+        if self.constraints.size <= saddle.SMALL:
+            return Saddle(0, 0, _EMPTY, none, np.zeros((0, 1)), none, none)
+        pattern, slots, place, entries = saddle.analyse(self.unknowns, self.mass_entries, self.constraints)
         multiplier = np.zeros(len(place), dtype=np.int64)
         multiplier[place[self.unknowns :]] = 1
-        return Saddle(
-            len(place),
-            pattern.slots,
-            pattern,
-            place,
-            packed(scatter(pattern, slots, self.mass_entries)),
-            entries,
-            multiplier,
-        )
+        base = scatter(pattern, slots, self.mass_entries)
+        return Saddle(len(place), pattern.slots, pattern, place, base, entries, multiplier)
 
     def tile(self, tile: Tile, lanes: slice) -> Arrays:
         """The arrays of one tile of lanes. Raises InputError if a mass matrix is singular."""
@@ -257,21 +181,18 @@ class Model:
         return self.shared_tiles[len(tile)]
 
     def _tile(self, tile: Tile, lanes: slice) -> Arrays:
-        def packed(values: Array) -> Array:
-            return pack(values, lanes, tile)
-
         pattern, _ = self.mass_pattern
-        mass = packed(self.mass_values)
+        mass = pack(self.mass_values, lanes, tile)
         factor = mass.copy()
         _factor_mass(tile, pattern, factor)
         inverse = factor[: self.unknowns * len(tile)]
         if not np.all((inverse > 0) & np.isfinite(inverse)):
             raise InputError(f"{self.scene.name}: the mass matrix is singular; some coordinate moves no mass")
-        d, c = self.derived, self.constraints
-        e = self.elements
+        forces = self.elements, self.forces, self.applied, self.functions, self.constraints, self._saddle
         return Arrays(
             gate.home(),
             Gates(0, 0, 0, 0),
+            (0,) * self.dimensions,
             self.unknowns,
             self.force_rows,
             self.held_rows,
@@ -280,29 +201,16 @@ class Model:
             self.baumgarte,
             self.scene.solver.project,
             bool(np.any(self.constraints.drive >= 0)),
-            Derived(d.start, d.source, packed(d.coefficient), packed(d.constant)),
+            any(family.damped for family in self.elements),
+            packed(self.derived, lanes, tile),
             pattern,
             mass,
             factor,
             np.sqrt(inverse),
             self.mass_values.shape[1] == 1,
             np.ascontiguousarray(factor[:: len(tile)]),
-            packed(self.weight),
-            Elements(
-                e.cables_full._replace(coefficients=packed(e.cables_full.coefficients)),
-                e.cables_reduced._replace(coefficients=packed(e.cables_reduced.coefficients)),
-                e.cubics._replace(coefficients=packed(e.cubics.coefficients), reference=packed(e.cubics.reference)),
-                e.quintics._replace(
-                    coefficients=packed(e.quintics.coefficients), reference=packed(e.quintics.reference)
-                ),
-                e.solids._replace(coefficients=packed(e.solids.coefficients)),
-                e.two_point_solids._replace(coefficients=packed(e.two_point_solids.coefficients)),
-            ),
-            self.forces._replace(law=packed(self.forces.law)),
-            self.applied._replace(coefficient=packed(self.applied.coefficient), factor=packed(self.applied.factor)),
-            self.functions,
-            c._replace(factor=packed(c.factor), constant=packed(c.constant), coefficient=packed(c.coefficient)),
-            self._saddle(packed),
+            pack(self.weight, lanes, tile),
+            *packed(forces, lanes, tile),
         )
 
 

@@ -12,8 +12,9 @@ from itertools import combinations
 
 import numpy as np
 
+from shoal.mechanics.joints import Meet, of_scene
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import GROUND, Attachment, Revolute, Rod, Scene, Weld
+from shoal.scene import GROUND, Rod, Scene
 from shoal.scene.joints import places
 from shoal.scene.loads import sides as load_sides
 
@@ -24,7 +25,6 @@ BREAKS = 5.0
 
 A run that gained energy without bound would else have no reach.
 """
-TETHERS = Revolute | Weld
 
 
 def size(scene: Scene) -> Array:
@@ -80,13 +80,19 @@ def stretch(scene: Scene, energy: Array) -> Array:
 def tethered(scene: Scene) -> bool:
     """Whether revolute joints and welds tie every body to fixed ground."""
     held, frontier = {GROUND}, [GROUND]
+    tethers = _tethers(scene)
     while frontier:
         here = frontier.pop()
-        for joint in scene.joints.values():
-            if isinstance(joint, TETHERS) and here in (ends := {side.body for side in _ends(joint)}):
+        for tether in tethers:
+            if here in (ends := {tether.first.body, tether.second.body}):
                 frontier += (new := ends - held)
                 held |= new
     return not scene.ground_points and held >= set(scene.bodies)
+
+
+def _tethers(scene: Scene) -> list[Meet]:
+    """Where joints hold places together."""
+    return [condition for _, condition in of_scene(scene) if isinstance(condition, Meet)]
 
 
 def distance_to_ground(scene: Scene, points: Array) -> Array:
@@ -94,11 +100,7 @@ def distance_to_ground(scene: Scene, points: Array) -> Array:
 
     points: (samples, markers, 2, lanes).
     """
-    sides = (side for joint in scene.joints.values() if isinstance(joint, TETHERS) for side in _ends(joint))
+    sides = (side for tether in _tethers(scene) for side in (tether.first, tether.second))
     anchors = [scene.location(side) for side in sides if side.body == GROUND]
     distances = [np.hypot(points[:, :, 0] - x, points[:, :, 1] - y) for x, y in anchors or [(0.0, 0.0)]]
     return np.asarray(np.min(distances, axis=0))
-
-
-def _ends(joint: Revolute | Weld) -> tuple[Attachment, Attachment]:
-    return joint.first, joint.second

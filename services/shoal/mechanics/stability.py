@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse
 import scipy.sparse.linalg
 
 from shoal.mechanics.dynamics import work_space
+from shoal.mechanics.gates import ready
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
+from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.sparse import Pattern
 from shoal.mechanics.numerics.tile import Array, pack, tiles, unpack
-from shoal.mechanics.tangent import ready, stiffness_at, tangent_tile
+from shoal.mechanics.tangent import stiffness_at, tangent_tile
 
 _DENSE = 60
 """Up to so many unknowns the dense eigenproblem is the faster one."""
@@ -36,7 +37,7 @@ def highest_frequency(model: Model) -> float:
 
 def highest_damping_rate(model: Model) -> float:
     """Largest decay rate of friction and damping at the initial state, over all lanes [1/s]."""
-    if model.forces.size == 0 and not any(b.damped for b in (model.elements.cubics, model.elements.quintics)):
+    if model.forces.size == 0 and not any(family.damped for family in model.elements):
         return 0.0
     return max(0.0, _largest_eigenvalue(model, damping=True))
 
@@ -87,26 +88,11 @@ def _top(pattern: Pattern, matrix: Array, mass: Array) -> float:
     if not np.any(matrix):
         return 0.0
     if n <= _DENSE:
-        full = (_dense(pattern, matrix), _dense(pattern, mass))
+        full = [sparse.matrix(pattern, values).toarray() for values in (matrix, mass)]
         return float(scipy.linalg.eigh(*full, eigvals_only=True, subset_by_index=[n - 1, n - 1])[0])
     start = np.cos(np.arange(n))  # a fixed start vector, so that the same scene gives the same limit
-    sparse = (_sparse(pattern, matrix), _sparse(pattern, mass))
+    stiff, heavy = (sparse.matrix(pattern, values) for values in (matrix, mass))
     found = scipy.sparse.linalg.eigsh(
-        sparse[0], k=1, M=sparse[1], which="LA", v0=start, tol=_ACCURACY, return_eigenvectors=False
+        stiff, k=1, M=heavy, which="LA", v0=start, tol=_ACCURACY, return_eigenvectors=False
     )
     return float(found[0])
-
-
-def _dense(pattern: Pattern, values: Array) -> Array:
-    n = pattern.size
-    out = np.diag(values[:n])
-    columns = np.repeat(np.arange(n), np.diff(pattern.column))
-    out[pattern.row, columns] = values[n:]
-    out[columns, pattern.row] = values[n:]
-    return out
-
-
-def _sparse(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
-    n = pattern.size
-    lower = scipy.sparse.csc_array((values[n:], pattern.row, pattern.column), shape=(n, n))
-    return scipy.sparse.csc_array(lower + lower.T + scipy.sparse.diags_array(values[:n]))

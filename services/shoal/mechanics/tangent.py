@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
-from shoal.mechanics import dynamics, forces, model
+from shoal.mechanics import gates
+from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.elements import ancf_cable, ancf_full, beam
-from shoal.mechanics.model import Arrays, Gates, Model, scatter
-from shoal.mechanics.numerics import gate, sparse
-from shoal.mechanics.numerics.tile import Array, Index, Tile, pack
-from shoal.mechanics.numerics.vector import add_product, pointer, shift
+from shoal.mechanics.model import Arrays, Model, scatter
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics.tile import Array, Index, Tile, index, pack, stacked
+from shoal.mechanics.numerics.vector import add_product
 
 
 class Tangent(NamedTuple):
@@ -49,21 +50,14 @@ def tangent_tile(model: Model, tile: Tile, lanes: slice) -> Tangent:
         pack(scatter(pattern, slot, model.mass_entries), lanes, tile),
         blocks,
         len(found),
-        np.array([source for _, source, _ in found], dtype=np.int64),
-        np.array([slot[key] for key, *_ in found], dtype=np.int64),
-        pack(_stack(found), lanes, tile),
+        index([source for _, source, _ in found]),
+        index([slot[key] for key, *_ in found]),
+        pack(stacked([c for *_, c in found]), lanes, tile),
         len(curved),
-        np.array([slot[key] for key, *_ in curved], dtype=np.int64),
-        np.array([owner for _, owner, _ in curved], dtype=np.int64),
-        pack(_stack(curved), lanes, tile),
+        index([slot[key] for key, *_ in curved]),
+        index([owner for _, owner, _ in curved]),
+        pack(stacked([c for *_, c in curved]), lanes, tile),
     )
-
-
-def _stack(found: list[tuple[tuple[int, int], int, Array]]) -> Array:
-    values = np.empty((len(found), max((np.size(c) for *_, c in found), default=1)))
-    for row, (*_, c) in enumerate(found):
-        values[row] = c
-    return values
 
 
 def _expand(model: Model, row: int) -> list[tuple[int, Array]]:
@@ -107,62 +101,6 @@ def _contributions(model: Model) -> tuple[list[tuple[tuple[int, int], int, Array
 
 
 @njit(cache=True, error_model="numpy")
-def raw(t: Tangent) -> Tangent:
-    """The same lists with pointers in place of arrays."""
-    return Tangent(
-        sparse.raw(t.pattern),
-        pointer(t.mass),
-        t.blocks,
-        t.contributions,
-        pointer(t.source),
-        pointer(t.slot),
-        pointer(t.coefficient),
-        t.curvatures,
-        pointer(t.curvature),
-        pointer(t.owner),
-        pointer(t.bend),
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def _stiffness_blocks(tile: Tile, m: Arrays, w: Work, z: Array, block: Array) -> None:
-    """The tangents of all elements, family by family, then of the forces."""
-    e = m.elements
-    first = 0
-    ancf_cable.tangent(tile, e.cables_full, ancf_cable.FULL_AXIAL, ancf_cable.FULL_BENDING, z, w.element, block, first)
-    first += 64 * e.cables_full.size
-    ancf_cable.tangent(
-        tile, e.cables_reduced, ancf_cable.REDUCED_AXIAL, ancf_cable.REDUCED_BENDING, z, w.element, block, first
-    )
-    first += 64 * e.cables_reduced.size
-    beam.tangent(tile, e.cubics, z, w.element, block, first)
-    first += 64 * e.cubics.size
-    beam.tangent(tile, e.quintics, z, w.element, block, first)
-    first += 144 * e.quintics.size
-    ancf_full.tangent(tile, e.solids, z, w.element, block, first)
-    first += 144 * e.solids.size
-    ancf_full.tangent(tile, e.two_point_solids, z, w.element, block, first)
-    first += 144 * e.two_point_solids.size
-    forces.tangent(tile, m.forces, m.functions, z, w.memory, w.element, block, first)
-
-
-@njit(cache=True, error_model="numpy")
-def _damping_blocks(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, block: Array, size: int) -> None:
-    """The same of the damping."""
-    e = m.elements
-    for i in range(size * len(tile)):
-        block[i] = 0.0
-    first = 64 * (e.cables_full.size + e.cables_reduced.size)
-    if e.cubics.damped:
-        beam.damping(tile, e.cubics, z, w.element, block, first)
-    first += 64 * e.cubics.size
-    if e.quintics.damped:
-        beam.damping(tile, e.quintics, z, w.element, block, first)
-    first += 144 * (e.quintics.size + e.solids.size + e.two_point_solids.size)
-    forces.damping(tile, m.forces, z, zdot, w.element, block, first)
-
-
-@njit(cache=True, error_model="numpy")
 def assemble(
     tile: Tile,
     m: Arrays,
@@ -181,8 +119,7 @@ def assemble(
     multiplier: one lambda per constraint, (constraints, lanes); block: work space of 2 t.blocks rows.
     The derived rows of z, and those of w.zdot where anything is damped, must be filled. Pointers.
     """
-    arguments = (gate.typed(m.home, m), gate.typed(w.home, w), z, damping_factor, block, t.blocks)
-    gate.call(m.gates.assemble, (tile, *arguments))
+    gates.tangents(tile, m, w, z, damping_factor, block, t.blocks)
     width = len(tile)
     for i in range(slots * width):
         values[i] = mass_factor * t.mass[i]
@@ -193,42 +130,13 @@ def assemble(
 
 
 @njit(cache=True, error_model="numpy")
-def _assemble_gate(tile, pm, pw, z, damping_factor, block, blocks):  # type: ignore[no-untyped-def]
-    """K + damping_factor D of every element and force, block by block."""
-    m, w = gate.load(pm), gate.load(pw)
-    width = len(tile)
-    _stiffness_blocks(tile, m, w, z, block)
-    if damping_factor != 0.0 and (m.forces.size > 0 or m.elements.cubics.damped or m.elements.quintics.damped):
-        other = shift(block, blocks * width)
-        _damping_blocks(tile, m, w, z, w.zdot, other, blocks)
-        for i in range(blocks * width):
-            block[i] += damping_factor * other[i]
-
-
-_GATES: dict[int, Gates] = {}
-
-
-def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
-    """The same arrays with a home of their own and the gates for this width, compiled or taken from the cache."""
-    if len(tile) not in _GATES:
-        _GATES[len(tile)] = dynamics.gates(tile, arrays, room, _assemble_address)
-    return arrays._replace(home=gate.home(), gates=_GATES[len(tile)])
-
-
-def _assemble_address(width: Any, m: Any, w: Any) -> int:
-    """The gate of the element tangents for one width."""
-    rows = types.CPointer(types.float64)
-    return gate.address(_assemble_gate, (width, m, w, rows, types.float64, rows, types.int64))
-
-
-@njit(cache=True, error_model="numpy")
 def stiffness_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work, damping_factor: float) -> Array:
     """K + damping_factor D at the state in `room`, without constraints; (slots, lanes)."""
     width = len(tile)
-    m, t, w = model.raw(arrays), raw(tangent), dynamics.raw(room)
-    dynamics.enter(m, w)
-    dynamics.derive(tile, m, w.z, m.force_rows, False)
-    dynamics.derive(tile, m, w.zdot, m.force_rows, True)
+    m, t, w = raw(arrays), raw(tangent), raw(room)
+    gates.enter(m, w)
+    derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
+    derive(tile, m.derived, w.zdot, m.unknowns, m.force_rows, True)
     block = np.empty(2 * tangent.blocks * width + 1)
     values = np.empty(tangent.mass.size)
     multiplier = np.zeros(m.constraints.size * width + 1)

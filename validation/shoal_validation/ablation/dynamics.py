@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from shoal.engines.swarm_motion import Search, Switches
 from shoal.mechanics.simulate import simulate
-from shoal.mechanics.swarm_motion import Search, Switches
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
 

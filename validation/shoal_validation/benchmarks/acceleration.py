@@ -20,8 +20,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
+from shoal.engines import swarm_motion
+from shoal.engines.swarm_motion import Search, Switches
 from shoal.mechanics.simulate import simulate
-from shoal.mechanics.swarm_motion import Search, Switches
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Status, Trajectory
 
@@ -106,7 +107,7 @@ def measure_cost(scene_name: str, step: float, steps: int, solvers: tuple[str, .
 
 def cost(name: str, scene: Scene, times: Array, true: Trajectory, search: Search | None) -> CostRow:
     """One row; the time of compiled solvers is taken over more steps, after the call that compiles them."""
-    run = simulate(scene, times, search=search)
+    run = simulate(scene, times) if search is None else swarm_motion.simulate(scene, times, search)
     seconds = run.wall_s / run.steps
     if search is None:
         longer = simulate(scene, LONGER * times)
@@ -134,7 +135,10 @@ def passage(
     """One solver through the singular positions of the linkage."""
     end = np.linspace(0.0, duration, 101)[1:]
     scene = _moving(integrator, step, duration).with_values({"solver.project": project, "solver.acceleration": solver})
-    run = simulate(scene, end, search=Search(switches=Switches(**ABLATIONS[ablation])))
+    if swarm_motion.asked_for(scene):
+        run = swarm_motion.simulate(scene, end, Search(switches=Switches(**ABLATIONS[ablation])))
+    else:
+        run = simulate(scene, end)
     place = run.marker("B0")[-1]
     off = float(np.linalg.norm(place - _projected(integrator, step, duration)))
     return PassageRow(

@@ -14,11 +14,10 @@ from shoal.engines.exudyn_build import build as build_exudyn
 from shoal.engines.exudyn_build import library
 from shoal.engines.exudyn_record import choose_steps
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.dynamics import work_space
-from shoal.mechanics.integrators import choose
+from shoal.mechanics.integrators import choose, halting
 from shoal.mechanics.march import march
-from shoal.mechanics.numerics.tile import Tile, pack, tiles
-from shoal.mechanics.tangent import ready
+from shoal.mechanics.numerics.tile import tiles
+from shoal.mechanics.simulate import at_start
 from shoal.scene import Scene, load_scene
 
 from shoal_validation.benchmarks.timing import median_time
@@ -81,18 +80,14 @@ def prepare(what: Scene, lanes: int) -> Any:
     model = build(what.with_lanes(values), lanes)
     tile, parts = tiles(lanes)
     times = np.linspace(0.0, what.solver.duration, 51)[1:]
-    work = [_room(model, tile, part) for part in parts]
+    work = [(*at_start(model, tile, part), choose(what.solver, model, tile, part)) for part in parts]
+    kept = [(room.z.copy(), room.zdot.copy()) for _, room, _ in work]
+    stops = halting(what.solver, model, what.solver.integrator, what.solver.duration)
+    rows, tolerance = model.marker_rows.ravel(), what.solver.rank_tolerance
 
     def run() -> None:
-        for arrays, room, scheme, q, v in work:
-            room.z[: len(q)], room.zdot[: len(v)] = q, v
-            march(tile, scheme, arrays, room, what.solver.step, STEPS, times, model.marker_rows.ravel(), 1e-9)
+        for (arrays, room, scheme), (z, zdot) in zip(work, kept, strict=True):
+            room.z[:], room.zdot[:] = z, zdot
+            march(tile, scheme, arrays, room, what.solver.step, STEPS, times, rows, tolerance, stops)
 
     return run
-
-
-def _room(model: Any, tile: Tile, part: slice) -> tuple[Any, ...]:
-    arrays = model.tile(tile, part)
-    scheme = choose(model.scene.solver, model, tile, part)
-    room = work_space(tile, arrays)
-    return ready(tile, arrays, room), room, scheme, pack(model.q0, part, tile), pack(model.v0, part, tile)

@@ -56,8 +56,7 @@ def integrate(scene: Scene, problem: Problem, name: Name, tolerance: float) -> R
     if not run.success:
         raise ComputationError(run.message)
     at = points([place(scene).point(scene, scene.markers[problem.marker])], n)
-    there = at.matrix @ run.y[:n] + at.constant[:, None]
-    path: Array = np.stack([there[0].real, there[0].imag], axis=1)
+    path: Array = (at.matrix[0] @ run.y[:n]).T + at.constant[0]
     return Run(path, evaluations=int(run.nfev))
 
 

@@ -11,33 +11,26 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse
 from numba import njit
 
-from shoal.mechanics import dynamics, forces, functions, model
+from shoal.mechanics import forces, functions, gates, plane
 from shoal.mechanics.assembly.affine import Affine
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.dynamics import Work, derived_rows, work_space
+from shoal.mechanics.derived import derive
+from shoal.mechanics.dynamics import Work, derived_rows, remember, work_space
+from shoal.mechanics.elements.families import KERNELS
+from shoal.mechanics.gates import ready
 from shoal.mechanics.least import constraints
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics.sparse import Pattern
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile
-from shoal.mechanics.numerics.vector import pointer
-from shoal.mechanics.tangent import ready, stiffness_at, tangent_tile
+from shoal.mechanics.tangent import stiffness_at, tangent_tile
 from shoal.scene import Scene
 
 Sparse = scipy.sparse.csr_array
 _LANE = slice(0, 1)
-_STIFF = {
-    "cables_full": (3, 1),
-    "cables_reduced": (3, 1),
-    "cubics": (4, 1),
-    "quintics": (4, 1),
-    "solids": (10, 2),
-    "two_point_solids": (10, 2),
-}
-"""Coefficients of an element by family, and how many of them are not stiffnesses (they come first)."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -45,12 +38,12 @@ def _look(
     tile: Tile, arrays: Arrays, room: Work, t: float, gap: Array, rate: Array, bias: Array, jacobian: Array
 ) -> None:
     """Force (into room.a), energies (room.energy) and constraints of the state in `room`."""
-    m, w = model.raw(arrays), dynamics.raw(room)
-    dynamics.enter(m, w)
-    dynamics.derive(tile, m, w.z, m.rows, False)
-    dynamics.derive(tile, m, w.zdot, m.rows, True)
-    dynamics.force(tile, m, w, t, w.z, w.zdot, w.a)
-    dynamics.energies(tile, m, w)
+    m, w = raw(arrays), raw(room)
+    gates.enter(m, w)
+    derive(tile, m.derived, w.z, m.unknowns, m.rows, False)
+    derive(tile, m.derived, w.zdot, m.unknowns, m.rows, True)
+    gates.force(tile, m, w, t, w.z, w.zdot, w.a)
+    gates.energies(tile, m, w)
     constraints.residual(tile, m.constraints, m.functions, t, w.z, pointer(gap))
     constraints.rates(tile, m.constraints, m.functions, t, pointer(rate))
     constraints.bias(tile, m.constraints, m.functions, t, w.zdot, pointer(bias))
@@ -60,24 +53,24 @@ def _look(
 @njit(cache=True, error_model="numpy")
 def _elastic(tile: Tile, arrays: Arrays, room: Work) -> None:
     """The elastic part of the force, into room.a."""
-    m, w = model.raw(arrays), dynamics.raw(room)
-    dynamics.enter(m, w)
-    dynamics.elastic_force(tile, m, w, w.z, w.a, False)
+    m, w = raw(arrays), raw(room)
+    gates.enter(m, w)
+    gates.elastic_force(tile, m, w, w.z, w.a, False)
 
 
 @njit(cache=True, error_model="numpy")
 def _accelerate(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: float) -> None:
     """The acceleration by Gauss's principle, into room.a."""
-    m, w = model.raw(arrays), dynamics.raw(room)
-    dynamics.enter(m, w)
-    dynamics.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
+    m, w = raw(arrays), raw(room)
+    gates.enter(m, w)
+    gates.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
 
 
 @njit(cache=True, error_model="numpy")
 def _remember(tile: Tile, arrays: Arrays, room: Work) -> None:
     """Count the turns of angle forces."""
-    m, w = model.raw(arrays), dynamics.raw(room)
-    dynamics.remember(tile, m, w)
+    m, w = raw(arrays), raw(room)
+    remember(tile, m, w)
 
 
 @dataclass(frozen=True)
@@ -108,24 +101,30 @@ class Evaluation:
 
 
 class Points(NamedTuple):
-    """Vectors that are affine in the coordinates: matrix (vectors, unknowns) and constant (vectors,), complex."""
+    """Vectors that are affine in the coordinates: matrix (vectors, d, unknowns) and constant (vectors, d)."""
 
-    matrix: npt.NDArray[np.complex128]
-    constant: npt.NDArray[np.complex128]
+    matrix: Array
+    constant: Array
 
-    def at(self, q: Array) -> npt.NDArray[np.complex128]:
-        """The vectors x + iy at the coordinates q."""
+    def at(self, q: Array) -> Array:
+        """The vectors at the coordinates q, (vectors, d)."""
         return self.matrix @ q + self.constant
+
+    def turning(self, q: Array) -> Array:
+        """Of directions: the derivatives of their angles [rad] at q, (vectors, unknowns)."""
+        now = self.at(q)
+        x, y = self.matrix.transpose(1, 0, 2)
+        return np.asarray(plane.cross(now.T[..., None], (x, y)) / np.sum(now**2, axis=1)[:, None])
 
 
 def points(vectors: Sequence[Affine], unknowns: int) -> Points:
     """Vectors of a placement as one matrix."""
-    matrix = np.zeros((len(vectors), unknowns), dtype=complex)
-    constant = np.zeros(len(vectors), dtype=complex)
+    matrix = np.zeros((len(vectors), plane.DIMENSIONS, unknowns))
+    constant = np.zeros((len(vectors), plane.DIMENSIONS))
     for k, vector in enumerate(vectors):
-        constant[k] = complex(vector.constant)
+        constant[k] = vector.constant[:, 0]
         for unknown, coefficient in vector.terms.items():
-            matrix[k, unknown] += complex(coefficient)
+            matrix[k, :, unknown] += coefficient[:, 0]
     return Points(matrix, constant)
 
 
@@ -138,7 +137,7 @@ class Evaluator:
         self._room = work_space(SINGLE, self._arrays)
         self._arrays = ready(SINGLE, self._arrays, self._room)
         self._tangent = tangent_tile(model, SINGLE, _LANE)
-        self.mass = _symmetric(self._tangent.pattern, self._tangent.mass)
+        self.mass = sparse.matrix(self._tangent.pattern, self._tangent.mass)
         self._rows = _expansion(model)
         self._enter(model.q0[:, 0], None)
         derived_rows(SINGLE, self._arrays, self._room)
@@ -198,7 +197,7 @@ class Evaluator:
         if multipliers is not None:
             tangent = self._tangent
             np.add.at(values, tangent.curvature, tangent.bend * multipliers[tangent.owner])
-        return scipy.sparse.csc_array(_symmetric(self._tangent.pattern, values) + self._load_stiffness(arrays, t))
+        return scipy.sparse.csc_array(sparse.matrix(self._tangent.pattern, values) + self._load_stiffness(arrays, t))
 
     def damping(self, q: Array, v: Array | None = None, *, dry: bool = False) -> scipy.sparse.csc_array:
         """-dQ/dv, (unknowns, unknowns); dry: with the slope of smoothed dry friction, which is huge at rest."""
@@ -210,8 +209,8 @@ class Evaluator:
             arrays = arrays._replace(forces=arrays.forces._replace(law=law))
         both = stiffness_at(SINGLE, arrays, self._tangent, self._room, 1.0)
         values = both - stiffness_at(SINGLE, arrays, self._tangent, self._room, 0.0)
-        damped = arrays.elements.cubics.damped or arrays.elements.quintics.damped or arrays.forces.size > 0
-        return _symmetric(self._tangent.pattern, values if damped else 0.0 * values)
+        damped = arrays.forces.size > 0 or any(family.damped for family in arrays.elements)
+        return sparse.matrix(self._tangent.pattern, values if damped else 0.0 * values)
 
     def strain_energies(self, q: Array) -> dict[str, float]:
         """Strain energy [J] of every flexible body."""
@@ -252,21 +251,21 @@ class Evaluator:
     def _only(self, body: str, number: int | None = None) -> Arrays:
         """The arrays with the stiffness of one element of a body (or of all of them), and with no loads."""
         arrays = self._arrays
-        families = {}
-        for (name, (size, first)), owners in zip(_STIFF.items(), self.model.owners, strict=True):
-            family = getattr(arrays.elements, name)
-            values = family.coefficients.reshape(-1, size).copy()
+        families = []
+        for family, owners in zip(arrays.elements, self.model.owners, strict=True):
+            kernel = KERNELS[type(family)]
+            values = family.coefficients.reshape(-1, kernel.coefficients).copy()
             for row, owner in enumerate(owners):
                 if owner != body or number not in (None, row - owners.index(owner)):
-                    values[row, first:] = 0.0
-            families[name] = family._replace(coefficients=values.ravel())
+                    values[row, kernel.first_stiffness :] = 0.0
+            families.append(family._replace(coefficients=values.ravel()))
         law = np.zeros_like(arrays.forces.law)
         law[forces.SPEED :: forces.LAW] = 1.0
         none = np.full_like(arrays.forces.table, -1)
         applied = arrays.applied
         return arrays._replace(
             weight=0.0 * arrays.weight,
-            elements=arrays.elements._replace(**families),
+            elements=tuple(families),
             forces=arrays.forces._replace(law=law, table=none, energy=none),
             applied=applied._replace(coefficient=0.0 * applied.coefficient, factor=0.0 * applied.factor),
         )
@@ -304,12 +303,12 @@ class Evaluator:
             return float("nan")
         strength = self._strengths(arrays, applied.fixed_function, t)
         total = -float(np.sum(applied.coefficient * strength * z[applied.row])) if applied.fixed else 0.0
-        rows = arrays.forces.rows.reshape(-1, forces.ROWS)
+        rows = arrays.forces.rows.reshape(-1, forces.side(arrays.forces))
         for k, torque in self._torques(arrays, t):
             ax, ay, bx, by = z[rows[k, :4]]
             last = self._room.memory[k]
-            change = np.angle(complex(bx, by) * complex(ax, -ay) * np.exp(-1j * last))
-            total -= torque * (last + change)
+            change = plane.angle((bx, by)) - plane.angle((ax, ay)) - last
+            total -= torque * (last + change - 2 * np.pi * np.rint(change / (2 * np.pi)))
         return total
 
     def _load_stiffness(self, arrays: Arrays, t: float) -> scipy.sparse.csc_array:
@@ -325,7 +324,7 @@ class Evaluator:
             # d/dd of R d/|d| with R = [[fx, -fy], [fy, fx]]: R (I - n n')/|d|
             normal = np.array([[dy * dy, -dx * dy], [-dx * dy, dx * dx]]) / size**3
             parts.append((rows[:2], rows[2:], -np.array([[fx, -fy], [fy, fx]]) @ normal))
-        pairs = arrays.forces.rows.reshape(-1, forces.ROWS)
+        pairs = arrays.forces.rows.reshape(-1, forces.side(arrays.forces))
         for k, torque in self._torques(arrays, t):
             for rows, sign in ((pairs[k, :2], -1.0), (pairs[k, 2:4], 1.0)):
                 x, y = z[rows]
@@ -350,10 +349,3 @@ def _expansion(model: Model) -> Sparse:
     column = np.concatenate([np.arange(n), d.source])
     value = np.concatenate([np.ones(n), d.coefficient[:, 0] if len(d.source) else np.zeros(0)])
     return Sparse((value, (row, column)), shape=(model.rows, n))
-
-
-def _symmetric(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
-    """The matrix whose lower triangle lies in the slots of a pattern."""
-    n = pattern.size
-    lower = scipy.sparse.csc_array((values[n:], pattern.row, pattern.column), shape=(n, n))
-    return scipy.sparse.csc_array(lower + lower.T + scipy.sparse.diags_array(values[:n]))

@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse
 
-from shoal.mechanics.analysis.evaluate import Evaluator, Points, points
-from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics import plane
+from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.assembly.frames import BeamFrame, Frame, PointFrame
-from shoal.mechanics.assembly.placement import Placement, place
+from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.forces import LAW
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import InitialState, RigidBody, Scene
@@ -48,7 +48,7 @@ class FreeBodies:
         """The mass matrix of inertias alone [kg m^2]."""
         diagonal = np.zeros(self.unknowns)
         for name, inertia in added.items():
-            for row in vectors(self.placement.frames[name])[1].pair or ():
+            for row in self.placement.frames[name].vectors[1].own or ():
                 diagonal[row] = inertia
         return scipy.sparse.csc_array(scipy.sparse.diags_array(diagonal))
 
@@ -59,8 +59,8 @@ class FreeBodies:
 
     def state(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """Coordinates, rates and accelerations of the free bodies."""
-        matrix = self._map.matrix.real
-        return matrix @ q + self._map.constant.real, matrix @ v, matrix @ a
+        matrix, constant = self._map
+        return matrix @ q + constant, matrix @ v, matrix @ a
 
 
 def _without_joints(scene: Scene, placement: Placement) -> Scene:
@@ -68,13 +68,13 @@ def _without_joints(scene: Scene, placement: Placement) -> Scene:
     initial = {}
     for name in scene.bodies:
         pose, start = placement.poses[name], placement.scene.start(name)
-        angle = start.angle + float(np.angle(pose.direction * np.exp(-1j * start.angle)))
-        where, speed = complex(pose.position), complex(pose.velocity)
+        axis, turning = pose.directors[0, :, 0], pose.turning[0, :, 0]
+        turn = float(plane.angle(axis)) - start.angle
         initial[name] = InitialState.model_construct(
-            angle=angle,
-            rate=float(pose.rate),
-            position=(where.real, where.imag),
-            velocity=(speed.real, speed.imag),
+            angle=start.angle + turn - 2 * np.pi * np.rint(turn / (2 * np.pi)),
+            rate=float(plane.cross(axis, turning)),
+            position=tuple(pose.position[:, 0].tolist()),
+            velocity=tuple(pose.velocity[:, 0].tolist()),
         )
     return scene.model_copy(update={"joints": {}, "initial": initial})
 
@@ -89,26 +89,15 @@ def _with_inertia(scene: Scene) -> tuple[Scene, dict[str, float]]:
     return scene.model_copy(update={"bodies": bodies}), lent
 
 
-def vectors(frame: Frame) -> list[Affine]:
-    """The vectors that are a body's own coordinates when it is free."""
-    if isinstance(frame, PointFrame):
-        return [frame.origin]
-    if isinstance(frame, BeamFrame):
-        return [vector for node in frame.nodes for vector in node]
-    return [frame.origin, frame.axis]
-
-
-def _coordinates(free: Placement, joined: Placement, unknowns: int) -> Points:
-    """Coordinates of the free bodies by those of the machine; real."""
+def _coordinates(free: Placement, joined: Placement, unknowns: int) -> tuple[Array, Array]:
+    """Coordinates of the free bodies by those of the machine: a matrix and a constant."""
     pairs = [(free.drivers[name], joined.drivers[name]) for name in free.drivers]
     for name, frame in free.frames.items():
-        pairs += zip(vectors(frame), vectors(joined.frames[name]), strict=True)
-    matrix = np.zeros((len(free.positions), unknowns), dtype=complex)
-    constant = np.zeros(len(free.positions), dtype=complex)
+        pairs += zip(frame.vectors, joined.frames[name].vectors, strict=True)
+    matrix = np.zeros((len(free.positions), unknowns))
+    constant = np.zeros(len(free.positions))
     found = points([there for _, there in pairs], unknowns)
     for k, (here, _) in enumerate(pairs):
-        assert here.pair is not None
-        x, y = here.pair
-        matrix[x], matrix[y] = found.matrix[k].real, found.matrix[k].imag
-        constant[x], constant[y] = found.constant[k].real, found.constant[k].imag
-    return Points(matrix, constant)
+        rows = list(here.own or ())
+        matrix[rows], constant[rows] = found.matrix[k], found.constant[k]
+    return matrix, constant

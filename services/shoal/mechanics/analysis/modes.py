@@ -172,13 +172,11 @@ def _modes(scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int
     placement, unknowns = place(scene), evaluator.model.unknowns
     at = points([placement.point(scene, side) for side in scene.markers.values()], unknowns).matrix
     lines = points([placement.direction(scene, side) for side in scene.markers.values()], unknowns)
-    direction = lines.at(q)
-    turning = np.imag(np.conj(direction)[:, None] * lines.matrix) / np.abs(direction)[:, None] ** 2
+    turning = lines.turning(q)
     found = []
     for value, y in zip(values[keep], shapes.T[keep], strict=True):
         shape = basis @ y
-        moved = np.column_stack([at.real @ shape, at.imag @ shape])
-        found.append(Mode(complex(value), shape, moved, turning @ shape))
+        found.append(Mode(complex(value), shape, at @ shape, turning @ shape))
     balanced = balance.residual(view) < 1e-5
     return Modes(scene, about, balanced, message, q, tuple(scene.markers), tuple(found))
 

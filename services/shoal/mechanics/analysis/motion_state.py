@@ -8,15 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from shoal.errors import ComputationError, InputError
-from shoal.mechanics import forces, stability
+from shoal.mechanics import stability
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.integrators import choose, facts, halting, pick
 from shoal.mechanics.march import march
-from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import SINGLE, Array
-from shoal.mechanics.tangent import ready
+from shoal.mechanics.simulate import at_start, check_step
 from shoal.scene import Scene
 
 LANE = slice(0, 1)
@@ -42,17 +40,14 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
         raise InputError("times: give times of at least 0 s")
     model = build(scene, horizon=max(times))
     choice = pick(scene.solver, model, stability.step_limit)
-    if max(times) > 0 and scene.solver.step > choice.limit:
-        raise InputError(
-            f"solver.step: {scene.solver.step:g} s is beyond the stability limit {choice.limit:.3e} s of "
-            f"{choice.name} for this scene; use a smaller step or solver.integrator=generalized-alpha"
-        )
+    if max(times) > 0:
+        check_step(scene, choice)
     evaluator = Evaluator(model)
     n = model.unknowns
     none = np.zeros(0, dtype=np.int64)
     found = []
     for time in map(float, times):
-        arrays, room = at_start(model)
+        arrays, room = at_start(model, SINGLE, LANE)
         steps = max(1, int(np.ceil(time / scene.solver.step - 1e-9))) if time > 0 else 0
         step = time / steps if steps else scene.solver.step
         scheme = choose(scene.solver, model, SINGLE, LANE, choice.name)
@@ -66,15 +61,3 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
         evaluator.turns = room.memory
         found.append(State(time, q, v, evaluator.acceleration(q, v, time), room.memory.copy()))
     return evaluator, found
-
-
-def at_start(model: Model) -> tuple[Arrays, Work]:
-    """The arrays and the work space of one lane that stands at its start, as a march takes them."""
-    n = model.unknowns
-    arrays = model.tile(SINGLE, LANE)
-    room = work_space(SINGLE, arrays)
-    arrays = ready(SINGLE, arrays, room)
-    room.z[:n], room.zdot[:n] = model.q0[:, 0], model.v0[:, 0]
-    derived_rows(SINGLE, arrays, room)
-    room.memory[:] = forces.initial_memory(SINGLE, arrays.forces, room.z, model.start_angles[:, 0])
-    return arrays, room

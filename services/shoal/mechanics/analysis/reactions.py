@@ -13,20 +13,20 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from shoal.mechanics.analysis.evaluate import Evaluator
-from shoal.mechanics.analysis.free_bodies import FreeBodies, vectors
+from shoal.mechanics import plane
+from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.motion_state import states
 from shoal.mechanics.assembly.affine import Affine
-from shoal.mechanics.assembly.frames import BeamFrame, PointFrame
-from shoal.mechanics.assembly.pose import unit
+from shoal.mechanics.assembly.frames import BeamFrame, RigidFrame
+from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, conditions
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import Attachment, Coupling, Distance, Revolute, Scene, Slider, Weld
+from shoal.scene import Attachment, Coupling, Revolute, Scene, Slider
+from shoal.scene.joints import places
 from shoal.trajectory import plain
 
-Complex = npt.NDArray[np.complex128]
 RANK = 1e-9
 SHARE = 1e-6
 """A component that takes part in a self-stress (of unit size) by less than this is unique."""
@@ -44,8 +44,8 @@ class JointReaction:
 
     joint: str
     kind: str
-    at: tuple[float, float]
-    force: tuple[float, float]
+    at: tuple[float, ...]
+    force: tuple[float, ...]
     torque: float
     components: dict[str, float]
     unique: bool
@@ -93,7 +93,7 @@ class _Component(NamedTuple):
     joint: str
     name: str
     gradient: Array
-    force: complex
+    force: Array
     torque: bool
 
 
@@ -140,15 +140,15 @@ def reactions_of(
     for name in bodies.scene.joints:
         mine = [k for k, part in enumerate(unknown) if part.joint == name]
         values = {k: float(solution[k]) * (lever if unknown[k].torque else 1.0) for k in mine}
-        total = sum((unknown[k].force * values[k] for k in mine), 0j) + rubbed.get(name, (0j, 0.0))[0]
-        torque = sum(values[k] for k in mine if unknown[k].torque) + rubbed.get(name, (0j, 0.0))[1]
+        rubbing_force, rubbing_torque = rubbed.get(name, (np.zeros(plane.DIMENSIONS), 0.0))
+        total = sum((unknown[k].force * values[k] for k in mine), rubbing_force)
+        torque = sum(values[k] for k in mine if unknown[k].torque) + rubbing_torque
         joint = bodies.scene.joints[name]
-        place = complex(_value(bodies, _second(joint), at)[0])
         joints[name] = JointReaction(
             name,
             joint.kind,
-            (place.real, place.imag),
-            (float(total.real), float(total.imag)),
+            tuple(_place(bodies, _second(joint), at).value.tolist()),
+            tuple(total.tolist()),
             float(torque),
             {unknown[k].name: values[k] for k in mine},
             bool(np.all(free_play[mine] < SHARE)),
@@ -179,93 +179,94 @@ def redundant_constraints(evaluator: Evaluator, q: Array, t: float = 0.0) -> tup
 
 
 def _second(joint: Any) -> Attachment:
-    return joint.terms[0].at if isinstance(joint, Coupling) else joint.second
+    return places(joint)[0] if isinstance(joint, Coupling) else joint.second
 
 
-def _rows(bodies: FreeBodies, vector: Affine) -> Complex:
-    row = np.zeros(bodies.unknowns, dtype=complex)
-    for unknown, coefficient in vector.terms.items():
-        row[unknown] = complex(coefficient)
-    return row
+class _Moving(NamedTuple):
+    """A vector of the free bodies and its derivative: (d,) and (d, unknowns)."""
+
+    value: Array
+    slope: Array
 
 
-def _value(bodies: FreeBodies, side: Attachment, at: Array) -> tuple[complex, Complex]:
-    """Place [m] of an attachment and its derivative."""
-    vector = bodies.placement.point(bodies.scene, side)
-    row = _rows(bodies, vector)
-    return complex(row @ at + vector.constant), row
+def _moving(bodies: FreeBodies, vector: Affine, at: Array) -> _Moving:
+    found = points([vector], bodies.unknowns)
+    return _Moving(found.at(at)[0], found.matrix[0])
 
 
-def _direction(bodies: FreeBodies, side: Attachment, at: Array) -> tuple[complex, Complex]:
-    """Direction vector at an attachment and its derivative."""
-    vector = bodies.placement.direction(bodies.scene, side)
-    row = _rows(bodies, vector)
-    return complex(row @ at + vector.constant), row
+def _place(bodies: FreeBodies, side: Attachment, at: Array) -> _Moving:
+    return _moving(bodies, bodies.placement.point(bodies.scene, side), at)
 
 
-def _turning(bodies: FreeBodies, joint: Any, at: Array) -> Array:
+def _gap(bodies: FreeBodies, condition: Any, at: Array) -> _Moving:
+    return _moving(bodies, bodies.placement.gap(bodies.scene, condition), at)
+
+
+def _turning(bodies: FreeBodies, condition: Any, at: Array) -> Array:
     """d(angle of second - angle of first)."""
-    total = np.zeros(bodies.unknowns)
-    for side, sign in ((joint.first, -1.0), (joint.second, 1.0)):
-        direction, row = _direction(bodies, side, at)
-        total += sign * np.imag(np.conj(direction) * row) / abs(direction) ** 2
-    return total
+    lines = [bodies.placement.direction(bodies.scene, side) for side in (condition.first, condition.second)]
+    first, second = points(lines, bodies.unknowns).turning(at)
+    return np.asarray(second - first)
 
 
-def _sliding(bodies: FreeBodies, joint: Slider, at: Array) -> tuple[complex, Array, Array]:
+def _sliding(bodies: FreeBodies, first: Attachment, second: Attachment, turn: float, at: Array) -> tuple[Array, ...]:
     """Unit vector of a slider's line, and the derivatives of the place along and across it [m]."""
-    line, line_row = _direction(bodies, joint.first, at)
-    turn = complex(unit(joint.direction))
-    line, line_row = line * turn, line_row * turn
-    (p, p_row), (q, q_row) = (_value(bodies, side, at) for side in (joint.first, joint.second))
-    size = abs(line)
-    both = (np.conj(line) * (q_row - p_row) + np.conj(line_row) * (q - p)) / size
-    # The line is a direction only: its length does no work.
-    both = both - np.conj(line) * (q - p) * np.real(np.conj(line) * line_row) / size**3
-    return line / size, both.real, both.imag
+    direction = bodies.placement.direction(bodies.scene, first).turned(plane.rotation(turn))
+    line, gap = _moving(bodies, direction, at), _gap(bodies, Along(first, second, turn), at)
+    size = np.hypot(*line.value)
+    e = line.value / size
+    # The line is a direction only: its length does no work, only its turn does.
+    turning = plane.cross(line.value, line.slope) / size**2
+    along = e @ gap.slope + plane.cross(e, gap.value) * turning
+    across = plane.cross(e, gap.slope) - (e @ gap.value) * turning
+    return e, along, across
 
 
 def _components(bodies: FreeBodies, name: str, at: Array) -> list[_Component]:
     """The unknowns of a joint."""
-    joint = bodies.scene.joints[name]
-    if isinstance(joint, Coupling):
-        gradient = np.zeros(bodies.unknowns)
-        for term in joint.terms:
-            _, row = _value(bodies, term.at, at)
-            gradient += term.factor * (row.real if term.axis == "x" else row.imag)
-        first = joint.terms[0]
-        return [_Component(name, "coupled", gradient, first.factor * (1.0 if first.axis == "x" else 1j), False)]
-    (p, p_row), (q, q_row) = (_value(bodies, side, at) for side in (joint.first, joint.second))
-    gap = q_row - p_row
-    found = []
-    if isinstance(joint, Revolute | Weld):
-        found += [_Component(name, "fx", gap.real, 1.0, False), _Component(name, "fy", gap.imag, 1j, False)]
-    elif isinstance(joint, Slider):
-        line, _, across = _sliding(bodies, joint, at)
-        found.append(_Component(name, "normal", across, 1j * line, False))
-    elif isinstance(joint, Distance):
-        along = (q - p) / abs(q - p) if q != p else 1.0
-        found.append(_Component(name, "axial", np.real(np.conj(along) * gap), along, False))
-    if not isinstance(joint, Revolute | Distance) and not (isinstance(joint, Slider) and joint.rotation == "free"):
-        found.append(_Component(name, "torque", _turning(bodies, joint, at), 0.0, True))
-    return found
+    return [part for one in conditions(bodies.scene.joints[name]) for part in _of_condition(bodies, name, one, at)]
 
 
-def _friction(bodies: FreeBodies, at: Array, rate: Array) -> tuple[Array, dict[str, tuple[complex, float]]]:
+def _of_condition(bodies: FreeBodies, name: str, condition: Condition, at: Array) -> list[_Component]:
+    if isinstance(condition, Sum):
+        axes = ["xyz".index(term.axis) for term in condition.terms]
+        rows = [_place(bodies, term.at, at).slope[axis] for term, axis in zip(condition.terms, axes, strict=True)]
+        gradient = sum(term.factor * row for term, row in zip(condition.terms, rows, strict=True))
+        force = condition.terms[0].factor * np.eye(plane.DIMENSIONS)[axes[0]]
+        return [_Component(name, "coupled", np.asarray(gradient), force, False)]
+    if isinstance(condition, Turned):
+        none = np.zeros(plane.DIMENSIONS)
+        return [_Component(name, "torque", _turning(bodies, condition, at), none, True)]
+    if isinstance(condition, Along):
+        e, _, across = _sliding(bodies, condition.first, condition.second, condition.direction, at)
+        return [_Component(name, "normal", across, plane.quarter(e), False)]
+    gap = _gap(bodies, condition, at)
+    if isinstance(condition, Apart):
+        length = np.hypot(*gap.value)
+        along = gap.value / length if length > 0 else np.eye(plane.DIMENSIONS)[0]
+        return [_Component(name, "axial", along @ gap.slope, along, False)]
+    assert isinstance(condition, Meet)
+    return [
+        _Component(name, f"f{axis}", slope, unit, False)
+        for axis, slope, unit in zip("xyz", gap.slope, np.eye(plane.DIMENSIONS), strict=False)
+    ]
+
+
+def _friction(bodies: FreeBodies, at: Array, rate: Array) -> tuple[Array, dict[str, tuple[Array, float]]]:
     """Generalised force of all joint friction, and force and torque of each joint's on its second body."""
     total = np.zeros(bodies.unknowns)
-    each: dict[str, tuple[complex, float]] = {}
+    each: dict[str, tuple[Array, float]] = {}
     for name, joint in bodies.scene.joints.items():
         if not (isinstance(joint, Revolute | Slider) and (joint.friction or joint.coulomb)):
             continue
         if isinstance(joint, Revolute):
-            line, gradient = 0j, _turning(bodies, joint, at)
+            line, gradient = np.zeros(plane.DIMENSIONS), _turning(bodies, joint, at)
         else:
-            line, gradient, _ = _sliding(bodies, joint, at)
+            line, gradient, _ = _sliding(bodies, joint.first, joint.second, joint.direction, at)
         speed = float(gradient @ rate)
         drag = -joint.friction * speed - joint.coulomb * float(np.tanh(speed / joint.coulomb_speed))
         total += drag * gradient
-        each[name] = (line * drag, 0.0 if line else drag)
+        each[name] = (line * drag, 0.0 if np.any(line) else drag)
     return total, each
 
 
@@ -273,32 +274,26 @@ def _displacements(bodies: FreeBodies, at: Array, lever: float) -> Array:
     """Displacements of the free bodies whose work must vanish, (displacements, unknowns)."""
     rows = []
 
-    def add(*parts: tuple[Any, complex]) -> None:
+    def add(vector: Affine, value: Array) -> None:
         row = np.zeros(bodies.unknowns)
-        for vector, value in parts:
-            x, y = vector.pair
-            row[x], row[y] = value.real, value.imag
+        row[list(vector.own or ())] = value
         rows.append(row)
 
+    axes = np.eye(plane.DIMENSIONS)
     for frame in bodies.placement.frames.values():
-        if isinstance(frame, PointFrame | BeamFrame):
-            order = len(frame.nodes[0]) if isinstance(frame, BeamFrame) else 1
-            for k, vector in enumerate(vectors(frame)):
-                scale = lever ** -float(k % order)
-                add((vector, scale + 0j))
-                add((vector, 1j * scale))
-            continue
-        add((frame.origin, 1.0 + 0j))
-        add((frame.origin, 1j))
-        assert frame.axis.pair is not None
-        x, y = frame.axis.pair
-        add((frame.axis, 1j * complex(at[x], at[y]) / lever))
+        order = len(frame.nodes[0]) if isinstance(frame, BeamFrame) else 1
+        free = frame.vectors[:1] if isinstance(frame, RigidFrame) else frame.vectors
+        for k, vector in enumerate(free):
+            for axis in axes:
+                add(vector, axis * lever ** -float(k % order))
+        if isinstance(frame, RigidFrame):
+            add(frame.directors[0], plane.quarter(frame.directors[0].at(at)) / lever)
     return np.array(rows)
 
 
 def _lever(bodies: FreeBodies, at: Array) -> float:
     """The size of the machine [m]: its largest distance between joints, or 1."""
-    places = [_value(bodies, _second(joint), at)[0] for joint in bodies.scene.joints.values()]
+    found = [_place(bodies, _second(joint), at).value for joint in bodies.scene.joints.values()]
     for body in bodies.scene.bodies.values():
-        places += [complex(*point) for point in body.points.values()]
-    return float(max((abs(a - b) for a in places for b in places), default=0.0)) or 1.0
+        found += [np.array(point) for point in body.points.values()]
+    return float(max((np.hypot(*(a - b)) for a in found for b in found), default=0.0)) or 1.0

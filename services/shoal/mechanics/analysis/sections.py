@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.mechanics import plane
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.assembly.frames import BeamFrame
-from shoal.mechanics.assembly.pose import as_complex
 from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, DistributedForce, Rod, Scene
@@ -51,32 +51,27 @@ def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: 
     element = ELEMENTS[body.element]
     length = float(frame.element_length)
     broken = _interrupted(scene, rod, body)
-    load = as_complex(scene.gravity)
+    load = np.array(scene.gravity)
     along = [d for d in scene.loads.values() if isinstance(d, DistributedForce) and d.body == rod]
     rows: list[tuple[float, float, float, float]] = []
     for number, elastic in enumerate(bodies.evaluator.element_forces(at, rate, rod)):
         height, width = body.section((number + 0.5) / body.elements)
-        pairs = [pair for vector in frame.vectors(number) if (pair := vector.pair)]
-        vectors = np.array([complex(at[x], at[y]) for x, y in pairs])
-        changes = np.array([complex(change[x], change[y]) for x, y in pairs])
-        inertia = np.array(element.mass(body.density, height, width, length)) @ changes
-        weight = np.array(element.weight(body.density, height, width, length)) * load
+        own = np.array([vector.own for vector in frame.of_element(number)])
+        inertia = np.array(element.mass(body.density, height, width, length)) @ change[own]
+        weight = np.outer(element.weight(body.density, height, width, length), load)
         unit = np.array(element.weight(1.0, 1.0, 1.0, length))
         for one in along:
-            weight = weight + unit * as_complex(one.force) * float(one.scale(np.array(t)))
-        inner = np.array([complex(elastic[x], elastic[y]) for x, y in pairs])
-        ends = inertia - inner - weight
+            weight = weight + np.outer(unit, one.force) * float(one.scale(np.array(t)))
+        ends = inertia - elastic[own] - weight
         order = len(ends) // 2
         for end in range(2):
             part = slice(end * order, (end + 1) * order)
             s = (number + end) * length
-            direction = frame.direction(complex(s))
-            tangent = sum((c * at[unknown] for unknown, c in direction.terms.items()), complex(direction.constant))
-            tangent = tangent / abs(tangent)
-            sign = 1.0 if end == 1 else -1.0
-            force = sign * np.conj(tangent) * ends[part][0]
-            moment = sign * float(np.sum(np.imag(np.conj(vectors[part][1:]) * ends[part][1:])))
-            row = (float(force.real), float(force.imag), moment)
+            tangent = frame.direction((s, 0.0)).at(at)
+            tangent = tangent / np.hypot(*tangent)
+            force = (1.0 if end == 1 else -1.0) * ends[part][0]
+            moment = (1.0 if end == 1 else -1.0) * np.sum(plane.cross(at[own][part][1:].T, ends[part][1:].T))
+            row = (float(tangent @ force), float(plane.cross(tangent, force)), float(moment))
             rows.append((s, *row) if number not in broken else (s, np.nan, np.nan, np.nan))
     s, normal, shear, bending = np.array(rows).T
     return Sections(s, normal, shear, bending)

@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from shoal.mechanics import plane
 from shoal.mechanics.analysis.balance import Balance, Found, zero_level
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.reactions import Reactions, reactions_of
+from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.assembly.groups import start_angle
-from shoal.mechanics.assembly.placement import Placement, place
+from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
@@ -222,7 +224,7 @@ class _Search:
             q=q,
             multipliers=view.multipliers,
             markers=tuple(self.scene.markers),
-            points=np.column_stack([at.real, at.imag]),
+            points=at,
             angles=self.angles.copy(),
             energy={"strain": e.strain, "gravity": e.gravity, "applied": float(e.applied)},
             strain_energy=self.evaluator.strain_energies(q),
@@ -317,7 +319,8 @@ class _Search:
 
     def _turn(self, one: Array, other: Array) -> float:
         """Largest turn [rad] of a body or section between two states."""
-        change = np.angle(self.directions.at(other) * np.conj(self.directions.at(one)))
+        here, there = (self.directions.at(state).T for state in (one, other))
+        change = np.arctan2(plane.cross(here, there), np.sum(here * there, axis=0))
         return float(np.max(np.abs(change), initial=0.0))
 
     def _way(self, one: Array, other: Array) -> float:
@@ -329,15 +332,15 @@ class _Search:
     def _follow(self, q: Array) -> None:
         """Count the turns of springs and markers."""
         self.evaluator.remember(q)
-        now = self.marker_lines.at(q)
-        self.angles = self.angles + np.angle(now * np.exp(-1j * self.angles))
+        change = plane.angle(self.marker_lines.at(q).T) - self.angles
+        self.angles = self.angles + change - 2 * np.pi * np.rint(change / (2 * np.pi))
 
     def _movers(self, displacement: Array) -> str:
         """The bodies that a displacement moves, most of all first."""
         sizes = {}
         for name, frame in self.placement.frames.items():
             moving = points(_vectors(frame, self.balance.size), len(displacement)).matrix @ displacement
-            sizes[name] = float(np.max(np.abs(moving)))
+            sizes[name] = float(np.max(np.linalg.norm(moving, axis=1)))
         largest = max(sizes.values())
         ranked = sorted((name for name in sizes if sizes[name] > 0.1 * largest), key=lambda name: -sizes[name])
         return ", ".join(ranked[:4]) + (", ..." if len(ranked) > 4 else "")
@@ -348,10 +351,10 @@ def _directions(placement: Placement) -> list[Any]:
     found = []
     for frame in placement.frames.values():
         if isinstance(frame, RigidFrame):
-            found.append(frame.axis)
+            found.append(frame.directors[0])
         elif isinstance(frame, BeamFrame):
             count = len(frame.nodes)
-            found += [frame.direction(complex(float(frame.length) * k / (count - 1))) for k in range(count)]
+            found += [frame.direction((float(frame.length) * k / (count - 1), 0.0)) for k in range(count)]
     return found
 
 
@@ -360,5 +363,5 @@ def _vectors(frame: Any, size: float) -> list[Any]:
     if isinstance(frame, PointFrame):
         return [frame.origin]
     if isinstance(frame, RigidFrame):
-        return [frame.origin, frame.origin + frame.axis * size]
+        return [frame.origin, frame.origin + frame.directors[0] * size]
     return [node[0] for node in frame.nodes]

@@ -1,20 +1,18 @@
 """Points and directions of bodies as affine functions of the coordinates.
 
-A planar vector is one complex number x + iy; a coordinate is a real unknown with a complex coefficient. What joints
-share is eliminated by substituting such expressions: a point shared by two bodies, a direction kept by a weld, a
-place on a fixed line (one unknown). No multiplier, no drift.
+A coordinate is a real unknown, its coefficient a vector of R^d. What joints share is eliminated by substituting such
+expressions: a point shared by two bodies, a direction kept by a weld, a place on a fixed line (one unknown). No
+multiplier, no drift.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-Number = Any
-"""A real or complex scalar, or an array of one number per lane."""
+from shoal.mechanics.numerics.tile import Array, Number
 
 
 def is_zero(value: Number) -> bool:
@@ -24,10 +22,13 @@ def is_zero(value: Number) -> bool:
 
 @dataclass(frozen=True)
 class Affine:
-    """constant + sum of coefficient * unknown; unknowns are real and numbered, coefficients complex."""
+    """constant + sum of coefficient * unknown; the unknowns are numbered.
 
-    terms: Mapping[int, Number]
-    constant: Number = 0.0
+    Coefficients and constant are vectors (d, lanes), or (d, 1) where they do not depend on the lane.
+    """
+
+    terms: Mapping[int, Array]
+    constant: Array
 
     def __add__(self, other: Affine) -> Affine:
         terms = dict(self.terms)
@@ -42,16 +43,43 @@ class Affine:
     def __sub__(self, other: Affine) -> Affine:
         return self + other * -1.0
 
+    def turned(self, matrix: Array) -> Affine:
+        """The vector mapped by a matrix, (d, d) or (d, d, lanes)."""
+        matrix = matrix if matrix.ndim == 3 else matrix[..., None]
+        return Affine({unknown: mapped(matrix, c) for unknown, c in self.terms.items()}, mapped(matrix, self.constant))
+
     @property
-    def pair(self) -> tuple[int, int] | None:
-        """The two unknowns that are the x and y of this vector, if it is just that."""
-        if len(self.terms) == 2 and is_zero(self.constant):
-            (first, x), (second, y) = self.terms.items()
-            if np.all(x == 1.0) and np.all(y == 1j):
-                return first, second
-        return None
+    def own(self) -> tuple[int, ...] | None:
+        """The d unknowns that are the components of this vector, if it is just that."""
+        axes = np.eye(len(self.constant))[..., None]
+        if len(self.terms) != len(axes) or not is_zero(self.constant):
+            return None
+        same = all(np.all(c == axis) for c, axis in zip(self.terms.values(), axes, strict=True))
+        return tuple(self.terms) if same else None
+
+    def at(self, q: Array) -> Array:
+        """Its value at coordinates, (d,), of a machine of one lane."""
+        return sum((c[:, 0] * q[unknown] for unknown, c in self.terms.items()), self.constant[:, 0])
+
+    def rate(self, v: Array) -> Array:
+        """Its rate of change at rates of the coordinates, (d,)."""
+        return sum((c[:, 0] * v[unknown] for unknown, c in self.terms.items()), 0.0 * self.constant[:, 0])
 
 
-def fixed(value: Number) -> Affine:
-    """A vector that does not move."""
+def mapped(matrix: Array, u: Array) -> Array:
+    """A matrix (d, d, lanes) times a vector (d, lanes)."""
+    return np.stack([sum(entry * part for entry, part in zip(row, u, strict=True)) for row in matrix])
+
+
+def fixed(value: Array) -> Affine:
+    """A vector that does not move, (d, lanes)."""
     return Affine({}, value)
+
+
+def combined(vectors: tuple[Affine, ...], factors: tuple[Number, ...]) -> Affine:
+    """The sum of vectors times numbers; those times zero are left out, so that their unknowns are."""
+    total = fixed(0.0 * vectors[0].constant)
+    for one, factor in zip(vectors, factors, strict=True):
+        if np.any(factor):
+            total = total + one * factor
+    return total

@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.assembly.affine import Affine, Number, fixed
+from shoal.mechanics import plane
+from shoal.mechanics.assembly.affine import Affine, combined, fixed
+from shoal.mechanics.elements.element import Element
+from shoal.mechanics.numerics.tile import Number
+
+Place = tuple[Number, ...]
+"""A place in a body's frame [m]; of a rod the arc length and the height above the axis."""
 
 
 @dataclass(frozen=True)
@@ -18,43 +24,52 @@ class PointFrame:
     name: str
     origin: Affine
 
-    def point(self, p: Number) -> Affine:
+    def point(self, place: Place) -> Affine:
         """The point itself, which is the only one there is."""
-        if np.any(p):
+        if np.any(place):
             raise InputError(f"bodies.{self.name}: a point mass has only the point [0, 0]")
         return self.origin
 
-    def direction(self, p: Number) -> Affine:
+    def direction(self, place: Place) -> Affine:
         """A point mass has none; its marker reports the angle zero."""
-        return fixed(1.0)
+        return fixed(np.eye(len(self.origin.constant))[0][:, None])
+
+    @property
+    def vectors(self) -> list[Affine]:
+        """The vectors that are its coordinates when it is free."""
+        return [self.origin]
 
 
 @dataclass(frozen=True)
 class RigidFrame:
-    """A rigid body: position r of its origin and unit vector e, both affine in the coordinates."""
+    """A rigid body: the position of its origin and the directors along its axes, all affine in the coordinates."""
 
     origin: Affine
-    axis: Affine
+    directors: tuple[Affine, ...]
 
-    def point(self, p: Number) -> Affine:
-        """The material point p = x + iy [m]."""
-        offset: Affine = self.axis * p
-        return self.origin + offset
+    def point(self, place: Place) -> Affine:
+        """The material point at a place."""
+        return self.origin + combined(self.directors, place)
 
-    def direction(self, p: Number) -> Affine:
+    def direction(self, place: Place) -> Affine:
         """A vector along the body's x axis."""
-        return self.axis
+        return self.directors[0]
+
+    @property
+    def vectors(self) -> list[Affine]:
+        """The vectors that are its coordinates when it is free: in the plane the first director turns the second."""
+        return [self.origin, self.directors[0]]
 
 
 @dataclass(frozen=True)
 class BeamFrame:
     """A flexible rod: the nodal vectors of its equally spaced nodes, and the element that interpolates them.
 
-    nodes: one tuple of vectors per node (position first), as the element's module orders them.
+    nodes: one tuple of vectors per node (position first), as the element's file orders them.
     """
 
     name: str
-    element: Any
+    element: Element
     length: Number
     nodes: tuple[tuple[Affine, ...], ...]
 
@@ -63,44 +78,46 @@ class BeamFrame:
         """Length of one element [m]."""
         return self.length / (len(self.nodes) - 1)
 
-    def vectors(self, number: int) -> list[Affine]:
+    @property
+    def vectors(self) -> list[Affine]:
+        """The vectors that are its coordinates when it is free."""
+        return [vector for node in self.nodes for vector in node]
+
+    def of_element(self, number: int) -> list[Affine]:
         """The nodal vectors of an element."""
         return [*self.nodes[number], *self.nodes[number + 1]]
 
-    def point(self, p: Number) -> Affine:
-        """The material point at the arc length p = s + iy [m], y off the axis."""
-        node = self.node(p)
-        if node is not None and is_on_axis(p):
+    def point(self, place: Place) -> Affine:
+        """The material point at an arc length and a height above the axis [m]."""
+        node = self.node(place)
+        if node is not None and is_on_axis(place):
             return self.nodes[node][0]
-        return self._blend(p, self.element.position_shape)
+        return self._blend(place, self.element.position_shape)
 
-    def direction(self, p: Number) -> Affine:
-        """A vector along the axis (of a section that shears: perpendicular to it) at the arc length p [m]."""
-        return self._blend(p, self.element.direction_shape)
+    def direction(self, place: Place) -> Affine:
+        """A vector along the axis (of a section that shears: perpendicular to it) at an arc length [m]."""
+        found = self._blend(place, self.element.direction_shape)
+        return found.turned(plane.QUARTER.T) if self.element.normal else found
 
-    def node(self, p: Number) -> int | None:
-        """The node at the arc length p, if there is one."""
-        place = np.real(p) / self.length * (len(self.nodes) - 1)
-        nearest = int(np.rint(np.asarray(place).flat[0]))
-        return nearest if np.all(np.abs(place - nearest) < 1e-9) else None
+    def node(self, place: Place) -> int | None:
+        """The node at an arc length, if there is one."""
+        number = place[0] / self.length * (len(self.nodes) - 1)
+        nearest = int(np.rint(np.asarray(number).flat[0]))
+        return nearest if np.all(np.abs(number - nearest) < 1e-9) else None
 
-    def _blend(self, p: Number, shape: Any) -> Affine:
+    def _blend(self, place: Place, shape: Any) -> Affine:
         elements = len(self.nodes) - 1
-        place = np.real(p) / np.asarray(self.length) * elements
-        number = min(int(np.min(place) + 1e-9), elements - 1)
-        if np.max(place) > number + 1 + 1e-9:
+        where = place[0] / np.asarray(self.length) * elements
+        number = min(int(np.min(where) + 1e-9), elements - 1)
+        if np.max(where) > number + 1 + 1e-9:
             raise InputError("markers: a marker must stay in one element of its cable while a length varies")
-        weights = shape(place - number, np.imag(p), np.asarray(self.element_length))
-        total = fixed(0.0)
-        for weight, vector in zip(weights, self.vectors(number), strict=True):
-            if np.any(weight):
-                total = total + vector * weight
-        return total
+        weights = shape(where - number, place[1], np.asarray(self.element_length))
+        return combined(tuple(self.of_element(number)), tuple(weights))
 
 
-def is_on_axis(p: Number) -> bool:
+def is_on_axis(place: Place) -> bool:
     """Whether a place of a rod has no offset from its axis."""
-    return not np.any(np.imag(p))
+    return not np.any(place[1])
 
 
 Frame = PointFrame | RigidFrame | BeamFrame

@@ -7,28 +7,30 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.assembly.affine import Affine, Number
-from shoal.mechanics.assembly.pose import as_complex, unit
-from shoal.scene import GROUND, Attachment, Coupling, Parallel, Perpendicular, Revolute, Rod, Scene, Slider, Weld
-
-Place = tuple[str, Number]
+from shoal.mechanics import joints, plane
+from shoal.mechanics.assembly.affine import Affine, combined, fixed
+from shoal.mechanics.assembly.frames import Place
+from shoal.mechanics.joints import Along, Meet, Turned
+from shoal.mechanics.numerics.tile import Array, Number
+from shoal.scene import GROUND, Attachment, Rod, Scene
 
 
 @dataclass
 class JointPoint:
     """Places that joints hold together; `where` is known once a body that has it is placed.
 
-    line: joint, point [m] and unit direction of a fixed line that the place stays on.
+    places: bodies and places in their frames [m]. line: joint, point [m] and unit direction of a fixed line that the
+    place stays on, (d, lanes) each.
     """
 
     name: str
-    places: list[Place]
+    places: list[tuple[str, Place]]
     where: Affine | None = None
-    line: tuple[str, Number, Number] | None = None
+    line: tuple[str, Array, Array] | None = None
     on_line: bool = False
     """Whether `where` was made so that the line holds."""
 
-    def local(self, body: str) -> Number:
+    def local(self, body: str) -> Place:
         """The place in a body's frame [m]."""
         return next(p for owner, p in self.places if owner == body)
 
@@ -37,11 +39,11 @@ class JointPoint:
         return any(owner == body for owner, _ in self.places)
 
 
-def place_of(scene: Scene, attachment: Attachment) -> Place:
+def place_of(scene: Scene, attachment: Attachment) -> tuple[str, Place]:
     """The body (or ground, or moving point of the ground) and the place in its frame [m]."""
     if attachment.body == GROUND and isinstance(attachment.point, str):
-        return moving(attachment.point), 0.0j
-    return attachment.body, as_complex(scene.location(attachment))
+        return moving(attachment.point), (0.0,) * plane.DIMENSIONS
+    return attachment.body, scene.location(attachment)
 
 
 def moving(point: str) -> str:
@@ -50,15 +52,14 @@ def moving(point: str) -> str:
 
 
 def joint_points(scene: Scene) -> list[JointPoint]:
-    """Group the places that revolute joints, welds and sliders on the ground name, transitively."""
+    """Group the places that joints let coincide, or keep on a line of the ground, transitively."""
     groups: list[JointPoint] = []
-    for name, joint in scene.joints.items():
-        if isinstance(joint, Revolute | Weld):
-            _merge(groups, JointPoint(name, [place_of(scene, joint.first), place_of(scene, joint.second)]))
-        elif isinstance(joint, Slider) and joint.first.body == GROUND and not isinstance(joint.first.point, str):
-            _, base = place_of(scene, joint.first)
-            line = (name, base, unit(joint.direction))
-            _merge(groups, JointPoint(name, [place_of(scene, joint.second)], line=line))
+    for name, condition in joints.of_scene(scene):
+        if isinstance(condition, Meet):
+            _merge(groups, JointPoint(name, [place_of(scene, side) for side in (condition.first, condition.second)]))
+        elif isinstance(condition, Along) and condition.is_fixed:
+            line = name, plane.vector(*scene.location(condition.first)), plane.vector(*plane.unit(condition.direction))
+            _merge(groups, JointPoint(name, [place_of(scene, condition.second)], line=line))
     for group in groups:
         bodies = [body for body, _ in group.places]
         for body in bodies:
@@ -66,7 +67,7 @@ def joint_points(scene: Scene) -> list[JointPoint]:
                 raise InputError(f"joints.{group.name}: two places of {body} cannot be joined into one point")
         grounded = [position for body, position in group.places if body == GROUND]
         if grounded:
-            group.where = Affine({}, grounded[0])
+            group.where = fixed(plane.vector(*grounded[0]))
     return groups
 
 
@@ -78,67 +79,78 @@ def _merge(groups: list[JointPoint], new: JointPoint) -> None:
     groups.append(new)
 
 
-def _same(one: Place, other: Place) -> bool:
-    return one[0] == other[0] and bool(np.all(np.abs(one[1] - other[1]) < 1e-12))
+def _same(one: tuple[str, Place], other: tuple[str, Place]) -> bool:
+    near = (np.all(np.abs(np.subtract(a, b)) < 1e-12) for a, b in zip(one[1], other[1], strict=True))
+    return one[0] == other[0] and all(near)
 
 
 @dataclass
 class Orientations:
-    """Rigid bodies that keep their relative angles: body -> (root, exp(i angle) from the root's axis to its own)."""
+    """Rigid bodies that keep their relative angles.
 
-    of: dict[str, tuple[str, Number]] = field(default_factory=dict)
-    axis: dict[str, Affine] = field(default_factory=dict)
-    """Axis of each root that has one already."""
+    of: body -> its root and the rotation (d, d, lanes) from the root's directors to its own, as columns. directors: of
+    each root that has them already.
+    """
 
-    def root(self, body: str) -> tuple[str, Number]:
-        """Root and relative direction of a body; a body by itself is its own root."""
-        return self.of.get(body, (body, 1.0 + 0.0j))
+    of: dict[str, tuple[str, Array]] = field(default_factory=dict)
+    directors: dict[str, tuple[Affine, ...]] = field(default_factory=dict)
 
-    def join(self, name: str, first: str, second: str, turn: Number) -> None:
-        """Keep second = turn * first. Raises InputError if other joints already keep another angle."""
+    def root(self, body: str) -> tuple[str, Array]:
+        """Root and relative rotation of a body; a body by itself is its own root."""
+        return self.of.get(body, (body, np.eye(plane.DIMENSIONS)[..., None]))
+
+    def of_body(self, body: str) -> tuple[Affine, ...]:
+        """The directors of a body whose root has them."""
+        root, relative = self.root(body)
+        return rotated(self.directors[root], relative)
+
+    def join(self, name: str, first: str, second: str, turn: Array) -> None:
+        """Keep second = first turned. Raises InputError if other joints already keep another angle."""
         (root, a), (other, b) = self.root(first), self.root(second)
         if root == other:
-            if np.any(np.abs(b - a * turn) > 1e-9):
+            if np.any(np.abs(b - product(a, turn)) > 1e-9):
                 raise InputError(f"joints.{name}: other joints already keep another angle between {first} and {second}")
             return
         if other == GROUND:  # the ground stays a root
-            root, other, a, b, turn = other, root, b, a, np.conj(turn)
-        shift = a * turn * np.conj(b)
+            root, other, a, b, turn = other, root, b, a, transposed(turn)
+        shift = product(product(a, turn), transposed(b))
         members = [body for body in {*self.of, other} if self.root(body)[0] == other]
         for body in members:
-            self.of[body] = (root, shift * self.root(body)[1])
+            self.of[body] = (root, product(shift, self.root(body)[1]))
+
+
+def product(a: Array, b: Array) -> Array:
+    """The product of matrices (d, d, lanes)."""
+    rows = range(len(a))
+    return np.stack([np.stack([sum(a[i, k] * b[k, j] for k in rows) for j in rows]) for i in rows])
+
+
+def transposed(a: Array) -> Array:
+    """A matrix (d, d, lanes), transposed."""
+    return a.transpose(1, 0, 2)
+
+
+def rotated(directors: tuple[Affine, ...], rotation: Array) -> tuple[Affine, ...]:
+    """Directors combined by the columns of a rotation (d, d, lanes)."""
+    return tuple(combined(directors, tuple(rotation[:, k])) for k in range(len(directors)))
 
 
 def orientations(scene: Scene) -> Orientations:
     """Group the rigid bodies whose relative angle joints keep; flexible bodies are held by constraints instead."""
-    found = Orientations(axis={GROUND: Affine({}, 1.0 + 0.0j)})
-    for name, joint in scene.joints.items():
-        turn = kept_turn(scene, joint)
-        if (
-            turn is not None
-            and not isinstance(joint, Coupling)
-            and all(is_stiff(scene, side.body) for side in (joint.first, joint.second))
-        ):
-            found.join(name, joint.first.body, joint.second.body, turn)
+    axes = np.eye(plane.DIMENSIONS)[..., None]
+    found = Orientations(directors={GROUND: tuple(fixed(axis) for axis in axes)})
+    for name, condition in joints.of_scene(scene):
+        if isinstance(condition, Turned) and not condition.driven:
+            sides = condition.first, condition.second
+            if all(is_stiff(scene, side.body) for side in sides):
+                found.join(name, sides[0].body, sides[1].body, kept_rotation(scene, condition))
     return found
 
 
-def kept_turn(scene: Scene, joint: object) -> Number | None:
-    """exp(i angle) from the first body's direction to the second's, if the joint keeps it."""
-    if isinstance(joint, Weld):
-        return unit(joint.angle) if joint.angle is not None else _start_turn(scene, joint)
-    if isinstance(joint, Slider) and joint.rotation == "locked":
-        return _start_turn(scene, joint)
-    if isinstance(joint, Parallel):
-        return np.sign(np.real(_start_turn(scene, joint)) + 1e-12)
-    if isinstance(joint, Perpendicular):
-        return 1j * np.sign(np.imag(_start_turn(scene, joint)) + 1e-12)
-    return None
-
-
-def _start_turn(scene: Scene, joint: Weld | Slider | Parallel | Perpendicular) -> Number:
-    first, second = (unit(start_angle(scene, side)) for side in (joint.first, joint.second))
-    return np.conj(first) * second
+def kept_rotation(scene: Scene, condition: Turned) -> Array:
+    """The rotation from the first body's directors to the second's that a joint keeps, (d, d, lanes)."""
+    ahead = start_angle(scene, condition.second) - start_angle(scene, condition.first)
+    return plane.rotation(condition.kept(ahead))
 
 
 def start_angle(scene: Scene, side: Attachment) -> Number:

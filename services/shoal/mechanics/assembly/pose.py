@@ -4,34 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from shoal.mechanics.assembly.affine import Number
-
-
-def as_complex(vector: tuple[Number, Number]) -> Number:
-    """x + iy."""
-    return vector[0] + 1j * np.asarray(vector[1]) if np.ndim(vector[0]) or np.ndim(vector[1]) else complex(*vector)
-
-
-def unit(angle: Number) -> Number:
-    """exp(i angle)."""
-    return np.exp(1j * np.asarray(angle)) if np.ndim(angle) else complex(np.exp(1j * angle))
+from shoal.mechanics.numerics.tile import Array, Number
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Initial position [m] and direction of a body's frame, velocity [m/s] and rate [rad/s]; complex, per lane."""
+    """Initial position [m] (d, lanes) and directors of a body's frame, with their rates of change [m/s, 1/s].
 
-    position: Number
-    direction: Number
-    velocity: Number
-    rate: Number
+    directors, turning: one vector for each axis of the body and its rate, (d, d, lanes).
+    """
 
-    def point(self, p: Number) -> Number:
-        """Initial position of the material point p."""
-        return self.position + self.direction * p
+    position: Array
+    directors: Array
+    velocity: Array
+    turning: Array
 
-    def point_velocity(self, p: Number) -> Number:
-        """Initial velocity of the material point p."""
-        return self.velocity + 1j * self.rate * self.direction * p
+    def point(self, place: tuple[Number, ...]) -> Array:
+        """Initial position of a material point."""
+        return self.position + arm(self.directors, place)
+
+    def point_velocity(self, place: tuple[Number, ...]) -> Array:
+        """Initial velocity of a material point."""
+        return self.velocity + arm(self.turning, place)
+
+
+def arm(directors: Array, place: tuple[Number, ...]) -> Array:
+    """The way from a body's origin to a place in its frame [m], (d, lanes)."""
+    total: Array = sum(director * part for director, part in zip(directors, place, strict=True))
+    return total

@@ -14,7 +14,6 @@ from numba import njit
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import pointer
 from shoal.scene import Solver
 
 SAFETY = 0.9
@@ -47,21 +46,6 @@ def control_room(solver: Solver, tile: Tile) -> Control:
     first = np.full(1, min(solver.step, largest))
     lanes = (np.ones(width), np.zeros(width), np.zeros(width), np.zeros(width))
     return Control(solver.relative_tolerance, solver.absolute_tolerance, largest, first, *lanes)
-
-
-@njit(cache=True, error_model="numpy")
-def raw(c: Control) -> Control:
-    """The same with pointers in place of arrays."""
-    return Control(
-        c.relative_tolerance,
-        c.absolute_tolerance,
-        c.largest,
-        pointer(c.suggestion),
-        pointer(c.alive),
-        pointer(c.weight_q),
-        pointer(c.weight_v),
-        pointer(c.error),
-    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -12,14 +12,14 @@ import numpy as np
 from numba import njit
 from scipy.integrate import DOP853
 
-from shoal.mechanics import dynamics
+from shoal.mechanics import gates
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import control
 from shoal.mechanics.integrators.control import RESOLUTION, Control, control_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import pointer
 from shoal.scene import Solver
 
 STAGES = 12
@@ -76,23 +76,6 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Dop853:
 
 
 @njit(cache=True, error_model="numpy")
-def _raw(s: Dop853) -> Dop853:
-    """The same with pointers in place of arrays."""
-    return Dop853(
-        s.rank_tolerance,
-        control.raw(s.control),
-        pointer(s.slope_q),
-        pointer(s.slope_v),
-        pointer(s.stage_q),
-        pointer(s.stage_v),
-        pointer(s.stage_a),
-        pointer(s.begin),
-        pointer(s.dense),
-        pointer(s.evaluations),
-    )
-
-
-@njit(cache=True, error_model="numpy")
 def _stage(tile: Tile, scheme: Dop853, m: Arrays, w: Work, h: float, number: int, q: Array, v: Array) -> None:
     """Coordinates and rates of a stage, from w.before and the slopes of the stages before it. Uses w.stage."""
     end = m.unknowns * len(tile)
@@ -143,7 +126,7 @@ def _errors(tile: Tile, scheme: Dop853, m: Arrays, h: float) -> None:
 @njit(cache=True, error_model="numpy")
 def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> float:
     """One step from the time t, of at most h [s]; returns its length. w.a holds the acceleration before and after."""
-    rest, room = h, _raw(scheme)
+    rest, room = h, raw(scheme)
     c = room.control
     room.begin[0], room.dense[0] = t, 0.0
     if not control.begin(tile, m, w, c):
@@ -154,7 +137,7 @@ def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> 
     while True:
         for number in range(1, STAGES):
             _stage(tile, room, m, w, h, number, w.z, w.zdot)
-            dynamics.acceleration(
+            gates.acceleration(
                 tile, m, w, t + INSTANTS[number] * h, w.z, w.zdot, room.rank_tolerance, w.a
             )  # fmt: skip
             _keep(tile, room, m, number, w.zdot, w.a)
@@ -172,8 +155,8 @@ def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> 
                 return rest
             h = control.first_trial(c, rest)
     control.accept(c, error, h, ORDER_OF_ERROR, rejected)
-    dynamics.settle(tile, m, w, t + h, room.rank_tolerance)
-    dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, room.rank_tolerance, w.a)
+    gates.settle(tile, m, w, t + h, room.rank_tolerance)
+    gates.acceleration(tile, m, w, t + h, w.z, w.zdot, room.rank_tolerance, w.a)
     room.evaluations[0] += 1
     return h
 
@@ -181,7 +164,7 @@ def step(tile: Tile, scheme: Dop853, m: Arrays, w: Work, t: float, h: float) -> 
 @njit(cache=True, error_model="numpy")
 def inside(tile: Tile, scheme: Dop853, m: Arrays, w: Work, past: Array, x: float, h: float, q: Array, v: Array) -> None:
     """The motion at the fraction x of the last step, of order 7; the three stages it needs are made on demand."""
-    room = _raw(scheme)
+    room = raw(scheme)
     end = m.unknowns * len(tile)
     slope_q, slope_v = room.slope_q, room.slope_v
     if room.dense[0] == 0.0:
@@ -192,7 +175,7 @@ def inside(tile: Tile, scheme: Dop853, m: Arrays, w: Work, past: Array, x: float
         for number in range(STAGES + 1, 16):
             _stage(tile, room, m, w, h, number, q_, v_)
             instant = room.begin[0] + INSTANTS[number] * h
-            dynamics.acceleration(tile, m, w, instant, q_, v_, room.rank_tolerance, a_)
+            gates.acceleration(tile, m, w, instant, q_, v_, room.rank_tolerance, a_)
             _keep(tile, room, m, number, v_, a_)
     for i in range(end):
         q[i] = w.before[i] + _dense(end, i, slope_q, w.z[i] - w.before[i], x, h)

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics
+from shoal.mechanics import dynamics, gates
+from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.functions import evaluate
 from shoal.mechanics.integrators import newton
@@ -22,8 +23,8 @@ from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.least import constraints
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import pointer
 from shoal.scene import Solver
 
 ROUND_OFF = 1e-15
@@ -60,18 +61,6 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> EnergyMo
 
 
 @njit(cache=True, error_model="numpy")
-def _raw(s: EnergyMomentum) -> EnergyMomentum:
-    """The same with pointers in place of arrays."""
-    return EnergyMomentum(
-        newton.raw(s.newton),
-        pointer(s.middle),
-        pointer(s.change),
-        pointer(s.elastic),
-        pointer(s.evaluations),
-    )
-
-
-@njit(cache=True, error_model="numpy")
 def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: float, f: Array) -> None:
     """The force of the step that led from w.before to w.z, into f: at the midpoint, corrected along the step.
 
@@ -82,11 +71,11 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
     end = m.unknowns * width
     middle, change = scheme.middle, scheme.change
     _halve(tile, scheme, m, w)
-    dynamics.elastic_force(tile, m, w, middle, f, True)
-    dynamics.derive(tile, m, w.before, m.force_rows, False)
-    dynamics.derive(tile, m, w.z, m.force_rows, False)
+    gates.elastic_force(tile, m, w, middle, f, True)
+    derive(tile, m.derived, w.before, m.unknowns, m.force_rows, False)
+    derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
     dynamics.add_mean_force(tile, m, w, w.before, w.z, f)
-    dynamics.energies(tile, m, w)
+    gates.energies(tile, m, w)
     sparse.multiply(tile, m.pattern, m.mass, change, w.stage)
     for lane in range(width):
         work, square = 0.0, 0.0
@@ -102,11 +91,11 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
     # What has no potential acts as it does half-way: the whole force less its elastic part.
     for i in range(end):
         change[i] /= h
-    dynamics.force(tile, m, w, t + 0.5 * h, middle, change, w.stage)
+    gates.force(tile, m, w, t + 0.5 * h, middle, change, w.stage)
     for i in range(end):
         change[i] *= h
         f[i] += w.stage[i]
-    dynamics.elastic_force(tile, m, w, middle, w.stage, False)
+    gates.elastic_force(tile, m, w, middle, w.stage, False)
     for i in range(end):
         f[i] -= w.stage[i]
 
@@ -124,9 +113,9 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
     """One step of h [s] from the time t."""
     width = len(tile)
     end = m.unknowns * width
-    room = _raw(scheme)
+    room = raw(scheme)
     residual, change = room.newton.residual, room.change
-    dynamics.energies(tile, m, w)
+    gates.energies(tile, m, w)
     for lane in range(width):
         room.elastic[lane] = w.energy[width + lane]
     for i in range(end):
@@ -142,7 +131,7 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
             residual[i] -= w.stage[i]
         newton.add_reactions(tile, m, w, room.newton, room.middle)
         # The unknown is the midpoint, which moves half as far as the end.
-        dynamics.derive(tile, m, w.z, m.held_rows, False)
+        derive(tile, m.derived, w.z, m.unknowns, m.held_rows, False)
         constraints.residual(tile, m.constraints, m.functions, dynamics.instant(w, t + h), w.z, w.gauss.gap)
         for k in range(m.constraints.size * width):
             w.gauss.gap[k] *= 0.5
@@ -155,12 +144,12 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
     for i in range(end):
         w.zdot[i] = 2.0 * (w.z[i] - w.before[i]) / h - w.zdot[i]
     room.evaluations[0] += 1
-    dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, room.newton.rank_tolerance, w.a)
+    gates.acceleration(tile, m, w, t + h, w.z, w.zdot, room.newton.rank_tolerance, w.a)
     if dynamics.loaded(m):
         _halve(tile, room, m, w)
         for i in range(end):
             change[i] /= h
-        dynamics.force(tile, m, w, t + 0.5 * h, room.middle, change, w.stage)
+        gates.force(tile, m, w, t + 0.5 * h, room.middle, change, w.stage)
         if m.driven:
             _count_drives(tile, m, w, room.newton, t, h)
     return h

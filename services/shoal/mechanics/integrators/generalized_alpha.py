@@ -19,11 +19,11 @@ from shoal.mechanics.integrators import newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
-from shoal.mechanics.least import gauss
+from shoal.mechanics.least import drift
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import pointer
 from shoal.scene import Solver
 
 
@@ -73,7 +73,7 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
         w.zdot[i] += h * ((1 - gamma) * auxiliary[i] + gamma * predicted)
         auxiliary[i] = predicted
         w.a[i] = 0.0
-    room = newton.raw(scheme.newton)
+    room = raw(scheme.newton)
     scheme.evaluations[0] += newton.solve(tile, m, w, room, t + h, mass_factor, damping_factor)
     newton.take_power(tile, m, w, room, t + h)
     for i in range(end):
@@ -82,7 +82,7 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
         for i in range(end):
             w.before[i] = w.zdot[i]
         now = dynamics.instant(w, t + h)
-        gauss.project_rates(tile, m, w.gauss, now, w.z, w.zdot, scheme.newton.rank_tolerance)
+        drift.project_rates(tile, m, w.gauss, now, w.z, w.zdot, scheme.newton.rank_tolerance)
         if m.driven:
             _count_impulse(tile, m, w, h)
     return h

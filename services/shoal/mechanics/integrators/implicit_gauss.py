@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics
+from shoal.mechanics import dynamics, gates
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.functions import evaluate
 from shoal.mechanics.integrators import newton
@@ -23,6 +23,7 @@ from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
@@ -61,11 +62,11 @@ def step(tile: Tile, scheme: ImplicitGauss, m: Arrays, w: Work, t: float, h: flo
         w.before[i] = w.zdot[i]
         w.z[i] += h * w.zdot[i]
         w.a[i] = 0.0
-    scheme.evaluations[0] += newton.solve(tile, m, w, newton.raw(scheme.newton), t + h, 1.0 / (h * h), 1.0 / h)
+    scheme.evaluations[0] += newton.solve(tile, m, w, raw(scheme.newton), t + h, 1.0 / (h * h), 1.0 / h)
     if dynamics.loaded(m):
         for i in range(end):
             w.before[i] = 0.5 * (w.before[i] + w.zdot[i])
-        dynamics.force(tile, m, w, t + h, w.z, w.before, w.stage)
+        gates.force(tile, m, w, t + h, w.z, w.before, w.stage)
         if m.driven:
             _count_drives(tile, scheme, m, w, t, h)
     return h

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics
+from shoal.mechanics import dynamics, gates
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
@@ -53,12 +53,12 @@ def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, t: float, h: float) -
         for i in range(end):
             w.stage[i] = w.zdot[i]
             w.zdot[i] += 0.5 * h * w.a[i]
-        dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         for i in range(end):
             w.zdot[i] = w.stage[i] + 0.5 * h * w.a[i]
-        dynamics.settle(tile, m, w, t + h, scheme.rank_tolerance)
+        gates.settle(tile, m, w, t + h, scheme.rank_tolerance)
     else:
-        dynamics.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         for i in range(end):
             w.zdot[i] += 0.5 * h * w.a[i]
     return h

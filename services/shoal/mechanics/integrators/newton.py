@@ -7,14 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics
+from shoal.mechanics import dynamics, gates
 from shoal.mechanics import tangent as tangents
+from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.least import constraints, gauss
+from shoal.mechanics.least import constraints, implicit
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import pointer
 from shoal.mechanics.tangent import Tangent, tangent_tile
 from shoal.scene import Solver
 
@@ -58,25 +58,10 @@ def newton_room(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Newto
 
 
 @njit(cache=True, error_model="numpy")
-def raw(n: Newton) -> Newton:
-    """The same with pointers in place of arrays."""
-    return Newton(
-        n.tolerance,
-        n.rank_tolerance,
-        tangents.raw(n.tangent),
-        n.slots,
-        pointer(n.matrix),
-        pointer(n.block),
-        pointer(n.residual),
-        pointer(n.multiplier),
-    )
-
-
-@njit(cache=True, error_model="numpy")
 def add_reactions(tile: Tile, m: Arrays, w: Work, newton: Newton, z: Array) -> None:
     """residual -= C_q(z)' lambda. Leaves C_q in w.gauss.jacobian."""
     if m.constraints.size > 0:
-        dynamics.derive(tile, m, z, m.held_rows, False)
+        derive(tile, m.derived, z, m.unknowns, m.held_rows, False)
         constraints.jacobian(tile, m.constraints, z, 1.0, w.gauss.jacobian)
         constraints.subtract_transposed(tile, m.constraints, w.gauss.jacobian, newton.multiplier, newton.residual)
 
@@ -107,9 +92,9 @@ def correct(
     sparse.factor(tile, pattern, newton.matrix)
     sparse.solve(tile, pattern, newton.matrix, newton.residual, 0)
     if m.constraints.size > 0:
-        gauss.prepare(tile, m, newton.matrix, pattern, z, w.gauss)
-        gauss.add_rates(tile, m, w.gauss, newton.residual)
-        gauss.apply(tile, m, w.gauss, newton.rank_tolerance, newton.residual)
+        implicit.prepare(tile, m, newton.matrix, pattern, z, w.gauss)
+        implicit.add_rates(tile, m, w.gauss, newton.residual)
+        implicit.apply(tile, m, w.gauss, newton.rank_tolerance, newton.residual)
         for k in range(m.constraints.size * len(tile)):
             newton.multiplier[k] += w.gauss.multiplier[k]
 
@@ -145,7 +130,7 @@ def solve(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, mass_factor:
     t = dynamics.instant(w, t)
     while iterations < ITERATIONS:
         iterations += 1
-        dynamics.force(tile, m, w, t, w.z, w.zdot, residual)
+        gates.force(tile, m, w, t, w.z, w.zdot, residual)
         sparse.multiply(tile, m.pattern, m.mass, w.a, w.stage)
         for i in range(end):
             residual[i] -= w.stage[i]
@@ -170,6 +155,6 @@ def take_power(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float) -> None
     """
     if dynamics.loaded(m):
         t = dynamics.instant(w, t)
-        dynamics.force(tile, m, w, t, w.z, w.zdot, w.stage)
+        gates.force(tile, m, w, t, w.z, w.zdot, w.stage)
         if m.driven:
             constraints.add_power(tile, m.constraints, m.functions, t, newton.multiplier, w.power)

@@ -15,21 +15,23 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics
+from shoal.mechanics import dynamics, gates
 from shoal.mechanics import tangent as tangents
+from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import control
 from shoal.mechanics.integrators.control import RESOLUTION, Control, control_room
+from shoal.mechanics.integrators.radau5_tableau import DIFFERENCE, FILTER, RATES, STAGES, A, C, T
 from shoal.mechanics.integrators.scheme import Facts, implement
-from shoal.mechanics.least import gauss
+from shoal.mechanics.least import implicit
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import clear, pointer
+from shoal.mechanics.numerics.vector import clear
 from shoal.mechanics.tangent import Tangent, tangent_tile
 from shoal.scene import Solver
 
-STAGES = 3
 ITERATIONS = 20
 CONVERGED = 1e-3
 """What may be left of Newton's error, as a fraction of the error allowed in a step."""
@@ -38,37 +40,6 @@ SLOWEST = 0.1
 STAGNANT = 5e-2
 """A change below this that does not shrink anymore is round-off."""
 ORDER_OF_ERROR = 4
-FILTER = 2
-"""The stage whose factored matrix filters the error estimate."""
-
-
-def _collocation() -> tuple[Array, Array]:
-    """A and c: c are the zeros of the right Radau polynomial, A integrates the Lagrange polynomials through them."""
-    root = np.sqrt(6.0)
-    c = np.array([(4 - root) / 10, (4 + root) / 10, 1.0])
-    powers = np.vander(c, STAGES, increasing=True)
-    integrals = np.column_stack([c ** (k + 1) / (k + 1) for k in range(STAGES)])
-    return np.asarray(np.linalg.solve(powers.T, integrals.T).T, dtype=float), c
-
-
-def _crout(matrix: Array) -> Array:
-    """Lower factor of matrix = lower * upper, where the upper one has ones on its diagonal."""
-    lower, rest = np.zeros_like(matrix), matrix.copy()
-    for k in range(len(matrix)):
-        lower[k:, k] = rest[k:, k]
-        rest -= np.outer(rest[:, k], rest[k] / rest[k, k])
-    return lower
-
-
-A, C = _collocation()
-T = _crout(A)
-# An embedded method of order 3 that also uses the slope at the beginning, with the weight T[FILTER, FILTER], differs
-# from the method by sum of DIFFERENCE * (stage - beginning).
-DIFFERENCE = np.linalg.solve(
-    A.T, np.linalg.solve(np.vander(C, STAGES, increasing=True).T, [-T[FILTER, FILTER], 0.0, 0.0])
-)
-RATES = np.linalg.inv(np.column_stack([C, C**2, C**3]))
-"""Coefficients of x, x^2, x^3 in the rate's collocation polynomial, from what the stages add to the rate at x = 0."""
 
 
 class Radau5(NamedTuple):
@@ -145,43 +116,13 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Radau5:
 
 
 @njit(cache=True, error_model="numpy")
-def _raw(s: Radau5) -> Radau5:
-    """The same with pointers in place of arrays."""
-    return Radau5(
-        s.rank_tolerance,
-        control.raw(s.control),
-        tangents.raw(s.tangent),
-        s.slots,
-        pointer(s.stiffness),
-        pointer(s.damping),
-        (pointer(s.factors[0]), pointer(s.factors[1]), pointer(s.factors[2])),
-        pointer(s.block),
-        pointer(s.multiplier),
-        pointer(s.stage_q),
-        pointer(s.stage_v),
-        pointer(s.stage_a),
-        pointer(s.defect_q),
-        pointer(s.defect_v),
-        pointer(s.product_q),
-        pointer(s.product_v),
-        pointer(s.change_q),
-        pointer(s.change_v),
-        pointer(s.product),
-        pointer(s.slope),
-        pointer(s.polynomial),
-        pointer(s.last),
-        pointer(s.evaluations),
-    )
-
-
-@njit(cache=True, error_model="numpy")
 def _linearise(tile: Tile, scheme: Radau5, m: Arrays, w: Work) -> None:
     """Stiffness and damping at the state in w.z, with the multipliers of its acceleration."""
     multiplier = scheme.multiplier
     for k in range(m.constraints.size * len(tile)):
         multiplier[k] = w.gauss.multiplier[k]
-    dynamics.derive(tile, m, w.z, m.force_rows, False)
-    dynamics.derive(tile, m, w.zdot, m.force_rows, True)
+    derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
+    derive(tile, m.derived, w.zdot, m.unknowns, m.force_rows, True)
     # D is needed where there is friction only; then it is what a second tangent has more.
     for part in range(2 if dynamics.loaded(m) else 1):
         values = scheme.stiffness if part == 0 else scheme.damping
@@ -224,11 +165,11 @@ def _solve(tile: Tile, scheme: Radau5, m: Arrays, w: Work, h: float, s: int) -> 
     if m.constraints.size > 0:
         for i in range(end):
             w.stage[i] = product[i] - change_v[i]
-        gauss.prepare(tile, m, factors, pattern, w.z, w.gauss)
+        implicit.prepare(tile, m, factors, pattern, w.z, w.gauss)
         for k in range(m.constraints.size):
             clear(tile, w.gauss.gap, k)
-        gauss.add_rates(tile, m, w.gauss, w.stage)
-        gauss.apply(tile, m, w.gauss, scheme.rank_tolerance, product)
+        implicit.add_rates(tile, m, w.gauss, w.stage)
+        implicit.apply(tile, m, w.gauss, scheme.rank_tolerance, product)
     for i in range(end):
         change_v[i] = product[i]
         change_q[i] += g * product[i]
@@ -262,7 +203,7 @@ def _evaluate(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float, h: float
     for s in range(STAGES):
         for i in range(end):
             w.z[i], w.zdot[i] = q[s * end + i], v[s * end + i]
-        dynamics.acceleration(tile, m, w, t + C[s] * h, w.z, w.zdot, scheme.rank_tolerance, w.a)
+        gates.acceleration(tile, m, w, t + C[s] * h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         for i in range(end):
             a[s * end + i] = w.a[i]
     for s in range(STAGES):
@@ -371,7 +312,7 @@ def _estimate(tile: Tile, scheme: Radau5, m: Arrays, w: Work, h: float) -> None:
 @njit(cache=True, error_model="numpy")
 def step(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float, h: float) -> float:
     """One step from the time t, of at most h [s]; returns its length. w.a holds the acceleration before and after."""
-    rest, room = h, _raw(scheme)
+    rest, room = h, raw(scheme)
     end = m.unknowns * len(tile)
     c = room.control
     if not control.begin(tile, m, w, c):
@@ -409,8 +350,8 @@ def step(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float, h: float) -> 
                 p[(k + 1) * end + i] += RATES[k, s] * (room.stage_v[s * end + i] - w.before[end + i])
         w.z[i], w.zdot[i] = room.stage_q[2 * end + i], room.stage_v[2 * end + i]
     room.last[0] = trial
-    dynamics.settle(tile, m, w, t + trial, room.rank_tolerance)
-    dynamics.acceleration(tile, m, w, t + trial, w.z, w.zdot, room.rank_tolerance, w.a)
+    gates.settle(tile, m, w, t + trial, room.rank_tolerance)
+    gates.acceleration(tile, m, w, t + trial, w.z, w.zdot, room.rank_tolerance, w.a)
     room.evaluations[0] += 1
     return trial
 

@@ -9,16 +9,15 @@ Settings carry a field `evaluations`, (1,): how many times the step has evaluate
 
 from __future__ import annotations
 
-from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
 from numba.extending import overload
 
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import dense
 from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics.choice import body, is_of
 from shoal.mechanics.numerics.tile import Array, Tile
 
 
@@ -82,40 +81,28 @@ def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quint
     those of `advance`, `interpolate` and `restart`.
     """
 
-    def ours(scheme: Any) -> bool:
-        return isinstance(scheme, types.BaseNamedTuple) and scheme.instance_class is settings
-
     @overload(advance, jit_options={"error_model": "numpy", "forceinline": True})
     def choose_step(tile, scheme, m, w, t, h):  # type: ignore[no-untyped-def]
-        return _body(step) if ours(scheme) else None
+        return body(step) if is_of(scheme, settings) else None
 
     @overload(interpolate, jit_options={"error_model": "numpy"})
     def choose_inside(tile, scheme, m, w, past, x, h, q, v):  # type: ignore[no-untyped-def]
-        return _body(inside) if ours(scheme) else None
+        return body(inside) if is_of(scheme, settings) else None
 
     @overload(restart, jit_options={"error_model": "numpy"})
     def choose_restart(scheme):  # type: ignore[no-untyped-def]
-        if not ours(scheme):
+        if not is_of(scheme, settings):
             return None
-        return (lambda scheme: None) if anew is None else _body(anew)
+        return (lambda scheme: None) if anew is None else body(anew)
 
     @overload(adaptive)
     def choose_adaptive(scheme):  # type: ignore[no-untyped-def]
-        if not ours(scheme):
+        if not is_of(scheme, settings):
             return None
         return (lambda scheme: True) if facts.adaptive else (lambda scheme: False)
 
     @overload(averages)
     def choose_averages(scheme):  # type: ignore[no-untyped-def]
-        if not ours(scheme):
+        if not is_of(scheme, settings):
             return None
         return (lambda scheme: True) if facts.mean_power else (lambda scheme: False)
-
-
-def _body(kernel: Any) -> Any:
-    """The Python function of a kernel without its annotations, which differ from scheme to scheme.
-
-    Compiled in place of the call: a call of the compiled kernel would be one more layer to optimise.
-    """
-    function = kernel.py_func
-    return FunctionType(function.__code__, function.__globals__, function.__name__)

@@ -8,19 +8,13 @@ the column `column[e]` of the constraint whose range in `entry` contains e.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
 from numba import njit
 
 from shoal.mechanics import functions
-from shoal.mechanics.assembly.affine import Affine, Number
 from shoal.mechanics.functions import Functions
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import pointer
-from shoal.scene.function import Composed
 
 POWERS = 3
 """Constraints are measured in 1 (directions), m or m^2."""
@@ -48,143 +42,6 @@ class Constraints(NamedTuple):
     target: Index
     source: Index
     coefficient: Array
-
-
-@dataclass(frozen=True)
-class Held:
-    """One constraint before it has rows: Re or Im of conj(u) w, plus a constant and a function of time.
-
-    lengths: the power of a length that it is measured in.
-    """
-
-    name: str
-    u: Affine
-    w: Affine
-    crossed: bool
-    constant: Number
-    drive: Composed | None
-    lengths: int
-
-    def products(self, rows: Callable[[Affine], tuple[int, int]]) -> list[tuple[int, int, Number, Affine, Affine]]:
-        """(left row, right row, factor, left vector, right vector); left row -1 for a linear term.
-
-        The vectors are times a component: (row of x or y) is the real part of vector * conj(1 or i).
-        """
-        u, w = self.u, self.w
-        sign = 1.0
-        if not w.terms:
-            u, w, sign = w, u, (-1.0 if self.crossed else 1.0)
-        y = rows(w)
-        if not u.terms:
-            parts = (-np.imag(u.constant), np.real(u.constant)) if self.crossed else _split(u.constant)
-            return [(-1, y[k], sign * parts[k], u, w) for k in range(2) if np.any(parts[k])]
-        x = rows(u)
-        if self.crossed:
-            return [(x[0], y[1], 1.0, u, w), (x[1], y[0], -1.0, u, w)]
-        return [(x[0], y[0], 1.0, u, w), (x[1], y[1], 1.0, u, w)]
-
-
-def _split(value: Number) -> tuple[Number, Number]:
-    return np.real(value), np.imag(value)
-
-
-class Terms:
-    """Collects constraints before their vectors have rows."""
-
-    def __init__(self) -> None:
-        self.held: list[Held] = []
-
-    def dot(
-        self, name: str, u: Affine, w: Affine, lengths: int, constant: Number = 0.0, drive: Composed | None = None
-    ) -> None:
-        """u . w + constant + drive(t) = 0, measured in m to the power of `lengths`."""
-        self.held.append(Held(name, u, w, False, constant, drive, lengths))
-
-    def cross(self, name: str, u: Affine, w: Affine, lengths: int, drive: Composed | None = None) -> None:
-        """u x w + drive(t) = 0, measured in m to the power of `lengths`."""
-        self.held.append(Held(name, u, w, True, 0.0, drive, lengths))
-
-    def vanish(self, name: str, vector: Affine, drives: tuple[Composed, Composed] | None = None) -> None:
-        """vector + drives(t) = 0, two linear constraints [m]."""
-        for axis, part in enumerate((1.0, 1j)):
-            self.dot(name, Affine({}, part), vector, 1, drive=drives[axis] if drives else None)
-
-
-def assemble(
-    terms: Terms, rows: Callable[[Affine], tuple[int, int]], stack: Callable[[list[Number]], Array], driven: int
-) -> Constraints:
-    """The lists of the collected constraints. Their functions of time are numbered from `driven` on, in their order."""
-    start, entry = [0], [0]
-    lefts: list[int] = []
-    rights: list[int] = []
-    factors: list[Number] = []
-    column: list[int] = []
-    parts: list[tuple[int, int, Number]] = []
-    drive = []
-    for held in terms.held:
-        found: dict[int, int] = {}
-        for left, right, factor, u, w in held.products(rows):
-            lefts.append(left)
-            rights.append(right)
-            factors.append(factor)
-            for row, vector, other in ((left, u, right), (right, w, left)):
-                if row < 0:
-                    continue
-                upright = row == rows(vector)[1]
-                for unknown, value in vector.terms.items():
-                    coefficient = factor * _split(value)[upright]
-                    if not np.any(coefficient):
-                        continue
-                    if unknown not in found:
-                        found[unknown] = len(column)
-                        column.append(unknown)
-                    parts.append((found[unknown], other, coefficient))
-        start.append(len(lefts))
-        entry.append(len(column))
-        drive.append(-1 if held.drive is None else driven)
-        driven += held.drive is not None
-
-    def index(values: list[int]) -> Index:
-        return np.array(values, dtype=np.int64)
-
-    return Constraints(
-        len(terms.held),
-        index(start),
-        index(lefts),
-        index(rights),
-        stack(factors),
-        stack([held.constant for held in terms.held]),
-        index([held.lengths for held in terms.held]),
-        index(drive),
-        index(entry),
-        index(column),
-        len(parts),
-        index([target for target, _, _ in parts]),
-        index([source for _, source, _ in parts]),
-        stack([coefficient for _, _, coefficient in parts]),
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def raw(constraints: Constraints) -> Constraints:
-    """The same constraints with pointers in place of arrays."""
-    c = constraints
-    return Constraints(
-        c.size,
-        pointer(c.start),
-        pointer(c.left),
-        pointer(c.right),
-        pointer(c.factor),
-        pointer(c.constant),
-        pointer(c.lengths),
-        pointer(c.drive),
-        pointer(c.entry),
-        pointer(c.column),
-        c.parts,
-        pointer(c.target),
-        pointer(c.source),
-        pointer(c.coefficient),
-    )
 
 
 @njit(cache=True, error_model="numpy")

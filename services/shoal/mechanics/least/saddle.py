@@ -19,7 +19,7 @@ from numba import njit
 from shoal.mechanics.least.constraints import Constraints
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import copy, pointer, scale
+from shoal.mechanics.numerics.vector import copy, scale
 
 SMALL = 16
 """Up to so many constraints the orthogonal projection is used, which is more accurate and about as fast."""
@@ -114,20 +114,6 @@ def analyse(
     pattern, slot = sparse.analyse(len(place), [key(i, j) for i, j in [*mass, *pairs]])
     masses = {(i, j): slot[key(i, j)] for i, j in mass}
     return pattern, masses, place, np.array([slot[key(i, j)] for i, j in pairs], dtype=np.int64)
-
-
-@njit(cache=True, error_model="numpy")
-def raw(s: Saddle) -> Saddle:
-    """The same problem with pointers in place of arrays."""
-    return Saddle(
-        s.size,
-        s.slots,
-        sparse.raw(s.pattern),
-        pointer(s.place),
-        pointer(s.base),
-        pointer(s.slot),
-        pointer(s.multiplier),
-    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -75,17 +75,21 @@ def call(typing_context, address, arguments):  # type: ignore[no-untyped-def]
     return types.void(address, arguments), generate
 
 
+@intrinsic
+def ask(typing_context, address, t, out):  # type: ignore[no-untyped-def]
+    """Call a C function at an address, void (double t, double *out): one of Python's, by `ctypes`."""
+
+    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        where, time, place = values
+        kind = ir.FunctionType(ir.VoidType(), [ir.DoubleType(), place.type])
+        builder.call(builder.inttoptr(where, kind.as_pointer()), [time, place])
+        return context.get_dummy_value()
+
+    return types.void(address, t, out), generate
+
+
 def address(kernel: Any, kinds: tuple[Any, ...]) -> int:
     """Compile a kernel for these argument types (or take it from the cache) and return where it is."""
     kernel.compile(kinds)
     compiled = kernel.overloads[kinds]
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
-
-
-def returned(function: Any, *arguments: Any) -> Any:
-    """The type of what a compiled function returns for arguments like these."""
-    from numba import typeof
-
-    kinds = tuple(typeof(argument) for argument in arguments)
-    function.compile(kinds)
-    return function.overloads[kinds].signature.return_type

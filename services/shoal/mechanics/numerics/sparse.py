@@ -11,13 +11,13 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse
 from numba import njit
 
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 from shoal.mechanics.numerics.vector import (
     add_product,
     copy,
-    pointer,
     scale,
     scale_alike,
     subtract_dot,
@@ -96,23 +96,11 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
     return Pattern(size, wide(column), short(row), *eliminations, *by_rows), slot
 
 
-@njit(cache=True, error_model="numpy")
-def raw(pattern: Pattern) -> Pattern:
-    """The same pattern with pointers in place of arrays."""
-    p = pattern
-    return Pattern(
-        p.size,
-        pointer(p.column),
-        pointer(p.row),
-        pointer(p.update),
-        pointer(p.target),
-        pointer(p.left),
-        pointer(p.right),
-        pointer(p.across),
-        pointer(p.slot),
-        pointer(p.other),
-        pointer(p.by_column),
-    )
+def matrix(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
+    """The symmetric matrix of one lane whose lower triangle lies in the slots of a pattern."""
+    n = pattern.size
+    lower = scipy.sparse.csc_array((values[n:], pattern.row, pattern.column), shape=(n, n))
+    return scipy.sparse.csc_array(lower + lower.T + scipy.sparse.diags_array(values[:n]))
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,12 +7,19 @@ the width a constant at compile time, so that loops over the lanes become vector
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
+"""Yes or no, by lane or by lane and pose."""
 Tile = tuple[int, ...]
+Number = Any
+"""A real scalar, or an array of one number per lane."""
 
 SINGLE: Tile = (0,)
 WIDE: Tile = (0,) * 16
@@ -39,3 +46,34 @@ def pack(values: Array, lanes: slice, tile: Tile) -> Array:
 def unpack(flat: Array, lanes: slice, tile: Tile) -> Array:
     """Back from flat storage to (rows, lanes of the tile)."""
     return flat.reshape(-1, len(tile))[:, : lanes.stop - lanes.start]
+
+
+def stacked(values: Sequence[Any]) -> Array:
+    """One row per value, a number or one per lane: (rows, lanes), or (rows, 1) if none depends on the lane."""
+    lanes = max((np.size(value) for value in values), default=1)
+    out = np.empty((len(values), lanes))
+    for row, value in enumerate(values):
+        out[row] = value
+    return out
+
+
+def index(values: Sequence[Any]) -> Index:
+    """Whole numbers as kernels take them."""
+    return np.array(values, dtype=np.int64)
+
+
+def packed(structure: Any, lanes: slice, tile: Tile) -> Any:
+    """A structure for one tile: of it and of its parts every array (rows, lanes) is packed, the rest as it is."""
+    if isinstance(structure, np.ndarray):
+        return pack(structure, lanes, tile) if structure.ndim == 2 else structure
+    if isinstance(structure, tuple):
+        parts = [packed(part, lanes, tile) for part in structure]
+        return structure._make(parts) if hasattr(structure, "_make") else tuple(parts)
+    return structure
+
+
+def varies(structure: Any) -> bool:
+    """Whether any number of a structure depends on the lane."""
+    if isinstance(structure, np.ndarray):
+        return structure.ndim == 2 and structure.shape[1] > 1
+    return isinstance(structure, tuple) and any(varies(part) for part in structure)

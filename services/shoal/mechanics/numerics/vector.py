@@ -1,8 +1,7 @@
 """Row operations on tiles as vector instructions, on raw pointers.
 
 Compiled loops over the lanes of a row only become vector code when the compiler can prove that rows
-do not overlap, which it cannot for rows picked by an index. These operations say it. Pointers
-instead of arrays keep reference counting out of the time loop; the caller owns the memory.
+do not overlap, which it cannot for rows picked by an index. These operations say it.
 """
 
 from __future__ import annotations
@@ -15,28 +14,6 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 _CONTRACT = ("contract",)
-
-
-@intrinsic
-def pointer(typing_context, array):  # type: ignore[no-untyped-def]
-    """Address of an array's first entry; the array must outlive its use."""
-    if not isinstance(array, types.Array) or array.layout != "C":
-        raise TypeError(f"pointer: needs a contiguous array, found {array}")
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        return cgutils.create_struct_proxy(signature.args[0])(context, builder, arguments[0]).data
-
-    return types.CPointer(array.dtype)(array), generate
-
-
-@intrinsic
-def shift(typing_context, base, offset):  # type: ignore[no-untyped-def]
-    """The pointer `offset` entries further on."""
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        return builder.gep(arguments[0], [arguments[1]])
-
-    return base(base, offset), generate
 
 
 def _row(builder: Any, base: Any, row: Any, width: int) -> Any:

@@ -11,31 +11,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from shoal.mechanics.assembly.affine import Number
-from shoal.mechanics.assembly.pose import as_complex, unit
-from shoal.mechanics.numerics.tile import Array, Index
-from shoal.scene import (
-    GROUND,
-    Attachment,
-    Coupling,
-    Distance,
-    DrivenAngle,
-    Function,
-    Parallel,
-    Perpendicular,
-    PointMass,
-    Revolute,
-    Rod,
-    Scene,
-    Slider,
-    Weld,
-)
+from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, conditions
+from shoal.mechanics.numerics.tile import Array, Index, Number
+from shoal.mechanics.plane import as_complex, phasor
+from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
 from shoal.scene.joints import places
-
-Flags = npt.NDArray[np.bool_]
-"""Yes or no, by lane or by lane and pose."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +94,7 @@ class Closure:
             columns = [self.column[body] + k for body in bodies for k in range(3)]
             part = copy(self)
             part.begin, part.column = self.begin[:, columns], {body: 3 * k for k, body in enumerate(bodies)}
-            found += [(name, columns, *row) for row in part._joint(joint, u[:, columns])]
+            found += [(name, columns, *row) for one in conditions(joint) for row in part._rows_of(one, u[:, columns])]
         none = np.zeros(len(u))
         for name in self._points:  # a point mass has no angle
             k = self.column[name] + 2
@@ -137,7 +118,7 @@ class Closure:
                 value, rate = as_complex(at.point), 0.0
             return Vector(_lanes(value, u), none, _lanes(rate, u))
         k = self.column[at.body]
-        axis = unit(u[:, k + 2])
+        axis = phasor(u[:, k + 2])
         arm = axis * place_of(self.scene, at)
         slope = np.zeros((len(u), u.shape[1]), dtype=complex)
         slope[:, k], slope[:, k + 1], slope[:, k + 2] = 1.0, 1j, 1j * arm
@@ -159,7 +140,7 @@ class Closure:
     def direction(self, u: Array, at: Attachment, turn: Number) -> Vector:
         """Unit vector of a body at an attachment, turned by `turn` [rad]."""
         value, slope = self._angle(u, at)
-        e = unit(value + turn)
+        e = phasor(value + turn)
         return Vector(e, 1j * e[:, None] * slope, np.zeros(len(u)))
 
     def _angle(self, u: Array, at: Attachment) -> tuple[Array, Array]:
@@ -174,62 +155,48 @@ class Closure:
         row[:, k] = 1.0
         return row
 
-    def _joint(self, joint: object, u: Array) -> list[tuple[Array, Array, Array]]:
+    def _rows_of(self, condition: Condition, u: Array) -> list[tuple[Array, Array, Array]]:
+        """Gaps of a condition with their derivatives by poses and by time."""
         none = np.zeros(len(u))
-        if isinstance(joint, Coupling):
-            gap, slope = none - value_of(joint.value), np.zeros((len(u), u.shape[1]))
-            for term in joint.terms:
+        if isinstance(condition, Sum):
+            gap, slope = none - value_of(condition.value), np.zeros((len(u), u.shape[1]))
+            for term in condition.terms:
                 at = self.place(u, term.at).times(term.factor * (1.0 if term.axis == "x" else -1j))
                 gap, slope, none = gap + at.value.real, slope + at.slope.real, none + at.rate.real
-            return [(gap, slope, none - rate_of(joint.value))]
-        assert isinstance(joint, Revolute | Weld | Slider | Distance | Parallel | Perpendicular | DrivenAngle)
-        first, second = joint.first, joint.second
-        found = []
-        if isinstance(joint, Revolute | Weld | Slider | Distance):
-            apart = self.place(u, second) - self.place(u, first)
-            if isinstance(joint, Slider):
-                across = self.direction(u, first, joint.direction).dot(apart)
-                found.append((across.value.imag, across.slope.imag, across.rate.imag))
-            elif isinstance(joint, Distance):
-                length = np.abs(apart.value)
-                along = np.where(length > 0, apart.value, 1.0) / np.where(length > 0, length, 1.0)
-                wanted, rate = self._length(joint, u, length)
-                slope = np.real(np.conj(along)[:, None] * apart.slope)
-                found.append((length - wanted, slope, np.real(np.conj(along) * apart.rate) - rate))
-            else:
-                found += [(f(apart.value), f(apart.slope), f(apart.rate)) for f in (np.real, np.imag)]
-        turn = self._turn(joint, u)
-        if turn is not None and not {first.body, second.body} & self._points:
-            (a, a_slope), (b, b_slope) = self._angle(u, first), self._angle(u, second)
-            rate = rate_of(joint.angle) if isinstance(joint, DrivenAngle) else 0.0
-            found.append((np.angle(unit(b - a - turn)), b_slope - a_slope, none - rate))
-        return found
+            return [(gap, slope, none - rate_of(condition.value))]
+        if isinstance(condition, Turned):
+            if {condition.first.body, condition.second.body} & self._points:
+                return []
+            (a, a_slope), (b, b_slope) = self._angle(u, condition.first), self._angle(u, condition.second)
+            rate = rate_of(condition.angle) if isinstance(condition.angle, Function) else 0.0
+            return [(np.angle(phasor(b - a - self._turn(condition, u))), b_slope - a_slope, none - rate)]
+        apart = self.place(u, condition.second) - self.place(u, condition.first)
+        if isinstance(condition, Along):
+            across = self.direction(u, condition.first, condition.direction).dot(apart)
+            return [(across.value.imag, across.slope.imag, across.rate.imag)]
+        if isinstance(condition, Apart):
+            length = np.abs(apart.value)
+            along = np.where(length > 0, apart.value, 1.0) / np.where(length > 0, length, 1.0)
+            wanted, rate = self._length(condition, length)
+            slope = np.real(np.conj(along)[:, None] * apart.slope)
+            return [(length - wanted, slope, np.real(np.conj(along) * apart.rate) - rate)]
+        assert isinstance(condition, Meet)
+        return [(f(apart.value), f(apart.slope), f(apart.rate)) for f in (np.real, np.imag)]
 
-    def _length(self, joint: Distance, u: Array, now: Array) -> tuple[Number, float]:
-        if joint.length is not None:
-            return value_of(joint.length), rate_of(joint.length)
+    def _length(self, condition: Apart, now: Array) -> tuple[Number, float]:
+        if condition.length is not None:
+            return value_of(condition.length), rate_of(condition.length)
         if not self.own:
             return now, 0.0
-        begin = self.place(self.begin, joint.second) - self.place(self.begin, joint.first)
+        begin = self.place(self.begin, condition.second) - self.place(self.begin, condition.first)
         return np.abs(begin.value), 0.0
 
-    def _turn(self, joint: object, u: Array) -> Number | None:
-        """Angle [rad] that a joint keeps from the first direction to the second, if it keeps one."""
-        if isinstance(joint, DrivenAngle):
-            return value_of(joint.angle)
-        if isinstance(joint, Weld) and joint.angle is not None:
-            return joint.angle
-        if isinstance(joint, Weld | Parallel | Perpendicular) or (
-            isinstance(joint, Slider) and joint.rotation == "locked"
-        ):
-            at = self.begin if self.own or isinstance(joint, Parallel | Perpendicular) else u
-            ahead = self._angle(at, joint.second)[0] - self._angle(at, joint.first)[0]
-            if isinstance(joint, Parallel):
-                return np.where(np.cos(ahead) >= -1e-12, 0.0, np.pi)
-            if isinstance(joint, Perpendicular):
-                return np.where(np.sin(ahead) >= -1e-12, 0.5, -0.5) * np.pi
-            return ahead
-        return None
+    def _turn(self, condition: Turned, u: Array) -> Number:
+        """Angle [rad] that a condition keeps from the first direction to the second."""
+        if isinstance(condition.angle, Function):
+            return value_of(condition.angle)
+        at = u if condition.is_of_start and not self.own else self.begin
+        return condition.kept(self._angle(at, condition.second)[0] - self._angle(at, condition.first)[0])
 
 
 def _lanes(value: Number, u: Array) -> Array:
@@ -241,7 +208,7 @@ def place_of(scene: Scene, at: Attachment) -> Number:
     place, body = as_complex(scene.location(at)), scene.bodies.get(at.body)
     if isinstance(body, Rod) and body.element != "rigid" and body.curvature:
         s = np.real(place)
-        return body.axis(s) + 1j * np.imag(place) * unit(body.turn(s))
+        return body.axis(s) + 1j * np.imag(place) * phasor(body.turn(s))
     return place
 
 

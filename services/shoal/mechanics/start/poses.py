@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shoal.mechanics.numerics.tile import Array
-from shoal.mechanics.start.closure import Closure, Flags, place_of
+from shoal.mechanics.joints import Apart, Turned, of_scene
+from shoal.mechanics.numerics.tile import Array, Flags
+from shoal.mechanics.start.closure import Closure, place_of
 from shoal.mechanics.start.walk import Walk, guessed_angles
 from shoal.scene import Scene
 from shoal.scene.joints import places
@@ -147,10 +148,8 @@ class Assembly:
     def _own(self) -> bool:
         """Whether joints keep what the start gives them."""
         return any(
-            (joint.kind == "weld" and joint.angle is None)
-            or (joint.kind == "distance" and joint.length is None)
-            or (joint.kind == "slider" and joint.rotation == "locked")
-            for joint in self.scene.joints.values()
+            (isinstance(one, Turned) and one.is_of_start) or (isinstance(one, Apart) and one.length is None)
+            for _, one in of_scene(self.scene)
         )
 
     def close(self, closure: Closure, u: Array, fixed: Flags, weight: Array | None = None) -> tuple[Array, Array]:

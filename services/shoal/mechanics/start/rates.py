@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shoal.mechanics.assembly.pose import as_complex, unit
-from shoal.mechanics.numerics.tile import Array
-from shoal.mechanics.start.closure import Closure, Flags
+from shoal.mechanics.numerics.tile import Array, Flags
+from shoal.mechanics.plane import as_complex, phasor
+from shoal.mechanics.start.closure import Closure
 from shoal.mechanics.start.poses import ROUNDING, Assembly, Statement, stated
 from shoal.scene import PointMass, Scene
 from shoal.scene.record import Record
@@ -220,7 +220,7 @@ def _metric(scene: Scene, poses: Array, size: float) -> Array:
         k = 3 * number
         point = isinstance(body, PointMass)
         c = 0.0 if isinstance(body, PointMass) else as_complex(body.centre_of_mass)
-        arm = unit(poses[:, k + 2]) * c
+        arm = phasor(poses[:, k + 2]) * c
         inertia = 0.0 if isinstance(body, PointMass) else body.inertia
         matrix[:, k, k] = matrix[:, k + 1, k + 1] = body.mass
         matrix[:, k + 2, k + 2] = inertia + body.mass * (np.abs(arm) ** 2 + (1.0 if point else 1e-6 * size**2))

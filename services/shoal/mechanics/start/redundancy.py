@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from shoal.mechanics.assembly.pose import as_complex, unit
 from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.plane import as_complex, phasor
 from shoal.mechanics.start.closure import Closure, lead, place_of
 from shoal.mechanics.start.poses import Assembly
 from shoal.scene import GROUND, Attachment, Coupling, InitialState, RigidBody, Scene
@@ -65,7 +65,7 @@ def _split(scene: Scene) -> Scene:
             return at
         place, start = scene.location(at), scene.start(at.body)
         name = names.setdefault((at.body, place), f"{at.body}-{len(names)}")
-        where = as_complex(start.position or (0.0, 0.0)) + unit(start.angle) * place_of(scene, at)
+        where = as_complex(start.position or (0.0, 0.0)) + phasor(start.angle) * place_of(scene, at)
         bodies[name] = RigidBody(mass=1.0, inertia=1.0)
         initial[name] = InitialState(angle=start.angle + lead(scene, at), position=(where.real, where.imag))
         return Attachment(body=name, point=(0.0, 0.0))

@@ -14,13 +14,13 @@ import numpy as np
 from pydantic import BaseModel
 
 from shoal.errors import InputError
-from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics import plane
 from shoal.mechanics.assembly.frames import Frame
-from shoal.mechanics.numerics.tile import Array
-from shoal.mechanics.start.closure import Flags
+from shoal.mechanics.joints import Apart, Meet, Turned, of_scene
+from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.start.poses import Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
-from shoal.scene import GROUND, InitialState, Revolute, Scene
+from shoal.scene import GROUND, InitialState, Scene
 from shoal.scene.scene import POSES, RATES, Quantity
 
 _MANY = 40
@@ -82,11 +82,8 @@ def complete(scene: Scene) -> Start:
 def gives_numbers(scene: Scene) -> bool:
     """Whether joints or loads take a number of theirs (an angle, a length, a side) from the start."""
     kept = any(
-        (joint.kind in ("weld",) and joint.angle is None)
-        or (joint.kind == "distance" and joint.length is None)
-        or (joint.kind == "slider" and joint.rotation == "locked")
-        or joint.kind in ("parallel", "perpendicular")
-        for joint in scene.joints.values()
+        (isinstance(one, Turned) and one.angle is None) or (isinstance(one, Apart) and one.length is None)
+        for _, one in of_scene(scene)
     )
     return kept or any(
         (load.kind == "spring" and load.length is None) or (load.kind == "torsion-spring" and load.angle is None)
@@ -99,10 +96,10 @@ def is_direct(scene: Scene) -> bool:
     if scene.ground_points:
         return False
     group = {name: name for name in (GROUND, *scene.bodies)}
-    for joint in scene.joints.values():
-        if not isinstance(joint, Revolute):
+    for _, condition in of_scene(scene):
+        if not isinstance(condition, Meet):
             return False
-        one, other = group[joint.first.body], group[joint.second.body]
+        one, other = group[condition.first.body], group[condition.second.body]
         if one == other:
             return False
         for body, owner in group.items():
@@ -210,24 +207,19 @@ def _written(values: Array) -> str:
 def begun(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
     """The state of every body at the coordinates q and rates v of a machine, each (unknowns,); scene: started."""
     found = {}
+    origin = (0.0,) * plane.DIMENSIONS
     for name, frame in frames.items():
-        (place, speed), (axis, turning) = (_at(one, q, v) for one in (frame.point(0.0), frame.direction(0.0)))
-        near = scene.start(name).angle
+        place, axis = frame.point(origin), frame.direction(origin)
+        near, along = scene.start(name).angle, axis.at(q)
+        turn = float(plane.angle(along)) - near
         found[name] = InitialState.model_construct(
-            angle=float(near + np.angle(axis * np.exp(-1j * near))),
-            rate=float(np.imag(np.conj(axis) * turning)) / abs(axis) ** 2,
-            position=(place.real, place.imag),
-            velocity=(speed.real, speed.imag),
+            angle=float(near + turn - 2 * np.pi * np.rint(turn / (2 * np.pi))),
+            rate=float(plane.cross(along, axis.rate(v)) / sum(along**2)),
+            position=tuple(place.at(q).tolist()),
+            velocity=tuple(place.rate(v).tolist()),
             guess=(),
         )
     return found
-
-
-def _at(vector: Affine, q: Array, v: Array) -> tuple[complex, complex]:
-    place, speed = complex(vector.constant), 0j
-    for unknown, factor in vector.terms.items():
-        place, speed = place + factor * q[unknown], speed + factor * v[unknown]
-    return place, speed
 
 
 def changes(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:

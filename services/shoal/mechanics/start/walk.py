@@ -7,23 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.assembly.affine import Number
-from shoal.mechanics.assembly.pose import as_complex, unit
-from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.joints import Along, Apart, Meet, Sum, Turned, of_scene
+from shoal.mechanics.numerics.tile import Array, Number
+from shoal.mechanics.plane import as_complex, phasor
 from shoal.mechanics.start.closure import Closure, lead, place_of, rate_of, value_of
-from shoal.scene import (
-    GROUND,
-    Attachment,
-    Coupling,
-    Distance,
-    DrivenAngle,
-    Parallel,
-    Perpendicular,
-    Revolute,
-    Scene,
-    Slider,
-    Weld,
-)
+from shoal.scene import GROUND, Attachment, Function, Scene
 
 Step = tuple[str, Attachment | None, Attachment | None, Number]
 """A body, the known attachment it hangs on, its own attachment there, and how far apart they are [m]."""
@@ -44,22 +32,22 @@ class Walk:
             waiting.pop(step[0])
 
     def _next(self, waiting: dict[str, None], known: set[str]) -> Step:
-        for kinds in ((Revolute, Weld), None, (Slider,), (Distance,)):
-            if kinds is None:
+        for kind in (Meet, None, Along, Apart):
+            if kind is None:
                 for name in waiting:
                     if self.scene.start(name).position is not None:
                         return name, None, None, 0.0
                 continue
-            for joint in self.scene.joints.values():
-                if not isinstance(joint, kinds):
+            for _, condition in of_scene(self.scene):
+                if not isinstance(condition, Meet | Along | Apart) or not isinstance(condition, kind):
                     continue
-                for here, there in ((joint.first, joint.second), (joint.second, joint.first)):
+                for here, there in _both_ways(condition):
                     if here.body in known and there.body in waiting:
-                        if not isinstance(joint, Distance):
+                        if not isinstance(condition, Apart):
                             return there.body, here, there, 0.0
-                        if joint.length is not None:
-                            return there.body, here, there, value_of(joint.length)
-        if any(isinstance(joint, Coupling) for joint in self.scene.joints.values()):
+                        if condition.length is not None:
+                            return there.body, here, there, value_of(condition.length)
+        if any(isinstance(condition, Sum) for _, condition in of_scene(self.scene)):
             return next(iter(waiting)), None, None, 0.0
         name = next(iter(waiting))
         raise InputError(f"initial.{name}.position: say where {name} starts; no joint point tells it")
@@ -68,12 +56,13 @@ class Walk:
     def closing(self) -> list[str]:
         """Joints that the walk does not need: they close loops."""
         used = {(id(here), id(there)) for _, here, there, _ in self.steps}
-        used |= {(there, here) for here, there in used}
-        return [
+        needed = {
             name
-            for name, joint in self.scene.joints.items()
-            if isinstance(joint, Coupling) or (id(joint.first), id(joint.second)) not in used
-        ]
+            for name, condition in of_scene(self.scene)
+            if not isinstance(condition, Sum)
+            and any((id(here), id(there)) in used for here, there in _both_ways(condition))
+        }
+        return [name for name in self.scene.joints if name not in needed]
 
     def poses(self, closure: Closure, angles: Array, rates: Array) -> tuple[Array, Array]:
         """Poses and their rates for angles [rad] and rates [rad/s] of all bodies, each (lanes, bodies)."""
@@ -86,7 +75,7 @@ class Walk:
                 position, speed = as_complex(start.position or (0.0, 0.0)), as_complex(start.velocity)
             else:
                 at = closure.here(u, here)
-                arm = unit(u[:, k + 2]) * place_of(self.scene, there)
+                arm = phasor(u[:, k + 2]) * place_of(self.scene, there)
                 position = at.value + away - arm
                 speed = closure.speed(at, v, here) - 1j * v[:, k + 2] * arm
             u[:, k], u[:, k + 1] = np.real(position), np.imag(position)
@@ -96,7 +85,7 @@ class Walk:
 
 def guessed_angles(scene: Scene, lanes: int) -> tuple[Array, Array]:
     """Angles [rad] and rates [rad/s] of all bodies: as stated, as a neighbour tells, or zero; each (lanes, bodies)."""
-    both, ties = [], [joint for joint in scene.joints.values() if isinstance(joint, _TIES)]
+    both, ties = [], [condition for _, condition in of_scene(scene) if isinstance(condition, Turned)]
     for quantity, level in (("angle", 0), ("rate", 1)):
         found: dict[str, Number] = {
             name: value for name, start in scene.initial.items() if (value := getattr(start, quantity)) is not None
@@ -112,29 +101,24 @@ def guessed_angles(scene: Scene, lanes: int) -> tuple[Array, Array]:
     return both[0], both[1]
 
 
-_Tie = Weld | Slider | Parallel | Perpendicular | DrivenAngle
-_TIES = (Weld, Slider, Parallel, Perpendicular, DrivenAngle)
+def _both_ways(condition: Meet | Along | Apart | Turned) -> tuple[tuple[Attachment, Attachment], ...]:
+    return (condition.first, condition.second), (condition.second, condition.first)
 
 
-def _tied(scene: Scene, ties: list[_Tie], found: dict[str, Number], level: int) -> Iterator[tuple[str, Number]]:
+def _tied(scene: Scene, ties: list[Turned], found: dict[str, Number], level: int) -> Iterator[tuple[str, Number]]:
     """Bodies whose angle (level 0) or rate (level 1) a joint tells from that of a neighbour."""
-    for joint in ties:
-        if (joint.first.body in found) == (joint.second.body in found):
+    for tie in ties:
+        if (tie.first.body in found) == (tie.second.body in found):
             continue
-        sign, here, there = (
-            (1, joint.first, joint.second) if joint.first.body in found else (-1, joint.second, joint.first)
-        )
-        turn: Number = None
-        if isinstance(joint, DrivenAngle):
-            turn = (value_of, rate_of)[level](joint.angle)
-        elif isinstance(joint, Parallel):
+        sign, here, there = (1, tie.first, tie.second) if tie.first.body in found else (-1, tie.second, tie.first)
+        if isinstance(tie.angle, Function):
+            turn: Number = (value_of, rate_of)[level](tie.angle)
+        elif level:
             turn = 0.0
-        elif isinstance(joint, Perpendicular):
-            turn = np.pi / 2 * (1 - level)
-        elif isinstance(joint, Weld) and (level or joint.angle is not None):
-            turn = 0.0 if level else joint.angle
-        elif isinstance(joint, Slider) and joint.rotation == "locked" and level:
-            turn = 0.0
-        if turn is not None and scene.bodies[there.body].kind != "point-mass":
+        elif not tie.is_of_start:
+            turn = tie.angle if tie.either is None else tie.either[0]
+        else:
+            continue
+        if scene.bodies[there.body].kind != "point-mass":
             shift = 0.0 if level else lead(scene, here) - lead(scene, there)
             yield there.body, found[here.body] + shift + sign * turn

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shoal.engines.swarm_motion import INTEGRATOR, GaussFunction, Search, Switches, gauss_function
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
-from shoal.mechanics.swarm_motion import INTEGRATOR, GaussFunction, Search, Switches, gauss_function
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Status, Trajectory
 

@@ -1,0 +1,73 @@
+"""What sharing could not express of the joints, as constraints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics import joints, plane
+from shoal.mechanics.assembly.affine import fixed
+from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.frames import BeamFrame
+from shoal.mechanics.assembly.groups import is_stiff, kept_rotation
+from shoal.mechanics.joints import Along, Apart, Meet, Sum, Turned
+from shoal.scene import GROUND, Function, Scene
+
+
+def hold(scene: Scene, result: Placement) -> None:
+    """What sharing could not express of the joints' conditions."""
+    for name, joint in scene.joints.items():
+        conditions = joints.conditions(joint)
+        for condition in conditions:
+            if isinstance(condition, Turned):
+                clamped = condition is joints.weld_of(conditions) and _is_clamp(scene, condition, result)
+                _keep_turn(scene, name, condition, clamped, result)
+            else:
+                _keep(scene, name, condition, result)
+
+
+def _keep(scene: Scene, name: str, condition: Meet | Along | Apart | Sum, result: Placement) -> None:
+    terms = result.terms
+    if isinstance(condition, Along):
+        if not condition.is_fixed:
+            line = result.direction(scene, condition.first).turned(plane.rotation(condition.direction))
+            terms.cross(name, line, result.gap(scene, condition), 1)
+    elif isinstance(condition, Apart):
+        gap = result.gap(scene, condition)
+        if condition.length is None:
+            terms.dot(name, gap, gap, 2, -sum(result.start_of(gap)[0] ** 2))
+        else:
+            terms.dot(name, gap, gap, 2, drive=condition.length.through("square", "neg"))
+    elif isinstance(condition, Sum):
+        axes = np.eye(plane.DIMENSIONS)
+        total = fixed(plane.vector(0.0, 0.0))
+        for term in condition.terms:
+            onto_first = np.outer(axes[0], term.factor * axes["xyz".index(term.axis)])
+            total = total + result.point(scene, term.at).turned(onto_first)
+        terms.dot(name, fixed(axes[0][:, None]), total, 1, drive=condition.value.through("neg"))
+    else:
+        assert isinstance(condition, Meet)  # shared, or a constraint where its loop closes
+
+
+def _keep_turn(scene: Scene, name: str, condition: Turned, clamped: bool, result: Placement) -> None:
+    first, second = condition.first, condition.second
+    stiff = is_stiff(scene, first.body) and is_stiff(scene, second.body)
+    if isinstance(condition.angle, Function):
+        if not stiff:
+            raise InputError(f"joints.{name}: drives the angle of a flexible rod; weld a rigid body to it instead")
+        a, b = result.direction(scene, first), result.direction(scene, second)
+        result.terms.dot(name, a, b, 0, drive=condition.angle.through("cos", "neg"))
+        result.terms.cross(name, a, b, 0, condition.angle.through("sin", "neg"))
+    elif not stiff and not clamped:
+        held = result.direction(scene, first).turned(kept_rotation(scene, condition))
+        result.terms.cross(name, held, result.direction(scene, second), 0)
+
+
+def _is_clamp(scene: Scene, weld: Turned, result: Placement) -> bool:
+    """Whether the weld is to the ground at a node, where the slope has one unknown only."""
+    sides = {side.body: side for side in (weld.first, weld.second)}
+    if GROUND not in sides:
+        return False
+    side = next(side for body, side in sides.items() if body != GROUND)
+    frame = result.frames[side.body]
+    return isinstance(frame, BeamFrame) and frame.node(scene.location(side)) is not None

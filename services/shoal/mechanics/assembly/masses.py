@@ -1,0 +1,95 @@
+"""Mass matrix, weight and flexible elements, body by body."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from shoal.mechanics import plane
+from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.frames import BeamFrame, PointFrame, RigidFrame
+from shoal.mechanics.assembly.rods import rod_axis
+from shoal.mechanics.assembly.rows import Rows
+from shoal.mechanics.elements import ELEMENTS, FAMILIES
+from shoal.mechanics.elements.families import Collected
+from shoal.mechanics.numerics.tile import Number
+from shoal.scene import PointMass, RigidBody, Rod, Scene
+
+
+class Masses:
+    """The mass matrix as entries (row, column), row >= column, the weight by unknown, and the flexible elements."""
+
+    def __init__(self, scene: Scene, placement: Placement, rows: Rows) -> None:
+        self.scene, self.placement, self.rows = scene, placement, rows
+        self.gravity = plane.vector(*scene.gravity)
+        self.entries: dict[tuple[int, int], Number] = {}
+        self.weight: list[Number] = [0.0] * len(placement.positions)
+        self.families = {kind: Collected() for kind in FAMILIES}
+        for name, body in scene.bodies.items():
+            self._add(name, body)
+        for vector in placement.drivers.values():
+            # The motion of a moving point of the ground is prescribed, so its mass is of no consequence.
+            self._add_mass([vector], [[min(np.min(np.asarray(body.mass)) for body in scene.bodies.values())]])
+
+    def _add(self, name: str, body: Rod | RigidBody | PointMass) -> None:
+        frame = self.placement.frames[name]
+        if isinstance(frame, BeamFrame):
+            assert isinstance(body, Rod)
+            self._add_rod(name, body, frame)
+        elif isinstance(frame, PointFrame):
+            self._add_mass([frame.origin], [[body.mass]])
+            self._add_load([frame.origin], [body.mass])
+        else:
+            assert isinstance(frame, RigidFrame)
+            assert not isinstance(body, PointMass)
+            x, y = body.centre_of_mass
+            mx, my = body.mass * x, body.mass * y
+            # Of the moments of second order the plane knows the sum only, as its directors turn together.
+            inertia = body.inertia + body.mass * (x**2 + y**2)
+            vectors = [frame.origin, *frame.directors]
+            self._add_mass(vectors, [[body.mass, mx, my], [mx, inertia, 0.0], [my, 0.0, 0.0]])
+            self._add_load(vectors, [body.mass, mx, my])
+
+    def _add_rod(self, name: str, rod: Rod, frame: BeamFrame) -> None:
+        element = ELEMENTS[rod.element]
+        length = frame.element_length * np.ones(1) if np.ndim(frame.element_length) else frame.element_length
+        for number in range(rod.elements):
+            height, width = rod.section((number + 0.5) / rod.elements)
+            vectors = frame.of_element(number)
+            self._add_mass(vectors, element.mass(rod.density, height, width, length))
+            self._add_load(vectors, element.weight(rod.density, height, width, length))
+            nodal: list[Any] = []
+            for node in (number, number + 1):
+                s = rod.length * node / rod.elements
+                nodal += [plane.vector(*rod_axis(rod, s)), *element.nodal_vectors(rod, s)]
+            part = element.part(rod, height, width, length, nodal)
+            self.families[element.family].add(name, self.rows.of_all(vectors), part)
+
+    def _add_mass(self, vectors: list[Affine], matrix: list[list[Number]]) -> None:
+        """Add T' M T for the body's vectors = T q, whose kinetic energy is 1/2 sum M_ab v_a . v_b."""
+        for left, row in zip(vectors, matrix, strict=True):
+            for right, mass in zip(vectors, row, strict=True):
+                if not np.any(mass):
+                    continue
+                for i, ci in left.terms.items():
+                    for j, cj in right.terms.items():
+                        if i >= j:
+                            value = sum(a * mass * b for a, b in zip(ci, cj, strict=True))
+                            if np.any(value) or i == j:
+                                self.entries[i, j] = self.entries.get((i, j), 0.0) + value
+
+    def _add_load(self, vectors: list[Affine], masses: list[Number]) -> None:
+        for vector, mass in zip(vectors, masses, strict=True):
+            for unknown, coefficient in vector.terms.items():
+                force = sum(c * mass * g for c, g in zip(coefficient, self.gravity, strict=True))
+                self.weight[unknown] = self.weight[unknown] + force
+
+    def elements(self) -> tuple[Any, ...]:
+        """The families as arrays."""
+        return tuple(found.family(kind) for kind, found in self.families.items())
+
+    def owners(self) -> tuple[tuple[str, ...], ...]:
+        """The body of every element, by family."""
+        return tuple(tuple(found.owners) for found in self.families.values())

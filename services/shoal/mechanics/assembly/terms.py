@@ -1,0 +1,115 @@
+"""Constraints before their vectors have rows, and how they become the lists of `least.constraints`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.mechanics import plane
+from shoal.mechanics.assembly.affine import Affine, fixed
+from shoal.mechanics.assembly.rows import Rows
+from shoal.mechanics.least.constraints import Constraints
+from shoal.mechanics.numerics.tile import Array, Number, index, stacked
+from shoal.scene.function import Composed
+
+
+@dataclass(frozen=True)
+class Held:
+    """One constraint before it has rows: u' form w, plus a constant and a function of time.
+
+    form: (d, d). lengths: the power of a length that it is measured in.
+    """
+
+    name: str
+    u: Affine
+    w: Affine
+    form: Array
+    constant: Number
+    drive: Composed | None
+    lengths: int
+
+    def products(self, rows: Callable[[Affine], tuple[int, ...]]) -> list[tuple[int, int, Number, Affine, Affine]]:
+        """(left row, right row, factor, left vector, right vector); left row -1 for a linear term."""
+        u, w, form = self.u, self.w, self.form
+        if not w.terms:
+            u, w, form = w, u, form.T
+        y = rows(w)
+        if not u.terms:
+            parts = [sum(f * part for f, part in zip(column, u.constant, strict=True)) for column in form.T]
+            return [(-1, y[k], part, u, w) for k, part in enumerate(parts) if np.any(part)]
+        x = rows(u)
+        return [(x[i], y[j], form[i, j], u, w) for i, j in zip(*np.nonzero(form), strict=True)]
+
+
+class Terms:
+    """Collects constraints before their vectors have rows."""
+
+    def __init__(self) -> None:
+        self.held: list[Held] = []
+
+    def dot(
+        self, name: str, u: Affine, w: Affine, lengths: int, constant: Number = 0.0, drive: Composed | None = None
+    ) -> None:
+        """u . w + constant + drive(t) = 0, measured in m to the power of `lengths`."""
+        self.held.append(Held(name, u, w, np.eye(len(u.constant)), constant, drive, lengths))
+
+    def cross(self, name: str, u: Affine, w: Affine, lengths: int, drive: Composed | None = None) -> None:
+        """u x w + drive(t) = 0 of two vectors of the plane, measured in m to the power of `lengths`."""
+        self.held.append(Held(name, u, w, plane.CROSS, 0.0, drive, lengths))
+
+    def vanish(self, name: str, vector: Affine, drives: tuple[Composed, ...] | None = None) -> None:
+        """vector + drives(t) = 0, a linear constraint for each component [m]."""
+        for k, axis in enumerate(np.eye(len(vector.constant))):
+            self.dot(name, fixed(axis[:, None]), vector, 1, drive=drives[k] if drives else None)
+
+
+def assemble(terms: Terms, rows: Rows, driven: int) -> Constraints:
+    """The lists of the collected constraints. Their functions of time are numbered from `driven` on, in their order."""
+    start, entry = [0], [0]
+    lefts: list[int] = []
+    rights: list[int] = []
+    factors: list[Number] = []
+    column: list[int] = []
+    parts: list[tuple[int, int, Number]] = []
+    drive = []
+    for held in terms.held:
+        found: dict[int, int] = {}
+        for left, right, factor, u, w in held.products(rows.of):
+            lefts.append(left)
+            rights.append(right)
+            factors.append(factor)
+            for row, vector, other in ((left, u, right), (right, w, left)):
+                if row < 0:
+                    continue
+                component = rows.of(vector).index(row)
+                for unknown, value in vector.terms.items():
+                    coefficient = factor * value[component]
+                    if not np.any(coefficient):
+                        continue
+                    if unknown not in found:
+                        found[unknown] = len(column)
+                        column.append(unknown)
+                    parts.append((found[unknown], other, coefficient))
+        start.append(len(lefts))
+        entry.append(len(column))
+        drive.append(-1 if held.drive is None else driven)
+        driven += held.drive is not None
+
+    return Constraints(
+        len(terms.held),
+        index(start),
+        index(lefts),
+        index(rights),
+        stacked(factors),
+        stacked([held.constant for held in terms.held]),
+        index([held.lengths for held in terms.held]),
+        index(drive),
+        index(entry),
+        index(column),
+        len(parts),
+        index([target for target, _, _ in parts]),
+        index([source for _, source, _ in parts]),
+        stacked([coefficient for _, _, coefficient in parts]),
+    )

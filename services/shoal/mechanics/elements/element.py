@@ -1,0 +1,35 @@
+"""What placement and model need to know of a kind of flexible element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from shoal.mechanics.elements.families import Part
+from shoal.mechanics.numerics.tile import Number
+from shoal.scene import Rod
+
+Shape = Callable[[Number, Number, Number], list[Number]]
+
+
+@dataclass(frozen=True)
+class Element:
+    """A kind of flexible element with two nodes.
+
+    family: the type of its kernel's arrays. nodal_vectors: (rod, arc length [m]) -> the vectors a node has besides its
+    position, in the unstrained rod, along its own frame, (2, ...). position_shape, direction_shape: (fraction x, height
+    y [m], element length [m]) -> the factors of the nodal vectors of both nodes. clamped: which of a node's vectors a
+    clamp holds. normal: whether that one, and what direction_shape gives, is along the section, a right angle to the
+    left of the axis. mass, weight: (density, height, width, length) -> consistent mass on the nodal vectors and load of
+    a unit acceleration. part: (rod, height, width, length, nodal vectors at rest) -> one element for its kernel.
+    """
+
+    family: type
+    nodal_vectors: Callable[[Rod, Number], list[Number]]
+    position_shape: Shape
+    direction_shape: Shape
+    mass: Callable[[Number, Number, Number, Number], list[list[Number]]]
+    weight: Callable[[Number, Number, Number, Number], list[Number]]
+    part: Callable[[Rod, Number, Number, Number, list[Number]], Part]
+    clamped: int = 0
+    normal: bool = False

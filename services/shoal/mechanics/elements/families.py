@@ -1,0 +1,172 @@
+"""The kernels of flexible elements, chosen by the type of their arrays at compile time.
+
+A family is a subclass of `Family`; `implement` in its own file says which kernels are its. Compiled code
+goes through the families of a model in their order and calls the functions below.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import overload
+
+from shoal.mechanics.numerics.choice import body, is_of
+from shoal.mechanics.numerics.tile import Array, Index, Number, Tile, index, stacked
+
+PLAN = 4
+"""Numbers of an element in the plan: its first row of the table, how many rows, its first row of the reference, and the
+variant of the kernel (which only the family itself knows)."""
+
+
+OPTIONS = {"error_model": "numpy"}
+
+
+class Family(NamedTuple):
+    """Elements of one family, any number of them, also none; each family is a subclass.
+
+    side: rows of one element. damped: whether any loses energy in itself, otherwise rates are not looked at. table:
+    quadrature rules back to back. plan: PLAN numbers an element. rows: `side` an element. coefficients: (numbers *
+    size, lanes); reference: the stress-free shape where the kernel needs it, (any, lanes).
+    """
+
+    size: int
+    side: int
+    damped: bool
+    table: Array
+    plan: Index
+    rows: Index
+    coefficients: Array
+    reference: Array
+
+
+class Kernel(NamedTuple):
+    """Of one element: rows, coefficients, and the first of these that is a stiffness."""
+
+    side: int
+    coefficients: int
+    first_stiffness: int
+
+
+class Part(NamedTuple):
+    """One element, as its family stores it. rule: rows of the table, (points, columns)."""
+
+    rule: Array
+    variant: int
+    damped: bool
+    numbers: list[Number]
+    reference: list[Number]
+
+
+KERNELS: dict[type, Kernel] = {}
+
+
+class Collected:
+    """The elements of one family as they are found."""
+
+    def __init__(self) -> None:
+        self.owners: list[str] = []
+        self._rules: dict[bytes, tuple[int, Array]] = {}
+        self._points = 0
+        self._plan: list[int] = []
+        self._rows: list[int] = []
+        self._numbers: list[Number] = []
+        self._reference: list[Number] = []
+        self._damped = False
+
+    def add(self, owner: str, rows: list[int], part: Part) -> None:
+        """One element of a body."""
+        key = part.rule.tobytes()
+        if key not in self._rules:
+            self._rules[key] = self._points, part.rule
+            self._points += len(part.rule)
+        self._plan += [self._rules[key][0], len(part.rule), len(self._reference), part.variant]
+        self.owners.append(owner)
+        self._rows += rows
+        self._numbers += part.numbers
+        self._reference += part.reference
+        self._damped = self._damped or part.damped
+
+    def family(self, kind: Any) -> Any:
+        """All of them as arrays."""
+        table = np.concatenate([np.zeros(0), *(rule.ravel() for _, rule in self._rules.values())])
+        side = KERNELS[kind].side
+        plan, rows = index(self._plan), index(self._rows)
+        numbers, reference = stacked(self._numbers), stacked(self._reference)
+        return kind(len(self.owners), side, self._damped, table, plan, rows, numbers, reference)
+
+
+def add_force(
+    tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array, power: Array, moving: bool
+) -> None:
+    """Add the elastic force -dU/dz and the damping force [N, N m, ...] to f (rows, lanes). Pointers.
+
+    power: row 0 += power dissipated by damping [W]; w: work space of 64 rows. zdot and power are not looked at unless
+    the family is damped; moving: whether damping counts, or the elastic part alone.
+    """
+    raise NotImplementedError(type(family).__name__)
+
+
+def add_mean_force(tile: Tile, family: Family, before: Array, after: Array, f: Array, w: Array) -> None:
+    """Add the force whose work over a step is exactly the loss of energy, of families that know it; else nothing."""
+    raise NotImplementedError(type(family).__name__)
+
+
+def is_exact(family: Family) -> bool:
+    """Whether `add_mean_force` does anything."""
+    raise NotImplementedError(type(family).__name__)
+
+
+def add_energy(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: int) -> None:
+    """Add the strain energy [J] to a row of energy; w: work space of 64 rows. Pointers."""
+    raise NotImplementedError(type(family).__name__)
+
+
+def tangent(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
+    """Stiffness d2U/dz2 of every element; rows of out from `first` on: (size side^2, lanes), row-major blocks."""
+    raise NotImplementedError(type(family).__name__)
+
+
+def damping(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
+    """Damping matrix -df/dzdot of every element [N s/m, ...], laid out as in `tangent`; zero on entry. Pointers."""
+    raise NotImplementedError(type(family).__name__)
+
+
+def implement(
+    kind: type, kernel: Kernel, *, force: Any, potential: Any, stiffness: Any, viscosity: Any = None, mean: Any = None
+) -> None:
+    """Let compiled calls with elements of this type run these kernels, whose parameters are named as above.
+
+    viscosity: of a family that may be damped. mean: of one that is exact.
+    """
+    KERNELS[kind] = kernel
+
+    @overload(add_force, jit_options=OPTIONS)
+    def choose_force(tile, family, z, zdot, f, w, power, moving):  # type: ignore[no-untyped-def]
+        return body(force) if is_of(family, kind) else None
+
+    @overload(add_energy, jit_options=OPTIONS)
+    def choose_energy(tile, family, z, w, energy, row):  # type: ignore[no-untyped-def]
+        return body(potential) if is_of(family, kind) else None
+
+    @overload(tangent, jit_options=OPTIONS)
+    def choose_tangent(tile, family, z, w, out, first):  # type: ignore[no-untyped-def]
+        return body(stiffness) if is_of(family, kind) else None
+
+    @overload(damping, jit_options=OPTIONS)
+    def choose_damping(tile, family, z, w, out, first):  # type: ignore[no-untyped-def]
+        if not is_of(family, kind):
+            return None
+        return (lambda tile, family, z, w, out, first: None) if viscosity is None else body(viscosity)
+
+    @overload(add_mean_force, jit_options=OPTIONS)
+    def choose_mean_force(tile, family, before, after, f, w):  # type: ignore[no-untyped-def]
+        if not is_of(family, kind):
+            return None
+        return (lambda tile, family, before, after, f, w: None) if mean is None else body(mean)
+
+    @overload(is_exact)
+    def choose_exact(family):  # type: ignore[no-untyped-def]
+        if not is_of(family, kind):
+            return None
+        return (lambda family: False) if mean is None else (lambda family: True)

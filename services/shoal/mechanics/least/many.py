@@ -1,0 +1,104 @@
+"""Least constraint with many constraints, by the sparse saddle point problem (`saddle`)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics import functions
+from shoal.mechanics.least import constraints, saddle
+from shoal.mechanics.least.work import GaussWork
+from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.pointers import pointer
+from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.vector import clear, copy, subtract
+
+
+@njit(cache=True, error_model="numpy")
+def solve(tile: Tile, m: Arrays, w: GaussWork, load: Array, gap: Array, out: Array, multiplier: Array) -> None:
+    """[M C_q'; C_q 0] [out; multiplier] = [load; -gap] with the factors in w.saddle."""
+    s, room = m.saddle, w.saddle
+    n = m.unknowns
+    for i in range(n):
+        copy(tile, room.x, s.place[i], load, i)
+    for k in range(m.constraints.size):
+        clear(tile, room.x, s.place[n + k])
+        subtract(tile, room.x, s.place[n + k], gap, k)
+    sparse.solve(tile, s.pattern, room.values, room.x, 0)
+    for i in range(n):
+        copy(tile, out, i, room.x, s.place[i])
+    for k in range(m.constraints.size):
+        copy(tile, multiplier, k, room.x, s.place[n + k])
+
+
+@njit(cache=True, error_model="numpy")
+def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array) -> None:
+    """See `principle.constrain`; C_q and eta are in w."""
+    c = m.constraints
+    entries = c.entry[c.size]
+    dropped = saddle.factor(tile, m.saddle, entries, w.jacobian, w.saddle, saddle.SINGULAR)
+    solve(tile, m, w, a, w.gap, a, w.multiplier)
+    if dropped > 0:
+        _add_third_derivatives(tile, m, w, t, v, a)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array) -> None:
+    """Correct `a` by the rows u' d3C/dt3 = 0 of the rows that the factorisation left out, one after the other."""
+    width = len(tile)
+    c = m.constraints
+    n, count = m.unknowns, c.size
+    constraints.jacobian(tile, c, v, 0.0, w.turning)
+    moves = np.zeros((count, n))
+    rows = np.zeros((count, n))
+    zeros = np.zeros(count * width)
+    load = np.zeros(n * width)
+    found = np.zeros(n * width)
+    for lane in range(width):
+        rank = 0
+        for k in range(count):
+            if w.saddle.values[m.saddle.place[n + k] * width + lane] != 0.0:
+                continue
+            # u = e_k - mu with C_q' mu = the row k
+            for i in range(n * width):
+                load[i] = 0.0
+            for e in range(c.entry[k], c.entry[k + 1]):
+                load[c.column[e] * width + lane] = w.jacobian[e * width + lane]
+            solve(tile, m, w, pointer(load), pointer(zeros), pointer(found), w.multiplier)
+            target, size = 0.0, 0.0
+            for i in range(n):
+                rows[rank, i] = 0.0
+            for j in range(count):
+                u = (1.0 if j == k else 0.0) - w.multiplier[j * width + lane]
+                target -= u * functions.evaluate(m.functions, c.drive[j], t, 3)
+                for e in range(c.entry[j], c.entry[j + 1]):
+                    part = 3.0 * u * w.turning[e * width + lane]
+                    rows[rank, c.column[e]] += part
+                    size += abs(part)
+            largest = 0.0
+            for i in range(n * width):
+                load[i] = 0.0
+            for i in range(n):
+                largest = max(largest, abs(rows[rank, i]))
+                load[i * width + lane] = rows[rank, i]
+            if not largest > 1e-10 * size:
+                continue
+            solve(tile, m, w, pointer(load), pointer(zeros), pointer(found), w.multiplier)
+            whole = 0.0
+            for i in range(n):
+                moves[rank, i] = found[i * width + lane]
+                whole += moves[rank, i] * rows[rank, i]
+            for r in range(rank):
+                part = np.dot(rows[r], moves[rank]) / np.dot(rows[r], moves[r])
+                for i in range(n):
+                    moves[rank, i] -= part * moves[r, i]
+            along = np.dot(rows[rank], moves[rank])
+            if not along > 1e-10 * whole:
+                continue
+            gap = target
+            for i in range(n):
+                gap -= rows[rank, i] * a[i * width + lane]
+            for i in range(n):
+                a[i * width + lane] += gap / along * moves[rank, i]
+            rank += 1

@@ -1,0 +1,134 @@
+"""Gauss's principle of least constraint, in the metric of the mass matrix.
+
+The true acceleration minimises 1/2 (M a - Q)' M^-1 (M a - Q) subject to C_q a = -eta (paper, eq. 16). How the
+minimiser is found is one of METHODS; `projection` is the default and the only one that is right at singular positions.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from shoal.errors import InputError
+from shoal.mechanics import functions
+from shoal.mechanics.derived import derive
+from shoal.mechanics.least import alternatives, constraints, many, projection
+from shoal.mechanics.least.work import GaussWork, LaneWork, lane_work, load_lane, rows
+from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.tile import Array, Tile
+
+PROJECTION, BAUMGARTE, SOUGHT = 0, 4, 5
+METHODS = {
+    "projection": PROJECTION,
+    "kkt": alternatives.KKT,
+    "augmented-lagrangian": alternatives.AUGMENTED,
+    "proximal": alternatives.PROXIMAL,
+    "baumgarte": BAUMGARTE,
+}
+"""Ways to the acceleration. With SOUGHT somebody else seeks it; see `gates.Seek`."""
+
+
+def method(name: str) -> int:
+    """The number of a way to the acceleration. Raises InputError."""
+    if name not in METHODS:
+        raise InputError(f"solver.acceleration: the mechanics knows no {name!r}; there are {', '.join(METHODS)}")
+    return METHODS[name]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def state(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array) -> None:
+    """C_q into w.jacobian and eta into w.gap at a state, whose derived rows are filled."""
+    derive(tile, m.derived, q, m.unknowns, m.held_rows, False)
+    derive(tile, m.derived, v, m.unknowns, m.held_rows, True)
+    constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
+    constraints.bias(tile, m.constraints, m.functions, t, v, w.gap)
+
+
+@njit(cache=True, error_model="numpy")
+def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, a: Array, tolerance: float) -> None:
+    """Turn the forces Q in `a` into the true acceleration; the multipliers go into w.multiplier.
+
+    tolerance: distance from a singular position, relative to a row's length, below which third derivatives take over.
+    They tell the acceleration there up to the distance d itself. The constraints tell it up to eps/d^2: round-off eps
+    in C_q v leaves the rate of the weakest direction uncertain by eps/d, and its acceleration by that over d. So the
+    best tolerance is about the cube root of eps.
+    """
+    state(tile, m, w, t, q, v)
+    if m.saddle.size > 0 and m.method == PROJECTION:
+        many.constrain(tile, m, w, t, v, a)
+        return
+    width = len(tile)
+    s = lane_work(m, w)
+    rows(tile, m, w)
+    sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, a, 0)
+    if m.method == BAUMGARTE:
+        _stabilise(tile, m, w, t, q, v)
+    for lane in range(width):
+        load_lane(width, lane, m, w, s, a)
+        count = m.constraints.size
+        for k in range(count):
+            s.weights[k] = -w.gap[k * width + lane]
+        if m.method == PROJECTION or m.method == BAUMGARTE:
+            rank = projection.orthonormalise(s.rows, s.triangle, s.norms, s.order, tolerance)
+            first = rank
+            projection.components(rank, s.triangle, s.norms, s.order, s.weights, s.wanted)
+            if rank < count:
+                rank = _add_third_derivatives(tile, m, w, s, t, v, lane, rank)
+            projection.move(rank, s.rows, s.wanted, s.y)
+            projection.multipliers(first, s.triangle, s.norms, s.order, s.wanted, s.weights)
+        else:
+            alternatives.correct(m.method, s.rows, s.weights, s.triangle, s.norms, s.wanted, s.y)
+            for k in range(count):
+                s.weights[k] = s.wanted[k] * s.norms[k]
+        for i in range(m.unknowns):
+            a[i * width + lane] = s.y[i]
+        for k in range(count):
+            w.multiplier[k * width + lane] = s.weights[k]
+    sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, a, 0)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_third_derivatives(
+    tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, v: Array, lane: int, rank: int
+) -> int:
+    """Rows u' d3C/dt3 = 0 for the dependent combinations u of one lane; returns the new rank."""
+    width = len(tile)
+    count, n = m.constraints.size, m.unknowns
+    c = m.constraints
+    first = rank
+    constraints.jacobian(tile, c, v, 0.0, w.turning)
+    for number in range(first, count):
+        projection.dependence(number, first, s.triangle, s.norms, s.order, s.weights)
+        target, size = 0.0, 0.0
+        for i in range(n * width):
+            w.extra[i] = 0.0
+        for k in range(count):
+            target -= s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 3)
+            for e in range(c.entry[k], c.entry[k + 1]):
+                part = 3.0 * s.weights[k] * w.turning[e * width + lane]
+                w.extra[c.column[e] * width + lane] += part
+                size += abs(part)
+        largest = 0.0
+        for i in range(n):
+            largest = max(largest, abs(w.extra[i * width + lane]))
+        if not largest > 1e-10 * size:
+            continue  # redundant everywhere, or at rest
+        sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+        for i in range(n):
+            s.row[i] = w.extra[i * width + lane]
+        rank = projection.extend(rank, s.rows, s.wanted, s.row, target, 1e-6)
+    return rank
+
+
+@njit(cache=True, error_model="numpy")
+def _stabilise(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array) -> None:
+    """Baumgarte 1972: C'' + 2 alpha C' + alpha^2 C = 0 in place of C'' = 0."""
+    width = len(tile)
+    c = m.constraints
+    constraints.residual(tile, c, m.functions, t, q, w.multiplier)
+    for i in range(c.size * width):
+        w.gap[i] += m.baumgarte * m.baumgarte * w.multiplier[i]
+    constraints.rates(tile, c, m.functions, t, w.multiplier)
+    constraints.add_product(tile, c, w.jacobian, v, w.multiplier)
+    for i in range(c.size * width):
+        w.gap[i] += 2.0 * m.baumgarte * w.multiplier[i]

@@ -1,0 +1,118 @@
+"""Room for the constraints of one tile, and what all ways to the acceleration do first."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import carray, njit
+
+from shoal.mechanics.least import saddle
+from shoal.mechanics.least.saddle import SaddleWork
+from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.tile import Array, Index, Tile
+from shoal.mechanics.numerics.vector import clear, copy
+
+
+class LaneWork(NamedTuple):
+    """Work space for one lane at a time, as arrays; see `GaussWork`."""
+
+    rows: Array
+    triangle: Array
+    norms: Array
+    order: Index
+    wanted: Array
+    weights: Array
+    y: Array
+    row: Array
+
+
+class GaussWork(NamedTuple):
+    """Work space of one tile.
+
+    jacobian, turning: C_q and dC_q/dt (entries, lanes). response: C_q' or H^-1 C_q' (constraints * unknowns, lanes).
+    gram: (constraints^2, lanes). multiplier, gap: (constraints, lanes). extra: (unknowns, lanes). For one lane at a
+    time: rows (constraints, unknowns), triangle, norms, order, wanted, weights (constraints), y, row (unknowns).
+    """
+
+    jacobian: Array
+    turning: Array
+    response: Array
+    gram: Array
+    multiplier: Array
+    gap: Array
+    extra: Array
+    rows: Array
+    triangle: Array
+    norms: Array
+    order: Array
+    wanted: Array
+    weights: Array
+    y: Array
+    row: Array
+    saddle: SaddleWork
+
+
+def work_space(width: int, m: Arrays) -> GaussWork:
+    """Room for the constraints of a model."""
+    count, n, entries = m.constraints.size, m.unknowns, len(m.constraints.column)
+    sizes = (entries, entries, count * n, count * count, count, count, n)
+    jacobian, turning, response, gram, multiplier, gap, extra = (np.zeros(size * width) for size in sizes)
+    return GaussWork(
+        jacobian,
+        turning,
+        response,
+        gram,
+        multiplier,
+        gap,
+        extra,
+        np.zeros((count, n)),
+        np.zeros((count, count)),
+        np.zeros(count),
+        np.zeros(count, dtype=np.int64),
+        np.zeros(count),
+        np.zeros(count),
+        np.zeros(n),
+        np.zeros(n),
+        saddle.room(m.saddle.size, m.saddle.slots, width),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def lane_work(m: Arrays, w: GaussWork) -> LaneWork:
+    """The room for one lane as arrays."""
+    count, n = m.constraints.size, m.unknowns
+    return LaneWork(
+        carray(w.rows, (count, n)),
+        carray(w.triangle, (count, count)),
+        carray(w.norms, (count,)),
+        carray(w.order, (count,)),
+        carray(w.wanted, (count,)),
+        carray(w.weights, (count,)),
+        carray(w.y, (n,)),
+        carray(w.row, (n,)),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def rows(tile: Tile, m: Arrays, w: GaussWork) -> None:
+    """The rows D^-1/2 L^-1 C_q' of the Jacobian in w.jacobian, into w.response."""
+    n = m.unknowns
+    c = m.constraints
+    for row in range(c.size * n):
+        clear(tile, w.response, row)
+    for k in range(c.size):
+        for e in range(c.entry[k], c.entry[k + 1]):
+            copy(tile, w.response, k * n + c.column[e], w.jacobian, e)
+        sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.response, k * n)
+
+
+@njit(cache=True, error_model="numpy")
+def load_lane(width: int, lane: int, m: Arrays, w: GaussWork, s: LaneWork, y: Array) -> None:
+    """The rows and y of one lane."""
+    for k in range(m.constraints.size):
+        for i in range(m.unknowns):
+            s.rows[k, i] = w.response[(k * m.unknowns + i) * width + lane]
+    for i in range(m.unknowns):
+        s.y[i] = y[i * width + lane]
