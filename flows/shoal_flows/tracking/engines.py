@@ -13,9 +13,8 @@ from shoal.pictures.engines import engines
 from shoal.pictures.style import png
 from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import Scene
-from shoal.trajectory import Trajectory
+from shoal.trajectory import Trajectory, json_text
 
-from shoal_flows.jsontext import as_json_text
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
 
@@ -34,7 +33,7 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
         marker = tip(scene)
         shown = picture or png(engines(comparison, marker, f"{scene.name}: the engines over each other"))
         study.picture(shown, "engines.png")
-        study.text(as_json_text(comparison.differences(), indent=1), "differences.json")
+        study.text(json_text(comparison.differences(), indent=1), "differences.json")
         for name, motion in comparison.trajectories.items():
             with open_run("Comparison", name, tags={"kind": "engine", "scene": scene.name}, parent=study.run_id) as run:
                 _log_engine(run, scene, motion)

@@ -1,0 +1,57 @@
+"""Shoal itself: as a service, as a unit in another program, and whether all of it is there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from shoal.commands.finish import finish
+from shoal.commands.options import EngineName, option_json, option_out, option_set
+
+
+@click.command()
+@click.argument("engine", type=EngineName())
+@click.option("--host", default="127.0.0.1", show_default=True)
+@click.option("--port", type=click.IntRange(1, 65535), metavar="PORT", help="8001 gauss, 8002 exudyn, 8003 casadi.")
+@click.option("--certificate", type=click.Path(path_type=Path), help="Serve https with this certificate (PEM).")
+@click.option("--key", type=click.Path(path_type=Path), help="The certificate's private key (PEM).")
+def serve(engine: str, host: str, port: int | None, certificate: Path | None, key: Path | None) -> None:
+    """Serve ENGINE over HTTP until Ctrl-C. SHOAL_API_* in the environment sets the limits."""
+    from shoal.api.serve import serve
+
+    serve(engine, host, port, certificate, key)
+
+
+@click.command("export-fmu")
+@click.argument("scene")
+@option_set
+@click.option(
+    "--parameter",
+    "parameters",
+    multiple=True,
+    metavar="PATH",
+    help="A number of the scene that a host may set (repeatable); else gravity and the initial angles.",
+)
+@option_out(".fmu", otherwise="; else the scene's name")
+def export_fmu(scene: str, values: dict[str, Any], parameters: tuple[str, ...], out: Path | None) -> None:
+    """Write SCENE as an FMI 2.0 unit for co-simulation. A host needs this installation to run it."""
+    from shoal.fmu.export import export
+    from shoal.scene import load_scene
+
+    click.echo(export(load_scene(scene).with_values(values), parameters, out))
+
+
+@click.command()
+@option_json
+def doctor(as_json: bool) -> None:
+    """Check the installation and say what is wrong. Engines, compiled kernels, pipeline, folders."""
+    from shoal.doctor import examine
+    from shoal.terminal import screen
+    from shoal.terminal.lists import doctor_table
+
+    checks = examine()
+    report = {"status": "ok" if all(c.ok for c in checks) else "failed", "checks": [vars(c) for c in checks]}
+    screen.show(report, as_json, lambda: doctor_table(checks))
+    finish(all(check.ok for check in checks), "something is missing; see the table")

@@ -1,0 +1,81 @@
+"""The two streams: tables and sentences on the output, progress on standard error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from shoal.home import compiled
+from shoal.trajectory import json_text
+
+out = Console(highlight=False)
+err = Console(stderr=True, highlight=False)
+
+
+def show(data: Mapping[str, Any], as_json: bool, draw: Callable[[], None]) -> None:
+    """One JSON object, or the table."""
+    if as_json:
+        print(json_text(data))  # noqa: T201 - this is the output
+    else:
+        draw()
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """A spinner on a terminal; nothing in a log file."""
+    with _progress() as progress:
+        progress.add_task(what, total=None)
+        yield
+
+
+@contextmanager
+def fitness_progress(what: str) -> Iterator[Callable[[int, float, float, int], None]]:
+    """A line that follows the best fitness of a running search, and what it has cost."""
+    with _progress() as progress:
+        task = progress.add_task(f"{what}: preparing the data", total=None)
+
+        def note(iteration: int, best: float, mean: float, evaluations: int) -> None:
+            progress.update(task, description=f"{what}: best fitness {best:.3e}, {evaluations} evaluations")
+
+        yield note
+
+
+@contextmanager
+def rungs_progress(what: str) -> Iterator[Callable[[str], None]]:
+    """A line that names the model just run."""
+    with _progress() as progress:
+        task = progress.add_task(f"{what}: looking for the cheapest model", total=None)
+        yield lambda model: progress.update(task, description=f"{what}: ran {model}")
+
+
+def _progress() -> Progress:
+    if not compiled():
+        err.print("compiling the solver for this machine; this takes a few minutes, once", soft_wrap=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    return Progress(*columns, console=err, transient=True, disable=not err.is_terminal)
+
+
+def table(title: str, *headings: str) -> Table:
+    """An empty table; its title is printed at once, so that it is not folded to the width of the table."""
+    out.print(title, style="bold")
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, heading in enumerate(headings):
+        made.add_column(escape(heading), justify="left" if index == 0 else "right", overflow="fold")
+    return made
+
+
+def put(shown: Table | str = "") -> None:
+    """A table, or an empty line."""
+    out.print(shown)
+
+
+def say(text: str, style: str = "") -> None:
+    """A line of text, on a terminal folded at 80 columns, in a log file whole; what looks like markup is none."""
+    out.print(escape(text), style=style, width=min(80, out.width), soft_wrap=not out.is_terminal)
