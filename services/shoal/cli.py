@@ -29,7 +29,7 @@ from shoal.errors import InputError, ShoalError
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """No room: on the disk, for this user, in this file."""
 EXTRAS = {
-    "pipeline": ("prefect", "mlflow", "shoal_flows"),
+    "pipeline": ("prefect", "mlflow"),
     "services": ("fastapi", "starlette", "uvicorn", "pydantic_settings", "orjson"),
     "fmu": ("pythonfmu",),
 }
