@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
-from io import StringIO
 from typing import Any
 
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.pictures.engines import engines
+from shoal.pictures.files import rows
 from shoal.pictures.style import png
 from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import Scene
@@ -63,7 +62,7 @@ def log_sweep(result: Sweep) -> str:
             for name in ("time_error", "mesh_error"):
                 if (error := getattr(result.check, name)) is not None:
                     run.metric(f"final/{name}", error)
-        run.text(_table(result), "sweep.csv")
+        run.text(rows(result), "sweep.csv")
         if len(result.grid) <= 2:
             for marker in result.displacements:
                 run.picture(png(draw_sweep(result, marker)), f"displacement-{marker}.png")
@@ -94,12 +93,3 @@ def _scene(scene: Scene) -> dict[str, Any]:
 
 def _refused(comparison: Comparison) -> Mapping[str, str]:
     return {f"refused.{name}": reason for name, reason in comparison.refused.items()}
-
-
-def _table(result: Sweep) -> str:
-    rows = result.rows()
-    stream = StringIO()
-    writer = csv.DictWriter(stream, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return stream.getvalue()

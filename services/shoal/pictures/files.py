@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Mapping
 from io import StringIO
 from pathlib import Path
@@ -56,19 +57,18 @@ def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selectio
         title = f"{ends(scene.name, moving)}{trust}"
         return gif(moving, title) if moves else png(poses(moving, title))
 
-    forms: Forms = {".html": page, ".gif": lambda: drawn(moves=True), ".png": lambda: drawn(moves=False)}
-    save(path, forms | {".csv": lambda: _columns(motion), ".json": lambda: json_text(motion.to_json(), indent=1)})
+    drawings: Forms = {".html": page, ".gif": lambda: drawn(moves=True), ".png": lambda: drawn(moves=False)}
+    save(path, {**drawings, ".csv": lambda: columns(motion, "{:.12g}".format), ".json": _json(motion)})
 
 
-def _columns(motion: Trajectory) -> str:
-    """Time, x, y and angle of every marker, separated by commas."""
-    columns, table = ["t"], [motion.times]
+def columns(motion: Trajectory, digits: Callable[[float], str]) -> str:
+    """Time [s], x and y [m] and angle [rad] of every marker of one lane, separated by commas; digits: a number's."""
+    names, table = ["t"], [motion.times]
     for name in motion.markers:
-        columns += [f"{name}.x", f"{name}.y", f"{name}.angle"]
+        names += [f"{name}.x", f"{name}.y", f"{name}.angle"]
         table += [*motion.marker(name).T, motion.angle(name)]
-    stream = StringIO()
-    np.savetxt(stream, np.column_stack(table), delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
-    return stream.getvalue()
+    rows = (",".join(map(digits, row)) for row in np.column_stack(table).tolist())
+    return "\n".join([",".join(names), *rows, ""])
 
 
 def estimate(found: Estimate, problem: Problem, path: Path) -> None:
@@ -116,24 +116,26 @@ def design(found: Design, path: Path) -> None:
 
         return png(design(found))
 
-    save(path, {".json": lambda: json_text(found.to_json(), indent=1), ".png": drawn})
+    save(path, {".json": _json(found), ".png": drawn})
 
 
 def sweep(result: Sweep, path: Path) -> None:
     """Every point, or the displacement of the last marker."""
+    save(path, {".csv": lambda: rows(result), ".json": _json(result), ".png": lambda: _plotted(result)})
 
-    def table() -> str:
-        rows = result.rows()
-        lines = [",".join(rows[0]), *(",".join("" if v is None else str(v) for v in row.values()) for row in rows)]
-        return "\n".join(lines) + "\n"
 
-    written = {".csv": table, ".json": lambda: json_text(result.to_json(), indent=1)}
-    save(path, {**written, ".png": lambda: _plotted(result)})
+def rows(result: Sweep) -> str:
+    """Every point, separated by commas."""
+    found, stream = result.rows(), StringIO()
+    writer = csv.DictWriter(stream, list(found[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(found)
+    return stream.getvalue()
 
 
 def comparison(result: Comparison, path: Path) -> None:
     """All distances, or the engines over each other at the last marker."""
-    save(path, {".json": lambda: json_text(result.to_json(), indent=1), ".png": lambda: _plotted(result)})
+    save(path, {".json": _json(result), ".png": lambda: _plotted(result)})
 
 
 def _plotted(result: Estimate | Sweep | Comparison) -> bytes:
@@ -142,3 +144,8 @@ def _plotted(result: Estimate | Sweep | Comparison) -> bytes:
     from shoal.pictures.style import png
 
     return png(plot(result).figure)
+
+
+def _json(result: Trajectory | Design | Sweep | Comparison) -> Callable[[], str]:
+    """What `--json` prints, one number a line."""
+    return lambda: json_text(result.to_json(), indent=1)
