@@ -33,7 +33,7 @@ from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import load_scene
 from shoal.selection import Selection, select
-from shoal.terminal import analysis, forward, inverse, lists, screen
+from shoal.terminal import screen, tables
 
 WIDTH = 80
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
@@ -53,23 +53,23 @@ def found() -> Estimate:
 
 def squeezed() -> None:
     scene = load_scene("andrews-squeezer")
-    forward.trajectory_table(get_engine("gauss").simulate(scene, [1e-3]), scene)
-    analysis.reactions_table(reactions(scene, [1e-3]))
+    tables.trajectory_table(get_engine("gauss").simulate(scene, [1e-3]), scene)
+    tables.reactions_table(reactions(scene, [1e-3]))
 
 
 TABLES: dict[str, Callable[[], None]] = {
     "trajectory, reactions": squeezed,
-    "selection": lambda: forward.selection_table(chosen()),
-    "sweep": lambda: forward.sweep_table(sweep(DOUBLE, ANGLES, get_engine("gauss"), 0.1)),
-    "comparison": lambda: forward.comparison_table(compare(DOUBLE, ["gauss", "casadi"], [0.1])),
-    "equilibrium": lambda: analysis.equilibrium_table(statics(DOUBLE)),
-    "modes": lambda: analysis.modes_table(modes(DOUBLE)),
-    "estimate": lambda: inverse.estimate_table(found()),
-    "design": lambda: inverse.design_table(design(load_problem("paper-case-1"), noise=1e-3)),
+    "selection": lambda: tables.selection_table(chosen()),
+    "sweep": lambda: tables.sweep_table(sweep(DOUBLE, ANGLES, get_engine("gauss"), 0.1)),
+    "comparison": lambda: tables.comparison_table(compare(DOUBLE, ["gauss", "casadi"], [0.1])),
+    "equilibrium": lambda: tables.equilibrium_table(statics(DOUBLE)),
+    "modes": lambda: tables.modes_table(modes(DOUBLE)),
+    "estimate": lambda: tables.estimate_table(found()),
+    "design": lambda: tables.design_table(design(load_problem("paper-case-1"), noise=1e-3)),
 }
 PROSE: dict[str, Callable[[], None]] = {
-    "doctor": lambda: lists.doctor_table([Check("MLflow server", False, "does not answer", "start it " * 12)]),
-    "listing": lambda: lists.listing("scenes", {"flexible-double-pendulum-hanging": "a description " * 12}),
+    "doctor": lambda: tables.doctor_table([Check("MLflow server", False, "does not answer", "start it " * 12)]),
+    "listing": lambda: screen.listing("scenes", {"flexible-double-pendulum-hanging": "a description " * 12}),
 }
 
 

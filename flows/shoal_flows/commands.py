@@ -7,34 +7,36 @@ from pathlib import Path
 from typing import Any
 
 import click
-from shoal.commands.finish import finish
-from shoal.commands.options import key_value, option_json, option_out
+from shoal.commands import options
+from shoal.errors import ComputationError, check_trusted
 
 
 @click.command("run")
 @click.argument("flow")
-@click.option("--param", "parameters", multiple=True, metavar="K=V", callback=key_value, help="JSON or plain text.")
-@option_json
+@click.option(
+    "--param", "parameters", multiple=True, metavar="K=V", callback=options.key_value, help="JSON or plain text."
+)
+@options.as_json
 def run_flow(flow: str, parameters: dict[str, str], as_json: bool) -> None:
     """Run a Prefect FLOW and log it to MLflow. It is forward, identify, compare, sweep or nightly."""
     from shoal_flows import run
 
-    finish(run.main(flow, parameters, as_json), "the flow did not end well")
+    check_trusted(run.main(flow, parameters, as_json), "the flow did not end well")
 
 
 @click.command()
 @click.argument("run_id")
-@option_json
+@options.as_json
 def rerun(run_id: str, as_json: bool) -> None:
     """Repeat a study from its MLflow run, and compare the figures."""
     from shoal_flows import rerun
 
-    finish(rerun.main(run_id, as_json), "the figures do not agree")
+    check_trusted(rerun.main(run_id, as_json), "the figures do not agree")
 
 
 @click.command()
 @click.argument("runs", nargs=-1, required=True, metavar="RUN...")
-@option_out(".html", default="report.html")
+@options.out(".html", default="report.html")
 def report(runs: tuple[str, ...], out: Path) -> None:
     """Make one page of identifications of one problem.
 
@@ -54,7 +56,7 @@ def report(runs: tuple[str, ...], out: Path) -> None:
     files.report(found, out)
     click.echo(f"report: {out}")
     best = found[best_of({name: answer.estimate for name, answer in found.items()})].estimate
-    finish(best.verdict.trusted, f"{best.verdict}: {best.message}")
+    check_trusted(best.verdict.trusted, f"{best.verdict}: {best.message}")
 
 
 @click.command()
@@ -80,4 +82,4 @@ def demo() -> None:
     """The main job: both cases of the paper on every engine. One table, one report."""
     from shoal_flows import demo
 
-    sys.exit(demo.main())
+    sys.exit(0 if demo.main() else ComputationError.exit_status)

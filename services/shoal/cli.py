@@ -20,11 +20,10 @@ import click
 
 from shoal.commands.analysis import modes, reactions, statics
 from shoal.commands.built_in import problems, scenes
-from shoal.commands.finish import EXIT_UNTRUSTED
 from shoal.commands.forward import compare, simulate, sweep
 from shoal.commands.installation import doctor, export_fmu, serve
 from shoal.commands.inverse import design, identify
-from shoal.errors import InputError, ShoalError
+from shoal.errors import ComputationError, InputError, ShoalError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """No room: on the disk, for this user, in this file."""
@@ -75,7 +74,7 @@ class Program(click.Group):
                 raise
             click.echo(f"shoal: cannot write: {error.strerror}", err=True)
             # What is still in the buffer of standard output would fail once more.
-            os._exit(EXIT_UNTRUSTED)
+            os._exit(ComputationError.exit_status)
 
 
 @cache

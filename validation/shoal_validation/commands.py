@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import click
-from shoal.commands.finish import finish
-from shoal.commands.options import option_json
+from shoal.commands import options
+from shoal.errors import check_trusted
 
 
 @click.command()
 @click.option("--only", metavar="NAME", help="One problem of the library or of the paper.")
 @click.option("--quick", is_flag=True, help="A part that takes less than three minutes.")
-@option_json
+@options.as_json
 def validate(only: str | None, quick: bool, as_json: bool) -> None:
     """Run the problem library over all engines, and write a page. Against its references and the nights before."""
     from shoal_validation.nightly.main import main
 
-    good = main(only, quick, as_json)
-    finish(good, "not every line is as it should be; the page and the lines above name them")
+    check_trusted(
+        main(only, quick, as_json), "not every line is as it should be; the page and the lines above name them"
+    )

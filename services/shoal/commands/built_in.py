@@ -14,7 +14,7 @@ def scenes(name: str | None) -> None:
     from shoal.identification.problem import problem_names
     from shoal.scene.load import load_scene, scene_library, scene_names, unknown
     from shoal.scene.parametric import parametric
-    from shoal.terminal.lists import listing
+    from shoal.terminal.screen import listing
 
     if name is None:
         listing("scenes", {n: load_scene(n).description for n in scene_names()})
@@ -52,7 +52,7 @@ def problems(name: str | None) -> None:
 
 def _list_problems() -> None:
     from shoal.identification.problem import load_problem, problem_names
-    from shoal.terminal.lists import listing
+    from shoal.terminal.screen import listing
 
     listing("problems", {n: load_problem(n).description for n in problem_names()})
 

@@ -2,47 +2,43 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import click
 
-from shoal.commands.finish import finish
-from shoal.commands.options import axes, option_at, option_engine, option_json, option_out, option_set, option_verify
-from shoal.errors import InputError
+from shoal.commands import options
+from shoal.commands.options import Out, Times, Values
+from shoal.errors import InputError, check_trusted
 
 
 @click.command()
 @click.argument("scene")
-@option_engine
-@option_set
-@option_at
+@options.engine
+@options.values
+@options.at
 @click.option(
     "--tolerance",
     type=float,
     metavar="METRES",
     help="Find the cheapest model whose error at the markers stays below; overrides elements, integrator and step.",
 )
-@option_verify
-@option_json
-@option_out(".html", ".gif", ".png", ".csv", ".json")
+@options.verify
+@options.as_json
+@options.out(".html", ".gif", ".png", ".csv", ".json")
 def simulate(
     scene: str,
     engine: str,
-    values: dict[str, Any],
-    times: list[float] | None,
+    values: Values,
+    times: Times,
     tolerance: float | None,
     verify: bool,
     as_json: bool,
-    out: Path | None,
+    out: Out,
 ) -> None:
     """Say where the markers of SCENE go, and how far to trust it."""
     from shoal.engines import get_engine
     from shoal.engines.verification import verified
     from shoal.pictures import files
     from shoal.scene import load_scene
-    from shoal.terminal import screen
-    from shoal.terminal.forward import trajectory_table
+    from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
     selection = None
@@ -61,28 +57,21 @@ def simulate(
     if out is not None:
         files.trajectory(trajectory, wanted, out, selection)
     report = trajectory.to_json() | ({} if selection is None else {"selection": selection.to_json()})
-    screen.show(report, as_json, lambda: trajectory_table(trajectory, wanted, selection))
-    finish(trajectory.ok, trajectory.message)
+    screen.show(report, as_json, lambda: tables.trajectory_table(trajectory, wanted, selection))
+    check_trusted(trajectory.ok, trajectory.message)
 
 
 @click.command()
 @click.argument("scene")
-@click.option("--vary", "vary", multiple=True, required=True, metavar="PATH=LOW:HIGH:COUNT", callback=axes)
-@option_engine
-@option_set
+@click.option("--vary", "vary", multiple=True, required=True, metavar="PATH=LOW:HIGH:COUNT", callback=options.axes)
+@options.engine
+@options.values
 @click.option("--at", "time", type=float, metavar="T", help="Instant [s]; the scene's duration by default.")
-@option_verify
-@option_json
-@option_out(".csv", ".json", ".png")
+@options.verify
+@options.as_json
+@options.out(".csv", ".json", ".png")
 def sweep(
-    scene: str,
-    vary: dict[str, Any],
-    engine: str,
-    values: dict[str, Any],
-    time: float | None,
-    verify: bool,
-    as_json: bool,
-    out: Path | None,
+    scene: str, vary: Values, engine: str, values: Values, time: float | None, verify: bool, as_json: bool, out: Out
 ) -> None:
     """Marker positions of SCENE over a grid of values. At one instant; the paper's Figure 4, for example."""
     from shoal.engines import get_engine
@@ -90,8 +79,7 @@ def sweep(
     from shoal.engines.sweep import sweep
     from shoal.pictures import files
     from shoal.scene import load_scene
-    from shoal.terminal import screen
-    from shoal.terminal.forward import sweep_table
+    from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"sweeping {wanted.name}"):
@@ -99,37 +87,29 @@ def sweep(
         result = spot_checked(result, get_engine(engine)) if verify else result
     if out is not None:
         files.sweep(result, out)
-    screen.show(result.to_json(), as_json, lambda: sweep_table(result))
-    finish(result.ok, result.complaint)
+    screen.show(result.to_json(), as_json, lambda: tables.sweep_table(result))
+    check_trusted(result.ok, result.complaint)
 
 
 @click.command()
 @click.argument("scene")
 @click.option("--engines", default="gauss,exudyn,casadi", show_default=True, help="Names, separated by commas.")
-@option_set
-@option_at
-@option_json
-@option_out(".json", ".png")
-def compare(
-    scene: str,
-    engines: str,
-    values: dict[str, Any],
-    times: list[float] | None,
-    as_json: bool,
-    out: Path | None,
-) -> None:
+@options.values
+@options.at
+@options.as_json
+@options.out(".json", ".png")
+def compare(scene: str, engines: str, values: Values, times: Times, as_json: bool, out: Out) -> None:
     """Run SCENE on several engines and show how far apart they are."""
     from shoal.engines.compare import compare
     from shoal.pictures import files
     from shoal.scene import load_scene
-    from shoal.terminal import screen
-    from shoal.terminal.forward import comparison_table
+    from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"running {wanted.name} on {engines}"):
         comparison = compare(wanted, [name.strip() for name in engines.split(",")], times)
     if out is not None:
         files.comparison(comparison, out)
-    screen.show(comparison.to_json(), as_json, lambda: comparison_table(comparison))
     reasons = [*comparison.refused.values(), *(t.message for t in comparison.trajectories.values() if t.message)]
-    finish(comparison.ok, reasons[0] if reasons else "fewer than two engines ran")
+    screen.show(comparison.to_json(), as_json, lambda: tables.comparison_table(comparison))
+    check_trusted(comparison.ok, reasons[0] if reasons else "fewer than two engines ran")

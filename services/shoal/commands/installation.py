@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
-from shoal.commands.finish import finish
-from shoal.commands.options import EngineName, option_json, option_out, option_set
+from shoal.commands import options
+from shoal.commands.options import Out, Values
+from shoal.errors import check_trusted
 
 
 @click.command()
-@click.argument("engine", type=EngineName())
+@click.argument("engine", type=options.EngineName())
 @click.option("--host", default="127.0.0.1", show_default=True)
 @click.option("--port", type=click.IntRange(1, 65535), metavar="PORT", help="8001 gauss, 8002 exudyn, 8003 casadi.")
 @click.option("--certificate", type=click.Path(path_type=Path), help="Serve https with this certificate (PEM).")
@@ -26,7 +26,7 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None, ke
 
 @click.command("export-fmu")
 @click.argument("scene")
-@option_set
+@options.values
 @click.option(
     "--parameter",
     "parameters",
@@ -34,8 +34,8 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None, ke
     metavar="PATH",
     help="A number of the scene that a host may set (repeatable); else gravity and the initial angles.",
 )
-@option_out(".fmu", otherwise="; else the scene's name")
-def export_fmu(scene: str, values: dict[str, Any], parameters: tuple[str, ...], out: Path | None) -> None:
+@options.out(".fmu", otherwise="; else the scene's name")
+def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], out: Out) -> None:
     """Write SCENE as an FMI 2.0 unit for co-simulation. A host needs this installation to run it."""
     from shoal.fmu.export import export
     from shoal.scene import load_scene
@@ -44,14 +44,14 @@ def export_fmu(scene: str, values: dict[str, Any], parameters: tuple[str, ...], 
 
 
 @click.command()
-@option_json
+@options.as_json
 def doctor(as_json: bool) -> None:
     """Check the installation and say what is wrong. Engines, compiled kernels, pipeline, folders."""
     from shoal.doctor import examine
-    from shoal.terminal import screen
-    from shoal.terminal.lists import doctor_table
+    from shoal.terminal import screen, tables
 
     checks = examine()
-    report = {"status": "ok" if all(c.ok for c in checks) else "failed", "checks": [vars(c) for c in checks]}
-    screen.show(report, as_json, lambda: doctor_table(checks))
-    finish(all(check.ok for check in checks), "something is missing; see the table")
+    ok = all(check.ok for check in checks)
+    report = {"status": "ok" if ok else "failed", "checks": [vars(check) for check in checks]}
+    screen.show(report, as_json, lambda: tables.doctor_table(checks))
+    check_trusted(ok, "something is missing; see the table")

@@ -11,6 +11,12 @@ import click
 from shoal.errors import InputError
 
 Command = Callable[..., Any]
+Values = dict[str, Any]
+"""Fields of a scene by path."""
+Times = list[float] | None
+"""Instants [s], else the scene's own."""
+Out = Path | None
+"""Where the result is written, if it is."""
 
 
 def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, str]:
@@ -75,7 +81,7 @@ def recordings(
     return found or None
 
 
-def times_list(context: click.Context, parameter: click.Parameter, text: str | None) -> list[float] | None:
+def times_list(context: click.Context, parameter: click.Parameter, text: str | None) -> Times:
     """T,T,... as numbers."""
     if text is None:
         return None
@@ -129,7 +135,7 @@ class EngineName(click.ParamType):  # type: ignore[type-arg]  # click 8.1 has no
         return click.Choice(list(ENGINES))
 
 
-option_set = click.option(
+values = click.option(
     "--set",
     "values",
     multiple=True,
@@ -137,22 +143,20 @@ option_set = click.option(
     callback=field_values,
     help="Set any field of the scene, such as bodies.OA.elements=16, solver.step=1e-5 (repeatable).",
 )
-option_at = click.option("--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s].")
-option_verify = click.option(
-    "--verify/--no-verify", default=True, show_default=True, help="Estimate errors by more runs."
-)
-option_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
-option_engine = click.option("--engine", cls=LateHelp, told=_engines, default="gauss", show_default=True)
-option_method = click.option("--method", cls=LateHelp, told=_methods, metavar="NAME")
+at = click.option("--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s].")
+verify = click.option("--verify/--no-verify", default=True, show_default=True, help="Estimate errors by more runs.")
+as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+engine = click.option("--engine", cls=LateHelp, told=_engines, default="gauss", show_default=True)
+method = click.option("--method", cls=LateHelp, told=_methods, metavar="NAME")
 
 
-def option_out(*endings: str, default: str | None = None, otherwise: str = "") -> Callable[[Command], Command]:
+def out(*endings: str, default: str | None = None, otherwise: str = "") -> Callable[[Command], Command]:
     """--out FILE, refused before anything is computed where it could not be written.
 
     endings: the forms there are; otherwise: what happens without the option
     """
 
-    def checked(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
+    def checked(context: click.Context, parameter: click.Parameter, path: Out) -> Out:
         if path is None:
             return None
         if path.suffix not in endings:

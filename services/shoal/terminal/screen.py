@@ -20,7 +20,7 @@ err = Console(stderr=True, highlight=False)
 
 
 def show(data: Mapping[str, Any], as_json: bool, draw: Callable[[], None]) -> None:
-    """One JSON object, or the table."""
+    """One JSON object, or what `draw` prints."""
     if as_json:
         print(json_text(data))  # noqa: T201 - this is the output
     else:
@@ -71,9 +71,15 @@ def table(title: str, *headings: str) -> Table:
     return made
 
 
-def put(shown: Table | str = "") -> None:
-    """A table, or an empty line."""
-    out.print(shown)
+def listing(title: str, items: Mapping[str, str]) -> None:
+    """Names with their descriptions."""
+    made = Table(title=title, title_justify="left", title_style="bold", box=None, show_header=False, pad_edge=False)
+    made.add_column(no_wrap=True)
+    made.add_column()
+    for name, text in items.items():
+        made.add_row(name, text)
+    out.print(made)
+    out.print()
 
 
 def say(text: str, style: str = "") -> None:
