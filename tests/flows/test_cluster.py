@@ -59,6 +59,6 @@ def test_a_cluster_that_is_none_is_refused_in_one_line(asked: pytest.MonkeyPatch
 
 def test_a_scheduler_that_does_not_answer_is_told(asked: pytest.MonkeyPatch) -> None:
     asked.setenv("SHOAL_CLUSTER", f"tcp://127.0.0.1:{free_port()}")
-    asked.setattr(cluster, "_PATIENCE", 0.5)
+    asked.setattr(cluster, "PATIENCE", 0.5)
     with pytest.raises(ComputationError, match="SHOAL_CLUSTER: no scheduler at tcp://"):
         workers.count()

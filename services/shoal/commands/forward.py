@@ -41,14 +41,14 @@ def simulate(
     from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
-    selection = None
+    stated, selection = wanted.name, None
     if tolerance is not None:
         from shoal.selection import select
 
         if engine != "gauss":
             raise InputError(f"--tolerance: models are chosen for engine gauss only, found --engine {engine}")
-        with screen.rungs_progress(wanted.name) as progress:
-            selection = select(wanted, tolerance, times, progress)
+        with screen.working(f"{stated}: looking for the cheapest model") as tell:
+            selection = select(wanted, tolerance, times, lambda model: tell(f"{stated}: ran {model}"))
         trajectory, wanted = selection.trajectory, selection.chosen.scene
     else:
         chosen = get_engine(engine)

@@ -53,8 +53,12 @@ def identify(
     from shoal.terminal import screen, tables
 
     wanted, wishes = load_problem(problem), Wishes(profiles=profiles, bootstrap=bootstrap)
-    with _interruptible(checkpoint), screen.fitness_progress(wanted.name) as progress:
-        estimate = identify(wanted, checkpoint=checkpoint, wishes=wishes, progress=progress, **how)
+    with _interruptible(checkpoint), screen.working(f"{wanted.name}: preparing the data") as tell:
+
+        def note(iteration: int, best: float, mean: float, evaluations: int) -> None:
+            tell(f"{wanted.name}: best fitness {best:.3e}, {evaluations} evaluations")
+
+        estimate = identify(wanted, checkpoint=checkpoint, wishes=wishes, progress=note, **how)
     if out is not None:
         files.estimate(estimate, wanted, out)
     screen.show(estimate.to_json(), as_json, lambda: tables.estimate_table(estimate))

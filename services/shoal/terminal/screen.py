@@ -28,38 +28,14 @@ def show(data: Mapping[str, Any], as_json: bool, draw: Callable[[], None]) -> No
 
 
 @contextmanager
-def working(what: str) -> Iterator[None]:
-    """A spinner on a terminal; nothing in a log file."""
-    with _progress() as progress:
-        progress.add_task(what, total=None)
-        yield
-
-
-@contextmanager
-def fitness_progress(what: str) -> Iterator[Callable[[int, float, float, int], None]]:
-    """A line that follows the best fitness of a running search, and what it has cost."""
-    with _progress() as progress:
-        task = progress.add_task(f"{what}: preparing the data", total=None)
-
-        def note(iteration: int, best: float, mean: float, evaluations: int) -> None:
-            progress.update(task, description=f"{what}: best fitness {best:.3e}, {evaluations} evaluations")
-
-        yield note
-
-
-@contextmanager
-def rungs_progress(what: str) -> Iterator[Callable[[str], None]]:
-    """A line that names the model just run."""
-    with _progress() as progress:
-        task = progress.add_task(f"{what}: looking for the cheapest model", total=None)
-        yield lambda model: progress.update(task, description=f"{what}: ran {model}")
-
-
-def _progress() -> Progress:
+def working(what: str) -> Iterator[Callable[[str], None]]:
+    """A spinner beside `what`, or beside what it is told later; only on a terminal, nothing in a log file."""
     if not compiled():
         err.print("compiling the solver for this machine; this takes a few minutes, once", soft_wrap=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    return Progress(*columns, console=err, transient=True, disable=not err.is_terminal)
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda now: progress.update(task, description=now)
 
 
 def table(title: str, *headings: str) -> Table:
