@@ -42,8 +42,9 @@ def report(runs: tuple[str, ...], out: Path) -> None:
 
     RUN is a file that `shoal identify --out FILE.json` wrote, or the id of a run in MLflow.
     """
-    from shoal.pictures import archive, files
-    from shoal.pictures.study import best_of
+    from shoal.pictures import archive
+    from shoal.pictures.files import save
+    from shoal.pictures.study import best_of, study
 
     found: dict[str, Any] = {}
     for run in runs:
@@ -53,7 +54,7 @@ def report(runs: tuple[str, ...], out: Path) -> None:
             from shoal_flows.report.stored import stored
 
             found |= stored(run)
-    files.report(found, out)
+    save(out, {".html": lambda: study(found)})
     click.echo(f"report: {out}")
     best = found[best_of({name: answer.estimate for name, answer in found.items()})].estimate
     check_trusted(best.verdict.trusted, f"{best.verdict}: {best.message}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -98,13 +98,6 @@ def moving_picture(answer: Answer) -> bytes:
     found = answer.estimate
     title = f"{found.problem}, {found.verdict}: {follows(found)}"
     return gif(motion(answer, next(iter(found.measurement.recordings))), title)
-
-
-def report(answers: Mapping[str, Answer], path: Path) -> None:
-    """Identifications by name as one page. Raises InputError, ComputationError."""
-    from shoal.pictures.study import study
-
-    save(path, {".html": lambda: study(answers)})
 
 
 def design(found: Design, path: Path) -> None:
