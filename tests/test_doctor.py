@@ -19,31 +19,29 @@ def test_a_server_that_does_not_answer_is_found(monkeypatch: pytest.MonkeyPatch)
         probe.bind(("127.0.0.1", 0))
         # Bound but not listening: nobody answers, and nobody else can take the port.
         monkeypatch.setenv("PREFECT_API_URL", f"http://127.0.0.1:{probe.getsockname()[1]}/api")
-        check = doctor._server("Prefect", "PREFECT_API_URL", "")
+        check = doctor.check_server("Prefect", "PREFECT_API_URL", "")
     assert not check.ok
     assert "unset PREFECT_API_URL" in check.advice
 
 
 def test_a_missing_package_names_its_extra() -> None:
-    check = doctor._package("no-such-package", "services")
+    check = doctor.check_package("no-such-package", "services")
     assert not check.ok
     assert "'services'" in check.advice
 
 
-def test_an_engine_that_is_wrong_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "_CLOSE", 0.0)
-    check = doctor._engine("casadi")
+def test_an_engine_that_is_wrong_is_found() -> None:
+    check = doctor.check_engine("casadi", close=0.0)
     assert not check.ok
     assert "off a pendulum" in check.found
 
 
-def test_a_port_in_use_by_another_program_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "_PATIENCE", 0.2)
+def test_a_port_in_use_by_another_program_is_told() -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
         other.settimeout(5)
-        found = doctor._port(other.getsockname()[1], "MLflow").found
+        found = doctor.check_port(other.getsockname()[1], "MLflow", patience=0.2).found
     assert "another program" in found
 
 
@@ -91,7 +89,7 @@ def test_nights_that_never_come_are_found(night: dict[str, Any] | None, coming: 
     if night is not None:
         answers["/api/deployments/name/nightly/validation"] = night
     with prefect(answers) as address:
-        check = doctor._nights(address)
+        check = doctor.check_nights(address)
     assert check.ok == ok
     assert word in check.found
     assert bool(check.advice) != ok
@@ -100,4 +98,4 @@ def test_nights_that_never_come_are_found(night: dict[str, Any] | None, coming: 
 def test_without_a_server_no_nights_are_expected() -> None:
     with prefect({"/api/health": True}) as address:
         pass
-    assert doctor._nights(address).ok
+    assert doctor.check_nights(address).ok

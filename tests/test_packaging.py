@@ -29,10 +29,52 @@ def test_uv_in_the_makefile_is_pinned() -> None:
     assert re.search(r"^UV_VERSION := \d+\.\d+\.\d+$", (ROOT / "Makefile").read_text(), re.MULTILINE)
 
 
-def test_command_line_imports_nothing_heavy() -> None:
-    program = f"import sys, shoal.cli; print([name for name in {HEAVY!r} if name in sys.modules])"
+def test_help_imports_nothing_heavy() -> None:
+    """The commands of all three packages are listed with their texts."""
+    program = f"""
+import sys
+from click.testing import CliRunner
+from shoal.cli import main
+print(CliRunner().invoke(main, ["--help"]).stdout)
+print([name for name in {HEAVY!r} if name in sys.modules])
+"""
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert (done.stdout.strip(), done.stderr) == ("[]", "")
+    assert done.stderr == ""
+    *text, heavy = done.stdout.splitlines()
+    assert heavy == "[]"
+    commands = [line.split(maxsplit=1) for line in text[text.index("Commands:") + 1 :] if line]
+    assert {"simulate", "run", "validate"} < {name for name, _ in commands}
+    assert commands == sorted(commands)
+
+
+@pytest.mark.parametrize(
+    ("command", "missing", "extra"),
+    [
+        ("report 0123", "mlflow", "pipeline"),
+        ("serve gauss", "uvicorn", "services"),
+        ("export-fmu single-pendulum", "pythonfmu", "fmu"),
+    ],
+)
+def test_what_only_an_extra_brings_is_named_in_one_line(command: str, missing: str, extra: str) -> None:
+    """The command itself is listed even so."""
+    program = f"""
+import sys
+from shoal.cli import main
+
+class Missing:
+    def find_spec(name, *_):
+        if name.split(".")[0] == {missing!r}:
+            raise ModuleNotFoundError(name, name=name)
+
+sys.meta_path.insert(0, Missing)
+main(sys.argv[1:])
+"""
+    asked = [sys.executable, "-c", program]
+    done = subprocess.run([*asked, *command.split()], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"shoal: {missing} is not installed; install shoal with its extra '{extra}'\n"
+    listed = subprocess.run([*asked, "--help"], capture_output=True, text=True, check=True)
+    assert f"  {command.split()[0]}" in listed.stdout
 
 
 def test_home_is_the_folder_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,16 +114,15 @@ def test_kernel_cache_follows_the_sources_and_the_compiler(tmp_path: Path, monke
     for folder in ("mechanics", "engines/tree"):
         shutil.copytree(ROOT / "services/shoal" / folder, tmp_path / folder)
     before = home.kernel_cache().name
-    monkeypatch.setattr(home, "_PACKAGE", tmp_path)
-    assert home.kernel_cache().name == before
+    assert home.kernel_cache(tmp_path).name == before
     (tmp_path / "mechanics" / "analysis" / "new.py").write_text("x = 1\n")
-    assert home.kernel_cache().name == before, "no kernel imports this file"
+    assert home.kernel_cache(tmp_path).name == before, "no kernel imports this file"
     (tmp_path / "mechanics" / "elements" / "new.py").write_text("from numba import njit\n")
-    with_new_file = home.kernel_cache().name
+    with_new_file = home.kernel_cache(tmp_path).name
     (tmp_path / "mechanics" / "numerics" / "tile.py").write_text("x = 1\n")
-    with_imported_file = home.kernel_cache().name
-    monkeypatch.setattr(home, "_version", lambda package: "0")
-    assert len({before, with_new_file, with_imported_file, home.kernel_cache().name}) == 4
+    with_imported_file = home.kernel_cache(tmp_path).name
+    monkeypatch.setattr(home, "versions", lambda packages: dict.fromkeys(("python", *packages), "0"))
+    assert len({before, with_new_file, with_imported_file, home.kernel_cache(tmp_path).name}) == 4
 
 
 def test_the_choice_of_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

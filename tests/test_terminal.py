@@ -16,11 +16,11 @@ from functools import cache
 from io import StringIO
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from rich.console import Console
-from shoal import terminal
 from shoal.cli import main
 from shoal.doctor import Check
 from shoal.engines import get_engine
@@ -33,6 +33,7 @@ from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import load_scene
 from shoal.selection import Selection, select
+from shoal.terminal import screen, tables
 
 WIDTH = 80
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
@@ -52,23 +53,23 @@ def found() -> Estimate:
 
 def squeezed() -> None:
     scene = load_scene("andrews-squeezer")
-    terminal.trajectory_table(get_engine("gauss").simulate(scene, [1e-3]), scene)
-    terminal.reactions_table(reactions(scene, [1e-3]))
+    tables.trajectory_table(get_engine("gauss").simulate(scene, [1e-3]), scene)
+    tables.reactions_table(reactions(scene, [1e-3]))
 
 
 TABLES: dict[str, Callable[[], None]] = {
     "trajectory, reactions": squeezed,
-    "selection": lambda: terminal.selection_table(chosen()),
-    "sweep": lambda: terminal.sweep_table(sweep(DOUBLE, ANGLES, get_engine("gauss"), 0.1)),
-    "comparison": lambda: terminal.comparison_table(compare(DOUBLE, ["gauss", "casadi"], [0.1])),
-    "equilibrium": lambda: terminal.equilibrium_table(statics(DOUBLE)),
-    "modes": lambda: terminal.modes_table(modes(DOUBLE)),
-    "estimate": lambda: terminal.estimate_table(found()),
-    "design": lambda: terminal.design_table(design(load_problem("paper-case-1"), noise=1e-3)),
+    "selection": lambda: tables.selection_table(chosen()),
+    "sweep": lambda: tables.sweep_table(sweep(DOUBLE, ANGLES, get_engine("gauss"), 0.1)),
+    "comparison": lambda: tables.comparison_table(compare(DOUBLE, ["gauss", "casadi"], [0.1])),
+    "equilibrium": lambda: tables.equilibrium_table(statics(DOUBLE)),
+    "modes": lambda: tables.modes_table(modes(DOUBLE)),
+    "estimate": lambda: tables.estimate_table(found()),
+    "design": lambda: tables.design_table(design(load_problem("paper-case-1"), noise=1e-3)),
 }
 PROSE: dict[str, Callable[[], None]] = {
-    "doctor": lambda: terminal.doctor_table([Check("MLflow server", False, "does not answer", "start it " * 12)]),
-    "listing": lambda: terminal.listing("scenes", {"flexible-double-pendulum-hanging": "a description " * 12}),
+    "doctor": lambda: tables.doctor_table([Check("MLflow server", False, "does not answer", "start it " * 12)]),
+    "listing": lambda: screen.listing("scenes", {"flexible-double-pendulum-hanging": "a description " * 12}),
 }
 
 
@@ -76,7 +77,7 @@ def printed(draw: Callable[[], None], monkeypatch: pytest.MonkeyPatch, width: in
     """What a table prints on a terminal of a width, or in a log file."""
     stream = StringIO()
     kind = None if log else True
-    monkeypatch.setattr(terminal, "out", Console(file=stream, width=width, force_terminal=kind, highlight=False))
+    monkeypatch.setattr(screen, "out", Console(file=stream, width=width, force_terminal=kind, highlight=False))
     draw()
     return stream.getvalue()
 
@@ -117,7 +118,7 @@ def test_numbers_have_their_units(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "OA.angle [rad]" in printed(TABLES["sweep"], monkeypatch, WIDTH, log=True)
 
 
-@pytest.mark.parametrize("command", [[], *([name] for name in sorted(main.commands))])
+@pytest.mark.parametrize("command", [[], *([name] for name in main.list_commands(click.Context(main)))])
 def test_help_fits(command: list[str]) -> None:
     result = CliRunner().invoke(main, [*command, "--help"], env={"COLUMNS": str(WIDTH)})
     assert result.exit_code == 0
@@ -246,13 +247,13 @@ def test_a_port_in_use_is_one_line() -> None:
 def test_who_waits_for_the_compiler_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     heard = Console(file=StringIO(), width=80)
-    monkeypatch.setattr(terminal, "err", heard)
-    with terminal.working("simulating"):
+    monkeypatch.setattr(screen, "err", heard)
+    with screen.working("simulating"):
         pass
     assert "compiling the solver" in heard.file.getvalue()  # type: ignore[attr-defined]
     (tmp_path / "kernel.nbi").touch()
     heard = Console(file=StringIO(), width=80)
-    monkeypatch.setattr(terminal, "err", heard)
-    with terminal.working("simulating"):
+    monkeypatch.setattr(screen, "err", heard)
+    with screen.working("simulating"):
         pass
     assert heard.file.getvalue() == ""  # type: ignore[attr-defined]

@@ -13,7 +13,7 @@ from typing import Any
 
 from shoal.errors import ComputationError, InputError
 
-_PATIENCE = 30.0
+PATIENCE = 30.0
 PRELOAD = "shoal_flows.preload"
 
 
@@ -32,7 +32,7 @@ def client() -> Any:
     wanted = setting()
     address = _local(wanted) if wanted.split(":")[0] == "local" else wanted
     try:
-        found = Client(address, timeout=_PATIENCE, set_as_default=False)
+        found = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         reason = str(error).splitlines()[0]
         raise ComputationError(f"SHOAL_CLUSTER: no scheduler at {wanted}: {reason}") from None

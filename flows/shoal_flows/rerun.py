@@ -83,12 +83,11 @@ def rerun(run_id: str) -> Repeated:
 def main(run_id: str, as_json: bool) -> bool:
     """Print what `rerun` found; returns whether all figures agree."""
     from rich.console import Console
-
-    from shoal_flows.jsontext import as_json_text
+    from shoal.trajectory import json_text
 
     repeated = rerun(run_id)
     if as_json:
-        print(as_json_text(repeated.to_json()))  # noqa: T201 - this is the output
+        print(json_text(repeated.to_json()))  # noqa: T201 - this is the output
         return repeated.agree
     console = Console(highlight=False)
     console.print(f"run {repeated.now} repeats {repeated.before}", soft_wrap=True)

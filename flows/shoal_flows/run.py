@@ -22,9 +22,9 @@ def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> bool:
         result = run_flow(name, parameters)
     notice()
     if as_json:
-        from shoal_flows.jsontext import as_json_text
+        from shoal.trajectory import json_text
 
-        print(as_json_text(result.to_json()))  # noqa: T201 - this is the output
+        print(json_text(result.to_json()))  # noqa: T201 - this is the output
     else:
         show(result)
     return bool(result.trusted)

@@ -7,12 +7,14 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from shoal.engines.pieces import joined, pieces
 from shoal.errors import ComputationError
 
 from shoal_flows import cluster, jobs, workers
 
 SCENE = "flexible-double-pendulum"
-VARY = {"initial.OA.angle": (0.0, 1.5, 200), "initial.AB.angle": (0.0, 1.5, 100)}
+VARY = {"initial.OA.angle": np.linspace(0.0, 1.5, 200), "initial.AB.angle": np.linspace(0.0, 1.5, 100)}
 TIME = 0.5
 """Instant [s] at which the sweep looks; the run ends there."""
 REPEATS = 5
@@ -32,7 +34,7 @@ def cost(number: int) -> Cost:
     cluster.client.cache_clear()
     client = cluster.client()
     client.wait_for_workers(number)
-    small = jobs.pieces({path: (low, high, 9) for path, (low, high, _) in VARY.items()}, number)[0]
+    small = pieces({path: values[:: len(values) // 8] for path, values in VARY.items()}, number)[0]
     for worker in client.nthreads():
         client.submit(jobs.swept, SCENE, small, "gauss", TIME, workers=[worker], pure=False).result()
     costs = [_once(client) for _ in range(REPEATS)]
@@ -44,8 +46,8 @@ def cost(number: int) -> Cost:
 def _once(client: Any) -> Cost:
     used = sum(client.run(time.process_time).values())
     begin = time.perf_counter()
-    pending = [workers.submit(jobs.swept, SCENE, piece, "gauss", TIME) for piece in jobs.pieces(VARY, workers.count())]
-    whole = jobs.joined([part.result() for part in pending])
+    pending = [workers.submit(jobs.swept, SCENE, piece, "gauss", TIME) for piece in pieces(VARY, workers.count())]
+    whole = joined([part.result() for part in pending])
     wall = time.perf_counter() - begin
     if not whole.ok:
         raise ComputationError("a point failed")

@@ -20,35 +20,28 @@ from shoal_flows import settings
 _PATIENCE = 60.0
 
 
-def ui(host: str, port: int, *, prefect: bool = False) -> None:
-    """Serve MLflow, and with `prefect` Prefect's pages on the next port. Raises InputError, ComputationError."""
+def ui(host: str, port: int) -> None:
+    """Serve MLflow. Raises InputError, ComputationError."""
     settings.apply()
     if address := settings.tracking_server():
         raise InputError(f"MLFLOW_TRACKING_URI: the runs are on {address}; browse them there")
     console = Console(stderr=True, highlight=False)
-    ports = [port, port + 1] if prefect else [port]
-    for wanted in ports:
-        check_free(host, wanted)
-    commands = [_mlflow(host, port), *([_prefect(host, port + 1)] if prefect else [])]
+    check_free(host, port)
     # A service manager asks with SIGTERM for what a person does with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    processes = [_start(command, f"{command[2]}-ui.log") for command in commands]
+    process = _start(_mlflow(host, port), "mlflow-ui.log")
     try:
-        _wait(processes[0], host, port)
+        _wait(process, host, port)
         console.print(f"MLflow:  http://{host}:{port}  (Ctrl-C stops it)", soft_wrap=True)
-        if prefect:
-            console.print(f"Prefect: http://{host}:{port + 1}", soft_wrap=True)
-        else:
-            where = f"PREFECT_HOME={os.environ['PREFECT_HOME']} {sys.executable} -m prefect server start"
-            console.print(f"Prefect's flow runs: {where}", soft_wrap=True)
-        while all(process.poll() is None for process in processes):
+        where = f"PREFECT_HOME={os.environ['PREFECT_HOME']} {sys.executable} -m prefect server start"
+        console.print(f"Prefect's flow runs: {where}", soft_wrap=True)
+        while process.poll() is None:
             time.sleep(0.3)
         raise ComputationError(f"a server ended by itself; see {settings.log_folder()}")
     except KeyboardInterrupt:
         console.print("stopped")
     finally:
-        for process in processes:
-            _stop(process)
+        _stop(process)
 
 
 def _mlflow(host: str, port: int) -> list[str]:
@@ -56,10 +49,6 @@ def _mlflow(host: str, port: int) -> list[str]:
     store += ["--artifacts-destination", settings.artifact_folder().as_uri()]
     address = ["--host", host, "--port", str(port), "--workers", "1"]
     return [sys.executable, "-m", "mlflow", "server", "--app-name", "shoal", *address, *store]
-
-
-def _prefect(host: str, port: int) -> list[str]:
-    return [sys.executable, "-m", "prefect", "server", "start", "--no-services", "--host", host, "--port", str(port)]
 
 
 def _start(command: list[str], log: str) -> subprocess.Popen[bytes]:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -32,21 +31,20 @@ __all__ = [
     "simulate",
     "sweep",
 ]
-_PLACES = {
-    "shoal.scene": ("Scene", "load_scene", "scene_names"),
-    "shoal.trajectory": ("Trajectory",),
-    "shoal.identification": ("Estimate", "Measurement", "Problem", "Recording", "load_problem", "problem_names"),
-    "shoal.notebook": ("compare", "identify", "plot", "select", "simulate", "sweep"),
-}
 
 
 def __getattr__(name: str) -> Any:
     """A name of the list, imported on demand; notebooks then know how to show what it makes."""
-    for module, names in _PLACES.items():
-        if name in names:
-            import_module("shoal.notebook")
-            return getattr(import_module(module), name)
-    raise AttributeError(f"module 'shoal' has no attribute {name!r}")
+    if name not in __all__:
+        raise AttributeError(f"module 'shoal' has no attribute {name!r}")
+    from shoal import notebook, scene, trajectory
+
+    for place in (notebook, scene, trajectory):
+        if hasattr(place, name):
+            return getattr(place, name)
+    from shoal import identification
+
+    return getattr(identification, name)
 
 
 def __dir__() -> list[str]:

@@ -26,9 +26,9 @@ _PACKAGES = {
 """What the extras bring that has no check of its own."""
 _PORTS = {5000: "MLflow", 4200: "Prefect", 8001: "gauss", 8002: "exudyn", 8003: "casadi"}
 """Where `make up`, `shoal ui` and `shoal serve` listen unless told otherwise."""
-_PATIENCE = 3.0
+PATIENCE = 3.0
 """Seconds that a server has to answer."""
-_CLOSE = 1e-4
+CLOSE = 1e-4
 """Distance [m] from the native solver within which an engine is right on the pendulum."""
 
 
@@ -49,12 +49,12 @@ def examine() -> list[Check]:
         _folder(),
         _native(),
         _cache(),
-        *(_engine(name) for name in ("exudyn", "casadi")),
-        *(_package(name, extra) for extra, names in _PACKAGES.items() for name in names),
-        _server("Prefect", "PREFECT_API_URL", "a flow starts its own"),
-        _server("MLflow", "MLFLOW_TRACKING_URI", "runs go to a database in the state folder"),
-        _nights(os.environ.get("PREFECT_API_URL") or "http://127.0.0.1:4200/api"),
-        *(_port(number, what) for number, what in _PORTS.items()),
+        *(check_engine(name) for name in ("exudyn", "casadi")),
+        *(check_package(name, extra) for extra, names in _PACKAGES.items() for name in names),
+        check_server("Prefect", "PREFECT_API_URL", "a flow starts its own"),
+        check_server("MLflow", "MLFLOW_TRACKING_URI", "runs go to a database in the state folder"),
+        check_nights(os.environ.get("PREFECT_API_URL") or "http://127.0.0.1:4200/api"),
+        *(check_port(number, what) for number, what in _PORTS.items()),
     ]
 
 
@@ -92,9 +92,9 @@ def _cache() -> Check:
     return Check("compile cache", True, f"{current.name}, {size / 1e6:.0f} MB{older}")
 
 
-def _engine(name: str) -> Check:
+def check_engine(name: str, close: float = CLOSE) -> Check:
     """Another engine on the pendulum, against our own."""
-    check = _package(name, "engines")
+    check = check_package(name, "engines")
     if not check.ok:
         return check
     from shoal.engines import get_engine
@@ -106,19 +106,20 @@ def _engine(name: str) -> Check:
         gap = float(np.max(np.abs(run.points - get_engine("gauss").simulate(scene, [0.5]).points)))
     except (ImportError, ShoalError) as error:
         return Check(name, False, f"{check.found} does not run: {error}", "reinstall it: make setup")
-    if not gap < _CLOSE:
+    if not gap < close:
         return Check(name, False, f"{check.found} is {gap:.0e} m off a pendulum", "reinstall it: make setup")
     return Check(name, True, f"{check.found}, right within {gap:.0e} m")
 
 
-def _package(name: str, extra: str) -> Check:
+def check_package(name: str, extra: str) -> Check:
+    """Whether a package is there, and which extra brings it."""
     try:
         return Check(name, True, version(name))
     except PackageNotFoundError:
         return Check(name, False, "not installed", f"run make setup, or install shoal with its extra '{extra}'")
 
 
-def _server(name: str, variable: str, otherwise: str) -> Check:
+def check_server(name: str, variable: str, otherwise: str) -> Check:
     """Whether a server that the user has named answers."""
     address = os.environ.get(variable, "")
     what = f"{name} server"
@@ -129,7 +130,7 @@ def _server(name: str, variable: str, otherwise: str) -> Check:
     return Check(what, False, f"{address} does not answer", f"start it (make up), or unset {variable}")
 
 
-def _nights(address: str) -> Check:
+def check_nights(address: str) -> Check:
     """Whether the Prefect server there has the next night in its calendar: a schedule alone makes no run."""
     what, api = "nights", address.rstrip("/")
     if not _answers(f"{api}/health"):
@@ -162,25 +163,26 @@ def _nights(address: str) -> Check:
 def _asked(url: str, data: object = None) -> Any:
     """What a server answers. Raises URLError, OSError, ValueError."""
     body = None if data is None else json.dumps(data).encode()
-    with urlopen(Request(url, body, {"Content-Type": "application/json"}), timeout=_PATIENCE) as answer:
+    with urlopen(Request(url, body, {"Content-Type": "application/json"}), timeout=PATIENCE) as answer:
         return json.load(answer)
 
 
-def _port(number: int, what: str) -> Check:
+def check_port(number: int, what: str, patience: float = PATIENCE) -> Check:
+    """Who listens where `what` would; patience: seconds that it has to answer."""
     with socket.socket() as probe:
-        probe.settimeout(_PATIENCE)
+        probe.settimeout(patience)
         taken = probe.connect_ex(("127.0.0.1", number)) == 0
     if not taken:
         return Check(f"port {number}", True, f"free for {what}")
     path = "api/health" if what == "Prefect" else "health"
-    healthy = _answers(f"http://127.0.0.1:{number}/{path}")
+    healthy = _answers(f"http://127.0.0.1:{number}/{path}", patience)
     found = "a server answers there" if healthy else "another program has it; choose another with --port"
     return Check(f"port {number}", True, f"in use where {what} would be: {found}")
 
 
-def _answers(url: str) -> bool:
+def _answers(url: str, patience: float = PATIENCE) -> bool:
     try:
-        with urlopen(url, timeout=_PATIENCE) as answer:  # an address that the user or this file names
+        with urlopen(url, timeout=patience) as answer:  # an address that the user or this file names
             return bool(answer.status == 200)
     except (URLError, OSError, ValueError):
         return False

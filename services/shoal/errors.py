@@ -19,3 +19,9 @@ class ComputationError(ShoalError):
     """The computation ran and cannot be trusted, or could not run to its end."""
 
     exit_status = 3
+
+
+def check_trusted(trusted: bool, reason: str) -> None:
+    """End where an answer cannot be trusted. Raises ComputationError."""
+    if not trusted:
+        raise ComputationError(reason)

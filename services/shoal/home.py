@@ -7,10 +7,10 @@ import os
 import platform
 import re
 import tempfile
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from shoal.errors import InputError
+from shoal.versions import versions
 
 _PACKAGE = Path(__file__).parent
 _KERNELS = ("mechanics", "engines/tree")
@@ -25,14 +25,14 @@ def home() -> Path:
     return folder
 
 
-def kernel_cache() -> Path:
-    """The folder of the compiled kernels, made on demand.
+def kernel_cache(package: Path = _PACKAGE) -> Path:
+    """The folder of the compiled kernels, made on demand. package: the folder of their sources.
 
     Its name changes with everything the machine code depends on. Numba itself only looks at the file
     of each kernel, so it would go on using one whose callee in another file has changed. Where the
     home cannot be written to, a private folder among the temporary files takes its place.
     """
-    name = f"kernels-{_fingerprint()}"
+    name = f"kernels-{_fingerprint(package)}"
     try:
         folder = home() / name
     except InputError:
@@ -51,21 +51,22 @@ def prepare_kernel_cache() -> None:
         os.environ["NUMBA_CACHE_DIR"] = str(kernel_cache())
 
 
-def _fingerprint() -> str:
+def _fingerprint(package: Path) -> str:
     """Short hash over the kernel sources, the versions of the compiler and the processor."""
     digest = hashlib.sha256()
-    for name, text in sorted(_kernel_sources().items()):
+    for name, text in sorted(_kernel_sources(package).items()):
         digest.update(name.encode() + b"\0" + text.encode() + b"\0")
-    for part in (_version("numba"), _version("numpy"), platform.python_version(), processor()):
+    used = versions(("numba", "numpy"))
+    for part in (used["numba"], used["numpy"], used["python"], processor()):
         digest.update(part.encode() + b"\0")
     return digest.hexdigest()[:16]
 
 
-def _kernel_sources() -> dict[str, str]:
+def _kernel_sources(package: Path) -> dict[str, str]:
     """Text by module of every file in the folders of kernels that holds one, or that such a file imports."""
     texts = {}
-    for source in (file for folder in _KERNELS for file in (_PACKAGE / folder).rglob("*.py")):
-        module = ".".join(source.relative_to(_PACKAGE).with_suffix("").parts)
+    for source in (file for folder in _KERNELS for file in (package / folder).rglob("*.py")):
+        module = ".".join(source.relative_to(package).with_suffix("").parts)
         texts[module.removesuffix(".__init__")] = source.read_text(encoding="utf-8")
     found: dict[str, str] = {}
     pending = [module for module, text in texts.items() if "njit" in text]
@@ -73,16 +74,9 @@ def _kernel_sources() -> dict[str, str]:
         module = pending.pop()
         if module in texts and module not in found:
             found[module] = texts[module]
-            for package, names in _IMPORT.findall(texts[module]):
-                pending += [package, *(f"{package}.{name}" for name in re.findall(r"\w+", names))]
+            for origin, names in _IMPORT.findall(texts[module]):
+                pending += [origin, *(f"{origin}.{name}" for name in re.findall(r"\w+", names))]
     return found
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""
 
 
 def processor() -> str:

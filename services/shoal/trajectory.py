@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -152,3 +153,8 @@ def plain(values: Any) -> Any:
     if isinstance(values, float):
         return values if np.isfinite(values) else None
     return values
+
+
+def json_text(data: Any, *, indent: int | None = None) -> str:
+    """One JSON value; numbers as `plain` makes them."""
+    return json.dumps(plain(data), allow_nan=False, indent=indent)

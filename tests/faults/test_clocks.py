@@ -12,6 +12,7 @@ import pytest
 import shoal
 import shoal_flows
 from shoal.api.jobs import Jobs
+from shoal.api.refusal import Refusal
 from shoal.api.schemas import IdentifyRequest
 from shoal.api.settings import Settings
 
@@ -62,11 +63,8 @@ def test_a_result_is_kept_over_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
             monkeypatch.setattr(time, "time", lambda jump=jump: now + jump)
             found.append(jobs.get(name).state == "done")
         monkeypatch.setattr("shoal.api.jobs.time.monotonic", lambda: steady + 3700.0)
-        return [*found, name in jobs._jobs and not _forgotten(jobs, name)]
+        with pytest.raises(Refusal, match="there is no such identification"):
+            jobs.get(name)
+        return found
 
-    assert asyncio.run(kept()) == [True, True, False]
-
-
-def _forgotten(jobs: Jobs, name: str) -> bool:
-    jobs._forget()
-    return name not in jobs._jobs
+    assert asyncio.run(kept()) == [True, True]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
-import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import psutil
 import pytest
 from shoal.errors import ComputationError
-from shoal_flows import events, remembered, run, server
+from shoal_flows import events, remembered, run
 
 STUDY = {"problem": "paper-case-1", "methods": ["least-squares"], "seeds": [0, 1]}
 FIRST = "paper-case-1, least-squares · seed 0"
@@ -38,8 +40,14 @@ def struck(when: str, blow: Callable[[], None]) -> Iterator[list[str]]:
         yield told
 
 
+def own_server() -> psutil.Process:
+    """The server that this process has started."""
+    (found,) = (child for child in psutil.Process().children() if "shoal_flows.embedded" in child.cmdline())
+    return found
+
+
 def kill() -> None:
-    os.kill(server._started[0]._process.pid, signal.SIGKILL)
+    own_server().kill()
 
 
 def figures(study: Any) -> list[Any]:
@@ -51,13 +59,13 @@ def figures(study: Any) -> list[Any]:
 def test_a_study_outlives_its_server() -> None:
     """kill -9: another takes its place, and knows of the whole study; the figures are those of an undisturbed one."""
     undisturbed = run.run_flow("identify", STUDY)
-    before = server._started[0]._process.pid
+    before = own_server()
     with struck(FIRST, kill) as told:
         found = run.run_flow("identify", STUDY)
     assert figures(found) == figures(undisturbed)
     assert not found.failures
     assert "done: Prefect's server, which ended with signal 9, started again" in told
-    assert server._started[0]._process.pid != before
+    assert own_server() != before
 
 
 @pytest.mark.slow
@@ -65,7 +73,7 @@ def test_a_study_outlives_its_server() -> None:
 def test_a_server_that_stays_away_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was computed is kept; the same study, asked for again, computes the rest."""
     undisturbed = run.run_flow("identify", STUDY)
-    monkeypatch.setattr(server._Kept, "_again", lambda *_: False)
+    monkeypatch.setattr(sys, "executable", "/bin/false")  # what another one would be started with
     monkeypatch.setenv("PREFECT_CLIENT_MAX_RETRIES", "1")
     with struck(FIRST, kill), pytest.raises(ComputationError, match="the same command goes on from there") as end:
         run.run_flow("identify", STUDY)
@@ -74,10 +82,10 @@ def test_a_server_that_stays_away_is_told_in_one_line(monkeypatch: pytest.Monkey
     assert figures(run.run_flow("identify", STUDY)) == figures(undisturbed)
 
 
-def test_a_server_that_is_not_there_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "_started", [])
-    monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
-    with pytest.raises(
-        ComputationError, match=r"PREFECT_API_URL: no server answers at http://127\.0\.0\.1:9/api; unset"
-    ):
-        run.run_flow("identify", STUDY)
+def test_a_server_that_is_not_there_is_told_in_one_line() -> None:
+    command = [sys.executable, "-c", "from shoal.cli import main; main()", "run", "identify"]
+    environment = {**os.environ, "PREFECT_API_URL": "http://127.0.0.1:9/api"}
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (3, "")
+    told = "shoal: PREFECT_API_URL: no server answers at http://127.0.0.1:9/api; unset it for a server of its own"
+    assert ended.stderr.splitlines()[-1] == told

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shoal.engines.pieces import joined, pieces
 from shoal.errors import ComputationError, InputError
 from shoal_flows import cluster, jobs, workers
 
@@ -19,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from deployed import free_port
 
 SCENE = "flexible-double-pendulum"
-VARY = {"initial.OA.angle": (0.0, 1.5, 32), "initial.AB.angle": (0.0, 1.5, 16)}
+VARY = {"initial.OA.angle": np.linspace(0.0, 1.5, 32), "initial.AB.angle": np.linspace(0.0, 1.5, 16)}
 
 
 @pytest.fixture
@@ -35,13 +36,13 @@ def test_a_killed_worker_loses_nothing(asked: pytest.MonkeyPatch) -> None:
     client = cluster.client()
     client.wait_for_workers(2)
     assert workers.count() == 2
-    pieces = jobs.pieces(VARY, 4)
-    pending = [workers.submit(jobs.swept, SCENE, piece, "gauss", 0.2) for piece in pieces]
+    grids = pieces(VARY, 4)
+    pending = [workers.submit(jobs.swept, SCENE, grid, "gauss", 0.2) for grid in grids]
     victim = next(iter(client.run(os.getpid).values()))
     time.sleep(0.5)
     os.kill(victim, signal.SIGKILL)
-    found = jobs.joined([part.result() for part in pending])
-    here = jobs.joined([jobs.swept(SCENE, piece, "gauss", 0.2) for piece in pieces])
+    found = joined([part.result() for part in pending])
+    here = joined([jobs.swept(SCENE, grid, "gauss", 0.2) for grid in grids])
     assert found.ok
     assert np.array_equal(found.displacements["B"], here.displacements["B"])
     assert victim not in client.run(os.getpid).values()
@@ -58,6 +59,6 @@ def test_a_cluster_that_is_none_is_refused_in_one_line(asked: pytest.MonkeyPatch
 
 def test_a_scheduler_that_does_not_answer_is_told(asked: pytest.MonkeyPatch) -> None:
     asked.setenv("SHOAL_CLUSTER", f"tcp://127.0.0.1:{free_port()}")
-    asked.setattr(cluster, "_PATIENCE", 0.5)
+    asked.setattr(cluster, "PATIENCE", 0.5)
     with pytest.raises(ComputationError, match="SHOAL_CLUSTER: no scheduler at tcp://"):
         workers.count()

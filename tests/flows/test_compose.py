@@ -107,7 +107,7 @@ def test_the_server_keeps_the_same_and_as_long_as_on_a_desk(monkeypatch: pytest.
     """Who holds the slot of the nights is written to a folder that outlives the server, as its database does."""
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
     monkeypatch.delenv("PREFECT_HOME", raising=False)
-    desk, stated = up._environment({}), SERVICES["prefect"]["environment"]
+    desk, stated = up.environment_of({}), SERVICES["prefect"]["environment"]
     for name in ("PREFECT_SERVER_CONCURRENCY_LEASE_STORAGE", "PREFECT_SERVER_SERVICES_DB_VACUUM_ENABLED"):
         assert stated[name] == desk[name]
     assert Path(desk["PREFECT_HOME"]).is_relative_to(tmp_path)
@@ -120,7 +120,7 @@ def test_what_goes_wrong_in_a_server_is_printed(monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
     name = "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL"
     monkeypatch.delenv(name, raising=False)
-    assert up._environment({})[name] == "ERROR"
+    assert up.environment_of({})[name] == "ERROR"
     assert all(name not in service.get("environment", {}) for service in SERVICES.values())
 
 

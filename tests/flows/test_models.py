@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import time
 from dataclasses import replace
@@ -218,27 +217,16 @@ def test_registration_costs_little(fits: list[Fit]) -> None:
     assert time.process_time() - begin < 10.0
 
 
-def use(monkeypatch: pytest.MonkeyPatch, address: str) -> None:
-    """Let what follows speak to this MLflow, as a new process would."""
-    monkeypatch.setenv("MLFLOW_TRACKING_URI", address)
-    monkeypatch.setattr(store, "_silent_until", 0.0)
-    store.connect.cache_clear()
-    store._experiment.cache_clear()
-
-
 def test_model_waits_with_its_study_and_an_earlier_one_takes_nothing_away(
     fits: list[Fit], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store.connect()
-    reachable = os.environ["MLFLOW_TRACKING_URI"]
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
     with monkeypatch.context() as silent:
         silent.setenv("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "0")
-        use(silent, "http://127.0.0.1:9")  # Nobody answers there.
+        silent.setenv("MLFLOW_TRACKING_URI", "http://127.0.0.1:9")  # Nobody answers there.
         with open_study("early", [fits[0].cell], fits[0].estimate.measurement) as early:
             register(early, [named(fits[0], "waiting")])
     assert len(outbox.pending()) == 1
-    use(monkeypatch, reachable)
     with monkeypatch.context() as elsewhere:
         elsewhere.setattr(store, "upload", lambda: 0)  # A study of another machine, which has no outbox.
         assert registered(fits[1], "waiting").aliases == ["champion"]

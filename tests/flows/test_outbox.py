@@ -13,6 +13,7 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
+from mlflow import MlflowClient
 from shoal.engines.compare import Comparison
 from shoal.errors import ComputationError, InputError
 from shoal_flows.rerun import rerun
@@ -26,22 +27,16 @@ from deployed import free_port
 
 
 def use(monkeypatch: pytest.MonkeyPatch, address: str) -> None:
-    """Let what follows speak to this MLflow, as a new process would."""
+    """Let what follows speak to this MLflow."""
     monkeypatch.setenv("MLFLOW_TRACKING_URI", address)
     monkeypatch.setenv("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "0")
-    store.connect.cache_clear()
-    store._experiment.cache_clear()
-    monkeypatch.setattr(store, "_silent_until", 0.0)
 
 
 @pytest.fixture
-def silent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
+def silent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A home of its own, and a server that does not answer."""
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path))
     use(monkeypatch, f"http://127.0.0.1:{free_port()}")
-    yield
-    store.connect.cache_clear()
-    store._experiment.cache_clear()
 
 
 @pytest.mark.usefixtures("silent")
@@ -78,12 +73,14 @@ def test_an_upload_that_breaks_off_sends_nothing_twice(monkeypatch: pytest.Monke
     use(monkeypatch, f"sqlite:///{tmp_path / 'later.db'}")
     made: list[str] = []
 
-    def breaks(run: Run) -> None:
-        made.append(run.run_id)
+    def breaks(client: MlflowClient, run_id: str, **_: object) -> None:
+        made.append(run_id)
         raise OSError("the line went dead")
 
-    with pytest.raises(OSError, match="went dead"):
-        outbox.upload(store._make, breaks)
+    with monkeypatch.context() as broken:
+        broken.setattr(MlflowClient, "log_batch", breaks)
+        with pytest.raises(ComputationError, match="went dead"):
+            store.upload()
     assert len(outbox.pending()) == 1
     assert store.upload() == 1
     client = store.connect()

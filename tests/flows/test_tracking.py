@@ -128,8 +128,7 @@ def test_experiments_explain_themselves(client: Any, fits: list[Fit]) -> None:
 def test_an_older_experiment_gets_the_views(client: Any) -> None:
     experiment = client.get_experiment_by_name("Identification")
     client.set_experiment_tag(experiment.experiment_id, "mlflow.sharedViewState.best", "old")
-    store._experiment.cache_clear()
-    store._experiment("Identification")
+    store.experiment(client, "Identification")
     assert json.loads(client.get_experiment(experiment.experiment_id).tags["mlflow.sharedViewState.best"])
 
 

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from urllib.request import urlopen
 
@@ -84,13 +84,9 @@ def begun(home: Path, at: Mapping[str, str]) -> dict[str, object]:
 @contextmanager
 def uploading(home: Path, at: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """What `shoal upload` does there."""
-    caches = (store.connect, store._experiment)
-    with monkeypatch.context() as settings, ExitStack() as after:
+    with monkeypatch.context() as settings:
         settings.setenv("SHOAL_HOME", str(home))
         settings.setenv("MLFLOW_TRACKING_URI", at["MLFLOW"])
-        for cached in caches:
-            cached.cache_clear()
-            after.callback(cached.cache_clear)
         yield
 
 
@@ -103,7 +99,7 @@ def check_schedules(prefect: str) -> dict[str, object]:
     times = [night["expected_start_time"] for night in nights(prefect)]
     assert len(times) == 3
     assert all(time.endswith("T02:00:00Z") for time in times)
-    seen = doctor._nights(f"{prefect}/api")
+    seen = doctor.check_nights(f"{prefect}/api")
     assert seen.ok
     assert seen.found.startswith(f"3 scheduled, the next at {times[0]}; no worker takes it")
     automate(prefect, "compare/compare", after="forward/forward")

@@ -111,10 +111,8 @@ def test_a_file_keeps_everything(several: Answer) -> None:
 
 
 def test_report_from_files(flexible: Answer, tmp_path: Path) -> None:
-    from shoal.terminal import write_estimate
-
     for name in ("one.json", "two.json"):
-        write_estimate(flexible.estimate, flexible.problem, tmp_path / name)
+        files.estimate(flexible.estimate, flexible.problem, tmp_path / name)
     out = tmp_path / "page.html"
     given = [str(tmp_path / name) for name in ("one.json", "two.json")]
     result = CliRunner().invoke(main, ["report", *given, "--out", str(out)])

@@ -17,7 +17,7 @@ from shoal_validation.problems import PROBLEMS, get_problem
 from shoal_validation.work_precision.contract import OURS, Method, Point, Run, counted
 from shoal_validation.work_precision.data import load, save
 from shoal_validation.work_precision.front import GAIN, cheapest, front
-from shoal_validation.work_precision.gauss import _method as own
+from shoal_validation.work_precision.gauss import method as own
 from shoal_validation.work_precision.measure import FAMILIES, Study, curve
 from shoal_validation.work_precision.mesh import with_mesh
 from shoal_validation.work_precision.page import failures, tables

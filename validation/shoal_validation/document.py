@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 
@@ -14,6 +15,14 @@ def rewrite(page: Path, name: str, text: str) -> None:
     if not (found and closed):
         raise ValueError(f"{page}: no section between {begin} and {end}")
     page.write_text(f"{before}{begin}\n{text.strip()}\n{end}{after}", encoding="utf-8")
+
+
+def publish(page: Path, tables: Mapping[str, str]) -> None:
+    """Print every text and, where the page is there, put it into the section of its name. Raises ValueError."""
+    for name, text in tables.items():
+        sys.stdout.write(f"{text}\n\n")
+        if page.exists():
+            rewrite(page, name, text)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -52,7 +52,7 @@ def run(stages: Sequence[Sequence[str]], *, postgres: bool = False) -> None:
             for database in keeping:
                 stack.callback(database.stop)
                 database.start()
-            environment = _environment(keeping[0].stores if keeping else {})
+            environment = environment_of(keeping[0].stores if keeping else {})
             started = [line for stage in stages for line in _stage(stage, environment, stack, console)]
             if any("worker" in stage for stage in stages):
                 _deploy(environment)
@@ -62,7 +62,7 @@ def run(stages: Sequence[Sequence[str]], *, postgres: bool = False) -> None:
         console.print("stopped")
 
 
-def _environment(stores: Mapping[str, str]) -> dict[str, str]:
+def environment_of(stores: Mapping[str, str]) -> dict[str, str]:
     """What every process sees: state below the home, the addresses of both servers, the programs of this Python."""
     folder = home()
     stated = {

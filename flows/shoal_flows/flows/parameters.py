@@ -10,11 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field
 from shoal.engines import ENGINES
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import problem_names
 from shoal.scene.load import scene_names
+from shoal.trajectory import Array
 from shoal_validation.nightly.plan import IDENTIFICATION
 from shoal_validation.problems import PROBLEMS
 
@@ -42,6 +44,10 @@ class Axis(BaseModel):
     low: float = Field(title="from")
     high: float = Field(title="to")
     count: int = Field(title="how many", ge=1)
+
+    def values(self) -> Array:
+        """All of them, (count,)."""
+        return np.linspace(self.low, self.high, self.count)
 
 
 def _axes(given: Any) -> Any:

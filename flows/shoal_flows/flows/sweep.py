@@ -27,6 +27,6 @@ def sweep(
         time: Instant [s] at which to look; none means the end of the scene's duration.
     """
     with progress(1, f"{scene} over {', '.join(axis.path for axis in vary)}"):
-        result = Swept(*run_grid(scene, {axis.path: (axis.low, axis.high, axis.count) for axis in vary}, engine, time))
+        result = Swept(*run_grid(scene, {axis.path: axis.values() for axis in vary}, engine, time))
     show_result(f"{scene}: sweep", tables.of_sweep(result.sweep), result.run_id)
     return ended(result, [result.sweep.complaint])

@@ -9,10 +9,11 @@ from typing import Any
 from prefect import task
 from prefect.cache_policies import NO_CACHE
 from shoal.engines.compare import Comparison
+from shoal.engines.pieces import joined, pieces
 from shoal.engines.sweep import Sweep
 from shoal.identification import Measurement
 from shoal.scene import Scene
-from shoal.trajectory import Trajectory
+from shoal.trajectory import Array, Trajectory
 
 from shoal_flows import events, fingerprint, jobs, pictures, remembered, workers
 from shoal_flows.jobs import Cell, Fit
@@ -57,20 +58,21 @@ def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene,
 
 
 @task(task_run_name="sweep {scene}", cache_policy=NO_CACHE)
-def run_grid(scene: str, vary: Mapping[str, Sequence[float]], engine: str, time: float | None) -> tuple[Sweep, str]:
+def run_grid(scene: str, vary: Mapping[str, Array], engine: str, time: float | None) -> tuple[Sweep, str]:
     """One scene over a grid, with the id of its run."""
     with events.work(f"{scene} over {', '.join(vary)}"):
-        whole = jobs.joined([part.result() for part in _parts(scene, vary, engine, time)])
+        whole = joined([part.result() for part in _parts(scene, vary, engine, time)])
         result = workers.run(jobs.spot_checked, whole, engine)
         return result, tracked.log_sweep(result)
 
 
-def _parts(scene: str, vary: Mapping[str, Sequence[float]], engine: str, time: float | None) -> Sequence[Future[Sweep]]:
+def _parts(scene: str, vary: Mapping[str, Array], engine: str, time: float | None) -> Sequence[Future[Sweep]]:
     """The grid in pieces, each a computation of its own, which is found again if the whole is broken off."""
-    pieces = jobs.pieces(vary, workers.count())
-    keys = [fingerprint.of_simulations("sweep", scene, {}, repr(piece), engine, time) for piece in pieces]
-    with ThreadPoolExecutor(len(pieces)) as waiting:
+    grids = pieces(vary, workers.count())
+    listed = [{path: values.tolist() for path, values in grid.items()} for grid in grids]
+    keys = [fingerprint.of_simulations("sweep", scene, {}, repr(grid), engine, time) for grid in listed]
+    with ThreadPoolExecutor(len(grids)) as waiting:
         return [
-            waiting.submit(remembered.run, key, jobs.swept, scene, piece, engine, time)
-            for key, piece in zip(keys, pieces, strict=True)
+            waiting.submit(remembered.run, key, jobs.swept, scene, grid, engine, time)
+            for key, grid in zip(keys, grids, strict=True)
         ]

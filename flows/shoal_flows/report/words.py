@@ -31,9 +31,9 @@ def largest_error(fit: Fit) -> float:
     return max(map(abs, errors(fit).values()))
 
 
-def largest_distance(compared: Compared, marker: str = "B") -> float:
-    """Largest distance [m] of two engines at a marker."""
-    return max((row["largest"] or np.inf) for row in compared.comparison.differences() if row["marker"] == marker)
+def largest_distance(compared: Compared) -> float:
+    """Largest distance [m] of two engines at the tip."""
+    return max((row["largest"] or np.inf) for row in compared.comparison.differences() if row["marker"] == "B")
 
 
 def identified(title: str, study: Study) -> str:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
-from io import StringIO
 from typing import Any
 
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.pictures.engines import engines
+from shoal.pictures.files import rows
 from shoal.pictures.style import png
 from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import Scene
-from shoal.trajectory import Trajectory
+from shoal.trajectory import Trajectory, json_text
 
-from shoal_flows.jsontext import as_json_text
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
 
@@ -34,7 +32,7 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
         marker = tip(scene)
         shown = picture or png(engines(comparison, marker, f"{scene.name}: the engines over each other"))
         study.picture(shown, "engines.png")
-        study.text(as_json_text(comparison.differences(), indent=1), "differences.json")
+        study.text(json_text(comparison.differences(), indent=1), "differences.json")
         for name, motion in comparison.trajectories.items():
             with open_run("Comparison", name, tags={"kind": "engine", "scene": scene.name}, parent=study.run_id) as run:
                 _log_engine(run, scene, motion)
@@ -64,7 +62,7 @@ def log_sweep(result: Sweep) -> str:
             for name in ("time_error", "mesh_error"):
                 if (error := getattr(result.check, name)) is not None:
                     run.metric(f"final/{name}", error)
-        run.text(_table(result), "sweep.csv")
+        run.text(rows(result), "sweep.csv")
         if len(result.grid) <= 2:
             for marker in result.displacements:
                 run.picture(png(draw_sweep(result, marker)), f"displacement-{marker}.png")
@@ -95,12 +93,3 @@ def _scene(scene: Scene) -> dict[str, Any]:
 
 def _refused(comparison: Comparison) -> Mapping[str, str]:
     return {f"refused.{name}": reason for name, reason in comparison.refused.items()}
-
-
-def _table(result: Sweep) -> str:
-    rows = result.rows()
-    stream = StringIO()
-    writer = csv.DictWriter(stream, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return stream.getvalue()

@@ -11,9 +11,9 @@ from shoal.identification import Estimate, Measurement
 from shoal.pictures.signals import signals
 from shoal.pictures.study import best_of as best_name
 from shoal.scene import Rod
+from shoal.trajectory import json_text
 
 from shoal_flows.jobs import Cell, Fit
-from shoal_flows.jsontext import as_json_text
 from shoal_flows.pictures import Album
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
@@ -100,7 +100,7 @@ def log_fit(fit: Fit, album: Album, study: str) -> str:
         for name, picture in album.pictures.items():
             run.picture(picture, name)
         run.text(album.page, "report.html")
-        run.text(as_json_text(album.archive, indent=1), ARCHIVE)
+        run.text(json_text(album.archive, indent=1), ARCHIVE)
         return run.run_id
 
 

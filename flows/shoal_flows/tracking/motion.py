@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-from io import StringIO
-
 import numpy as np
+from shoal.pictures.files import columns
 from shoal.trajectory import Trajectory
 
 from shoal_flows.tracking.store import Run
@@ -19,15 +17,4 @@ def log_motion(run: Run, motion: Trajectory, marker: str, prefix: str = "") -> N
     path = motion.marker(marker)
     for k, name in enumerate(("tip/x", "tip/y")):
         run.series(prefix + name, ((round(1e3 * motion.times[row]), float(path[row, k])) for row in chosen))
-    run.text(as_csv(motion), prefix.replace("/", "-") + "trajectory.csv")
-
-
-def as_csv(motion: Trajectory) -> str:
-    """Time [s], x and y [m] and angle [rad] of every marker, with all digits."""
-    stream = StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["t", *(f"{name}.{part}" for name in motion.markers for part in ("x", "y", "angle"))])
-    for row, time in enumerate(motion.times.tolist()):
-        cells = [(*motion.points[row, k, :, 0].tolist(), motion.angles[row, k, 0]) for k in range(len(motion.markers))]
-        writer.writerow([repr(time), *(repr(float(value)) for cell in cells for value in cell)])
-    return stream.getvalue()
+    run.text(columns(motion, repr), prefix.replace("/", "-") + "trajectory.csv")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from shoal.trajectory import json_text
 from shoal_validation.nightly.result import Night
 
-from shoal_flows.jsontext import as_json_text
 from shoal_flows.tracking.store import open_run
 
 
@@ -25,5 +25,5 @@ def log_night(night: Night, page: str) -> str:
             if line.seconds is not None:
                 run.metric(f"seconds/{name}", line.seconds)
         run.text(page, "index.html")
-        run.text(as_json_text(night.to_json(), indent=1), "night.json")
+        run.text(json_text(night.to_json(), indent=1), "night.json")
         return run.run_id

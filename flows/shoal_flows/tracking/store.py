@@ -21,7 +21,8 @@ from shoal_flows.tracking.record import LOCAL, Run
 
 log = logging.getLogger(__name__)
 _PAUSE = 60.0
-_silent_until = 0.0
+_silent: dict[str, float] = {}
+"""Until when [s] a server that did not answer is not asked again, by its address."""
 _BATCH = 1000
 _KIND = "custom_model_development"
 """What makes MLflow open on runs and metrics instead of traces of language models."""
@@ -63,7 +64,7 @@ def open_run(
         raise
     run.end("FINISHED")
     _deliver(run)
-    if parent is None and time.monotonic() >= _silent_until:
+    if parent is None and not _is_silent():
         # MLflow answers: what an earlier study could not tell it goes along.
         with suppress(ComputationError):
             upload()
@@ -79,16 +80,19 @@ def upload() -> int:
 
 def _attempt(what: Callable[[Run], None], run: Run) -> bool:
     """Whether MLflow took it; one that does not answer is not asked again for a while, as every try takes seconds."""
-    global _silent_until
-    if time.monotonic() < _silent_until:
+    if _is_silent():
         return False
     try:
         what(run)
     except _failures() as error:
-        _silent_until = time.monotonic() + _PAUSE
+        _silent[_address()] = time.monotonic() + _PAUSE
         log.warning("%s; run %r is kept in %s", _unreachable(error), run.name, outbox.folder())
         return False
     return True
+
+
+def _is_silent() -> bool:
+    return time.monotonic() < _silent.get(_address(), 0.0)
 
 
 def _deliver(run: Run) -> None:
@@ -107,7 +111,7 @@ def _make(run: Run) -> None:
         tags["mlflow.parentRunId"] = run.parent
     client = connect()
     start = run.started - int(1000 * run.took)
-    made = client.create_run(_experiment(run.experiment), start_time=start, tags=tags, run_name=run.name)
+    made = client.create_run(_experiment(_address(), run.experiment), start_time=start, tags=tags, run_name=run.name)
     run.run_id = made.info.run_id
 
 
@@ -136,16 +140,24 @@ def _failures() -> tuple[type[Exception], ...]:
     return ComputationError, MlflowException, OSError
 
 
-@cache
 def connect() -> Any:
     """MLflow's client, its database made if need be. Raises ComputationError if MLflow cannot be reached."""
+    return _client(_address())
+
+
+def _address() -> str:
     # MLflow reads the settings when it is imported.
     settings.apply()
+    return os.environ["MLFLOW_TRACKING_URI"]
+
+
+@cache
+def _client(address: str) -> Any:
     from mlflow import MlflowClient
     from mlflow.exceptions import MlflowException
 
     try:
-        client = MlflowClient()
+        client = MlflowClient(address)
         client.search_experiments(max_results=1)
     except MlflowException as error:
         raise _unreachable(error) from None
@@ -164,11 +176,15 @@ def _unreachable(error: Exception) -> ComputationError:
 
 
 @cache
-def _experiment(name: str) -> str:
-    """The experiment of that name, made with its description when it is first used."""
+def _experiment(address: str, name: str) -> str:
+    """That of MLflow at an address, looked at when it is first used."""
+    return experiment(_client(address), name)
+
+
+def experiment(client: Any, name: str) -> str:
+    """The id of the experiment of that name, made or brought up to date with its description and views."""
     from mlflow.exceptions import MlflowException
 
-    client = connect()
     found = client.get_experiment_by_name(name)
     tags = {
         "mlflow.note.content": _EXPERIMENTS[name],
@@ -202,4 +218,4 @@ def _common_tags() -> dict[str, str]:
     return {**tags, "platform": provenance.machine(), "mlflow.source.name": "shoal", "mlflow.source.type": "PROJECT"}
 
 
-__all__ = ["Run", "connect", "open_run", "upload"]
+__all__ = ["Run", "connect", "experiment", "open_run", "upload"]

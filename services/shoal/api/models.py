@@ -45,7 +45,7 @@ class Config(Asked):
 
 
 @dataclass(frozen=True)
-class Model:
+class VectorFunction:
     """A vector function of parameters in their own units: the residuals of a forward model, or half their squares."""
 
     forward: ForwardModel
@@ -74,7 +74,7 @@ class Model:
         return np.asarray((residual @ jacobian)[None] if self.squared else jacobian)
 
 
-def _tip_motion(bench: Bench, config: Config) -> Model:
+def _tip_motion(bench: Bench, config: Config) -> VectorFunction:
     """The channels themselves, which are the residuals of a measurement of zeros without noise and priors."""
     problem = _problem(bench, config)
     blank = {n: p.model_copy(update={"prior": None}) for n, p in problem.parameters.items()}
@@ -87,7 +87,8 @@ def _tip_motion(bench: Bench, config: Config) -> Model:
         name: replace(one, values=np.zeros_like(one.values), noise=np.full(len(one.channels), np.nan))
         for name, one in recordings.items()
     }
-    return Model(ForwardModel(problem, problem.load_scene(config.values), bench.engine, Measurement(zeros)), False)
+    forward = ForwardModel(problem, problem.load_scene(config.values), bench.engine, Measurement(zeros))
+    return VectorFunction(forward, squared=False)
 
 
 def _instants(problem: Problem, source: EngineSource | FileSource, times: list[float] | None) -> Recording:
@@ -98,16 +99,17 @@ def _instants(problem: Problem, source: EngineSource | FileSource, times: list[f
     return Recording(instants, channels, np.zeros((len(instants), len(channels))), "", np.empty(0), source)
 
 
-def _misfit(bench: Bench, config: Config) -> Model:
+def _misfit(bench: Bench, config: Config) -> VectorFunction:
     """Half the sum of squares."""
     if config.scene is not None:
         raise InputError("config: scene: misfit needs a problem, whose data tell what fits")
     problem = _problem(bench, config)
     measurement = measure(problem, problem.load_scene(), written(config.recordings) or None)
-    return Model(ForwardModel(problem, problem.load_scene(config.values), bench.engine, measurement), True)
+    forward = ForwardModel(problem, problem.load_scene(config.values), bench.engine, measurement)
+    return VectorFunction(forward, squared=True)
 
 
-_MAKE: dict[str, Callable[[Bench, Config], Model]] = {"tip-motion": _tip_motion, "misfit": _misfit}
+_MAKE: dict[str, Callable[[Bench, Config], VectorFunction]] = {"tip-motion": _tip_motion, "misfit": _misfit}
 
 
 def _problem(bench: Bench, config: Config) -> Problem:
@@ -130,7 +132,7 @@ def _problem(bench: Bench, config: Config) -> Problem:
 
 
 @lru_cache(maxsize=4)
-def _model(bench: Bench, name: str, config: bytes) -> Model:
+def _model(bench: Bench, name: str, config: bytes) -> VectorFunction:
     """The model of that name; the data of a problem are computed once."""
     try:
         return _MAKE[name](bench, Config.model_validate(orjson.loads(config)))

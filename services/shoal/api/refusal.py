@@ -36,7 +36,7 @@ KINDS: dict[str, tuple[int, str]] = {
 _BY_STATUS = {404: "not-found", 405: "method-not-allowed", 400: "malformed"}
 
 
-class Problem(BaseModel):
+class ProblemDocument(BaseModel):
     """A problem document. type: `urn:shoal:` and the kind; detail: one line; field: which field it is about."""
 
     model_config = ConfigDict(json_schema_extra={"title": "Problem document (RFC 9457)"})
@@ -58,10 +58,12 @@ class Refusal(HTTPException):
         self.kind, self.text, self.field = kind, detail, field or named_field(detail)
 
     @property
-    def document(self) -> Problem:
+    def document(self) -> ProblemDocument:
         """The problem document."""
         status, title = KINDS[self.kind]
-        return Problem(type=f"urn:shoal:{self.kind}", title=title, status=status, detail=self.text, field=self.field)
+        return ProblemDocument(
+            type=f"urn:shoal:{self.kind}", title=title, status=status, detail=self.text, field=self.field
+        )
 
 
 def named_field(detail: str) -> str | None:
@@ -116,6 +118,6 @@ def documented(*kinds: str) -> dict[int | str, dict[str, Any]]:
     by_status: dict[int | str, dict[str, Any]] = {}
     for kind in ("malformed", "unauthorized", "internal", *kinds):
         status, title = KINDS[kind]
-        content = {MEDIA_TYPE: {"schema": Problem.model_json_schema()}}
+        content = {MEDIA_TYPE: {"schema": ProblemDocument.model_json_schema()}}
         by_status.setdefault(status, {"description": title, "content": content})
     return by_status

@@ -18,7 +18,7 @@ from shoal.scene.record import one_line
 _ARRAY = "array"
 
 
-class _Record(BaseModel):
+class _Archived(BaseModel):
     """What `record` of the file holds."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True, ser_json_inf_nan="strings")
@@ -28,7 +28,7 @@ class _Record(BaseModel):
 
 def archived(answer: Answer) -> dict[str, Any]:
     """What `shoal identify --json` prints, and below `record` all that a page needs."""
-    record = _Record(problem=answer.problem, estimate=answer.estimate).model_dump_json(fallback=_listed)
+    record = _Archived(problem=answer.problem, estimate=answer.estimate).model_dump_json(fallback=_listed)
     return {**answer.estimate.to_json(), "record": json.loads(record)}
 
 
@@ -52,7 +52,7 @@ def parse(text: str, source: str) -> Answer:
     if not isinstance(data, Mapping) or "record" not in data:
         raise InputError(f"{source}: holds no identification; `shoal identify PROBLEM --out FILE.json` writes one")
     try:
-        record = _Record.model_validate(data["record"])
+        record = _Archived.model_validate(data["record"])
     except ValidationError as error:
         raise one_line(error, source) from None
     return Answer(record.problem, record.estimate)

@@ -1,13 +1,17 @@
-"""Results as files: what `--out FILE` of the command line writes. Imports wait: each command needs few of them."""
+"""Results as files: what `--out FILE` of the command line writes. Imports wait: each form needs few of them."""
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Callable
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
+import numpy as np
 
-from shoal.pictures import style
+from shoal.trajectory import json_text
+from shoal.whole import whole
 
 if TYPE_CHECKING:
     from shoal.engines.compare import Comparison
@@ -20,40 +24,69 @@ if TYPE_CHECKING:
     from shoal.trajectory import Trajectory
 
 
+Forms = dict[str, Callable[[], str | bytes]]
+"""What makes the content of a file, by the ending of its name."""
+
+
+def save(path: Path, forms: Forms) -> None:
+    """Write a file in the form of its ending, all of it or nothing. Raises ComputationError."""
+    content = forms[path.suffix]()
+    with whole(path) as part:
+        part.write_bytes(content if isinstance(content, bytes) else content.encode())
+
+
 def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selection | None = None) -> None:
-    """`.html`: a page that moves; `.gif`: a moving picture; else the machine at a few instants.
+    """One lane: a page that moves, a moving picture, the machine at a few instants, a table, or all there is.
 
     selection: how the model was chosen, for the page. Raises InputError, ComputationError.
     """
-    from shoal.pictures.gif import gif
-    from shoal.pictures.poses import poses
-    from shoal.pictures.simulation import moved, simulation
-    from shoal.pictures.titles import ends
 
-    if path.suffix == ".html":
-        path.write_text(simulation(motion, scene, selection), encoding="utf-8")
-        return
-    moving, trust = moved(motion, scene), "" if motion.ok else f" ({motion.status[0]}: not to be trusted)"
-    title = f"{ends(scene.name, moving)}{trust}"
-    if path.suffix == ".gif":
-        path.write_bytes(gif(moving, title))
-    else:
-        _write(poses(moving, title), path)
+    def page() -> str:
+        from shoal.pictures.simulation import simulation
+
+        return simulation(motion, scene, selection)
+
+    def drawn(moves: bool) -> bytes:
+        from shoal.pictures.gif import gif
+        from shoal.pictures.poses import poses
+        from shoal.pictures.simulation import moved
+        from shoal.pictures.style import png
+        from shoal.pictures.titles import ends
+
+        moving, trust = moved(motion, scene), "" if motion.ok else f" ({motion.status[0]}: not to be trusted)"
+        title = f"{ends(scene.name, moving)}{trust}"
+        return gif(moving, title) if moves else png(poses(moving, title))
+
+    drawings: Forms = {".html": page, ".gif": lambda: drawn(moves=True), ".png": lambda: drawn(moves=False)}
+    save(path, {**drawings, ".csv": lambda: columns(motion, "{:.12g}".format), ".json": _json(motion)})
+
+
+def columns(motion: Trajectory, digits: Callable[[float], str]) -> str:
+    """Time [s], x and y [m] and angle [rad] of every marker of one lane, separated by commas; digits: a number's."""
+    names, table = ["t"], [motion.times]
+    for name in motion.markers:
+        names += [f"{name}.x", f"{name}.y", f"{name}.angle"]
+        table += [*motion.marker(name).T, motion.angle(name)]
+    rows = (",".join(map(digits, row)) for row in np.column_stack(table).tolist())
+    return "\n".join([",".join(names), *rows, ""])
 
 
 def estimate(found: Estimate, problem: Problem, path: Path) -> None:
-    """`.html`: a page with everything; `.gif`: the motion of the first recording; else the model over the data."""
+    """A page with everything, the model over the data, the motion of the first recording, or all for `shoal report`."""
     from shoal.pictures.answer import Answer
-    from shoal.pictures.overlay import overlay
-    from shoal.pictures.report import report
 
-    answer = Answer(problem, found)
-    if path.suffix == ".html":
-        path.write_text(report(answer), encoding="utf-8")
-    elif path.suffix == ".gif":
-        path.write_bytes(moving_picture(answer))
-    else:
-        _write(overlay(found), path)
+    def page() -> str:
+        from shoal.pictures.report import report
+
+        return report(Answer(problem, found))
+
+    def kept() -> str:
+        from shoal.pictures.archive import archived
+
+        return json_text(archived(Answer(problem, found)), indent=1)
+
+    moves = {".gif": lambda: moving_picture(Answer(problem, found))}
+    save(path, {".html": page, ".png": lambda: _plotted(found), **moves, ".json": kept})
 
 
 def moving_picture(answer: Answer) -> bytes:
@@ -69,26 +102,43 @@ def moving_picture(answer: Answer) -> bytes:
 
 def design(found: Design, path: Path) -> None:
     """The candidates, and what duration does."""
-    from shoal.pictures.design import design
 
-    _write(design(found), path)
+    def drawn() -> bytes:
+        from shoal.pictures.design import design
+        from shoal.pictures.style import png
+
+        return png(design(found))
+
+    save(path, {".json": _json(found), ".png": drawn})
 
 
 def sweep(result: Sweep, path: Path) -> None:
-    """The displacement of the last marker."""
-    from shoal.pictures.sweep import sweep
+    """Every point, or the displacement of the last marker."""
+    save(path, {".csv": lambda: rows(result), ".json": _json(result), ".png": lambda: _plotted(result)})
 
-    _write(sweep(result, list(result.positions)[-1]), path)
+
+def rows(result: Sweep) -> str:
+    """Every point, separated by commas."""
+    found, stream = result.rows(), StringIO()
+    writer = csv.DictWriter(stream, list(found[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(found)
+    return stream.getvalue()
 
 
 def comparison(result: Comparison, path: Path) -> None:
-    """The engines over each other at the last marker."""
-    from shoal.pictures.engines import engines
-    from shoal.pictures.titles import agrees
-
-    last = list(result.scene.markers)[-1]
-    _write(engines(result, last, agrees(result, last)), path)
+    """All distances, or the engines over each other at the last marker."""
+    save(path, {".json": _json(result), ".png": lambda: _plotted(result)})
 
 
-def _write(figure: Figure, path: Path) -> None:
-    path.write_bytes(style.png(figure))
+def _plotted(result: Estimate | Sweep | Comparison) -> bytes:
+    """The picture that a notebook shows."""
+    from shoal.pictures.inline import plot
+    from shoal.pictures.style import png
+
+    return png(plot(result).figure)
+
+
+def _json(result: Trajectory | Design | Sweep | Comparison) -> Callable[[], str]:
+    """What `--json` prints, one number a line."""
+    return lambda: json_text(result.to_json(), indent=1)

@@ -6,7 +6,6 @@ from io import BytesIO
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -88,10 +87,5 @@ def _stage(found: Motion, title: str) -> tuple[Figure, list[tuple[Any, Any]], An
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=3)
     clock = axes.text(0.99, 0.99, "", transform=axes.transAxes, ha="right", va="top", family="monospace")
     for artist in (*(drawn for drawn, _ in shown), clock):
-        _animated(artist)
+        artist.set_animated(True)  # left out of the still picture
     return figure, shown, clock
-
-
-def _animated(artist: Artist) -> None:
-    """Leave it out of the still picture."""
-    artist.set_animated(True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from jinja2 import BaseLoader, ChoiceLoader, Environment, PackageLoader, StrictUndefined
@@ -34,12 +33,9 @@ def environment(*more: BaseLoader) -> Environment:
     return Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, loader=loader)
 
 
-def render(template: str, path: Path | None = None, **content: Any) -> str:
-    """A page as HTML without a reference to anything outside; written to `path` if given."""
-    text = environment().get_template(template).render(**content)
-    if path is not None:
-        path.write_text(text, encoding="utf-8")
-    return text
+def render(template: str, **content: Any) -> str:
+    """A page as HTML without a reference to anything outside."""
+    return environment().get_template(template).render(**content)
 
 
 def animation(found: Motion, what: str) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from shoal_validation.ablation import dynamics, inverse, report
-from shoal_validation.document import rewrite
+from shoal_validation.document import publish
 
 
 def main(arguments: list[str]) -> None:
@@ -41,11 +41,7 @@ def main(arguments: list[str]) -> None:
     report.draw_dynamics(stepped, chosen.out / "ablation-dynamics.png")
     report.draw_inverse(searched, chosen.out / "ablation-inverse.png")
     tables = {"ablation-dynamics": report.dynamics_table(stepped), "ablation-inverse": report.inverse_table(searched)}
-    page = chosen.out.parent / "identification-charts.md"
-    for name, text in tables.items():
-        print(f"{text}\n")
-        if page.exists():
-            rewrite(page, name, text)
+    publish(chosen.out.parent / "identification-charts.md", tables)
 
 
 def _measure(quick: bool, which: list[str]) -> dict[str, Any]:

@@ -85,15 +85,13 @@ class Data:
         return np.array(list(self.whole.truth.values()))
 
 
-def measure_swarm(
-    swarm: str, data: Data, *, seeds: int, budget: int = BUDGET, note: Callable[[], None] = lambda: None
-) -> Searches:
+def measure_swarm(swarm: str, data: Data, *, seeds: int, note: Callable[[], None] = lambda: None) -> Searches:
     """All combinations and seeds; `note` is called after each run."""
     table = np.empty((3, 2, 2, 2, 2, seeds))
     for combination in combinations():
         for seed in range(seeds):
             place: tuple[slice | int, ...] = (slice(None), *map(int, combination), seed)
-            table[place] = search(swarm, data, combination, seed, budget)
+            table[place] = search(swarm, data, combination, seed, BUDGET)
             note()
     return Searches(swarm, *table)
 

@@ -16,7 +16,6 @@ same state: a chain that hangs in revolute joints about alternating axes, from a
 
 from __future__ import annotations
 
-import importlib
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -117,7 +116,8 @@ def own_step(bodies: int, steps: int, repeats: int) -> tuple[float, Callable[[fl
 
 def mujoco_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:
     """Seconds a step of mj_step, and the tip at the end."""
-    mujoco = importlib.import_module("mujoco")
+    import mujoco
+
     # Built by calls: its XML may not be nested as deeply as the longest chain.
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.gravity = STEP, GRAVITY
@@ -147,11 +147,13 @@ def mujoco_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:
 
 def exudyn_tree_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:
     """Seconds a step of Exudyn's tree of minimal coordinates, and the tip at the end."""
-    exu, items = library(), importlib.import_module("exudyn.itemInterface")
+    exu = library()
+    from exudyn import itemInterface
+
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     node = mbs.AddNode(
-        items.NodeGenericODE2(
+        itemInterface.NodeGenericODE2(
             referenceCoordinates=[0.0] * bodies,
             initialCoordinates=_angles(bodies),
             initialCoordinates_t=[0.0] * bodies,
@@ -160,7 +162,7 @@ def exudyn_tree_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array
     )
     kinds = exu.JointType
     tree = mbs.AddObject(
-        items.ObjectKinematicTree(
+        itemInterface.ObjectKinematicTree(
             nodeNumber=node,
             gravity=list(GRAVITY),
             jointTypes=[kinds.RevoluteZ if k % 2 else kinds.RevoluteY for k in range(bodies)],
@@ -173,7 +175,7 @@ def exudyn_tree_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array
         )
     )
     tip = mbs.AddMarker(
-        items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=bodies - 1, localPosition=[1, 0, 0])
+        itemInterface.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=bodies - 1, localPosition=[1, 0, 0])
     )
     mbs.Assemble()
     settings = _settings(exu, steps, exu.DynamicSolverType.RK44)
@@ -184,7 +186,9 @@ def exudyn_tree_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array
 
 def exudyn_bodies_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:
     """Seconds a step of Exudyn's bodies with joints as constraints, and the tip at the end."""
-    exu, inertias = library(), importlib.import_module("exudyn.rigidBodyUtilities")
+    exu = library()
+    from exudyn import rigidBodyUtilities
+
     start = simulate(chain(bodies), [0.0], step=STEP)
     container = exu.SystemContainer()
     mbs = container.AddSystem()
@@ -192,7 +196,7 @@ def exudyn_bodies_run(bodies: int, steps: int, repeats: int) -> tuple[float, Arr
     for k in range(bodies):
         turn = start.rotation(f"B{k}")[0]
         body = mbs.CreateRigidBody(
-            inertia=inertias.RigidBodyInertia(mass=1.0, inertiaTensor=np.diag(MOMENTS), com=[0.0, 0.0, 0.0]),
+            inertia=rigidBodyUtilities.RigidBodyInertia(mass=1.0, inertiaTensor=np.diag(MOMENTS), com=[0.0, 0.0, 0.0]),
             referencePosition=place + 0.5 * turn[:, 0],
             referenceRotationMatrix=turn,
             gravity=list(GRAVITY),

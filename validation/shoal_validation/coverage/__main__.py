@@ -21,7 +21,7 @@ from shoal.identification.uncertainty import linearise, spread
 from shoal.trajectory import Array
 
 from shoal_validation.coverage.cases import Case, cases
-from shoal_validation.document import rewrite, table
+from shoal_validation.document import publish, table
 
 
 @dataclass(frozen=True)
@@ -90,10 +90,7 @@ def main(arguments: list[str]) -> None:
         "plain 1.96 sigma covers",
         "reported over true spread",
     )
-    text = table(head, rows)
-    print(text)
-    if chosen.page.exists():
-        rewrite(chosen.page, "coverage", text)
+    publish(chosen.page, {"coverage": table(head, rows)})
 
 
 if __name__ == "__main__":

@@ -6,20 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
 from shoal.identification.forward import ForwardModel
 from shoal.trajectory import Array
 
+from shoal_validation.problems.double_pendulum import lagrange
+
 HORIZON, RATE = 2.0, 100.0
 NOISE = 5e-3
 """Standard deviation of the noise [m], whatever its correlation."""
-G = 9.81
-LENGTHS = (1.0, 2.0)
-MASS = 1.0
-"""Of the first rod; that of the second follows from its density."""
 
 
 @dataclass(frozen=True)
@@ -40,28 +37,8 @@ class Case:
 
 
 def tip(times: Array, theta1: float, theta2: float, density: float = 1000.0, friction: float = 0.0) -> Array:
-    """Tip [m], (samples, 2), of two uniform rods of 1 m 1 kg and 2 m, released from rest at absolute angles from +X.
-
-    density: of the second rod, of 1e-3 m^2 [kg/m^3]; friction: of the joint at the ground [N m s]
-    """
-    (l1, l2), m1, m2 = LENGTHS, MASS, density * 1e-3 * LENGTHS[1]
-
-    def rate(_: float, y: Array) -> Array:
-        a, b, u, w = y
-        c, s = np.cos(a - b), np.sin(a - b)
-        mass = np.array([[(m1 / 3 + m2) * l1**2, m2 * l1 * l2 / 2 * c], [m2 * l1 * l2 / 2 * c, m2 * l2**2 / 3]])
-        load = np.array(
-            [
-                -m2 * l1 * l2 / 2 * s * w * w - (m1 / 2 + m2) * G * l1 * np.cos(a) - friction * u,
-                m2 * l1 * l2 / 2 * s * u * u - m2 * G * l2 / 2 * np.cos(b),
-            ]
-        )
-        return np.concatenate([[u, w], np.linalg.solve(mass, load)])
-
-    start = [theta1, theta2, 0.0, 0.0]
-    run = solve_ivp(rate, (0.0, times[-1]), start, "DOP853", t_eval=times, rtol=1e-11, atol=1e-11)
-    a, b = run.y[:2]
-    return np.stack([l1 * np.cos(a) + l2 * np.cos(b), l1 * np.sin(a) + l2 * np.sin(b)], axis=1)
+    """Tip of that machine [m], (samples, 2); angles [rad], density of the second rod, friction at the ground."""
+    return lagrange((theta1, theta2), times, density, friction)[1]
 
 
 def noise(count: int, rho: float, seed: int) -> Array:

@@ -19,7 +19,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from shoal_validation.document import rewrite
+from shoal_validation.document import publish
 from shoal_validation.inverse_precision import charts, horizon_noise, report
 from shoal_validation.inverse_precision.cases import BUDGET, CASES, Case
 from shoal_validation.inverse_precision.contenders import contenders
@@ -61,11 +61,7 @@ def _report(out: Path) -> None:
         panels = list(dict.fromkeys(cell.panel for cell in cells))
         charts.draw_map(panels, cells, file.with_suffix(".png"))
         tables[MAP] = report.map_table(panels, cells)
-    page = out.parent / "identification-charts.md"
-    for name, text in tables.items():
-        print(f"{text}\n")
-        if page.exists():
-            rewrite(page, name, text)
+    publish(out.parent / "identification-charts.md", tables)
 
 
 def _case(progress: Progress, case: Case, quick: bool) -> list[dict[str, Any]]:

@@ -18,9 +18,15 @@ def settle(times: Array) -> Reference:
     return Reference(lagrange(start, times)[1], "Lagrange's equations in two angles, scipy DOP853", 1e-9)
 
 
-def lagrange(start: tuple[float, float], times: Array) -> tuple[Array, Array]:
-    """Elbow and tip of that machine, (samples, 2) each, released from rest at other absolute angles [rad]."""
-    rods = [body for body in load_scene("rigid-double-pendulum").bodies.values() if isinstance(body, Rod)]
+def lagrange(
+    start: tuple[float, float], times: Array, density: float = 1000.0, friction: float = 0.0
+) -> tuple[Array, Array]:
+    """Elbow and tip of that machine [m], (samples, 2) each, released from rest at other absolute angles [rad].
+
+    density: of the second rod [kg/m^3]; friction: of the joint at the ground [N m s]
+    """
+    scene = load_scene("rigid-double-pendulum").with_values({"bodies.AB.density": density})
+    rods = [body for body in scene.bodies.values() if isinstance(body, Rod)]
     (m1, l1), (m2, l2) = ((rod.mass, rod.length) for rod in rods)
 
     def rate(_: float, y: Array) -> Array:
@@ -29,7 +35,7 @@ def lagrange(start: tuple[float, float], times: Array) -> tuple[Array, Array]:
         mass = np.array([[(m1 / 3 + m2) * l1**2, m2 * l1 * l2 / 2 * c], [m2 * l1 * l2 / 2 * c, m2 * l2**2 / 3]])
         load = np.array(
             [
-                -m2 * l1 * l2 / 2 * s * w * w - (m1 / 2 + m2) * G * l1 * np.cos(a),
+                -m2 * l1 * l2 / 2 * s * w * w - (m1 / 2 + m2) * G * l1 * np.cos(a) - friction * u,
                 m2 * l1 * l2 / 2 * s * u * u - m2 * G * l2 / 2 * np.cos(b),
             ]
         )

@@ -147,9 +147,9 @@ class StabilityMap:
             settings,
         )
 
-    def reduced(self, methods: tuple[Method, ...] | None = None) -> StabilityMap:
+    def reduced(self) -> StabilityMap:
         """The same question on three values of each axis."""
-        return replace(self, x=self.x.thinned(), y=self.y.thinned(), methods=methods or self.methods)
+        return replace(self, x=self.x.thinned(), y=self.y.thinned())
 
 
 @lru_cache(maxsize=512)

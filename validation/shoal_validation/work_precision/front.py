@@ -8,19 +8,17 @@ from shoal_validation.work_precision.contract import Point
 
 GAIN = 0.05
 """How much nearer than all faster points a point of the front has to be, as a part."""
-Error = Callable[[Point], float | None]
 
 
-def front(points: Iterable[Point], floor: float, error: Error = lambda point: point.error) -> list[Point]:
+def front(points: Iterable[Point], floor: float) -> list[Point]:
     """The believed points, faster to nearer, each nearer by `GAIN` than all faster ones.
 
-    floor: error of the reference [m], below which points cannot be told apart; error: which of a point's errors counts.
+    floor: error of the reference [m], below which points cannot be told apart
     """
     best, found = float("inf"), []
-    for point in sorted(points, key=lambda point: (point.seconds, error(point) or 0.0)):
-        away = error(point)
-        if point.ok and away is not None and max(away, floor) < best * (1 - GAIN):
-            best = max(away, floor)
+    for point in sorted(points, key=lambda point: (point.seconds, point.error)):
+        if point.ok and max(point.error, floor) < best * (1 - GAIN):
+            best = max(point.error, floor)
             found.append(point)
     return found
 

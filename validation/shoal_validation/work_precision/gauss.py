@@ -34,24 +34,25 @@ def methods(problem: Problem, brief: bool) -> list[Method]:
     """All of ours; brief: on few meshes."""
     if not problem.flexible:
         return [
-            *(_method(name, "", counted(problem, RIGID)) for name in INTEGRATORS),
-            *(_method(name, "", TOLERANCES) for name in ADAPTIVE),
+            *(method(name, "", counted(problem, RIGID)) for name in INTEGRATORS),
+            *(method(name, "", TOLERANCES) for name in ADAPTIVE),
         ]
     meshes = FEW_MESHES if brief else MESHES
     explicit, implicit = counted(problem, EXPLICIT), counted(problem, IMPLICIT)
-    found = [_method("leapfrog", mesh, explicit) for mesh in meshes]
-    found += [_method("rk4", mesh, explicit) for mesh in (SCENE_MESH, "4Q/24Q")]
-    found += [_method("semi-implicit-euler", SCENE_MESH, explicit)]
-    found += [_method(name, SCENE_MESH, implicit) for name in INTEGRATORS[3:]]
-    found += [_method(name, SCENE_MESH, TOLERANCES[1:8]) for name in ADAPTIVE]
-    found += [_method("leapfrog", mesh, explicit, lanes=LANES) for mesh in MANY_MESHES]
+    found = [method("leapfrog", mesh, explicit) for mesh in meshes]
+    found += [method("rk4", mesh, explicit) for mesh in (SCENE_MESH, "4Q/24Q")]
+    found += [method("semi-implicit-euler", SCENE_MESH, explicit)]
+    found += [method(name, SCENE_MESH, implicit) for name in INTEGRATORS[3:]]
+    found += [method(name, SCENE_MESH, TOLERANCES[1:8]) for name in ADAPTIVE]
+    found += [method("leapfrog", mesh, explicit, lanes=LANES) for mesh in MANY_MESHES]
     if not brief:
-        found += [_method("generalized-alpha", mesh, implicit) for mesh in IMPLICIT_MESHES]
-        found += [_method("energy-momentum", mesh, implicit) for mesh in ("2Q/6Q", "6Q/20Q")]
+        found += [method("generalized-alpha", mesh, implicit) for mesh in IMPLICIT_MESHES]
+        found += [method("energy-momentum", mesh, implicit) for mesh in ("2Q/6Q", "6Q/20Q")]
     return found
 
 
-def _method(integrator: str, mesh: str, settings: tuple[float, ...], lanes: int = 1) -> Method:
+def method(integrator: str, mesh: str, settings: tuple[float, ...], lanes: int = 1) -> Method:
+    """An integrator on a mesh (empty: the scene's own); settings: steps [s], or tolerances of an adaptive one."""
     adaptive = integrator in ADAPTIVE
 
     def prepare(problem: Problem, setting: float) -> Callable[[], Run]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Any
@@ -58,9 +57,10 @@ def _run(problem: Problem, scene: Scene, name: str, step: float) -> Run:
 @cache
 def _library() -> Any:
     try:
-        return importlib.import_module("mujoco")
+        import mujoco
     except ImportError as error:
         raise InputError(f"MuJoCo cannot be imported: {error}") from error
+    return mujoco
 
 
 def _hinges(scene: Scene) -> dict[str, tuple[str, Revolute]]:

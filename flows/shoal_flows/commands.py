@@ -1,0 +1,86 @@
+"""The commands of `shoal` that need flows or their runs. Prefect and MLflow are imported when one runs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+from shoal.commands import options
+from shoal.errors import ComputationError, check_trusted
+
+
+@click.command("run")
+@click.argument("flow")
+@click.option(
+    "--param", "parameters", multiple=True, metavar="K=V", callback=options.key_value, help="JSON or plain text."
+)
+@options.as_json
+def run_flow(flow: str, parameters: dict[str, str], as_json: bool) -> None:
+    """Run a Prefect FLOW and log it to MLflow. It is forward, identify, compare, sweep or nightly."""
+    from shoal_flows import run
+
+    check_trusted(run.main(flow, parameters, as_json), "the flow did not end well")
+
+
+@click.command()
+@click.argument("run_id")
+@options.as_json
+def rerun(run_id: str, as_json: bool) -> None:
+    """Repeat a study from its MLflow run, and compare the figures."""
+    from shoal_flows import rerun
+
+    check_trusted(rerun.main(run_id, as_json), "the figures do not agree")
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@options.out(".html", default="report.html")
+def report(runs: tuple[str, ...], out: Path) -> None:
+    """Make one page of identifications of one problem.
+
+    RUN is a file that `shoal identify --out FILE.json` wrote, or the id of a run in MLflow.
+    """
+    from shoal.pictures import archive
+    from shoal.pictures.files import save
+    from shoal.pictures.study import best_of, study
+
+    found: dict[str, Any] = {}
+    for run in runs:
+        if Path(run).suffix or Path(run).exists():
+            found[Path(run).stem if Path(run).stem not in found else run] = archive.read(Path(run))
+        else:
+            from shoal_flows.report.stored import stored
+
+            found |= stored(run)
+    save(out, {".html": lambda: study(found)})
+    click.echo(f"report: {out}")
+    best = found[best_of({name: answer.estimate for name, answer in found.items()})].estimate
+    check_trusted(best.verdict.trusted, f"{best.verdict}: {best.message}")
+
+
+@click.command()
+def upload() -> None:
+    """Send MLflow the runs that it could not be told of. They wait in the outbox."""
+    from shoal_flows.tracking.upload import upload
+
+    click.echo(f"{upload()} runs uploaded")
+
+
+@click.command()
+@click.option("--host", default="127.0.0.1", show_default=True)
+@click.option("--port", default=5000, show_default=True)
+def ui(host: str, port: int) -> None:
+    """Serve the MLflow dashboard of all runs until Ctrl-C."""
+    from shoal_flows.ui import ui
+
+    ui(host, port)
+
+
+@click.command()
+def demo() -> None:
+    """The main job: both cases of the paper on every engine. One table, one report."""
+    from shoal_flows import demo
+
+    sys.exit(0 if demo.main() else ComputationError.exit_status)

@@ -1,0 +1,70 @@
+"""What a scene is like: at rest, in small motions, in its joints."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import click
+
+from shoal.commands import options
+from shoal.commands.options import Values
+from shoal.errors import check_trusted
+
+
+@click.command()
+@click.argument("scene")
+@click.option("--time", default=0.0, show_default=True, metavar="T", help="Applied stand as they are at T [s].")
+@options.values
+@options.as_json
+def statics(scene: str, time: float, values: Values, as_json: bool) -> None:
+    """Find where SCENE comes to rest, and if it is stable there."""
+    from shoal.mechanics.analysis.statics import statics
+    from shoal.scene import load_scene
+    from shoal.terminal import screen, tables
+
+    wanted = load_scene(scene).with_values(values)
+    with screen.working(f"balancing {wanted.name}"):
+        equilibrium = statics(wanted, time)
+    screen.show(equilibrium.to_json(), as_json, lambda: tables.equilibrium_table(equilibrium))
+    check_trusted(equilibrium.ok, equilibrium.message)
+
+
+@click.command()
+@click.argument("scene")
+@click.option("--count", default=10, show_default=True, type=click.IntRange(min=1), help="How many, lowest first.")
+@click.option("--about", default="equilibrium", show_default=True, type=click.Choice(["equilibrium", "start"]))
+@options.values
+@options.as_json
+def modes(scene: str, count: int, about: Literal["equilibrium", "start"], values: Values, as_json: bool) -> None:
+    """Eigenfrequencies and mode shapes of SCENE. About its equilibrium, or its start."""
+    from shoal.mechanics.analysis.modes import modes
+    from shoal.scene import load_scene
+    from shoal.terminal import screen, tables
+
+    wanted = load_scene(scene).with_values(values)
+    with screen.working(f"modes of {wanted.name}"):
+        found = modes(wanted, about=about, count=count)
+    screen.show(found.to_json(), as_json, lambda: tables.modes_table(found))
+    check_trusted(found.ok, "it does not stay there: a motion grows")
+
+
+@click.command()
+@click.argument("scene")
+@click.option(
+    "--at", "times", required=True, metavar="T,T,...", callback=options.times_list, help="Times of the motion [s]."
+)
+@options.values
+@options.as_json
+def reactions(scene: str, times: list[float], values: Values, as_json: bool) -> None:
+    """Forces and torques in the joints of SCENE while it moves."""
+    from shoal.mechanics.analysis.reactions import reactions
+    from shoal.scene import load_scene
+    from shoal.terminal import screen, tables
+
+    wanted = load_scene(scene).with_values(values)
+    with screen.working(f"reactions of {wanted.name}"):
+        found = reactions(wanted, times)
+    ok = all(one.ok for one in found)
+    report = {"status": "ok" if ok else "unbalanced", "reactions": [one.to_json() for one in found]}
+    screen.show(report, as_json, lambda: tables.reactions_table(found))
+    check_trusted(ok, "the bodies are not in balance")

@@ -1,0 +1,57 @@
+"""Shoal itself: as a service, as a unit in another program, and whether all of it is there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from shoal.commands import options
+from shoal.commands.options import Out, Values
+from shoal.errors import check_trusted
+
+
+@click.command()
+@click.argument("engine", type=options.EngineName())
+@click.option("--host", default="127.0.0.1", show_default=True)
+@click.option("--port", type=click.IntRange(1, 65535), metavar="PORT", help="8001 gauss, 8002 exudyn, 8003 casadi.")
+@click.option("--certificate", type=click.Path(path_type=Path), help="Serve https with this certificate (PEM).")
+@click.option("--key", type=click.Path(path_type=Path), help="The certificate's private key (PEM).")
+def serve(engine: str, host: str, port: int | None, certificate: Path | None, key: Path | None) -> None:
+    """Serve ENGINE over HTTP until Ctrl-C. SHOAL_API_* in the environment sets the limits."""
+    from shoal.api.serve import serve
+
+    serve(engine, host, port, certificate, key)
+
+
+@click.command("export-fmu")
+@click.argument("scene")
+@options.values
+@click.option(
+    "--parameter",
+    "parameters",
+    multiple=True,
+    metavar="PATH",
+    help="A number of the scene that a host may set (repeatable); else gravity and the initial angles.",
+)
+@options.out(".fmu", otherwise="; else the scene's name")
+def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], out: Out) -> None:
+    """Write SCENE as an FMI 2.0 unit for co-simulation. A host needs this installation to run it."""
+    from shoal.fmu.export import export
+    from shoal.scene import load_scene
+
+    click.echo(export(load_scene(scene).with_values(values), parameters, out))
+
+
+@click.command()
+@options.as_json
+def doctor(as_json: bool) -> None:
+    """Check the installation and say what is wrong. Engines, compiled kernels, pipeline, folders."""
+    from shoal.doctor import examine
+    from shoal.terminal import screen, tables
+
+    checks = examine()
+    ok = all(check.ok for check in checks)
+    report = {"status": "ok" if ok else "failed", "checks": [vars(check) for check in checks]}
+    screen.show(report, as_json, lambda: tables.doctor_table(checks))
+    check_trusted(ok, "something is missing; see the table")

@@ -1,0 +1,116 @@
+"""Parameters of a problem: found from measured motion, and what to measure to know them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+
+from shoal.commands import options
+from shoal.commands.options import Out
+from shoal.errors import check_trusted
+
+
+@click.command()
+@click.argument("problem")
+@click.option(
+    "--data",
+    multiple=True,
+    metavar="[NAME=]FILE",
+    callback=options.recordings,
+    help="A recording (CSV, Parquet, or a YAML that describes one) instead of the problem's own, or one of several.",
+)
+@options.method
+@click.option("--seed", default=0, show_default=True, help="Seed of the random numbers.")
+@options.engine
+@options.values
+@click.option(
+    "--tolerance",
+    type=float,
+    metavar="METRES",
+    help="Error the model may have at the markers: coarse models for the search, the cheapest good one at the end.",
+)
+@click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="For all of it.")
+@click.option(
+    "--checkpoint",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Keep the evaluations in this file; where it exists, go on from it.",
+)
+@click.option("--profiles", is_flag=True, help="The profile likelihood of every parameter.")
+@click.option("--bootstrap", type=click.IntRange(min=0), default=0, metavar="N", help="Draws of a bootstrap.")
+@options.as_json
+@options.out(".html", ".png", ".gif", ".json")
+def identify(
+    problem: str, checkpoint: Path | None, profiles: bool, bootstrap: int, as_json: bool, out: Out, **how: Any
+) -> None:
+    """Find the parameters of PROBLEM from measured motion. With intervals and a verdict."""
+    from shoal.identification import identify, load_problem
+    from shoal.identification.conclude import Wishes
+    from shoal.pictures import files
+    from shoal.terminal import screen, tables
+
+    wanted, wishes = load_problem(problem), Wishes(profiles=profiles, bootstrap=bootstrap)
+    with _interruptible(checkpoint), screen.working(f"{wanted.name}: preparing the data") as tell:
+
+        def note(iteration: int, best: float, mean: float, evaluations: int) -> None:
+            tell(f"{wanted.name}: best fitness {best:.3e}, {evaluations} evaluations")
+
+        estimate = identify(wanted, checkpoint=checkpoint, wishes=wishes, progress=note, **how)
+    if out is not None:
+        files.estimate(estimate, wanted, out)
+    screen.show(estimate.to_json(), as_json, lambda: tables.estimate_table(estimate))
+    check_trusted(estimate.verdict.trusted, f"{estimate.verdict}: {estimate.message}")
+
+
+@click.command()
+@click.argument("problem")
+@click.option("--data", multiple=True, metavar="[NAME=]FILE", callback=options.recordings, help="As for identify.")
+@click.option("--about", type=click.Choice(["answer", "start"]), help="The answer from the data, where there are any.")
+@click.option("--noise", type=float, metavar="METRES", help="Standard deviation of positions; else the problem's.")
+@click.option("--angle-noise", type=float, metavar="RADIANS", help="Standard deviation of angles; else the problem's.")
+@click.option("--duration", type=float, metavar="SECONDS", help="Of the measurement; else that of the data.")
+@click.option("--rate", type=float, metavar="HERTZ", help="Samples per second; else that of the data.")
+@click.option("--parameter", metavar="NAME", help="To be sharpened; else the weakest.")
+@options.values
+@options.as_json
+@options.out(".json", ".png")
+def design(
+    problem: str,
+    data: str | dict[str, str] | None,
+    about: Literal["answer", "start"] | None,
+    as_json: bool,
+    out: Out,
+    **how: Any,
+) -> None:
+    """Say what to measure to know the parameters of PROBLEM best. Which marker, how long and how often."""
+    from shoal.identification import load_problem
+    from shoal.identification.design import about_answer, design, has_data
+    from shoal.pictures import files
+    from shoal.terminal import screen, tables
+
+    wanted = load_problem(problem)
+    with screen.working(f"designing a measurement for {wanted.name}"):
+        if about == "answer" or (about is None and (data is not None or has_data(wanted))):
+            found = about_answer(wanted, data=data, **how)
+        else:
+            found = design(wanted, **how)
+    if out is not None:
+        files.design(found, out)
+    screen.show(found.to_json(), as_json, lambda: tables.design_table(found))
+    check_trusted(found.ok, "no candidate tells every parameter; name one with --parameter")
+
+
+@contextmanager
+def _interruptible(checkpoint: Path | None) -> Iterator[None]:
+    """Say that a checkpoint is gone on from, and after Ctrl-C how."""
+    if checkpoint is not None and checkpoint.exists():
+        click.echo(f"shoal: going on from {checkpoint}", err=True)
+    try:
+        yield
+    except KeyboardInterrupt:
+        if checkpoint is not None:
+            click.echo(f"shoal: {checkpoint} keeps what was evaluated; the same command goes on from there", err=True)
+        raise

@@ -1,0 +1,177 @@
+"""What several commands are given, and how it is read. Raises click's errors, or InputError."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from shoal.errors import InputError
+
+Command = Callable[..., Any]
+Values = dict[str, Any]
+"""Fields of a scene by path."""
+Times = list[float] | None
+"""Instants [s], else the scene's own."""
+Out = Path | None
+"""Where the result is written, if it is."""
+
+
+def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, str]:
+    """PATH=VALUE pairs as a mapping."""
+    found = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not (key and equals and value):
+            raise click.BadParameter(f"{pair!r} is not PATH=VALUE")
+        found[key.strip()] = value.strip()
+    return found
+
+
+def field_values(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, Any]:
+    """PATH=VALUE pairs; a value in brackets or braces is a list or a mapping as YAML writes it, `null` is nothing."""
+    return {path: _structured(path, text) for path, text in key_value(context, parameter, pairs).items()}
+
+
+def _structured(path: str, text: str) -> Any:
+    if text == "null":
+        return None
+    if text[0] not in "[{":
+        return text
+    from shoal.scene.load import read_yaml
+
+    try:
+        return read_yaml(text, path)
+    except InputError:
+        raise click.BadParameter(
+            f"{path}: {text!r} is neither a list such as [0, -9.81] nor a mapping such as {{angle: 0.6}}"
+        ) from None
+
+
+def axes(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, Any]:
+    """PATH=LOW:HIGH:COUNT pairs as values by path."""
+    return {path: _axis(path, text) for path, text in key_value(context, parameter, pairs).items()}
+
+
+def _axis(path: str, text: str) -> Any:
+    import numpy as np
+
+    try:
+        low, high, count = text.split(":")
+        first, last, number = float(low), float(high), int(count)
+    except ValueError:
+        raise InputError(f"vary: {path}={text} is not PATH=LOW:HIGH:COUNT, such as initial.OA.angle=0:1.5:31") from None
+    if not (1 <= number <= 1_000_000) or not np.isfinite([first, last]).all():
+        raise InputError(f"vary: {path}={text}: COUNT is between 1 and 1000000, LOW and HIGH are finite")
+    return np.linspace(first, last, number)
+
+
+def recordings(
+    context: click.Context, parameter: click.Parameter, given: tuple[str, ...]
+) -> str | dict[str, str] | None:
+    """FILE, or NAME=FILE once or more."""
+    if len(given) == 1 and ("=" not in given[0] or Path(given[0]).exists()):
+        return given[0]
+    if bare := [one for one in given if "=" not in one]:
+        raise click.BadParameter(f"{bare[0]!r} is not NAME=FILE, as several recordings need it")
+    if len(found := key_value(context, parameter, given)) < len(given):
+        raise click.BadParameter("a recording is named twice")
+    return found or None
+
+
+def times_list(context: click.Context, parameter: click.Parameter, text: str | None) -> Times:
+    """T,T,... as numbers."""
+    if text is None:
+        return None
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise click.BadParameter(f"{text!r} is not a list of times in s, such as 0.1,0.2,0.5") from None
+
+
+class LateHelp(click.Option):
+    """An option whose help waits until somebody asks, as do the imports that it needs."""
+
+    def __init__(self, *args: Any, told: Callable[[], str], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.told = told
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """The option and its help."""
+        self.help = self.told()
+        return super().get_help_record(ctx)
+
+
+def _methods() -> str:
+    from shoal.identification.methods import METHODS
+
+    return f"One of {', '.join(METHODS)}; the problem's by default."
+
+
+def _engines() -> str:
+    from shoal.engines import ENGINES
+
+    return f"{', '.join(ENGINES)}, or the address of a service (see `shoal serve`)."
+
+
+class EngineName(click.ParamType):  # type: ignore[type-arg]  # click 8.1 has none
+    """One of the engines there are; their import waits until somebody asks."""
+
+    name = "engine"
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str | None:
+        """The names, as usage shows them."""
+        return self._choice().get_metavar(param, ctx)
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The name, if there is such an engine."""
+        return self._choice().convert(value, param, ctx)
+
+    def _choice(self) -> click.Choice[str]:
+        from shoal.engines import ENGINES
+
+        return click.Choice(list(ENGINES))
+
+
+values = click.option(
+    "--set",
+    "values",
+    multiple=True,
+    metavar="PATH=VALUE",
+    callback=field_values,
+    help="Set any field of the scene, such as bodies.OA.elements=16, solver.step=1e-5 (repeatable).",
+)
+at = click.option("--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s].")
+verify = click.option("--verify/--no-verify", default=True, show_default=True, help="Estimate errors by more runs.")
+as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+engine = click.option("--engine", cls=LateHelp, told=_engines, default="gauss", show_default=True)
+method = click.option("--method", cls=LateHelp, told=_methods, metavar="NAME")
+
+
+def out(*endings: str, default: str | None = None, otherwise: str = "") -> Callable[[Command], Command]:
+    """--out FILE, refused before anything is computed where it could not be written.
+
+    endings: the forms there are; otherwise: what happens without the option
+    """
+
+    def checked(context: click.Context, parameter: click.Parameter, path: Out) -> Out:
+        if path is None:
+            return None
+        if path.suffix not in endings:
+            raise InputError(f"out: {path} ends in {path.suffix or 'nothing'}; use one of {', '.join(endings)}")
+        if not path.absolute().parent.is_dir():
+            raise InputError(f"out: the folder {path.absolute().parent} does not exist")
+        return path
+
+    *others, last = endings
+    listed = f"{', '.join(others)} or {last}" if others else last
+    return click.option(
+        "--out",
+        type=click.Path(path_type=Path, dir_okay=False),
+        default=default,
+        show_default=default is not None,
+        callback=checked,
+        help=f"Write {listed}{otherwise}.",
+    )

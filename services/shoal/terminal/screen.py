@@ -1,0 +1,63 @@
+"""The two streams: tables and sentences on the output, progress on standard error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from shoal.home import compiled
+from shoal.trajectory import json_text
+
+out = Console(highlight=False)
+err = Console(stderr=True, highlight=False)
+
+
+def show(data: Mapping[str, Any], as_json: bool, draw: Callable[[], None]) -> None:
+    """One JSON object, or what `draw` prints."""
+    if as_json:
+        print(json_text(data))  # noqa: T201 - this is the output
+    else:
+        draw()
+
+
+@contextmanager
+def working(what: str) -> Iterator[Callable[[str], None]]:
+    """A spinner beside `what`, or beside what it is told later; only on a terminal, nothing in a log file."""
+    if not compiled():
+        err.print("compiling the solver for this machine; this takes a few minutes, once", soft_wrap=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda now: progress.update(task, description=now)
+
+
+def table(title: str, *headings: str) -> Table:
+    """An empty table; its title is printed at once, so that it is not folded to the width of the table."""
+    out.print(title, style="bold")
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, heading in enumerate(headings):
+        made.add_column(escape(heading), justify="left" if index == 0 else "right", overflow="fold")
+    return made
+
+
+def listing(title: str, items: Mapping[str, str]) -> None:
+    """Names with their descriptions."""
+    made = Table(title=title, title_justify="left", title_style="bold", box=None, show_header=False, pad_edge=False)
+    made.add_column(no_wrap=True)
+    made.add_column()
+    for name, text in items.items():
+        made.add_row(name, text)
+    out.print(made)
+    out.print()
+
+
+def say(text: str, style: str = "") -> None:
+    """A line of text, on a terminal folded at 80 columns, in a log file whole; what looks like markup is none."""
+    out.print(escape(text), style=style, width=min(80, out.width), soft_wrap=not out.is_terminal)

@@ -1,0 +1,277 @@
+"""Tables of 80 columns: motions, what a scene is like, what is found from measured motion, the installation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.markup import escape
+
+from shoal.pictures.choice import rows
+from shoal.pictures.estimates import estimates
+from shoal.pictures.numbers import rounded
+from shoal.pictures.start import remarks
+from shoal.pictures.units import fitness_unit, rms_unit
+from shoal.terminal import screen
+
+if TYPE_CHECKING:
+    from shoal.doctor import Check
+    from shoal.engines.compare import Comparison
+    from shoal.engines.sweep import Sweep
+    from shoal.identification import Estimate
+    from shoal.identification.design import Design
+    from shoal.mechanics.analysis.modes import Modes
+    from shoal.mechanics.analysis.reactions import Reactions
+    from shoal.mechanics.analysis.statics import Equilibrium
+    from shoal.scene import Scene
+    from shoal.selection import Selection
+    from shoal.trajectory import Trajectory
+
+_NOTHING = 1e-12
+"""Of the largest force: a force below it is the rounding of the arithmetic, and shown as zero."""
+
+
+def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection | None = None) -> None:
+    """Where the markers end, and the evidence."""
+    if selection is not None:
+        selection_table(selection)
+    table = screen.table(
+        f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s", "marker", "x [m]", "y [m]"
+    )
+    for name in trajectory.markers:
+        x, y = trajectory.marker(name)[-1]
+        table.add_row(name, f"{x:z.9f}", f"{y:z.9f}")
+    screen.out.print(table)
+    verification = trajectory.model.get("verification")
+    unknown = verification is not None and trajectory.ok and verification["time_error"] is None
+    screen.say(
+        f"status {trajectory.status[0]}{', but its time error is not known' if unknown else ''}; energy off by "
+        f"{trajectory.energy_drift[0]:.1e}, constraints by {trajectory.constraint_drift[0]:.1e}"
+    )
+    screen.say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms")
+    for remark in remarks(trajectory.model):
+        screen.say(remark)
+    if verification is not None:
+        for sentence in estimates(verification):
+            screen.say(sentence)
+
+
+def selection_table(selection: Selection) -> None:
+    """The ladder: what was tried, at what cost, how far off, and why it stopped."""
+    chosen = selection.chosen
+    title = (
+        f"models for {selection.tolerance:g} m at the markers: {len(selection.rungs)} runs, {selection.wall_s:.2f} s"
+    )
+    table = screen.table(title, "model", "unknowns", "steps", "ms", "error [m]", "")
+    for row in rows(selection):
+        table.add_row(*row)
+    screen.out.print(table)
+    for rod, reason in selection.rigid.items():
+        screen.say(f"{rod} stays rigid: {reason}")
+    verdict = "met" if selection.met else "not met"
+    screen.say(f"{verdict}: {chosen.name}, estimated error {chosen.error:.1e} m; {selection.reason}")
+    if selection.shear > selection.tolerance:
+        screen.say(f"beyond the beams' theory: shear and rotary inertia, about {selection.shear:.0e} m")
+    screen.out.print()
+
+
+def sweep_table(sweep: Sweep) -> None:
+    """Displacements of every marker over the grid."""
+    markers = list(sweep.positions)
+    last = markers[-1]
+    table = screen.table(
+        f"{sweep.scene.name}: displacement of {last} after {sweep.time:g} s",
+        *_short(list(sweep.grid)),
+        f"{last}.dx [m]",
+        f"{last}.dy [m]",
+        "status",
+    )
+    for row in sweep.rows():
+        numbers = [f"{row[path]:.6g}" for path in sweep.grid]
+        moved = [row[f"{last}.dx"], row[f"{last}.dy"]]
+        table.add_row(*numbers, *("-" if m is None else f"{m:.6f}" for m in moved), row["status"])
+    screen.out.print(table)
+    if sweep.check is not None:
+        screen.say(str(sweep.check))
+
+
+def _short(paths: list[str]) -> list[str]:
+    """Paths with their units, by their last two names where those tell them apart: OA.angle [rad]."""
+    from shoal.pictures.units import labelled
+
+    ends = [".".join(path.split(".")[-2:]) for path in paths]
+    names = ends if len(set(ends)) == len(ends) else paths
+    return [labelled(path, name) for path, name in zip(paths, names, strict=True)]
+
+
+def comparison_table(comparison: Comparison) -> None:
+    """Ends by engine, then differences by pair."""
+    last = list(comparison.scene.markers)[-1]
+    table = screen.table(
+        f"{comparison.scene.name}: {last} at the end", "engine", "x [m]", "y [m]", "energy", "time", "status"
+    )
+    for name, trajectory in comparison.trajectories.items():
+        x, y = trajectory.marker(last)[-1]
+        time = f"{trajectory.wall_s * 1e3:.0f} ms"
+        table.add_row(
+            name, f"{x:.7f}", f"{y:.7f}", f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0])
+        )
+    screen.out.print(table)
+    for name, reason in comparison.refused.items():
+        screen.say(f"{name} refused: {reason}")
+    table = screen.table("distances over all samples", "engines", "marker", "largest [m]", "final [m]")
+    for row in comparison.differences():
+        distances = ("-" if row[key] is None else f"{row[key]:.2e}" for key in ("largest", "final"))
+        table.add_row(" - ".join(row["engines"]), row["marker"], *distances)
+    screen.out.print(table)
+
+
+def equilibrium_table(equilibrium: Equilibrium) -> None:
+    """Where the markers rest, what the joints bear, and the evidence."""
+    table = screen.table(f"{equilibrium.scene.name} at rest", "marker", "x [m]", "y [m]", "angle [rad]")
+    for name in equilibrium.markers:
+        x, y = equilibrium.marker(name)
+        table.add_row(name, f"{x:z.9f}", f"{y:z.9f}", f"{equilibrium.angle(name):z.9f}")
+    screen.out.print(table)
+    if equilibrium.reactions is not None:
+        reactions_table([equilibrium.reactions])
+    lowest = equilibrium.eigenvalues[:1].real
+    screen.say(
+        f"status {equilibrium.status}{f' ({equilibrium.message})' if equilibrium.message else ''}; "
+        f"unbalanced {equilibrium.residual:.1e} of all forces, joints gape by {equilibrium.gap:.1e}"
+        + "".join(f"; lowest eigenvalue {value:.4g} rad^2/s^2" for value in lowest)
+        + f"; {equilibrium.iterations} iterations"
+    )
+
+
+def reactions_table(found: list[Reactions]) -> None:
+    """What every joint exerts on its second body."""
+    for reactions in found:
+        title = f"joint forces on the second body at t = {reactions.time:g} s"
+        table = screen.table(title, "joint", "kind", "fx [N]", "fy [N]", "torque [N m]", "unique")
+        every = [(*joint.force, joint.torque) for joint in reactions.joints.values()]
+        rounding = _NOTHING * float(np.max(np.abs(every), initial=0.0))
+        for (name, joint), values in zip(reactions.joints.items(), every, strict=True):
+            numbers = (f"{0.0 if abs(value) < rounding else value:.6g}" for value in values)
+            table.add_row(name, joint.kind, *numbers, "yes" if joint.unique else "no")
+        screen.out.print(table)
+        if reactions.redundancy:
+            screen.say(
+                f"{reactions.redundancy} more than needed: least forces are shown; "
+                f"redundant: {', '.join(reactions.constraints) or 'none away from this position'}"
+            )
+
+
+def modes_table(modes: Modes) -> None:
+    """Frequencies, slowest first."""
+    headings = ("mode", "frequency [Hz]", "[rad/s]", "damping ratio", "growth [1/s]", "kind")
+    table = screen.table(f"{modes.scene.name}: small motions about the {modes.about}", *headings)
+    for number, mode in enumerate(modes.modes, 1):
+        numbers = (mode.frequency, mode.angular_frequency, mode.damping_ratio, mode.eigenvalue.real)
+        table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind)
+    screen.out.print(table)
+    if not modes.balanced:
+        screen.say("the forces do not balance there; these are motions relative to its fall")
+
+
+def estimate_table(estimate: Estimate) -> None:
+    """The verdict, then values with intervals, other minima, what the residuals say, and what to do next."""
+    screen.say(f"verdict: {estimate.verdict}", style="bold")
+    for reason in filter(None, estimate.message.split("; ")):
+        screen.say(f"  {reason}")
+    table = screen.table(f"{estimate.problem}, {estimate.method}", "parameter", "value", "95 % interval", "known")
+    for name, value in {**estimate.parameters, **estimate.quantities}.items():
+        known = "yes" if value.identifiable else "at bound" if value.at_bound else "no"
+        # Two digits of the uncertainty; a value that is not known has none that mean anything.
+        unit = value.std if value.identifiable and value.std > 0 else abs(value.value) * 1e-2
+        interval = f"{rounded(value.lower, unit)} to {rounded(value.upper, unit)}" if value.identifiable else "-"
+        label = f"{name} [{value.unit}]" if value.unit else name
+        table.add_row(escape(label), rounded(value.value, unit), interval, known)
+    screen.out.print(table)
+    for sentence in estimate.combinations:
+        screen.say(sentence)
+    _minima(estimate)
+    for sentence in estimate.residual_tests.sentences():
+        screen.say(f"residual {sentence}")
+    for name, found in estimate.profiles.items():
+        sides = [side for side, is_open in (("below", found.lower_open), ("above", found.upper_open)) if is_open]
+        screen.say(
+            f"profile of {name}: {found.lower:.6g} to {found.upper:.6g}"
+            + (f", open {' and '.join(sides)}" * bool(sides))
+        )
+    if estimate.bootstrap is not None:
+        for name in estimate.parameters:
+            low, high = estimate.bootstrap.interval(name)
+            screen.say(f"bootstrap of {name}, {len(estimate.bootstrap.draws)} draws: {low:.6g} to {high:.6g}")
+    _effort(estimate)
+    for step in estimate.advice:
+        screen.say(f"next: {step}")
+
+
+def _minima(estimate: Estimate) -> None:
+    """At most five other minima, the best first."""
+    others = sorted(estimate.minima, key=lambda minimum: minimum["fitness"])
+    for other in others[:5]:
+        values = ", ".join(f"{name} {value:.4g}" for name, value in other.items() if name != "fitness")
+        screen.say(f"another minimum, fitness {other['fitness']:.3g} {fitness_unit(estimate)}: {values}")
+    if len(others) > 5:
+        screen.say(f"and {len(others) - 5} more minima, all worse")
+
+
+def _effort(estimate: Estimate) -> None:
+    """Where the data come from, what the search cost, and how the answer compares with a known truth."""
+    screen.say(f"data: {estimate.data}")
+    for note in estimate.notes:
+        screen.say(f"note: {note}")
+    screen.say(
+        f"fitness {estimate.fitness:.4e} {fitness_unit(estimate)}, RMS {estimate.rms:.3e} {rms_unit(estimate)}; "
+        f"{estimate.evaluations} evaluations in {estimate.wall_s:.2f} s"
+    )
+    for stage in estimate.model.get("selection", ()):
+        screen.say(
+            f"model for {stage['tolerance']:g} m: {stage['model']}, off by about {stage['error']:.1e} m, "
+            f"{stage['evaluations']} evaluations"
+        )
+    if estimate.truth:
+        errors = (f"{name} {estimate.parameters[name].value - true:+.2e}" for name, true in estimate.truth.items())
+        screen.say(f"against the truth of the computed data: {', '.join(errors)}")
+    if estimate.model_error_rms is not None:
+        screen.say(f"the mesh of the model is off by {estimate.model_error_rms:.1e} m (RMS); the intervals include it")
+
+
+def design_table(found: Design) -> None:
+    """Candidates, the best first, each alone and beside the best one; then duration and rate."""
+    beside = dict(found.second)
+    best = found.ranked[0][0]
+    title = f"{found.problem}: what to measure, {found.duration:g} s at {found.rate:g} samples a second"
+    table = screen.table(title, "marker", "weakest", "std", "A", "D", f"with {best.name}: weakest", "std")
+    now = found.weakest(found.now)
+    table.add_row("as now", now[0], f"{now[1]:.2e}", f"{found.now.a:.1e}", f"{found.now.d:.1e}", "", "")
+    for candidate, precision in found.ranked:
+        name, std = found.weakest(precision)
+        second = found.weakest(beside[candidate]) if candidate in beside else None
+        pair = ("", "") if second is None else (second[0], f"{second[1]:.2e}")
+        table.add_row(candidate.label, name, f"{std:.2e}", f"{precision.a:.1e}", f"{precision.d:.1e}", *pair)
+    screen.out.print(table)
+    table = screen.table(
+        f"{best.label}: largest std over range, by duration and samples a second",
+        "duration [s]",
+        *(f"{rate:g}" for rate in found.rates),
+    )
+    for duration, row in zip(found.durations, found.table, strict=True):
+        table.add_row(f"{duration:g}", *(f"{score:.1e}" for score in row))
+    screen.out.print(table)
+    angle = "" if found.angle_noise is None else f", {found.angle_noise:g} rad"
+    values = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
+    screen.say(f"noise {found.noise:g} m{angle}; about {values}")
+    screen.say("A, D: root mean square and geometric mean of the standard deviations over the ranges of the parameters")
+    screen.say(f"sensitivities by two steps differ by {found.doubt:.0e}")
+
+
+def doctor_table(checks: list[Check]) -> None:
+    """What was looked at, and what to do."""
+    table = screen.table("shoal doctor", "check", "", "found", "what to do")
+    for check in checks:
+        table.add_row(check.name, "ok" if check.ok else "FAILED", check.found, check.advice)
+    table.columns[2].justify = table.columns[3].justify = "left"
+    screen.out.print(table)
