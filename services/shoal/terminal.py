@@ -321,7 +321,7 @@ def sweep_table(sweep: Sweep) -> None:
 
 def _short(paths: list[str]) -> list[str]:
     """Paths with their units, by their last two names where those tell them apart: OA.angle [rad]."""
-    from shoal.identification.units import unit
+    from shoal.identification.recording.units import unit
 
     ends = [".".join(path.split(".")[-2:]) for path in paths]
     names = ends if len(set(ends)) == len(ends) else paths

@@ -14,10 +14,11 @@ from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification import Measurement, Problem
-from shoal.identification.design import Candidate, Design, design, precision
+from shoal.identification.design import Design, Sensor, design
+from shoal.identification.design.precision import precision
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.least_squares import descend
-from shoal.identification.observation import observe
+from shoal.identification.recording.observation import observe
 from shoal.trajectory import Array
 
 NOISE = 2e-3
@@ -49,7 +50,7 @@ def designed() -> Design:
 
 
 @cache
-def scatter(candidate: Candidate) -> Array:
+def scatter(candidate: Sensor) -> Array:
     """Standard deviations of the parameters over fits to data of Exudyn, each with its own noise, (parameters,)."""
     stated = problem()
     scene = stated.load_scene()
@@ -67,7 +68,7 @@ def scatter(candidate: Candidate) -> Array:
     return np.std(found, axis=0, ddof=1)
 
 
-def on_markers_of_the_scene() -> list[Candidate]:
+def on_markers_of_the_scene() -> list[Sensor]:
     return [candidate for candidate, _ in designed().ranked if candidate.name in ("A", "B")]
 
 

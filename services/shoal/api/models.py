@@ -28,7 +28,7 @@ from shoal.identification import Measurement, Problem, Recording, measure
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import linearise_many
 from shoal.identification.problem import Parameter
-from shoal.identification.recording import EngineSource, FileSource
+from shoal.identification.recording.source import EngineSource, FileSource
 from shoal.scene.record import one_line
 from shoal.trajectory import Array
 

@@ -12,7 +12,7 @@ from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods import Method, Outcome
 from shoal.identification.methods.auto import explains
 from shoal.identification.methods.least_squares import descend
-from shoal.identification.starts import starting_points
+from shoal.identification.methods.starts import starting_points
 from shoal.selection import Selection, select
 from shoal.trajectory import Array
 
@@ -20,6 +20,14 @@ COARSER = 30.0
 """The search goes by a model whose error may be larger by this factor than that of the final one."""
 _OFF = 3.0
 """A fit that leaves more than this many times the tolerance is not off by the model alone."""
+
+
+class Stopped(TimeIsUp):
+    """Time was up on the way; model: whose best so far stands."""
+
+    def __init__(self, model: ForwardModel) -> None:
+        super().__init__()
+        self.model = model
 
 
 @dataclass(frozen=True)
@@ -53,18 +61,18 @@ def coarse_to_fine(
         stages.append(_stage(chosen, coarse.counter.evaluations))
         fine, chosen = _chosen(coarse, outcome.point, tolerance)
     except TimeIsUp:
-        raise TimeIsUp(coarse) from None
+        raise Stopped(coarse) from None
     try:
         descent = descend(fine, outcome.point, progress)
     except TimeIsUp:
-        raise TimeIsUp(fine if np.isfinite(fine.counter.best_value) else coarse) from None
+        raise Stopped(fine if np.isfinite(fine.counter.best_value) else coarse) from None
     point, fitness, rows = descent.point, descent.fitness, descent.rows
     # The coarse model may have led to the wrong minimum.
     if np.sqrt(fitness) > _OFF * tolerance and not explains(fine, replace(outcome, fitness=fitness)):
         try:
             again = search(fine, rng, progress)
         except TimeIsUp:
-            raise TimeIsUp(fine) from None
+            raise Stopped(fine) from None
         rows = rows + [(len(rows) + i, best, mean) for i, best, mean in again.iterations]
         point, fitness = min((point, fitness), (again.point, again.fitness), key=lambda end: end[1])
     stages.append(_stage(chosen, fine.counter.evaluations))

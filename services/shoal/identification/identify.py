@@ -13,19 +13,20 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.identification.adapt import Stage, coarse_to_fine
+from shoal.identification.adapt import Stage, Stopped, coarse_to_fine
 from shoal.identification.checkpoint import Memory
 from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
-from shoal.identification.measurement import Measurement, measure
-from shoal.identification.methods import Outcome, get_method, prepare
-from shoal.identification.mirrors import with_mirror_images
-from shoal.identification.plausible import check_constant
+from shoal.identification.judge.mirrors import with_mirror_images
+from shoal.identification.measure import measure
+from shoal.identification.methods import Method, Outcome, get_method
+from shoal.identification.methods.starts import starting_points
 from shoal.identification.problem import Problem
-from shoal.identification.recording import EngineSource
-from shoal.identification.starts import starting_points
+from shoal.identification.recording.measurement import Measurement
+from shoal.identification.recording.plausible import check_constant
+from shoal.identification.recording.source import EngineSource
 from shoal.scene import Scene
 from shoal.versions import versions
 
@@ -60,7 +61,7 @@ def identify(
     progress: is told how the search goes. Raises InputError, ComputationError.
     """
     name = method or problem.method
-    get_method(name)
+    search = get_method(name)
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
     scene = problem.load_scene(values)
@@ -73,20 +74,19 @@ def identify(
     if deadline is not None:
         with deadline.paused():
             model.warm_up()
-            prepare(name)
-    unless_late(lambda: check_constant(model), None)
+    unless_late(lambda: check_constant(model.measurement, model.at_start), None)
     if checkpoint is not None:
         model.memory = Memory(checkpoint, _fingerprint(model, name, seed, tolerance))
     with nullcontext() if model.memory is None else closing(model.memory):
         begin = time.perf_counter()
-        model, outcome, stages = _search(model, name, np.random.default_rng(seed), tolerance, progress)
+        model, outcome, stages = _search(model, search, np.random.default_rng(seed), tolerance, progress)
         wall = time.perf_counter() - begin
         return conclude(model, outcome, name, seed, wall, stages, wishes)
 
 
 def _search(
     model: ForwardModel,
-    method: str,
+    search: Method,
     rng: np.random.Generator,
     tolerance: float | None,
     watch: Watch,
@@ -96,14 +96,14 @@ def _search(
     def progress(iteration: int, best: float, mean: float) -> None:
         watch(iteration, best, mean, asked.counter.evaluations)
 
-    search, asked, stages = get_method(method), model, list[Stage]()
+    asked, stages = model, list[Stage]()
     try:
         if tolerance is None:
             outcome = search(model, rng, progress)
         else:
             model, outcome, stages = coarse_to_fine(model, search, tolerance, rng, progress)
     except TimeIsUp as end:
-        model = end.model or model
+        model = end.model if isinstance(end, Stopped) else model
         outcome = _best_so_far(model)
     if outcome.ended:
         found = outcome

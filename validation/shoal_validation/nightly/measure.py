@@ -58,7 +58,7 @@ def angles(problem: str, method: str) -> Measured:
     """A problem of identification: largest error of a parameter [rad]; the making of the data is not timed."""
     from shoal.identification import identify, load_problem
     from shoal.identification.identify import load_truth
-    from shoal.identification.measurement import measure
+    from shoal.identification.measure import measure
 
     wanted = load_problem(problem)
     data = measure(wanted, load_truth(wanted))

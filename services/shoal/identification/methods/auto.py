@@ -10,15 +10,15 @@ import numpy.typing as npt
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.loss import noise_of
 from shoal.identification.methods.growth import growth, swings
 from shoal.identification.methods.lanes import descend_many, distinct, linearise_many
 from shoal.identification.methods.least_squares import PATIENCE, from_starts, linearise
 from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
-from shoal.identification.starts import scatter, starting_points
-from shoal.identification.units import of_channels
+from shoal.identification.methods.starts import scatter, starting_points
+from shoal.identification.recording.noise import noise_of
+from shoal.identification.recording.units import of_channels
 from shoal.trajectory import Array
 
 LARGE = 30.0
@@ -82,7 +82,7 @@ def _first_that_explains(model: ForwardModel, methods: dict[str, Callable[[], Ou
         found.append(outcome)
         if explains(model, outcome):
             break
-        left = f"{np.sqrt(outcome.fitness / model.things):.2g} {of_channels(model.measurement)}"
+        left = f"{np.sqrt(outcome.fitness / model.rows.things):.2g} {of_channels(model.measurement)}"
         reason = f"the fit before left {left.rstrip()}"
     best = min(found, key=lambda outcome: outcome.fitness)
     ends = [(o.point, o.fitness) for o in found if o is not best] + [m for o in found for m in o.minima]
@@ -98,8 +98,7 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
     """
     free = model.parameters.logarithmic
     if not explains(model, outcome):
-        others = [not (e.parameter.path or "").startswith("initial.") for e in model.parameters.entries.values()]
-        free = free | np.array(others)
+        free = free | ~model.parameters.initial
     points = _others(model, outcome.point, np.flatnonzero(free))
     if not len(points):
         return outcome
@@ -118,10 +117,8 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
     rest = [(outcome.point, outcome.fitness), *outcome.minima, *((d.point, d.fitness) for d in rivals if d is not best)]
     names = ", ".join(model.names[k] for k in np.flatnonzero(free))
     choice = f"{outcome.choice}; then from other values of {names}"
-    message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
-    return Outcome(
-        best.point, best.fitness, [*outcome.iterations, *rows], message, rest, choice, converged=best.converged
-    )
+    rows = [*outcome.iterations, *rows]
+    return Outcome(best.point, best.fitness, rows, best.message, rest, choice, converged=best.converged)
 
 
 def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> Array:
@@ -140,11 +137,11 @@ def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> Ar
 def explains(model: ForwardModel, outcome: Outcome) -> bool:
     """Whether a fit leaves no more than noise, as stated or as the data tell it, or little of what was measured."""
     rows = len(model.rows.time)
-    left = np.sqrt(outcome.fitness * model.samples / rows)
-    if model.noise is not None:
-        return bool(left <= _NOISES * model.noise)
+    left = np.sqrt(outcome.fitness * model.rows.samples / rows)
+    if model.rows.noise is not None:
+        return bool(left <= _NOISES * model.rows.noise)
     noise = max(float(np.max(np.nan_to_num(noise_of(r)))) for r in model.measurement.recordings.values())
-    return bool(left <= max(_UNEXPLAINED * model.spread, _NOISES * noise))
+    return bool(left <= max(_UNEXPLAINED * model.rows.signal, _NOISES * noise))
 
 
 def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]:

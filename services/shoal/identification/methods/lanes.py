@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
+from shoal.identification.methods.course import mean_of
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
@@ -25,6 +26,8 @@ _SMALL_STEP = 1e-9
 _SMALL_GAIN = 1e-8
 """A step that promises to lower the fitness by less than this fraction is the end."""
 _LARGE_DAMPING = 1e12
+_APART = 0.02
+"""Two starts are different if a parameter differs by more than this fraction of its range."""
 _SAME = 1e-4
 """Two points are the same if no parameter differs by more than this fraction of its range."""
 
@@ -39,6 +42,11 @@ class Descent:
     fitness: float
     rows: list[tuple[int, float, float]]
     converged: bool
+
+    @property
+    def message(self) -> str:
+        """Why it is no answer; empty if it has converged."""
+        return "" if self.converged else f"no convergence after {len(self.rows)} iterations"
 
 
 def descend_many(
@@ -130,7 +138,7 @@ def history(descents: Sequence[Descent]) -> list[tuple[int, float, float]]:
     for iteration in range(max(len(descent.rows) for descent in descents)):
         current = [descent.rows[iteration] for descent in descents if iteration < len(descent.rows)]
         best = min([row[1] for row in current] + [row[1] for row in rows[-1:]])
-        rows.append((iteration, best, _mean([row[2] for row in current])))
+        rows.append((iteration, best, mean_of(np.array([row[2] for row in current]))))
     return rows
 
 
@@ -141,6 +149,18 @@ def distinct(model: ForwardModel, descents: Sequence[Descent], apart: float = 1e
         if np.isfinite(descent.fitness) and all(_distance(model, descent, other) > apart for other in found):
             found.append(descent)
     return found
+
+
+def best_apart(model: ForwardModel, points: Array, values: Array, count: int) -> Array:
+    """The best points that are not close to a better one, one to `count`, (starts, parameters)."""
+    span = model.upper - model.lower
+    found: list[Array] = []
+    for k in np.argsort(values, kind="stable"):
+        if len(found) == count or not np.isfinite(values[k]):
+            break
+        if all(np.max(np.abs(points[k] - other) / span) > _APART for other in found):
+            found.append(points[k])
+    return np.array(found or [points[0]])
 
 
 @dataclass
@@ -161,19 +181,19 @@ class _Search:
     rows: list[tuple[int, float, float]] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.cost = _cost(self.residual)
+        self.cost = squares(self.residual)
         self.scale = np.full(len(self.point), 1e-300)
         self.rows = [(0, self.fitness, self.fitness)]
 
     @property
     def fitness(self) -> float:
         """Mean squared deviation at the point."""
-        return self.cost / self.model.samples
+        return self.cost / self.model.rows.samples
 
     @property
     def promise(self) -> float:
         """Fitness after the step asked for last, if the model were linear."""
-        return (self.cost - self.predicted) / self.model.samples
+        return (self.cost - self.predicted) / self.model.rows.samples
 
     def ask(self) -> Array | None:
         """Where to look next, (parameters,), or None at the end."""
@@ -185,7 +205,7 @@ class _Search:
             wanted = self.point + self._step()
             trial = np.clip(wanted, model.lower, model.upper)
             moved = trial - self.point
-            self.predicted = self.cost - _cost(self.residual + self.jacobian @ moved)
+            self.predicted = self.cost - squares(self.residual + self.jacobian @ moved)
             # A step that a bound cuts may lead uphill: a shorter one does not.
             cut = np.any(trial != wanted) and self.predicted < _SMALL_GAIN * self.cost
             if not cut or self.damping > _LARGE_DAMPING:
@@ -197,7 +217,7 @@ class _Search:
 
     def tell(self, trial: Array, residual: Array, jacobian: Array) -> None:
         """Take residuals (rows,) and Jacobian (rows, parameters) of the trial point."""
-        cost = _cost(residual)
+        cost = squares(residual)
         if cost < self.cost:
             ratio = (self.cost - cost) / self.predicted
             self.point, self.residual, self.jacobian, self.cost = trial, residual, jacobian, cost
@@ -207,7 +227,7 @@ class _Search:
             self.damping *= self.growth
             self.growth *= 2
             self.converged = self.damping > _LARGE_DAMPING
-        self.rows.append((len(self.rows), self.fitness, cost / self.model.samples))
+        self.rows.append((len(self.rows), self.fitness, cost / self.model.rows.samples))
 
     def descent(self) -> Descent:
         """What came out."""
@@ -242,14 +262,10 @@ def _distance(model: ForwardModel, one: _Search | Descent, other: _Search | Desc
 
 
 def _report(iteration: int, searches: Sequence[_Search], active: Sequence[_Search], progress: Progress) -> None:
-    progress(iteration, min(search.fitness for search in searches), _mean([search.rows[-1][2] for search in active]))
+    last = np.array([search.rows[-1][2] for search in active])
+    progress(iteration, min(search.fitness for search in searches), mean_of(last))
 
 
-def _mean(values: Sequence[float]) -> float:
-    """Mean of those that are finite; inf if none is."""
-    finite = [value for value in values if np.isfinite(value)]
-    return float(np.mean(finite)) if finite else float("inf")
-
-
-def _cost(residual: Array) -> float:
+def squares(residual: Array) -> float:
+    """Sum of the squares of a residual (rows,); inf where the motion failed."""
     return float(residual @ residual) if np.all(np.isfinite(residual)) else float("inf")

@@ -7,7 +7,7 @@ import numpy as np
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.lanes import Descent, descend_many, history, linearise_many
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.starts import starting_points
+from shoal.identification.methods.starts import starting_points
 from shoal.trajectory import Array
 
 __all__ = ["Descent", "descend", "from_starts", "least_squares", "linearise"]
@@ -30,8 +30,7 @@ def from_starts(model: ForwardModel, starts: Array, first: tuple[Array, Array], 
     descents = descend_many(model, starts, progress, first=first, patience=PATIENCE)
     best = min(descents, key=lambda d: d.fitness)
     others = [(d.point, d.fitness) for d in descents if d is not best]
-    message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
-    return Outcome(best.point, best.fitness, history(descents), message, others, converged=best.converged)
+    return Outcome(best.point, best.fitness, history(descents), best.message, others, converged=best.converged)
 
 
 def descend(model: ForwardModel, start: Array, progress: Progress) -> Descent:
