@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,17 +59,11 @@ def test_a_method_is_repeatable_counted_and_right(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", marked(name for name in METHODS if name not in SHOOTING))
-def test_failed_simulations_stop_no_method(name: str) -> None:
+def test_failed_simulations_stop_no_method(name: str, watched: Callable[..., Any]) -> None:
     """A third of the box cannot be simulated; the search goes on around it."""
     model = made()
-    inner: Callable[[np.ndarray], np.ndarray] = model._simulated_residuals
-
-    def failing(points: np.ndarray) -> np.ndarray:
-        found = inner(points).copy()
-        found[np.abs(points[:, 0] + 1.5) < 1.0] = np.inf
-        return found
-
-    model._simulated_residuals = failing  # type: ignore[method-assign]
+    first = model.problem.parameters[model.names[0]].path
+    watched(model, fails=lambda values: np.abs(values[first] + 1.5) < 1.0)
     outcome = solve(name, model)
     assert error(model, outcome) < (0.1 if name == "afsa" else 1e-3)
     if name in (*GLOBAL, *SWARMS):

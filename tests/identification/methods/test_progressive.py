@@ -1,5 +1,8 @@
 """Long and chaotic records: single shooting over growing horizons finds what one over the whole record does not."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 from shoal.engines import get_engine
@@ -41,21 +44,13 @@ def test_a_single_shot_over_the_same_record_fails() -> None:
     assert np.max(np.abs(shot.point - list(model.measurement.truth.values()))) > 1e-2
 
 
-def test_work_counts_the_simulated_time_of_every_run() -> None:
+def test_work_counts_the_simulated_time_of_every_run(watched: Callable[..., Any]) -> None:
     problem = rigid_problem()
     model = forward(problem, record(problem, CHAOTIC, 3.0))
-    seen: list[float] = []
-    simulate = ForwardModel._simulated_residuals
-
-    def spy(self: ForwardModel, points: np.ndarray) -> np.ndarray:
-        seen.extend([self.measurement.end] * len(points))
-        return simulate(self, points)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ForwardModel, "_simulated_residuals", spy)
-        progressive(model, np.random.default_rng(0), silent)
-    assert len(seen) == model.counter.evaluations
-    assert sum(seen) / 3.0 == pytest.approx(model.work)
+    engine = watched(model)
+    progressive(model, np.random.default_rng(0), silent)
+    assert len(engine.ends) == model.counter.evaluations
+    assert sum(engine.ends) / 3.0 == pytest.approx(model.work)
 
 
 def test_the_first_horizon_has_numbers_enough() -> None:
@@ -82,32 +77,21 @@ def test_friction_is_found_with_the_angles() -> None:
     assert estimate.parameters["theta1"].value == pytest.approx(CHAOTIC[0], abs=1e-3)
 
 
-def test_failed_simulations_cost_infinity_and_stop_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_simulations_cost_infinity_and_stop_nothing(watched: Callable[..., Any]) -> None:
     problem = rigid_problem()
     model = forward(problem, record(problem, CHAOTIC, 1.0))
-    monkeypatch.setattr(
-        ForwardModel, "_simulated_residuals", lambda self, points: np.full((len(points), len(self.rows.time)), np.inf)
-    )
+    watched(model, fails=lambda values: np.ones(1, dtype=bool))
     outcome = progressive(model, np.random.default_rng(0), silent)
     assert outcome.fitness == np.inf
     assert model.counter.failures > 0
 
 
-def test_a_start_that_cannot_be_simulated_is_left_for_one_that_can(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_start_that_cannot_be_simulated_is_left_for_one_that_can(watched: Callable[..., Any]) -> None:
     """The other elbow branch is infinite wherever it is looked at; the right one is found none the less."""
     problem = rigid_problem()
     model = forward(problem, record(problem, CHAOTIC, 1.0))
-    simulate = ForwardModel._simulated_residuals
-    failures: list[int] = []
-
-    def fails(self: ForwardModel, points: np.ndarray) -> np.ndarray:
-        found = simulate(self, points)
-        failed = points[:, 0] > CHAOTIC[0] + 0.2
-        failures.append(int(failed.sum()))
-        found[failed] = np.inf
-        return found
-
-    monkeypatch.setattr(ForwardModel, "_simulated_residuals", fails)
+    first = problem.parameters[model.names[0]].path
+    engine = watched(model, fails=lambda values: values[first] > CHAOTIC[0] + 0.2)
     outcome = progressive(model, np.random.default_rng(0), silent)
     assert outcome.point == pytest.approx(np.array(CHAOTIC), abs=1e-3)
-    assert sum(failures) > 0
+    assert engine.failures > 0

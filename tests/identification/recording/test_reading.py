@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shoal.errors import InputError
-from shoal.identification import table as tabular
+from shoal.identification.recording import table as tabular
 from shoal.identification.recording.reading import Samples, described
 from shoal.identification.recording.reading import read as read_source
 from shoal.identification.recording.source import SI, Channel, FileSource

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shoal.errors import InputError
-from shoal.identification import reading
+from shoal.identification.recording import reading
 from shoal.identification.recording.reading import Samples, read
 from shoal.identification.recording.source import Channel, FileSource
 

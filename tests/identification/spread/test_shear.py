@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 from shoal.errors import InputError
-from shoal.identification import Problem, Verdict, identify, model_error
+from shoal.identification import Problem, Verdict, identify
+from shoal.identification.spread import model_error
 
 MODULUS = 5e7
 CASES = [(height, seed) for height in (0.1, 0.06) for seed in range(5)]
