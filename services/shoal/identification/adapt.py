@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -40,10 +39,6 @@ class Stage:
     evaluations: int
     selection_s: float
 
-    def to_json(self) -> dict[str, Any]:
-        """As plain data."""
-        return vars(self)
-
 
 def coarse_to_fine(
     model: ForwardModel, search: Method, tolerance: float, rng: np.random.Generator, progress: Progress
@@ -56,35 +51,26 @@ def coarse_to_fine(
     stages: list[Stage] = []
     start = starting_points(model)[0]
     coarse, chosen = _chosen(model, start, COARSER * tolerance)
+    fine = coarse
     try:
         outcome = search(coarse, rng, progress)
         stages.append(_stage(chosen, coarse.counter.evaluations))
         fine, chosen = _chosen(coarse, outcome.point, tolerance)
-    except TimeIsUp:
-        raise Stopped(coarse) from None
-    try:
         descent = descend(fine, outcome.point, progress)
+        point, fitness, rows = descent.point, descent.fitness, descent.rows
+        # The coarse model may have led to the wrong minimum.
+        if np.sqrt(fitness) > _OFF * tolerance and not explains(fine, replace(outcome, fitness=fitness)):
+            again = search(fine, rng, progress)
+            rows = rows + [(len(rows) + i, best, mean) for i, best, mean in again.iterations]
+            point, fitness = min((point, fitness), (again.point, again.fitness), key=lambda end: end[1])
     except TimeIsUp:
         raise Stopped(fine if np.isfinite(fine.counter.best_value) else coarse) from None
-    point, fitness, rows = descent.point, descent.fitness, descent.rows
-    # The coarse model may have led to the wrong minimum.
-    if np.sqrt(fitness) > _OFF * tolerance and not explains(fine, replace(outcome, fitness=fitness)):
-        try:
-            again = search(fine, rng, progress)
-        except TimeIsUp:
-            raise Stopped(fine) from None
-        rows = rows + [(len(rows) + i, best, mean) for i, best, mean in again.iterations]
-        point, fitness = min((point, fitness), (again.point, again.fitness), key=lambda end: end[1])
     stages.append(_stage(chosen, fine.counter.evaluations))
     # Values of different models cannot be compared, so the search on the coarse one counts without a best value.
     fine.counter.charge(coarse.counter.evaluations, outcome.point, np.inf)
     rows = outcome.iterations + [(len(outcome.iterations) + i, best, mean) for i, best, mean in rows]
     message = "" if chosen.met else f"the model is off by about {chosen.chosen.error:.1g} m: {chosen.reason}"
-    return (
-        fine,
-        replace(outcome, point=point, fitness=fitness, iterations=rows, message=message),
-        stages,
-    )
+    return fine, replace(outcome, point=point, fitness=fitness, iterations=rows, message=message), stages
 
 
 def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[ForwardModel, Selection]:

@@ -112,6 +112,7 @@ def conclude(
     better = judgement.better or (unless_late(lambda: _lower(model, outcome, profiled), None) if ended else None)
     if better is not None and rounds > 0:
         return conclude(searched, _moved(outcome, better), method, seed, wall, stages, wishes, rounds - 1)
+    selected = {"selection": [vars(stage) for stage in stages]} if stages else {}
     correlation = autocorrelation(seen.residual, blocks)
     draws = wishes.bootstrap if known else 0
     rng = np.random.default_rng(seed)
@@ -140,7 +141,7 @@ def conclude(
         wall_s=wall,
         history=searched.counter.history,
         iterations=outcome.iterations,
-        minima=[{**_values_of(model, p), "fitness": f} for p, f in found.minima if np.isfinite(f)],
+        minima=[{**model.parameters.told(p), "fitness": f} for p, f in found.minima if np.isfinite(f)],
         residual_autocorrelation=correlation,
         residual_tests=tests,
         suspects=judgement.suspects,
@@ -152,7 +153,7 @@ def conclude(
         truth=dict(measurement.truth),
         data=measurement.origin,
         notes=[note for recording in measurement.recordings.values() for note in recording.notes],
-        model={"scene": model.scene.name, **model.problem.values, **_fitted(model.scene), **_chosen(stages)},
+        model={"scene": model.scene.name, **model.problem.values, **_fitted(model.scene), **selected},
         scenes={name: model.scene_at(point, name) for name in measurement.recordings},
         predicted=predicted,
         measurement=measurement,
@@ -172,10 +173,6 @@ def _predicted(model: ForwardModel, point: Array, name: str) -> Array:
     return np.asarray(unless_late(lambda: model.observe(point[None], name), nothing)[0])
 
 
-def _values_of(model: ForwardModel, point: Array) -> dict[str, float]:
-    return dict(zip(model.names, model.parameters.to_values(point).tolist(), strict=True))
-
-
 def _fitted(scene: Scene) -> dict[str, Any]:
     """Mesh and steps of the scene that was fitted, by their paths."""
     found: dict[str, Any] = {}
@@ -185,10 +182,6 @@ def _fitted(scene: Scene) -> dict[str, Any]:
             found |= {f"bodies.{name}.elements": body.elements} if body.element != "rigid" else {}
             found |= {f"bodies.{name}.quadrature": body.quadrature} if body.element == "ancf-cable" else {}
     return found | {f"solver.{name}": getattr(scene.solver, name) for name in ("integrator", "step")}
-
-
-def _chosen(stages: list[Stage]) -> dict[str, Any]:
-    return {"selection": [stage.to_json() for stage in stages]} if stages else {}
 
 
 def _moved(outcome: Outcome, better: Descent) -> Outcome:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -86,6 +87,10 @@ class ForwardModel:
     def upper(self) -> Array:
         """Upper bounds, (parameters,)."""
         return self.parameters.upper
+
+    def reach(self, point: Array) -> tuple[Array, Array]:
+        """Bounds that no step from a point crosses, (parameters,) each; from outside none leads further out."""
+        return np.minimum(self.lower, point), np.maximum(self.upper, point)
 
     def sizes(self, point: Array) -> Array:
         """Size of each parameter at a point, at least a thousandth of its range, 1 of a logarithm, (parameters,)."""
@@ -199,6 +204,10 @@ class ForwardModel:
         sized = [(name, getattr(body, "elements", 0)) for name, body in scene.bodies.items()]
         kind = (self.engine.name, str(sized), scene.solver.integrator, scene.solver.step, lanes == 1)
         return self.deadline.run(kind, scene, times, run)
+
+    def off_the_clock(self) -> AbstractContextManager[None]:
+        """For what does not count against the deadline."""
+        return nullcontext() if self.deadline is None else self.deadline.paused()
 
     def warm_up(self) -> None:
         """Have the engine load or compile what it needs, so that no clock counts it."""

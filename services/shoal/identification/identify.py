@@ -27,7 +27,6 @@ from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.plausible import check_constant
 from shoal.identification.recording.source import EngineSource
-from shoal.scene import Scene
 from shoal.versions import versions
 
 Watch = Callable[[int, float, float, int], None]
@@ -68,8 +67,9 @@ def identify(
     deadline = None if time_limit is None else Deadline(time_limit)
     computed = any(isinstance(source, EngineSource) for source in problem.sources.values())
     if measurement is None:
+        # Data are computed with the problem's values, not the user's.
         with deadline.paused() if deadline is not None and computed else nullcontext():
-            measurement = measure(problem, load_truth(problem), data)
+            measurement = measure(problem, problem.load_scene(), data)
     model = ForwardModel(problem, scene, get_engine(engine), measurement, deadline)
     if deadline is not None:
         with deadline.paused():
@@ -85,11 +85,7 @@ def identify(
 
 
 def _search(
-    model: ForwardModel,
-    search: Method,
-    rng: np.random.Generator,
-    tolerance: float | None,
-    watch: Watch,
+    model: ForwardModel, search: Method, rng: np.random.Generator, tolerance: float | None, watch: Watch
 ) -> tuple[ForwardModel, Outcome, list[Stage]]:
     """Run a method as long as it may; returns the model it ended with, where, and the models on the way."""
 
@@ -111,11 +107,6 @@ def _search(
     if model.refusal and not np.isfinite(outcome.fitness):
         raise InputError(model.refusal)
     return model, outcome, stages
-
-
-def load_truth(problem: Problem) -> Scene:
-    """The scene of a problem as the data are computed from it: with the problem's values, not the user's."""
-    return problem.load_scene()
 
 
 def _best_so_far(model: ForwardModel) -> Outcome:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,15 +68,9 @@ def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) 
         raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
     values = observe(trajectory, channels, camera(source))[0]
     values = values + source.noise * np.random.default_rng(source.seed).standard_normal(values.shape)
-    engine = ", ".join([source.engine, *(f"{path}={value}" for path, value in source.values.items())])
-    recording = Recording(
-        times,
-        channels,
-        values,
-        engine if source.noise == 0 else f"{engine}, noise {source.noise:g}",
-        _noise(problem, channels),
-        source.as_stated(),
-    )
+    origin = ", ".join([source.engine, *(f"{path}={value}" for path, value in source.values.items())])
+    origin = origin if source.noise == 0 else f"{origin}, noise {source.noise:g}"
+    recording = Recording(times, channels, values, origin, _noise(problem, channels), source.as_stated())
     paths = {name: parameter.path for name, parameter in problem.parameters.items()}
     return recording, {name: _true(truth, source, path) for name, path in paths.items() if path}
 
@@ -92,15 +87,8 @@ def _recorded(problem: Problem, scene: Scene, source: FileSource, path: Path) ->
     found = read(source, channels)
     sized = any(parameter.path == f"{RESERVED}.scale" for parameter in problem.parameters.values())
     check_units(source, channels, found.times, found.values, scene, sized)
-    return Recording(
-        found.times,
-        found.channels,
-        found.values,
-        found.origin,
-        _noise(problem, found.channels),
-        source.as_stated(),
-        (*found.notes, *_without_scale(problem, source, channels)),
-    )
+    notes = (*found.notes, *_without_scale(problem, source, channels))
+    return replace(found, noise=_noise(problem, channels), stated=source.as_stated(), notes=notes)
 
 
 def _without_scale(problem: Problem, source: FileSource, channels: tuple[Channel, ...]) -> tuple[str, ...]:

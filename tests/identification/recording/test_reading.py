@@ -8,8 +8,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shoal.errors import InputError
+from shoal.identification import Recording
 from shoal.identification.recording import table as tabular
-from shoal.identification.recording.reading import Samples, described
+from shoal.identification.recording.reading import described
 from shoal.identification.recording.reading import read as read_source
 from shoal.identification.recording.source import SI, Channel, FileSource
 
@@ -17,7 +18,7 @@ ANGLE = (Channel(marker="A", quantity="angle", column="theta"),)
 TIP = (Channel(marker="A", quantity="x", column="x"), Channel(marker="A", quantity="y", column="y"))
 
 
-def read(source: FileSource, channels: tuple[Channel, ...], path: Path) -> Samples:
+def read(source: FileSource, channels: tuple[Channel, ...], path: Path) -> Recording:
     return read_source(source.model_copy(update={"path": str(path)}), channels)
 
 

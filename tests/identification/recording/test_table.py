@@ -7,15 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shoal.errors import InputError
+from shoal.identification import Recording
 from shoal.identification.recording import reading
-from shoal.identification.recording.reading import Samples, read
+from shoal.identification.recording.reading import read
 from shoal.identification.recording.source import Channel, FileSource
 
 X = (Channel(marker="A", quantity="x", column="x"),)
 ROWS = "0.0,1.0\n0.1,2.0\n0.2,4.0\n0.3,3.0\n"
 
 
-def seen(path: Path, data: str | bytes, **source: object) -> Samples:
+def seen(path: Path, data: str | bytes, **source: object) -> Recording:
     path.write_bytes(data.encode() if isinstance(data, str) else data)
     return read(FileSource(path=str(path), **source), X)  # type: ignore[arg-type]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods import METHODS, get_method
+from shoal.identification.methods import METHODS
 from shoal.identification.methods.least_squares import descend
 from shoal.trajectory import Array
 
@@ -54,7 +54,7 @@ class Contender:
 
 def contenders() -> list[Contender]:
     """Everyone."""
-    found = [Contender(name, "shoal", get_method(name)) for name in METHODS]
+    found = [Contender(name, "shoal", search) for name, search in METHODS.items()]
     found.append(Contender("least-squares, random start", "shoal", random_descent))
     found += [Contender(name, "scipy", search) for name, search in SCIPY.items()]
     return found

@@ -16,15 +16,15 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.identification.design.asked import grid, noise_of, size_of, today_of
-from shoal.identification.design.precision import Bundle, Precision, counting
-from shoal.identification.design.precision import score as score_of
+from shoal.identification.design.precision import Aim, Bundle, Precision
 from shoal.identification.design.sensors import Sensor, columns_of, sensors_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.identify import identify
 from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement, Recording
-from shoal.identification.recording.source import EngineSource
+from shoal.identification.recording.source import Channel, EngineSource
 from shoal.identification.spread.sensitivity import AGREED, sensitivity
+from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
 _DURATIONS = (0.25, 0.5, 1.0, 1.5, 2.0)
@@ -36,22 +36,19 @@ _COURSE = 40
 class Design:
     """Sensors, the best first, at the duration [s] and rate [1/s] of today, for given noise [m], [rad].
 
-    span: ranges between the bounds; parameter: to be sharpened, None for the weakest, whichever that is
-    now: with the channels of the problem; second: each sensor beside the best one
+    aim: what is to be sharpened; now: with the channels of the problem; second: each sensor beside the best one
     table: score by the best marker, (durations, rates)
     course: score of each sensor until `times` [s], (sensors, times)
     doubt: relative difference of two steps of the sensitivities
     """
 
     problem: str
-    names: tuple[str, ...]
+    aim: Aim
     values: dict[str, float]
     noise: float
     angle_noise: float | None
     duration: float
     rate: float
-    span: Array
-    parameter: str | None
     now: Precision
     ranked: list[tuple[Sensor, Precision]]
     second: list[tuple[Sensor, Precision]]
@@ -62,25 +59,16 @@ class Design:
     course: Array
     doubt: float
 
-    def weakest(self, precision: Precision) -> tuple[str, float]:
-        """The parameter that counts, and its standard deviation."""
-        k = counting(self.names, precision, self.span, self.parameter)
-        return self.names[k], float(precision.std[k])
-
-    def score(self, precision: Precision) -> float:
-        """Standard deviation of the parameter that counts over its range: the smaller the better."""
-        return score_of(self.names, precision, self.span, self.parameter)
-
     @property
     def ok(self) -> bool:
         """Whether the best sensor tells the parameter, by sensitivities that can be believed."""
-        return bool(np.isfinite(self.score(self.ranked[0][1])) and self.doubt <= AGREED)
+        return bool(np.isfinite(self.aim.score(self.ranked[0][1])) and self.doubt <= AGREED)
 
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal design --json` prints; null where nothing is told."""
 
         def told(precision: Precision) -> dict[str, Any]:
-            std = dict(zip(self.names, precision.std.tolist(), strict=True))
+            std = dict(zip(self.aim.names, precision.std.tolist(), strict=True))
             return {"std": std, "a": precision.a, "d": precision.d, "unknown": precision.unknown}
 
         def rows(found: list[tuple[Sensor, Precision]]) -> list[dict[str, Any]]:
@@ -88,25 +76,12 @@ class Design:
                 {"marker": c.name, "body": c.body, "point": c.point, "quantity": c.quantity} | told(p) for c, p in found
             ]
 
+        stated = ("problem", "values", "noise", "angle_noise", "duration", "rate")
         return plain(  # type: ignore[no-any-return]
-            {
-                "status": "ok" if self.ok else "failed",
-                "problem": self.problem,
-                "values": self.values,
-                "noise": self.noise,
-                "angle_noise": self.angle_noise,
-                "duration": self.duration,
-                "rate": self.rate,
-                "weakest": self.weakest(self.now)[0],
-                "parameter": self.parameter,
-                "now": told(self.now),
-                "ranked": rows(self.ranked),
-                "second": rows(self.second),
-                "durations": self.durations,
-                "rates": self.rates,
-                "table": self.table,
-                "doubt": self.doubt,
-            }
+            {"status": "ok" if self.ok else "failed", **{name: getattr(self, name) for name in stated}}
+            | {"weakest": self.aim.weakest(self.now)[0], "parameter": self.aim.parameter, "now": told(self.now)}
+            | {"ranked": rows(self.ranked), "second": rows(self.second), "durations": self.durations}
+            | {"rates": self.rates, "table": self.table, "doubt": self.doubt}
         )
 
 
@@ -128,31 +103,64 @@ def design(
     are today's, where `duration` [s] and `rate` [1/s] are not given; noise [m], angle_noise [rad]: standard deviations,
     else the problem's; parameter: to sharpen, else whichever has the largest standard deviation for its range
     """
-    name, source = next(iter(problem.sources.items()))
+    source = next(iter(problem.sources.values()))
     noise, angle_noise = noise_of(problem, noise, angle_noise)
     duration, rate = today_of(source, measurement, duration, rate)
     scene, sensors = sensors_of(problem.load_scene(values))
+    present = problem.channels_of(source)
+    channels = (*present, *(channel for sensor in sensors for channel in sensor.channels))
+    model = _model(problem, scene, channels, grid(duration, rate))
+    aim = Aim(model.names, model.upper - model.lower, parameter)
+    if parameter is not None and parameter not in aim.names:
+        raise InputError(f"parameter: no parameter {parameter!r}; there are {', '.join(aim.names)}")
+    point = _point(model, at)
+    seen = sensitivity(model, point)
+    if not np.all(np.isfinite(seen.residual)):
+        reason = model.refusal or "it fails"
+        raise InputError(f"{problem.name}: the motion about these values cannot be simulated: {reason}")
+    size = np.array([size_of(channel, noise, angle_noise) for channel in channels])
+    bundle = Bundle.of(model.measurement.first.times, seen.jacobian, size, aim.span, len(present))
+    now = bundle.precision(range(bundle.present), duration)
+
+    def order(pair: tuple[Sensor, Precision]) -> tuple[float, int, float]:
+        return aim.score(pair[1]), pair[1].unknown, pair[1].a
+
+    columns = columns_of(bundle, sensors, angle_noise is not None)
+    ranked = sorted(((c, bundle.precision(own, duration)) for c, own in columns.items()), key=order)
+    best = columns[ranked[0][0]]
+    others = ((c, bundle.precision([*best, *own], duration)) for c, own in columns.items() if own != best)
+    durations, steps = duration * np.array(_DURATIONS), [round(2 / factor) for factor in _RATES]
+    course = np.linspace(0.0, 2 * duration, _COURSE + 1)[1:]
+    return Design(
+        problem=problem.name,
+        aim=aim,
+        values=model.parameters.told(point),
+        noise=noise,
+        angle_noise=angle_noise,
+        duration=duration,
+        rate=rate,
+        now=now,
+        ranked=ranked,
+        second=sorted(others, key=order),
+        durations=durations,
+        rates=rate * np.array(_RATES),
+        table=np.array([[aim.score(bundle.precision(best, end, step)) for step in steps] for end in durations]),
+        times=course,
+        course=np.array([[aim.score(bundle.precision(columns[c], end)) for end in course] for c, _ in ranked]),
+        doubt=seen.doubt,
+    )
+
+
+def _model(problem: Problem, scene: Scene, channels: tuple[Channel, ...], times: Array) -> ForwardModel:
+    """Of the first recording, with other channels at other times, of which nothing was measured yet."""
+    name, source = next(iter(problem.sources.items()))
     # Standard deviations are told in the parameters' own units, but for those that are stated to be logarithms.
     scales = {n: p.model_copy(update={"scale": "linear"}) for n, p in problem.parameters.items() if p.scale == "auto"}
     changes = {"loss": "squares", "recordings": {name: source} if problem.recordings else {}}
     changes["parameters"] = {**problem.parameters, **scales}
-    chosen = problem.model_copy(update=changes)
-    channels = (*problem.channels_of(source), *(channel for c in sensors for channel in c.channels))
-    times = grid(duration, rate)
-    zeros = np.zeros((len(times), len(channels)))
-    nothing = Recording(times, channels, zeros, "", np.full(len(channels), np.nan), source.as_stated())
-    model = ForwardModel(chosen, scene, get_engine("gauss"), Measurement({name: nothing}))
-    point = _point(model, at)
-    seen = sensitivity(model, point)
-    if not np.all(np.isfinite(seen.residual)):
-        raise InputError(
-            f"{problem.name}: the motion about these values cannot be simulated: {model.refusal or 'it fails'}"
-        )
-    rows = len(times) * len(channels)
-    size = np.array([size_of(channel, noise, angle_noise) for channel in channels])
-    table = seen.jacobian[:rows].reshape(len(times), len(channels), -1) / size[:, None]
-    bundle = Bundle(times, table, seen.jacobian[rows:], model.upper - model.lower, len(problem.channels_of(source)))
-    return _ranked(problem, model, point, bundle, sensors, (noise, angle_noise, duration, rate), parameter, seen.doubt)
+    zeros, unknown = np.zeros((len(times), len(channels))), np.full(len(channels), np.nan)
+    nothing = Measurement({name: Recording(times, channels, zeros, "", unknown, source.as_stated())})
+    return ForwardModel(problem.model_copy(update=changes), scene, get_engine("gauss"), nothing)
 
 
 def has_data(problem: Problem) -> bool:
@@ -177,55 +185,6 @@ def about_answer(
         )
     at = {name: value.value for name, value in found.parameters.items()}
     return design(problem, at=at, values=values, measurement=found.measurement, **options)
-
-
-def _ranked(
-    problem: Problem,
-    model: ForwardModel,
-    point: Array,
-    bundle: Bundle,
-    sensors: list[Sensor],
-    asked: tuple[float, float | None, float, float],
-    parameter: str | None,
-    doubt: float,
-) -> Design:
-    noise, angle_noise, duration, rate = asked
-    now = bundle.precision(range(bundle.present), duration)
-    if parameter is not None and parameter not in model.names:
-        raise InputError(f"parameter: no parameter {parameter!r}; there are {', '.join(model.names)}")
-
-    def score(found: Precision) -> float:
-        return score_of(model.names, found, bundle.span, parameter)
-
-    def order(pair: tuple[Sensor, Precision]) -> tuple[float, int, float]:
-        return score(pair[1]), pair[1].unknown, pair[1].a
-
-    columns = columns_of(bundle, sensors, angle_noise is not None)
-    ranked = sorted(((c, bundle.precision(own, duration)) for c, own in columns.items()), key=order)
-    best = columns[ranked[0][0]]
-    others = ((c, bundle.precision([*best, *own], duration)) for c, own in columns.items() if own != best)
-    durations, steps = duration * np.array(_DURATIONS), [round(2 / factor) for factor in _RATES]
-    times = np.linspace(0.0, 2 * duration, _COURSE + 1)[1:]
-    return Design(
-        problem.name,
-        model.names,
-        dict(zip(model.names, model.parameters.to_values(point).tolist(), strict=True)),
-        noise,
-        angle_noise,
-        duration,
-        rate,
-        bundle.span,
-        parameter,
-        now,
-        ranked,
-        sorted(others, key=order),
-        durations,
-        rate * np.array(_RATES),
-        np.array([[score(bundle.precision(best, end, step)) for step in steps] for end in durations]),
-        times,
-        np.array([[score(bundle.precision(columns[c], end)) for end in times] for c, _ in ranked]),
-        doubt,
-    )
 
 
 def _point(model: ForwardModel, at: Mapping[str, float] | None) -> Array:

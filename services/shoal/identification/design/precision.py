@@ -35,6 +35,13 @@ class Bundle:
     span: Array
     present: int
 
+    @classmethod
+    def of(cls, times: Array, jacobian: Array, noise: Array, span: Array, present: int) -> Bundle:
+        """From a Jacobian (rows and priors, parameters) at all times, of channels with some noise, (channels,)."""
+        rows = len(times) * len(noise)
+        table = jacobian[:rows].reshape(len(times), len(noise), -1) / noise[:, None]
+        return cls(times, table, jacobian[rows:], span, present)
+
     def precision(self, columns: Sequence[int], end: float, every: int = 2) -> Precision:
         """By some of the channels until a time [s], every so many instants."""
         # The grid is twice as fine as today's sampling.
@@ -57,12 +64,23 @@ def precision(jacobian: Array, span: Array) -> Precision:
     return Precision(relative * span, float(np.sqrt(np.mean(relative**2))), d, int(np.sum(~known)))
 
 
-def counting(names: Sequence[str], found: Precision, span: Array, parameter: str | None) -> int:
-    """Number of the parameter that counts: the one to be sharpened, else the weakest."""
-    return int(np.argmax(found.std / span)) if parameter is None else names.index(parameter)
+@dataclass(frozen=True)
+class Aim:
+    """What is to be sharpened: a parameter by its name, or None for the weakest, whichever that is.
 
+    names: of the parameters; span: their ranges between the bounds, (parameters,)
+    """
 
-def score(names: Sequence[str], found: Precision, span: Array, parameter: str | None) -> float:
-    """Standard deviation of the parameter that counts over its range: the smaller the better."""
-    k = counting(names, found, span, parameter)
-    return float(found.std[k] / span[k])
+    names: tuple[str, ...]
+    span: Array
+    parameter: str | None
+
+    def weakest(self, found: Precision) -> tuple[str, float]:
+        """The parameter that counts, and its standard deviation."""
+        k = int(np.argmax(found.std / self.span)) if self.parameter is None else self.names.index(self.parameter)
+        return self.names[k], float(found.std[k])
+
+    def score(self, found: Precision) -> float:
+        """Standard deviation of the parameter that counts over its range: the smaller the better."""
+        name, std = self.weakest(found)
+        return std / float(self.span[self.names.index(name)])

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.methods.starts import damped_step
 from shoal.identification.recording.source import Channel
 from shoal.trajectory import Array
 
@@ -102,12 +103,8 @@ def _gauss_newton(
     seen = model.poses(shifted, name).reshape(1 + len(angles), len(points), -1)
     error = _difference(seen[0], targets, kinds)
     jacobian = np.moveaxis(_difference(seen[1:], seen[0], kinds) / h, 0, -1)
-    normal = np.einsum("nck,ncl->nkl", jacobian, jacobian)
     # A little damping, so that a stretched pose (singular) does not send the angles far away.
-    normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(len(angles)) + 1e-14 * np.eye(
-        len(angles)
-    )
-    step = np.linalg.solve(normal, np.einsum("nck,nc->nk", jacobian, error)[..., None])[..., 0]
+    step = damped_step(error, jacobian, np.full(len(points), 1e-6))
     moved = points.copy()
     moved[:, angles] = (points[:, angles] - step + np.pi) % (2 * np.pi) - np.pi
     return moved

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import combinations, product
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.rivals import apart
-from shoal.identification.methods.lanes import descend_many
+from shoal.identification.methods.lanes import descend_many, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import poses_at
 from shoal.trajectory import Array
@@ -64,12 +65,9 @@ def with_mirror_images(model: ForwardModel, outcome: Outcome) -> Outcome:
 
 def images(model: ForwardModel, point: Array) -> Array:
     """Starts that might show the same, within the bounds, (images, parameters)."""
-    found: list[Array] = []
-    for candidate in _candidates(model, point):
-        turned = _within_bounds(model, candidate)
-        if turned is not None and all(apart(model, turned, other) for other in (point, *found)):
-            found.append(turned)
-    return np.array(found).reshape(-1, len(point))
+    turned = (_within_bounds(model, candidate) for candidate in _candidates(model, point))
+    found = kept_apart([point, *(one for one in turned if one is not None)], partial(apart, model))
+    return np.array(found[1:]).reshape(-1, len(point))
 
 
 def _candidates(model: ForwardModel, point: Array) -> Iterator[Array]:

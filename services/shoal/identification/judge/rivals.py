@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.special import chdtri
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import linearise_many
+from shoal.identification.methods.lanes import damped_step, kept_apart, linearise_many
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.identification.spread.value import Value
@@ -24,11 +25,8 @@ _APART = 1e-3
 def rivals_of(model: ForwardModel, outcome: Outcome, at: Linearisation) -> list[Array]:
     """Other minima that fit as well as the noise can tell, without repetitions, (parameters,) each."""
     limit = as_good(model, outcome, at)
-    found: list[Array] = []
-    for point, fitness in outcome.minima:
-        if fitness <= limit and all(apart(model, point, other) for other in (outcome.point, *found)):
-            found.append(point)
-    return found
+    good = [point for point, fitness in outcome.minima if fitness <= limit]
+    return kept_apart([outcome.point, *good], partial(apart, model))[1:]
 
 
 def as_good(model: ForwardModel, outcome: Outcome, at: Linearisation) -> float:
@@ -82,10 +80,7 @@ def _downhill(residual: Array, jacobian: Array, damping: float) -> Array:
     """A damped least-squares step from residuals (rows,) by their Jacobian (rows, directions)."""
     if not np.all(np.isfinite(residual)) or not np.all(np.isfinite(jacobian)):
         return np.zeros(jacobian.shape[1])
-    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-    stacked = np.concatenate([jacobian / scale, np.sqrt(damping) * np.eye(len(scale))])
-    wanted = np.concatenate([-residual, np.zeros(len(scale))])
-    return np.asarray(np.linalg.lstsq(stacked, wanted, rcond=None)[0] / scale)
+    return damped_step(residual, jacobian, np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300), damping)
 
 
 def apart(model: ForwardModel, one: Array, other: Array) -> bool:

@@ -54,7 +54,7 @@ def downhill(model: ForwardModel, point: Array, seen: Sensitivity) -> Downhill |
     nothing = max(_NOTHING * model.rows.signal, _DIGITS * largest * float(np.max(model.rows.weight)))
     if np.sqrt(np.mean((seen.jacobian @ step) ** 2)) < nothing:
         return None
-    low, high = _reach(model, point)
+    low, high = model.reach(point)
     places = np.clip(point + _PARTS[:, None] * step, low, high)
     rows = model.uncounted(np.concatenate([point[None], places]))
     before, *after = model.cost(rows).tolist()
@@ -83,16 +83,11 @@ def _step(model: ForwardModel, point: Array, seen: Sensitivity) -> Array:
     known = singular > RANK_TOLERANCE * singular[0]
     if not np.any(known):
         return np.zeros(len(point))
-    low, high = _reach(model, point)
+    low, high = model.reach(point)
     wanted = -left[:, known].T @ (seen.residual / steeper)
     bounds = ((low - point) / sizes, (high - point) / sizes)
     found = lsq_linear(singular[known, None] * right[known], wanted, bounds, method="bvls")
     return np.asarray(found.x * sizes)
-
-
-def _reach(model: ForwardModel, point: Array) -> tuple[Array, Array]:
-    """Bounds that no step crosses, (parameters,) each; from outside none leads further out."""
-    return np.minimum(model.lower, point), np.maximum(model.upper, point)
 
 
 def _distance(model: ForwardModel, point: Array, place: Array, seen: Sensitivity, residual: Array) -> float:

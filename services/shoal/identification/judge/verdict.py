@@ -147,11 +147,7 @@ def _against(tests: ResidualTests) -> str:
 
 
 def _identifiable(
-    seen: Sensitivity,
-    tests: ResidualTests,
-    parameters: Mapping[str, Value],
-    unknown: list[str],
-    found: list[Suspect],
+    seen: Sensitivity, tests: ResidualTests, parameters: Mapping[str, Value], unknown: list[str], found: list[Suspect]
 ) -> Judgement:
     """Identified, wholly or up to a combination, with what has to be said beside."""
     reasons, notes, advice = [], [], []

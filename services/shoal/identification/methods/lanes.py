@@ -7,16 +7,18 @@ squares problems, 2004).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.course import mean_of
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
+
+T = TypeVar("T")
 
 DIFFERENCE = 1e-6
 """Step of the finite differences, relative to the size of a parameter (at least 1e-3 of its range)."""
@@ -113,8 +115,7 @@ def linearise_many(model: ForwardModel, points: Array) -> tuple[Array, Array]:
     same steps in all lanes of a tile, so a point and its neighbours stand in one: differences of runs that were stepped
     differently are those of the integrator's errors.
     """
-    steps = DIFFERENCE * np.array([model.sizes(point) for point in points])
-    steps = np.where(points + steps > model.upper, -steps, steps)
+    steps = np.array([difference_at(model, point) for point in points])
     count, size = points.shape
     shifted = points[:, None] + np.concatenate([np.zeros((count, 1, size)), steps[:, None] * np.eye(size)], axis=1)
     together = _together(model) or count
@@ -123,6 +124,12 @@ def linearise_many(model: ForwardModel, points: Array) -> tuple[Array, Array]:
     with np.errstate(invalid="ignore"):
         jacobians = np.moveaxis((found[:, 1:] - found[:, :1]) / steps[:, :, None], 1, 2)
     return found[:, 0], np.where(np.isfinite(jacobians), jacobians, 0.0)
+
+
+def difference_at(model: ForwardModel, point: Array) -> Array:
+    """Step of the finite differences at a point, inwards at an upper bound, (parameters,)."""
+    step = DIFFERENCE * model.sizes(point)
+    return np.where(point + step > model.upper, -step, step)
 
 
 def _together(model: ForwardModel) -> int:
@@ -144,23 +151,31 @@ def history(descents: Sequence[Descent]) -> list[tuple[int, float, float]]:
 
 def distinct(model: ForwardModel, descents: Sequence[Descent], apart: float = 1e-3) -> list[Descent]:
     """The descents, best first, without those that ended where a better one did; apart: a fraction of the ranges."""
-    found: list[Descent] = []
-    for descent in sorted(descents, key=lambda d: d.fitness):
-        if np.isfinite(descent.fitness) and all(_distance(model, descent, other) > apart for other in found):
-            found.append(descent)
-    return found
+    finite = [descent for descent in descents if np.isfinite(descent.fitness)]
+    best_first = sorted(finite, key=lambda d: d.fitness)
+    return kept_apart(best_first, lambda one, other: _distance(model, one.point, other.point) > apart)
 
 
 def best_apart(model: ForwardModel, points: Array, values: Array, count: int) -> Array:
     """The best points that are not close to a better one, one to `count`, (starts, parameters)."""
-    span = model.upper - model.lower
-    found: list[Array] = []
-    for k in np.argsort(values, kind="stable"):
-        if len(found) == count or not np.isfinite(values[k]):
-            break
-        if all(np.max(np.abs(points[k] - other) / span) > _APART for other in found):
-            found.append(points[k])
-    return np.array(found or [points[0]])
+    best_first = [points[k] for k in np.argsort(values, kind="stable") if np.isfinite(values[k])]
+    found = kept_apart(best_first, lambda one, other: _distance(model, one, other) > _APART)
+    return np.array(found[:count] or [points[0]])
+
+
+class Course(list[tuple[int, float, float]]):
+    """Rows of (iteration, best, mean fitness), one for each population of a search; `progress` is told of each."""
+
+    def __init__(self, progress: Progress) -> None:
+        super().__init__()
+        self._progress = progress
+
+    def note(self, values: Array) -> Array:
+        """Add the row of a population; returns its values."""
+        best = min([*values[np.isfinite(values)].tolist(), self[-1][1] if self else np.inf])
+        self.append((len(self), best, mean_of(values)))
+        self._progress(*self[-1])
+        return values
 
 
 @dataclass
@@ -234,36 +249,53 @@ class _Search:
         return Descent(self.point, self.residual, self.jacobian, self.fitness, self.rows, self.converged)
 
     def _step(self) -> Array:
-        """Damped least-squares step in parameters scaled by the columns of the Jacobian (Marquardt 1963).
-
-        Parameters that stand at a bound and are driven against it stay there.
-        """
+        """Damped step, where parameters that stand at a bound and are driven against it stay there."""
         downhill = -self.jacobian.T @ self.residual
         held = (self.point <= self.model.lower) & (downhill < 0) | (self.point >= self.model.upper) & (downhill > 0)
         steeper = self.model.steepness(self.residual)
-        jacobian = np.where(held, 0.0, steeper[:, None] * self.jacobian / self.scale)
-        stacked = np.concatenate([jacobian, np.sqrt(self.damping) * np.eye(len(self.scale))])
-        wanted = np.concatenate([-self.residual / steeper, np.zeros(len(self.scale))])
-        return np.asarray(np.linalg.lstsq(stacked, wanted, rcond=None)[0] / self.scale)
+        jacobian = np.where(held, 0.0, steeper[:, None] * self.jacobian)
+        return damped_step(self.residual / steeper, jacobian, self.scale, self.damping)
 
 
 def _apart(searches: Sequence[_Search]) -> list[_Search]:
     """The searches without those that came to where a better one is."""
-    kept: list[_Search] = []
-    for search in sorted(searches, key=lambda s: s.cost):
-        if all(other.model is not search.model or _distance(search.model, search, other) > _SAME for other in kept):
-            kept.append(search)
+
+    def apart(one: _Search, other: _Search) -> bool:
+        return one.model is not other.model or _distance(one.model, one.point, other.point) > _SAME
+
+    return kept_apart(sorted(searches, key=lambda s: s.cost), apart)
+
+
+def kept_apart(found: Iterable[T], apart: Callable[[T, T], bool]) -> list[T]:
+    """Those that lie apart from all that were kept before them."""
+    kept: list[T] = []
+    for one in found:
+        if all(apart(one, other) for other in kept):
+            kept.append(one)
     return kept
 
 
-def _distance(model: ForwardModel, one: _Search | Descent, other: _Search | Descent) -> float:
+def _distance(model: ForwardModel, one: Array, other: Array) -> float:
     """Largest difference of a parameter, as a fraction of its range."""
-    return float(np.max(np.abs(one.point - other.point) / (model.upper - model.lower)))
+    return float(np.max(np.abs(one - other) / (model.upper - model.lower)))
+
+
+def damped_step(residual: Array, jacobian: Array, scale: Array, damping: float) -> Array:
+    """Least-squares step from residuals (rows,) by a Jacobian (rows, p), damped in units `scale` (Marquardt 1963)."""
+    stacked = np.concatenate([jacobian / scale, np.sqrt(damping) * np.eye(len(scale))])
+    wanted = np.concatenate([-residual, np.zeros(len(scale))])
+    return np.asarray(np.linalg.lstsq(stacked, wanted, rcond=None)[0] / scale)
 
 
 def _report(iteration: int, searches: Sequence[_Search], active: Sequence[_Search], progress: Progress) -> None:
     last = np.array([search.rows[-1][2] for search in active])
     progress(iteration, min(search.fitness for search in searches), mean_of(last))
+
+
+def mean_of(values: Array) -> float:
+    """Mean of those that are finite; inf if none is."""
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else float("inf")
 
 
 def squares(residual: Array) -> float:

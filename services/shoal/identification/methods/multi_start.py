@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import qmc
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.course import Course
-from shoal.identification.methods.lanes import best_apart, descend_many
+from shoal.identification.methods.lanes import Course, best_apart, descend_many
 from shoal.identification.methods.outcome import Outcome, concluded
 from shoal.identification.methods.starts import starting_points
 from shoal.trajectory import Array
@@ -30,6 +28,9 @@ def multi_start(model: ForwardModel, rng: np.random.Generator, progress: Progres
 
 def scatter(model: ForwardModel, poses: Array, rng: np.random.Generator) -> Array:
     """SCREENED points in the box; every other one has its initial state from one of the poses."""
+    with model.off_the_clock():  # slow to import
+        from scipy.stats import qmc
+
     points = model.lower + qmc.Sobol(len(model.lower), rng=rng).random(SCREENED) * (model.upper - model.lower)
     fixed = np.any(poses != model.parameters.start, axis=0)
     if np.all(fixed):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.methods.lanes import kept_apart
 from shoal.trajectory import Array
 
 _CANDIDATES = 16
@@ -100,7 +101,7 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
     cost[~np.isfinite(cost)] = np.inf
     going = np.flatnonzero(np.isfinite(cost))
     for _ in range(_ITERATIONS if going.size else 0):
-        step = _damped_step(error[going], jacobian[going], damping[going])
+        step = damped_step(error[going], jacobian[going], damping[going])
         trial = points[going]
         trial[:, angles] -= step
         trial = np.clip(trial, model.lower, model.upper)
@@ -129,7 +130,7 @@ def scatter(count: int, dimensions: int) -> Array:
     return np.asarray((0.5 + np.outer(np.arange(1, count + 1), ratio ** -np.arange(1.0, dimensions + 1))) % 1.0)
 
 
-def _damped_step(error: Array, jacobian: Array, damping: Array) -> Array:
+def damped_step(error: Array, jacobian: Array, damping: Array) -> Array:
     """What Levenberg-Marquardt takes off each point, (points, angles)."""
     normal = np.einsum("nck,ncl->nkl", jacobian, jacobian)
     gradient = np.einsum("nck,nc->nk", jacobian, error)
@@ -143,14 +144,10 @@ def _distinct(model: ForwardModel, points: Array, cost: Array, angles: list[int]
     """The points whose cost is about the best one's, inside the bounds, without repetitions."""
     near = cost <= 2 * cost.min() + 1e-6
     inside = np.all((points >= model.lower - 1e-9) & (points <= model.upper + 1e-9), axis=1)
-    candidates = points[near & inside] if np.any(near & inside) else points[[int(np.argmin(cost))]]
-    order = np.argsort(cost[near & inside]) if np.any(near & inside) else np.array([0])
-    found: list[Array] = []
-    for point in candidates[order]:
-        span = (model.upper - model.lower)[angles]
-        if all(np.max(np.abs((point - other)[angles]) / span) > _SAME for other in found):
-            found.append(point)
-    return np.array(found)
+    chosen = np.flatnonzero(near & inside) if np.any(near & inside) else np.array([np.argmin(cost)])
+    span = (model.upper - model.lower)[angles]
+    best_first = points[chosen[np.argsort(cost[chosen])]]
+    return np.array(kept_apart(best_first, lambda a, b: np.max(np.abs((a - b)[angles]) / span) > _SAME))
 
 
 def _pose_error(model: ForwardModel, name: str, points: Array, angles: list[int], pose: Array) -> tuple[Array, Array]:

@@ -8,24 +8,26 @@ from typing import Any
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.course import mean_of
+from shoal.identification.methods.lanes import mean_of
 from shoal.identification.methods.least_squares import least_squares
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import starting_points
-from shoal.swarm import minimize
+from shoal.swarm import Iafsa, minimize
 from shoal.trajectory import Array
 
 ITERATIONS = 100
 
 
-def by_swarm(
-    swarm: type[Any], seeded: bool, model: ForwardModel, rng: np.random.Generator, progress: Progress
-) -> Outcome:
-    """A swarm in the box of a problem; seeded: with the paper's two additional fish, where it has places for them."""
+def by_swarm(swarm: type[Any], model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
+    """A swarm in the box of a problem, with the paper's two additional fish where it has places for them."""
     has_places = {"traditional", "previous"} <= {field.name for field in fields(swarm)}
-    fish = seeds(model, rng) if seeded and has_places else {}
-    state, rows = school(model, swarm(lower=model.lower, upper=model.upper, **fish), rng, progress)
-    return Outcome(state.best, state.best_value, rows, "")
+    fish = seeds(model, rng) if has_places else {}
+    return _search(model, swarm(lower=model.lower, upper=model.upper, **fish), rng, progress)
+
+
+def iafsa_unseeded(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
+    """IAFSA as repaired, without the seeds of a traditional optimiser: what the swarm does by itself."""
+    return _search(model, Iafsa(lower=model.lower, upper=model.upper), rng, progress)
 
 
 def seeds(model: ForwardModel, rng: np.random.Generator) -> dict[str, Array]:
@@ -57,3 +59,8 @@ def school(
             progress(*rows[-1])
 
     return minimize(optimizer, evaluate, rng=rng, iterations=iterations, callback=note), rows
+
+
+def _search(model: ForwardModel, optimizer: Any, rng: np.random.Generator, progress: Progress) -> Outcome:
+    state, rows = school(model, optimizer, rng, progress)
+    return Outcome(state.best, state.best_value, rows, "")

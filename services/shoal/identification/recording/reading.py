@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from shoal.errors import InputError
+from shoal.identification.recording.measurement import Recording
 from shoal.identification.recording.noise import differences
 from shoal.identification.recording.source import SI, Channel, FileSource
 from shoal.identification.recording.swaps import mend
@@ -32,17 +32,6 @@ _PAUSE = 1.5
 """Times the usual interval; a longer one is a gap."""
 _NEARLY = 0.8
 """Of half a turn; an angle that turns farther from one sample to the next may as well have turned the other way."""
-
-
-@dataclass(frozen=True)
-class Samples:
-    """What a file holds; see `measurement.Recording`."""
-
-    times: Array
-    channels: tuple[Channel, ...]
-    values: Array
-    origin: str
-    notes: tuple[str, ...] = ()
 
 
 def described(fields: Mapping[str, Any], path: Path) -> dict[str, Any]:
@@ -69,8 +58,8 @@ def described(fields: Mapping[str, Any], path: Path) -> dict[str, Any]:
     return {**fields, **own, "path": str(path.parent / source.path)}
 
 
-def read(source: FileSource, channels: tuple[Channel, ...]) -> Samples:
-    """The samples of the recording that a source describes. Raises InputError."""
+def read(source: FileSource, channels: tuple[Channel, ...]) -> Recording:
+    """The recording that a source describes, without what is stated of it. Raises InputError."""
     path = Path(source.path or "")
     table = load_table(path, source.columns)
     for column in (source.time, *(c.column for c in channels))[bool(source.rate) :]:
@@ -96,7 +85,8 @@ def read(source: FileSource, channels: tuple[Channel, ...]) -> Samples:
         notes.append(f"of {len(chosen)} samples every {part}th is fitted; `duration` or `every` choose others")
         chosen = chosen[::part]
     origin = f"{path.name}, {_span(times[chosen])}, {len(chosen)} samples"
-    return Samples(times[chosen] - begin, channels, values[chosen], origin, tuple(notes))
+    unknown = np.full(len(channels), np.nan)
+    return Recording(times[chosen] - begin, channels, values[chosen], origin, unknown, notes=tuple(notes))
 
 
 def _times(source: FileSource, table: Table) -> Array:

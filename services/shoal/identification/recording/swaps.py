@@ -83,10 +83,7 @@ def _cheapest(costs: Array, penalty: float) -> list[int]:
     came_from: list[tuple[int, int]] = []
     for straight, fresh, back, twice in costs.reshape(4, -1).T.tolist():
         came = (int(total[1] + back < total[0] + straight), int(total[1] + twice < total[0] + fresh))
-        total = (
-            min(total[0] + straight, total[1] + back),
-            min(total[0] + fresh, total[1] + twice) + penalty,
-        )
+        total = (min(total[0] + straight, total[1] + back), min(total[0] + fresh, total[1] + twice) + penalty)
         came_from.append(came)
     path = [int(total[1] < total[0])]
     for came in reversed(came_from):

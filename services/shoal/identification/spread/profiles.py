@@ -15,7 +15,7 @@ import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import squares
+from shoal.identification.methods.lanes import damped_step, squares
 from shoal.identification.methods.least_squares import linearise
 from shoal.identification.spread.uncertainty import Linearisation, quantile
 from shoal.trajectory import Array, plain
@@ -129,10 +129,9 @@ def _settle(model: ForwardModel, point: Array, k: int) -> tuple[Array, float]:
         if not len(free) or not np.isfinite(cost):
             break
         size = np.maximum(np.linalg.norm(jacobian[:, free], axis=0), 1e-300)
-        stacked = np.concatenate([jacobian[:, free] / size, np.sqrt(damping) * np.eye(len(free))])
-        step, *_ = np.linalg.lstsq(stacked, np.concatenate([-residual, np.zeros(len(free))]), rcond=None)
+        step = damped_step(residual, jacobian[:, free], size, damping)
         trial = point.copy()
-        trial[free] = np.clip(point[free] + step / size, model.lower[free], model.upper[free])
+        trial[free] = np.clip(point[free] + step, model.lower[free], model.upper[free])
         trial_residual, trial_jacobian = linearise(model, trial)
         gain = cost - squares(trial_residual)
         if gain > 0:

@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.candidate import Candidate, with_parameters
-from shoal.identification.methods.lanes import DIFFERENCE, Descent, descend_each
+from shoal.identification.methods.lanes import Descent, descend_each, difference_at
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
 
@@ -62,7 +62,7 @@ class Together:
             # A point and its neighbours stand in one tile, which has one step: see `linearise_many`.
             most = 1 + max(len(point) for point in points)
             block = next((size for size in (2, 4, 8, len(WIDE)) if size >= most), most)
-            steps = [_step(models[k], point) for k, point in zip(chosen, points, strict=True)]
+            steps = [difference_at(models[k], point) for k, point in zip(chosen, points, strict=True)]
             lanes, owners = list[Array](), list[int]()
             for k, point, step in zip(chosen, points, steps, strict=True):
                 beside = [point, *(point + step * unit for unit in np.eye(len(point)))]
@@ -77,9 +77,3 @@ class Together:
             return list(seen[:, 0]), jacobians
 
         return descend_each(models, starts, linearise, patience=_PATIENCE, most=_ITERATIONS)
-
-
-def _step(model: ForwardModel, point: Array) -> Array:
-    """Of the differences, (parameters,)."""
-    step = DIFFERENCE * model.sizes(point)
-    return np.where(point + step > model.upper, -step, step)

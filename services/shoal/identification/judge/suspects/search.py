@@ -253,20 +253,9 @@ class _Search:
         if not explains(self.before, after, self.noise, len(self.residual)):
             return
         value, change = candidate.told(values)
-        unit, numbers = of_channels(self.model.measurement), len(values)
-        self.found.append(
-            Suspect(
-                candidate.name,
-                0.0 if candidate.tell else candidate.stated[0],
-                value,
-                self.before,
-                after,
-                change,
-                unit,
-                candidate.kind,
-                numbers,
-            )
-        )
+        stated = 0.0 if candidate.tell else candidate.stated[0]
+        told = (candidate.name, stated, value, self.before, after, change, of_channels(self.model.measurement))
+        self.found.append(Suspect(*told, candidate.kind, len(values)))
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
