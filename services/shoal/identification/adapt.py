@@ -9,7 +9,7 @@ import numpy as np
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods import Method, Outcome
-from shoal.identification.methods.auto import explains
+from shoal.identification.methods.auto import explained
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.methods.starts import starting_points
 from shoal.selection import Selection, select
@@ -59,7 +59,7 @@ def coarse_to_fine(
         descent = descend(fine, outcome.point, progress)
         point, fitness, rows = descent.point, descent.fitness, descent.rows
         # The coarse model may have led to the wrong minimum.
-        if np.sqrt(fitness) > _OFF * tolerance and not explains(fine, replace(outcome, fitness=fitness)):
+        if np.sqrt(fitness) > _OFF * tolerance and not explained(fine, replace(outcome, fitness=fitness)):
             again = search(fine, rng, progress)
             rows = rows + [(len(rows) + i, best, mean) for i, best, mean in again.iterations]
             point, fitness = min((point, fitness), (again.point, again.fitness), key=lambda end: end[1])
@@ -86,9 +86,9 @@ def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[Forwar
         path: value for rod, level in selection.chosen.levels.items() for path, value in level.fields(rod).items()
     }
     solver = selection.chosen.scene.solver.model_dump(mode="json")
-    kept = {name: solver[name] for name in ("integrator", "step", "relative_tolerance", "absolute_tolerance")}
-    scene = model.scene.with_values({**fields, **{f"solver.{name}": value for name, value in kept.items()}})
-    return replace(model, scene=scene), selection
+    for name in ("integrator", "step", "relative_tolerance", "absolute_tolerance"):
+        fields[f"solver.{name}"] = solver[name]
+    return replace(model, scene=model.scene.with_values(fields)), selection
 
 
 def _stage(selection: Selection, evaluations: int) -> Stage:

@@ -88,7 +88,7 @@ class ForwardModel:
         """Upper bounds, (parameters,)."""
         return self.parameters.upper
 
-    def reach(self, point: Array) -> tuple[Array, Array]:
+    def box_at(self, point: Array) -> tuple[Array, Array]:
         """Bounds that no step from a point crosses, (parameters,) each; from outside none leads further out."""
         return np.minimum(self.lower, point), np.maximum(self.upper, point)
 

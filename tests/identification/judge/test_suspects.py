@@ -8,7 +8,7 @@ from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem, Verdict, identify, load_problem
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects import Suspect, suspects
-from shoal.identification.methods.least_squares import least_squares, linearise
+from shoal.identification.methods.least_squares import differentiate, least_squares
 from shoal_validation.coverage.cases import tip
 from shoal_validation.suspects.study import trial
 
@@ -36,7 +36,7 @@ def found(points: np.ndarray, times: np.ndarray, gravity: float = -9.81) -> dict
     outcome = least_squares(model, np.random.default_rng(0), lambda *_: None)
     return {
         suspect.name: suspect
-        for suspect in suspects(model, outcome.point, *linearise(model, outcome.point), 1e-3).suspects
+        for suspect in suspects(model, outcome.point, *differentiate(model, outcome.point), 1e-3).suspects
     }
 
 

@@ -10,7 +10,7 @@ from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.fits import Together, groups_of
 from shoal.identification.judge.suspects.of_measurement import of_measurement
 from shoal.identification.judge.suspects.shaken import shaken
-from shoal.identification.methods.least_squares import descend, least_squares, linearise
+from shoal.identification.methods.least_squares import descend, differentiate, least_squares
 from shoal.identification.recording.observation import observe
 from shoal.scene import Scene
 from shoal_validation.suspects.study import trial
@@ -50,7 +50,7 @@ def found(changed: dict[str, object]) -> dict[str, Suspect]:
     """Suspects by name, the best first."""
     model = model_of(changed)
     outcome = least_squares(model, np.random.default_rng(0), lambda *_: None)
-    seen = linearise(model, outcome.point)
+    seen = differentiate(model, outcome.point)
     return {suspect.name: suspect for suspect in suspects(model, outcome.point, *seen, NOISE).suspects}
 
 

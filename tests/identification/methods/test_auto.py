@@ -7,7 +7,7 @@ from shoal.identification import identify, load_problem
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.auto import auto, false_minima
 from shoal.identification.methods.growth import growth
-from shoal.identification.methods.lanes import descend_many, linearise_many
+from shoal.identification.methods.lanes import descend_many, differentiate_many
 from shoal_validation.inverse_precision.cases import rigid_problem
 from shoal_validation.inverse_precision.chaos import CHAOTIC, GENTLE, ROUGH, SOLVER, record
 
@@ -32,7 +32,7 @@ def test_growth_tells_chaos_from_a_gentle_swing() -> None:
     sizes = []
     for start, horizon in ((GENTLE, 5.0), (CHAOTIC, 10.0)):
         model = forward(start, horizon)
-        sizes.append(growth(model, linearise_many(model, np.array([start]))[1][0]))
+        sizes.append(growth(model, differentiate_many(model, np.array([start]))[1][0]))
     assert sizes[0] < 10
     assert sizes[1] > 1e4
 

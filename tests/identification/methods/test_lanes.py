@@ -7,7 +7,7 @@ import pytest
 from shoal.engines import get_engine
 from shoal.identification import Measurement
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import descend_many, distinct, history, linearise_many
+from shoal.identification.methods.lanes import descend_many, differentiate_many, distinct, history
 from shoal.identification.methods.least_squares import descend
 from shoal_validation.inverse_precision.cases import PLAIN, rigid_problem, textbook
 
@@ -68,7 +68,7 @@ def test_a_derivative_does_not_depend_on_who_else_is_simulated(count: int) -> No
     model = made(5.0)
     points = np.random.default_rng(0).uniform(model.lower, model.upper, (count, 2))
     points[-1] = truth(model) + 0.05
-    alone, crowded = linearise_many(model, points[-1:])[1][0], linearise_many(model, points)[1][-1]
+    alone, crowded = differentiate_many(model, points[-1:])[1][0], differentiate_many(model, points)[1][-1]
     assert crowded == pytest.approx(alone, abs=2e-3 * float(np.abs(alone).max()))
 
 
@@ -132,6 +132,6 @@ def test_differences_stay_inside_the_box() -> None:
         return inner(points)
 
     model.residuals = noted  # type: ignore[method-assign]
-    residuals, jacobians = linearise_many(model, np.array([model.upper, model.lower]))
+    residuals, jacobians = differentiate_many(model, np.array([model.upper, model.lower]))
     assert np.all((asked[0] <= model.upper) & (asked[0] >= model.lower))
     assert jacobians.shape == (2, residuals.shape[1], 2)

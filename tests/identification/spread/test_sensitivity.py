@@ -6,7 +6,7 @@ from shoal.engines import get_engine
 from shoal.engines.casadi_shooting import shot
 from shoal.identification import Measurement, Problem, identify
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.least_squares import linearise as naive
+from shoal.identification.methods.least_squares import differentiate as naive
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.sensitivity import believed, sensitivity
 from shoal.identification.spread.uncertainty import linearise

@@ -5,7 +5,7 @@ import pytest
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.least_squares import linearise as differences
+from shoal.identification.methods.least_squares import differentiate as differences
 from shoal.identification.spread.covariance import Block, Noise, blocks_of, correlate, estimate_noise
 from shoal.identification.spread.uncertainty import linearise, quantile, spread
 from shoal_validation.coverage.__main__ import measure

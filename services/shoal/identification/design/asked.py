@@ -16,7 +16,7 @@ _MOST = 4000
 """Instants at which sensitivities are computed, at most."""
 
 
-def noise_of(problem: Problem, noise: float | None, angle_noise: float | None) -> tuple[float, float | None]:
+def stated_noise(problem: Problem, noise: float | None, angle_noise: float | None) -> tuple[float, float | None]:
     """Standard deviations of positions [m] and angles [rad], as given, else as the problem states them."""
     source = next(iter(problem.sources.values()))
     for channel in problem.channels_of(source):
@@ -37,7 +37,7 @@ def noise_of(problem: Problem, noise: float | None, angle_noise: float | None) -
     return noise, angle_noise
 
 
-def size_of(channel: Channel, noise: float, angle_noise: float | None) -> float:
+def noise_in(channel: Channel, noise: float, angle_noise: float | None) -> float:
     """Standard deviation of a channel; a rate without its own is as noisy as an angle, per second."""
     return channel.noise or (noise if channel.is_position else angle_noise or 1.0)
 

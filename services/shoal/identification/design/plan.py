@@ -15,7 +15,7 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
-from shoal.identification.design.asked import grid, noise_of, size_of, today_of
+from shoal.identification.design.asked import grid, noise_in, stated_noise, today_of
 from shoal.identification.design.precision import Aim, Bundle, Precision
 from shoal.identification.design.sensors import Sensor, columns_of, sensors_of
 from shoal.identification.forward import ForwardModel
@@ -104,7 +104,7 @@ def design(
     else the problem's; parameter: to sharpen, else whichever has the largest standard deviation for its range
     """
     source = next(iter(problem.sources.values()))
-    noise, angle_noise = noise_of(problem, noise, angle_noise)
+    noise, angle_noise = stated_noise(problem, noise, angle_noise)
     duration, rate = today_of(source, measurement, duration, rate)
     scene, sensors = sensors_of(problem.load_scene(values))
     present = problem.channels_of(source)
@@ -118,7 +118,7 @@ def design(
     if not np.all(np.isfinite(seen.residual)):
         reason = model.refusal or "it fails"
         raise InputError(f"{problem.name}: the motion about these values cannot be simulated: {reason}")
-    size = np.array([size_of(channel, noise, angle_noise) for channel in channels])
+    size = np.array([noise_in(channel, noise, angle_noise) for channel in channels])
     bundle = Bundle.of(model.measurement.first.times, seen.jacobian, size, aim.span, len(present))
     now = bundle.precision(range(bundle.present), duration)
 

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.starts import damped_step
+from shoal.identification.methods.starts import damped_steps
 from shoal.identification.recording.source import Channel
 from shoal.trajectory import Array
 
@@ -104,7 +104,7 @@ def _gauss_newton(
     error = _difference(seen[0], targets, kinds)
     jacobian = np.moveaxis(_difference(seen[1:], seen[0], kinds) / h, 0, -1)
     # A little damping, so that a stretched pose (singular) does not send the angles far away.
-    step = damped_step(error, jacobian, np.full(len(points), 1e-6))
+    step = damped_steps(error, jacobian, np.full(len(points), 1e-6))
     moved = points.copy()
     moved[:, angles] = (points[:, angles] - step + np.pi) % (2 * np.pi) - np.pi
     return moved

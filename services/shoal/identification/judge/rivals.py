@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import damped_step, kept_apart, linearise_many
+from shoal.identification.methods.lanes import damped_step, differentiate_many, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.identification.spread.value import Value
@@ -59,7 +59,7 @@ def connected(model: ForwardModel, one: Array, other: Array, limit: float) -> bo
     across = np.linalg.svd(way[None])[2][1:].T * span[:, None]
     points = one + np.linspace(0.0, 1.0, _STATIONS + 2)[1:-1, None] * way * span
     points = np.clip(points, model.lower, model.upper)
-    residuals, jacobians = linearise_many(model, points)
+    residuals, jacobians = differentiate_many(model, points)
     values, damping = model.cost(residuals), np.full(_STATIONS, 1e-3)
     for _ in range(_STEPS):
         above = np.flatnonzero(values > limit)
@@ -67,7 +67,7 @@ def connected(model: ForwardModel, one: Array, other: Array, limit: float) -> bo
             return True
         steps = [_downhill(residuals[k], jacobians[k] @ across, damping[k]) for k in above]
         trials = np.clip(points[above] + np.array(steps) @ across.T, model.lower, model.upper)
-        found, slopes = linearise_many(model, trials)
+        found, slopes = differentiate_many(model, trials)
         lower = model.cost(found) < values[above]
         damping[above] *= np.where(lower, 0.1, 10.0)
         kept = above[lower]

@@ -54,7 +54,7 @@ def downhill(model: ForwardModel, point: Array, seen: Sensitivity) -> Downhill |
     nothing = max(_NOTHING * model.rows.signal, _DIGITS * largest * float(np.max(model.rows.weight)))
     if np.sqrt(np.mean((seen.jacobian @ step) ** 2)) < nothing:
         return None
-    low, high = model.reach(point)
+    low, high = model.box_at(point)
     places = np.clip(point + _PARTS[:, None] * step, low, high)
     rows = model.uncounted(np.concatenate([point[None], places]))
     before, *after = model.cost(rows).tolist()
@@ -83,7 +83,7 @@ def _step(model: ForwardModel, point: Array, seen: Sensitivity) -> Array:
     known = singular > RANK_TOLERANCE * singular[0]
     if not np.any(known):
         return np.zeros(len(point))
-    low, high = model.reach(point)
+    low, high = model.box_at(point)
     wanted = -left[:, known].T @ (seen.residual / steeper)
     bounds = ((low - point) / sizes, (high - point) / sizes)
     found = lsq_linear(singular[known, None] * right[known], wanted, bounds, method="bvls")

@@ -30,6 +30,8 @@ _SMALL_GAIN = 1e-8
 _LARGE_DAMPING = 1e12
 _APART = 0.02
 """Two starts are different if a parameter differs by more than this fraction of its range."""
+ENDS_APART = 1e-3
+"""Two minima are different if a parameter differs by more than this fraction of its range."""
 _SAME = 1e-4
 """Two points are the same if no parameter differs by more than this fraction of its range."""
 
@@ -61,35 +63,35 @@ def descend_many(
 ) -> list[Descent]:
     """Minimise the squared residuals within the bounds from each start, (starts, parameters), in that order.
 
-    first: what `linearise_many` gives for the starts, if it is known.
+    first: what `differentiate_many` gives for the starts, if it is known.
     A descent leaves when it has converged, when it has come to where a better one is, and when after two steps even
     what its next step promises is more than `patience` times the best one's fitness. Those that leave early have not
     converged.
     """
-    searches = [_Search(model, *at) for at in zip(starts, *(first or linearise_many(model, starts)), strict=True)]
+    searches = [_Search(model, *at) for at in zip(starts, *(first or differentiate_many(model, starts)), strict=True)]
 
-    def linearise(_: Sequence[int], trials: Sequence[Array]) -> tuple[Sequence[Array], Sequence[Array]]:
-        residuals, jacobians = linearise_many(model, np.array(trials))
+    def differentiate(_: Sequence[int], trials: Sequence[Array]) -> tuple[Sequence[Array], Sequence[Array]]:
+        residuals, jacobians = differentiate_many(model, np.array(trials))
         return list(residuals), list(jacobians)
 
-    return _descend(searches, linearise, progress, patience)
+    return _descend(searches, differentiate, progress, patience)
 
 
-Linearise = Callable[[Sequence[int], Sequence[Array]], tuple[Sequence[Array], Sequence[Array]]]
+Differentiate = Callable[[Sequence[int], Sequence[Array]], tuple[Sequence[Array], Sequence[Array]]]
 """Residuals and Jacobians at points of some of several models, which are told by their numbers."""
 
 
 def descend_each(
-    models: Sequence[ForwardModel], starts: Sequence[Array], linearise: Linearise, *, patience: float, most: int
+    models: Sequence[ForwardModel], starts: Sequence[Array], differentiate: Differentiate, *, patience: float, most: int
 ) -> list[Descent]:
     """As `descend_many`, of several models with as many rows, from a start of each side by side; most: iterations."""
-    first = linearise(range(len(models)), starts)
+    first = differentiate(range(len(models)), starts)
     searches = [_Search(*at) for at in zip(models, starts, *first, strict=True)]
-    return _descend(searches, linearise, lambda *_: None, patience, most)
+    return _descend(searches, differentiate, lambda *_: None, patience, most)
 
 
 def _descend(
-    searches: list[_Search], linearise: Linearise, progress: Progress, patience: float, most: int = _ITERATIONS
+    searches: list[_Search], differentiate: Differentiate, progress: Progress, patience: float, most: int = _ITERATIONS
 ) -> list[Descent]:
     """Take steps until all have converged or left."""
     active, number = searches, {id(search): k for k, search in enumerate(searches)}
@@ -101,14 +103,14 @@ def _descend(
         if not going:
             break
         active, trials = [search for search, _ in going], [trial for _, trial in going]
-        seen = linearise([number[id(search)] for search in active], trials)
+        seen = differentiate([number[id(search)] for search in active], trials)
         for search, trial, residual, jacobian in zip(active, trials, *seen, strict=True):
             search.tell(trial, residual, jacobian)
         _report(iteration, searches, active, progress)
     return [search.descent() for search in searches]
 
 
-def linearise_many(model: ForwardModel, points: Array) -> tuple[Array, Array]:
+def differentiate_many(model: ForwardModel, points: Array) -> tuple[Array, Array]:
     """Residuals at points, (points, rows), and their forward-difference Jacobians, (points, rows, parameters).
 
     1 + parameters lanes for each point, in one call if the integrator's steps are fixed. Adaptive integrators take the
@@ -149,17 +151,17 @@ def history(descents: Sequence[Descent]) -> list[tuple[int, float, float]]:
     return rows
 
 
-def distinct(model: ForwardModel, descents: Sequence[Descent], apart: float = 1e-3) -> list[Descent]:
-    """The descents, best first, without those that ended where a better one did; apart: a fraction of the ranges."""
+def distinct(model: ForwardModel, descents: Sequence[Descent]) -> list[Descent]:
+    """The descents, best first, without those that ended where a better one did."""
     finite = [descent for descent in descents if np.isfinite(descent.fitness)]
     best_first = sorted(finite, key=lambda d: d.fitness)
-    return kept_apart(best_first, lambda one, other: _distance(model, one.point, other.point) > apart)
+    return kept_apart(best_first, lambda one, other: distance(model, one.point, other.point) > ENDS_APART)
 
 
 def best_apart(model: ForwardModel, points: Array, values: Array, count: int) -> Array:
     """The best points that are not close to a better one, one to `count`, (starts, parameters)."""
     best_first = [points[k] for k in np.argsort(values, kind="stable") if np.isfinite(values[k])]
-    found = kept_apart(best_first, lambda one, other: _distance(model, one, other) > _APART)
+    found = kept_apart(best_first, lambda one, other: distance(model, one, other) > _APART)
     return np.array(found[:count] or [points[0]])
 
 
@@ -261,7 +263,7 @@ def _apart(searches: Sequence[_Search]) -> list[_Search]:
     """The searches without those that came to where a better one is."""
 
     def apart(one: _Search, other: _Search) -> bool:
-        return one.model is not other.model or _distance(one.model, one.point, other.point) > _SAME
+        return one.model is not other.model or distance(one.model, one.point, other.point) > _SAME
 
     return kept_apart(sorted(searches, key=lambda s: s.cost), apart)
 
@@ -275,7 +277,7 @@ def kept_apart(found: Iterable[T], apart: Callable[[T, T], bool]) -> list[T]:
     return kept
 
 
-def _distance(model: ForwardModel, one: Array, other: Array) -> float:
+def distance(model: ForwardModel, one: Array, other: Array) -> float:
     """Largest difference of a parameter, as a fraction of its range."""
     return float(np.max(np.abs(one - other) / (model.upper - model.lower)))
 

@@ -19,14 +19,14 @@ STARTS = 16
 def multi_start(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """Look at a Sobol sequence over the box, descend from its best points; `minima` are the others that were found."""
     poses = starting_points(model)
-    points = scatter(model, poses, rng)
+    points = screened(model, poses, rng)
     course = Course(lambda *_: None)
     values = course.note(model.fitness(points))
     starts = best_apart(model, np.concatenate([poses, points]), np.concatenate([np.zeros(len(poses)), values]), STARTS)
     return concluded(model, descend_many(model, starts, progress), course)
 
 
-def scatter(model: ForwardModel, poses: Array, rng: np.random.Generator) -> Array:
+def screened(model: ForwardModel, poses: Array, rng: np.random.Generator) -> Array:
     """SCREENED points in the box; every other one has its initial state from one of the poses."""
     with model.off_the_clock():  # slow to import
         from scipy.stats import qmc

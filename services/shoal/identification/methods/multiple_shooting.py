@@ -16,7 +16,7 @@ from scipy.linalg.lapack import dgglse
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import linearise_many
+from shoal.identification.methods.lanes import differentiate_many
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import progressive
@@ -115,7 +115,7 @@ class Segments:
         """The parameters whose motion is nearest to the data, from states at the segments' begins."""
         point = point.copy()
         for iteration in range(_ITERATIONS):
-            seen, jacobian = self._linearise(point, states)
+            seen, jacobian = self._differentiate(point, states)
             if not np.all(np.isfinite(seen)):
                 break
             if iteration == 0:
@@ -130,11 +130,11 @@ class Segments:
                 break
         return point
 
-    def _linearise(self, point: Array, states: Array) -> tuple[Array, Array]:
+    def _differentiate(self, point: Array, states: Array) -> tuple[Array, Array]:
         """Channels and states (segments, instants, seen) and their derivatives (..., states and others)."""
         points = np.column_stack([states, np.tile(point[self.others], (len(states), 1))])
         instants = self.short.measurement.first.times
-        seen, jacobian = linearise_many(self.short, points)
+        seen, jacobian = differentiate_many(self.short, points)
         shape = (len(points), len(instants), -1)
         return seen.reshape(shape), jacobian.reshape(*shape, points.shape[1])
 

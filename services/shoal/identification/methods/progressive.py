@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import descend_many, distinct, history, squares
-from shoal.identification.methods.least_squares import linearise
+from shoal.identification.methods.lanes import descend_many, distance, distinct, history, kept_apart, squares
+from shoal.identification.methods.least_squares import differentiate
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import starting_points
 from shoal.trajectory import Array
@@ -83,7 +83,7 @@ def fit(model: ForwardModel, start: Array) -> Branch:
     """
     span = model.upper - model.lower
     point, damping = start, 1e-3
-    residual, jacobian = linearise(model, point)
+    residual, jacobian = differentiate(model, point)
     for _ in range(_ITERATIONS):
         cost = squares(residual)
         if not np.isfinite(cost):
@@ -97,7 +97,7 @@ def fit(model: ForwardModel, start: Array) -> Branch:
         predicted = cost - squares(residual + jacobian @ (trial - point))
         if predicted < _GAIN * cost:
             break
-        there = linearise(model, trial)
+        there = differentiate(model, trial)
         if squares(there[0]) < cost:
             point, (residual, jacobian) = trial, there
             damping /= 10
@@ -108,13 +108,9 @@ def fit(model: ForwardModel, start: Array) -> Branch:
 
 def _survivors(model: ForwardModel, branches: list[Branch]) -> list[Branch]:
     """The branches worth going on with, best first: none that is much worse than the best, none twice."""
-    span = model.upper - model.lower
-    found: list[Branch] = []
-    for branch in sorted(branches, key=lambda b: b.fitness):
-        new = all(np.max(np.abs(branch.point - other.point) / span) > 1e-5 for other in found)
-        if not found or (new and branch.fitness <= _HOPELESS * found[0].fitness):
-            found.append(branch)
-    return found
+    best, *others = sorted(branches, key=lambda b: b.fitness)
+    worth = [best, *(branch for branch in others if branch.fitness <= _HOPELESS * best.fitness)]
+    return kept_apart(worth, lambda one, other: distance(model, one.point, other.point) > 1e-5)
 
 
 def _reach(model: ForwardModel, branch: Branch, horizon: float) -> float:

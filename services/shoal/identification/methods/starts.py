@@ -101,7 +101,7 @@ def _poses(model: ForwardModel, name: str, middle: Array, angles: list[int], pos
     cost[~np.isfinite(cost)] = np.inf
     going = np.flatnonzero(np.isfinite(cost))
     for _ in range(_ITERATIONS if going.size else 0):
-        step = damped_step(error[going], jacobian[going], damping[going])
+        step = damped_steps(error[going], jacobian[going], damping[going])
         trial = points[going]
         trial[:, angles] -= step
         trial = np.clip(trial, model.lower, model.upper)
@@ -130,7 +130,7 @@ def scatter(count: int, dimensions: int) -> Array:
     return np.asarray((0.5 + np.outer(np.arange(1, count + 1), ratio ** -np.arange(1.0, dimensions + 1))) % 1.0)
 
 
-def damped_step(error: Array, jacobian: Array, damping: Array) -> Array:
+def damped_steps(error: Array, jacobian: Array, damping: Array) -> Array:
     """What Levenberg-Marquardt takes off each point, (points, angles)."""
     normal = np.einsum("nck,ncl->nkl", jacobian, jacobian)
     gradient = np.einsum("nck,nc->nk", jacobian, error)

@@ -35,7 +35,7 @@ def bent(model: ForwardModel, point: Array, at: Linearisation, seen: Sensitivity
         half = spread(lambda p, k=k: float(p[k]), point, at).half  # type: ignore[misc]
         along = share[:, k] / share[k, k] * half if share[k, k] > 0.0 and np.isfinite(half) else np.zeros(len(point))
         moves += [-along, along]
-    ends = np.clip(point + np.array(moves), *model.reach(point))
+    ends = np.clip(point + np.array(moves), *model.box_at(point))
     rows = model.uncounted(np.concatenate([point[None], ends]))
     base = float(rows[0] @ rows[0])
     promised = np.sum((seen.residual + (ends - point) @ seen.jacobian.T) ** 2, axis=1) - base

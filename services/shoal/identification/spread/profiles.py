@@ -16,7 +16,7 @@ import numpy as np
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import damped_step, squares
-from shoal.identification.methods.least_squares import linearise
+from shoal.identification.methods.least_squares import differentiate
 from shoal.identification.spread.uncertainty import Linearisation, quantile
 from shoal.trajectory import Array, plain
 
@@ -122,7 +122,7 @@ def _side(
 
 def _settle(model: ForwardModel, point: Array, k: int) -> tuple[Array, float]:
     """The others fitted with parameter k held: Levenberg-Marquardt from nearby."""
-    residual, jacobian = linearise(model, point)
+    residual, jacobian = differentiate(model, point)
     cost, damping = squares(residual), 1e-6
     for _ in range(_ITERATIONS):
         free = np.delete(np.arange(len(point)), k)
@@ -132,7 +132,7 @@ def _settle(model: ForwardModel, point: Array, k: int) -> tuple[Array, float]:
         step = damped_step(residual, jacobian[:, free], size, damping)
         trial = point.copy()
         trial[free] = np.clip(point[free] + step, model.lower[free], model.upper[free])
-        trial_residual, trial_jacobian = linearise(model, trial)
+        trial_residual, trial_jacobian = differentiate(model, trial)
         gain = cost - squares(trial_residual)
         if gain > 0:
             point, residual, jacobian, cost = trial, trial_residual, trial_jacobian, cost - gain

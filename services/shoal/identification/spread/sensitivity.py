@@ -137,6 +137,6 @@ def _differences(
 def _inside(model: ForwardModel, point: Array, moves: Array) -> Array:
     """Moves that stay within the bounds, or lead no further out of them; one that would not is not made."""
     there = point + moves
-    low, high = model.reach(point)
+    low, high = model.box_at(point)
     good = np.all((there >= low) & (there <= high), axis=1)
     return np.where(good[:, None], moves, 0.0)

@@ -58,8 +58,8 @@ class Together:
         """Descend from a start for each of some candidates."""
         models = [self.group[k].freed(self.model) for k in numbers]
 
-        def linearise(chosen: Sequence[int], points: Sequence[Array]) -> tuple[list[Array], list[Array]]:
-            # A point and its neighbours stand in one tile, which has one step: see `linearise_many`.
+        def differentiate(chosen: Sequence[int], points: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+            # A point and its neighbours stand in one tile, which has one step: see `differentiate_many`.
             most = 1 + max(len(point) for point in points)
             block = next((size for size in (2, 4, 8, len(WIDE)) if size >= most), most)
             steps = [difference_at(models[k], point) for k, point in zip(chosen, points, strict=True)]
@@ -76,4 +76,4 @@ class Together:
                 jacobians.append(np.where(np.isfinite(slope), slope, 0.0))
             return list(seen[:, 0]), jacobians
 
-        return descend_each(models, starts, linearise, patience=_PATIENCE, most=_ITERATIONS)
+        return descend_each(models, starts, differentiate, patience=_PATIENCE, most=_ITERATIONS)
