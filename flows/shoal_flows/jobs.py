@@ -12,7 +12,6 @@ from shoal.engines import get_engine, spot_checks
 from shoal.engines import sweep as sweeping
 from shoal.engines.gauss import GaussEngine
 from shoal.identification import Estimate, Measurement, identify, load_problem, measure
-from shoal.identification.identify import load_truth
 from shoal.pictures.answer import Answer
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Trajectory
@@ -55,7 +54,7 @@ class Fit:
 def measured(problem: str, data: str | None = None) -> Measurement:
     """The motion to fit: read from `data`, or computed as the problem says. Raises InputError."""
     stated = load_problem(problem)
-    return measure(stated, load_truth(stated), data)
+    return measure(stated, stated.load_scene(), data)
 
 
 def fit(cell: Cell, measurement: Measurement) -> Fit:

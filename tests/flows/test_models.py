@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal.identification import identify, load_problem
-from shoal.identification.estimate import Verdict
+from shoal.identification.judge.verdict import Verdict
 from shoal.scene import load_scene
 from shoal.scene.load import scene_names
 from shoal_flows import jobs, workers

@@ -136,7 +136,7 @@ def test_a_time_limit_gives_the_best_so_far_and_says_so() -> None:
 
 def test_a_time_limit_on_the_fine_model_leaves_what_the_coarse_one_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_time_left(model: ForwardModel, *_: object) -> None:
-        raise TimeIsUp(model)
+        raise TimeIsUp
 
     monkeypatch.setattr("shoal.identification.adapt.descend", no_time_left)
     problem = rigid_problem()

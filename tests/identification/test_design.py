@@ -14,10 +14,11 @@ from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification import Measurement, Problem
-from shoal.identification.design import Candidate, Design, design, precision
+from shoal.identification.design import Design, Sensor, design
+from shoal.identification.design.precision import precision
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.least_squares import descend
-from shoal.identification.observation import observe
+from shoal.identification.recording.observation import observe
 from shoal.trajectory import Array
 
 NOISE = 2e-3
@@ -49,7 +50,7 @@ def designed() -> Design:
 
 
 @cache
-def scatter(candidate: Candidate) -> Array:
+def scatter(candidate: Sensor) -> Array:
     """Standard deviations of the parameters over fits to data of Exudyn, each with its own noise, (parameters,)."""
     stated = problem()
     scene = stated.load_scene()
@@ -67,7 +68,7 @@ def scatter(candidate: Candidate) -> Array:
     return np.std(found, axis=0, ddof=1)
 
 
-def on_markers_of_the_scene() -> list[Candidate]:
+def on_markers_of_the_scene() -> list[Sensor]:
     return [candidate for candidate, _ in designed().ranked if candidate.name in ("A", "B")]
 
 
@@ -81,7 +82,7 @@ def test_predicted_deviation_is_the_scatter_of_fits(place: int) -> None:
 
 def test_the_recommended_marker_really_scatters_less() -> None:
     found = design(problem(), angle_noise=NOISE, parameter="theta2")
-    best, k = found.ranked[0][0], found.names.index("theta2")
+    best, k = found.ranked[0][0], found.aim.names.index("theta2")
     # It is another than the one measured now, or there would have been nothing to recommend.
     assert best.name == "B"
     (measured_now,) = [c for c in on_markers_of_the_scene() if c.name == "A" and c.quantity == "position"]
@@ -96,8 +97,8 @@ def test_more_tells_more() -> None:
     told = found.course[:, np.all(np.isfinite(found.course), axis=0)]
     assert told.shape[1] > 20
     assert np.all(np.diff(told, axis=1) <= 1e-9 * told[:, :-1])
-    best = found.score(found.ranked[0][1])
-    assert all(found.score(both) <= best * (1 + 1e-9) for _, both in found.second)
+    best = found.aim.score(found.ranked[0][1])
+    assert all(found.aim.score(both) <= best * (1 + 1e-9) for _, both in found.second)
 
 
 def test_twice_the_noise_is_twice_the_deviation() -> None:
@@ -107,7 +108,7 @@ def test_twice_the_noise_is_twice_the_deviation() -> None:
 
 def test_the_parameter_asked_for_decides() -> None:
     found = design(problem(), angle_noise=NOISE, parameter="theta1")
-    k = found.names.index("theta1")
+    k = found.aim.names.index("theta1")
     deviations = [one.std[k] for _, one in found.ranked]
     assert deviations == sorted(deviations)
 
@@ -129,8 +130,8 @@ def test_what_no_data_tell_is_infinite_and_null_in_json() -> None:
     both["density1"] = {"path": "bodies.OA.density", "lower": 200.0, "upper": 5000.0, "start": 1000.0}
     found = design(problem(parameters=both), angle_noise=NOISE)
     assert not found.ok
-    assert np.isinf(found.now.std[found.names.index("density")])
-    assert np.isfinite(found.now.std[found.names.index("theta1")])
+    assert np.isinf(found.now.std[found.aim.names.index("density")])
+    assert np.isfinite(found.now.std[found.aim.names.index("theta1")])
     assert found.now.unknown == 1
     text = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert text["now"]["std"]["density"] is None
@@ -141,7 +142,7 @@ def test_a_prior_counts() -> None:
     parameters = problem().model_dump(mode="json")["parameters"]
     parameters["density"]["prior"] = {"mean": 1000.0, "std": 1e-3}
     found = design(problem(parameters=parameters), angle_noise=NOISE)
-    assert found.now.std[found.names.index("density")] == pytest.approx(1e-3, rel=1e-3)
+    assert found.now.std[found.aim.names.index("density")] == pytest.approx(1e-3, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,7 @@ from typing import Any
 from shoal.errors import ComputationError
 
 from shoal_flows import provenance, settings
-from shoal_flows.tracking import origin, outbox, views
-from shoal_flows.tracking.model import registry
+from shoal_flows.tracking import origin, outbox, registry, views
 from shoal_flows.tracking.record import LOCAL, Run
 
 log = logging.getLogger(__name__)

@@ -19,7 +19,7 @@ from shoal.api.settings import Settings
 from shoal.engines import ENGINES
 from shoal.errors import InputError
 from shoal.identification import Problem, load_problem, problem_names
-from shoal.identification.recording import EngineSource, FileSource
+from shoal.identification.recording.source import EngineSource, FileSource
 from shoal.scene import Scene, load_scene, scene_names
 from shoal.scene.parametric import parametric
 

@@ -26,9 +26,9 @@ from shoal.engines.contract import sampling_times
 from shoal.errors import ComputationError, InputError
 from shoal.identification import Measurement, Problem, Recording, measure
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import linearise_many
+from shoal.identification.methods.lanes import differentiate_many
 from shoal.identification.problem import Parameter
-from shoal.identification.recording import EngineSource, FileSource
+from shoal.identification.recording.source import EngineSource, FileSource
 from shoal.scene.record import one_line
 from shoal.trajectory import Array
 
@@ -69,7 +69,7 @@ class VectorFunction:
     def jacobian(self, values: Array) -> Array:
         """Their derivatives, (outputs, parameters). Raises ComputationError."""
         parameters = self.forward.parameters
-        residuals, jacobians = linearise_many(self.forward, parameters.to_vector(values)[None])
+        residuals, jacobians = differentiate_many(self.forward, parameters.to_vector(values)[None])
         residual, jacobian = _finite(residuals[0]), jacobians[0] / np.where(parameters.logarithmic, values, 1.0)
         return np.asarray((residual @ jacobian)[None] if self.squared else jacobian)
 

@@ -18,7 +18,7 @@ from shoal.errors import InputError
 from shoal.identification import identify
 from shoal.identification.conclude import Wishes
 from shoal.identification.methods import get_method
-from shoal.identification.recording import FileSource
+from shoal.identification.recording.source import FileSource
 from shoal.trajectory import Trajectory
 
 Note = Callable[[Any], None]

@@ -1,10 +1,13 @@
 """From measured motion to parameters with an honest uncertainty."""
 
-from shoal.identification.estimate import Estimate, Value, Verdict
+from shoal.identification.estimate import Estimate
 from shoal.identification.identify import identify
-from shoal.identification.measurement import Measurement, Recording, measure
+from shoal.identification.judge.verdict import Verdict
+from shoal.identification.measure import measure
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import Problem, load_problem, problem_names
+from shoal.identification.recording.measurement import Measurement, Recording
+from shoal.identification.spread.value import Value
 
 __all__ = [
     "METHODS",

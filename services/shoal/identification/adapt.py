@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods import Method, Outcome
-from shoal.identification.methods.auto import explains
+from shoal.identification.methods.auto import explained
 from shoal.identification.methods.least_squares import descend
-from shoal.identification.starts import starting_points
+from shoal.identification.methods.starts import starting_points
 from shoal.selection import Selection, select
 from shoal.trajectory import Array
 
@@ -20,6 +19,14 @@ COARSER = 30.0
 """The search goes by a model whose error may be larger by this factor than that of the final one."""
 _OFF = 3.0
 """A fit that leaves more than this many times the tolerance is not off by the model alone."""
+
+
+class Stopped(TimeIsUp):
+    """Time was up on the way; model: whose best so far stands."""
+
+    def __init__(self, model: ForwardModel) -> None:
+        super().__init__()
+        self.model = model
 
 
 @dataclass(frozen=True)
@@ -31,10 +38,6 @@ class Stage:
     error: float
     evaluations: int
     selection_s: float
-
-    def to_json(self) -> dict[str, Any]:
-        """As plain data."""
-        return vars(self)
 
 
 def coarse_to_fine(
@@ -48,35 +51,26 @@ def coarse_to_fine(
     stages: list[Stage] = []
     start = starting_points(model)[0]
     coarse, chosen = _chosen(model, start, COARSER * tolerance)
+    fine = coarse
     try:
         outcome = search(coarse, rng, progress)
         stages.append(_stage(chosen, coarse.counter.evaluations))
         fine, chosen = _chosen(coarse, outcome.point, tolerance)
-    except TimeIsUp:
-        raise TimeIsUp(coarse) from None
-    try:
         descent = descend(fine, outcome.point, progress)
-    except TimeIsUp:
-        raise TimeIsUp(fine if np.isfinite(fine.counter.best_value) else coarse) from None
-    point, fitness, rows = descent.point, descent.fitness, descent.rows
-    # The coarse model may have led to the wrong minimum.
-    if np.sqrt(fitness) > _OFF * tolerance and not explains(fine, replace(outcome, fitness=fitness)):
-        try:
+        point, fitness, rows = descent.point, descent.fitness, descent.rows
+        # The coarse model may have led to the wrong minimum.
+        if np.sqrt(fitness) > _OFF * tolerance and not explained(fine, replace(outcome, fitness=fitness)):
             again = search(fine, rng, progress)
-        except TimeIsUp:
-            raise TimeIsUp(fine) from None
-        rows = rows + [(len(rows) + i, best, mean) for i, best, mean in again.iterations]
-        point, fitness = min((point, fitness), (again.point, again.fitness), key=lambda end: end[1])
+            rows = rows + [(len(rows) + i, best, mean) for i, best, mean in again.iterations]
+            point, fitness = min((point, fitness), (again.point, again.fitness), key=lambda end: end[1])
+    except TimeIsUp:
+        raise Stopped(fine if np.isfinite(fine.counter.best_value) else coarse) from None
     stages.append(_stage(chosen, fine.counter.evaluations))
     # Values of different models cannot be compared, so the search on the coarse one counts without a best value.
     fine.counter.charge(coarse.counter.evaluations, outcome.point, np.inf)
     rows = outcome.iterations + [(len(outcome.iterations) + i, best, mean) for i, best, mean in rows]
     message = "" if chosen.met else f"the model is off by about {chosen.chosen.error:.1g} m: {chosen.reason}"
-    return (
-        fine,
-        replace(outcome, point=point, fitness=fitness, iterations=rows, message=message),
-        stages,
-    )
+    return fine, replace(outcome, point=point, fitness=fitness, iterations=rows, message=message), stages
 
 
 def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[ForwardModel, Selection]:
@@ -92,9 +86,9 @@ def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[Forwar
         path: value for rod, level in selection.chosen.levels.items() for path, value in level.fields(rod).items()
     }
     solver = selection.chosen.scene.solver.model_dump(mode="json")
-    kept = {name: solver[name] for name in ("integrator", "step", "relative_tolerance", "absolute_tolerance")}
-    scene = model.scene.with_values({**fields, **{f"solver.{name}": value for name, value in kept.items()}})
-    return replace(model, scene=scene), selection
+    for name in ("integrator", "step", "relative_tolerance", "absolute_tolerance"):
+        fields[f"solver.{name}"] = solver[name]
+    return replace(model, scene=model.scene.with_values(fields)), selection
 
 
 def _stage(selection: Selection, evaluations: int) -> Stage:

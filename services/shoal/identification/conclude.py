@@ -8,32 +8,26 @@ from typing import Any
 import numpy as np
 
 from shoal.identification.adapt import Stage
-from shoal.identification.bootstrap import bootstrap
-from shoal.identification.covariance import blocks_of
-from shoal.identification.curvature import bent, by_profile
 from shoal.identification.deadline import unless_late
-from shoal.identification.estimate import Estimate, Value, Verdict
-from shoal.identification.forward import ForwardModel, accepts
-from shoal.identification.judge import Judgement, few, judge
-from shoal.identification.methods import Outcome
+from shoal.identification.estimate import Estimate
+from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.remarks import remarks
+from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
+from shoal.identification.judge.rivals import valley
+from shoal.identification.judge.verdict import Judgement, Verdict, judge
 from shoal.identification.methods.lanes import Descent, descend_many
-from shoal.identification.model_error import Corrections, ModelError, model_error, rms_of
-from shoal.identification.problem import RESERVED
-from shoal.identification.profiles import Profile, profiles
-from shoal.identification.rank import combinations
-from shoal.identification.residual_tests import ResidualTests, residual_tests
-from shoal.identification.rivals import valley
-from shoal.identification.sensitivity import Sensitivity, believed
-from shoal.identification.uncertainty import Linearisation, Spread, autocorrelation, linearise, spread
-from shoal.identification.units import unit
-from shoal.scene import Rod, Scene, expression
+from shoal.identification.methods.outcome import Outcome
+from shoal.identification.spread import intervals
+from shoal.identification.spread.bootstrap import bootstrap
+from shoal.identification.spread.covariance import blocks_of
+from shoal.identification.spread.curvature import bent, by_profile
+from shoal.identification.spread.model_error import ModelError, model_error, rms_of
+from shoal.identification.spread.profiles import Profile, profiles
+from shoal.identification.spread.rank import combinations
+from shoal.identification.spread.sensitivity import Sensitivity, believed
+from shoal.identification.spread.uncertainty import Linearisation, autocorrelation, linearise
+from shoal.scene import Rod, Scene
 from shoal.trajectory import Array
-
-_NOTICED = 0.1
-"""Of half an interval: a contribution to it that is worth a word."""
-_ALIKE = 3.0
-"""A residual within this factor of the mesh error is explained by it."""
-
 
 _LOWER = 1e-6
 """Of the fitness: an answer that is better by more is another one."""
@@ -70,7 +64,7 @@ def conclude(
     Where what looks for the cause of a misfit meets a better minimum, that one is concluded from, so many times.
     """
     searched, point, measurement = model, outcome.point, model.measurement
-    model = replace(model, memory=None, whole=None)
+    model = model.aside()
     if model.deadline is not None:
         model.deadline.extend()
     # The intervals look at the neighbourhood of the answer.
@@ -81,15 +75,13 @@ def conclude(
     possible = bool(np.all(np.isfinite(seen.residual)))
     if not possible:
         seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
+    known = possible and looked is not None
     blocks = blocks_of(model, len(seen.residual))
     at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks)
     predicted = {name: _predicted(model, point, name) for name in measurement.recordings}
-    nothing = ModelError(None, None)
-    error = (
-        unless_late(lambda: model_error(model, point, predicted, seen.residual), nothing)
-        if possible and looked
-        else nothing
-    )
+    error = ModelError(None, None)
+    if known:
+        error = unless_late(lambda: model_error(model, point, predicted, seen.residual), error)
     correction = error.corrections(at.pseudo_inverse)
     mesh, theory = (
         None if part is None else rms_of(part[: len(model.rows.time)]) for part in (error.mesh, error.theory)
@@ -98,20 +90,21 @@ def conclude(
     tests = residual_tests(model, seen.residual, blocks, at.noise, float(np.hypot(mesh or 0.0, theory or 0.0)), refined)
     told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
     at = replace(at, systematic=tests.excess * told)
-    alone: tuple[Outcome, list[Array]] = (outcome, [])
-    found, beside = unless_late(lambda: valley(model, outcome, at), alone) if looked and possible else alone
+    found, beside = outcome, list[Array]()
+    if known:
+        found, beside = unless_late(lambda: valley(model, outcome, at), (found, beside))
     ends = [point, *beside]
-    parameters = _spanning([_parameters(model, end, at, correction) for end in ends])
+    values = intervals.spanning([intervals.parameters(model, end, at, correction) for end in ends])
     if looked is None:
-        parameters = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in parameters.items()}
-    curved = _curved(model, outcome, at, seen, tests) if possible and looked else []
-    parameters, profiled = by_profile(model, ends, at, parameters, curved)
-    if wishes.profiles and possible and looked:
+        values = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in values.items()}
+    curved = _curved(model, outcome, at, seen, tests) if known else []
+    values, profiled = by_profile(model, ends, at, values, curved)
+    if wishes.profiles and known:
         profiled = profiles(model, point, at, profiled)
-    parameters |= {n: replace(parameters[n], identifiable=False) for n, p in profiled.items() if p.open}
-    unknown = combinations(model, point, at) if possible and looked else []
+    values |= {n: replace(values[n], identifiable=False) for n, p in profiled.items() if p.open}
+    unknown = combinations(model, point, at) if known else []
     if possible:
-        judgement = judge(model, found, seen, at, tests, parameters, unknown)
+        judgement = judge(model, found, seen, at, tests, values, unknown)
     else:
         message = "no parameter set could be simulated; look at the bounds and the scene"
         judgement = Judgement(Verdict.FAILED, message)
@@ -119,14 +112,15 @@ def conclude(
     better = judgement.better or (unless_late(lambda: _lower(model, outcome, profiled), None) if ended else None)
     if better is not None and rounds > 0:
         return conclude(searched, _moved(outcome, better), method, seed, wall, stages, wishes, rounds - 1)
+    selected = {"selection": [vars(stage) for stage in stages]} if stages else {}
     correlation = autocorrelation(seen.residual, blocks)
-    draws = wishes.bootstrap if possible and looked else 0
+    draws = wishes.bootstrap if known else 0
     rng = np.random.default_rng(seed)
     # Away from the minimum the mesh is not what limits the fit.
     limits = judgement.verdict is not Verdict.UNFINISHED and not stages
-    coarse = _coarse(model, mesh if limits else None, tests)
-    remarks = (_better(profiled), _bent(model, curved), coarse, _slender(parameters, tests, theory))
-    notes = (judgement.message or outcome.message, *remarks)
+    names = [model.names[k] for k in curved]
+    notes = [judgement.message or outcome.message]
+    notes += remarks(values, profiled, names, tests, mesh if limits else None, theory)
     return Estimate(
         problem=model.problem.name,
         method=method,
@@ -136,18 +130,18 @@ def conclude(
         message="; ".join(note for note in notes if note),
         advice=judgement.advice,
         choice=outcome.choice,
-        parameters=parameters,
-        quantities=_spanning([_quantities(model, end, at, correction, curved) for end in ends]),
+        parameters=values,
+        quantities=intervals.spanning([intervals.quantities(model, end, at, correction, curved) for end in ends]),
         combinations=unknown,
         fitness=outcome.fitness,
-        rms=float(np.sqrt(outcome.fitness / model.things)),
+        rms=float(np.sqrt(outcome.fitness / model.rows.things)),
         evaluations=searched.counter.evaluations,
         work=searched.work,
         placements=searched.placements,
         wall_s=wall,
         history=searched.counter.history,
         iterations=outcome.iterations,
-        minima=[{**_values_of(model, p), "fitness": f} for p, f in found.minima if np.isfinite(f)],
+        minima=[{**model.parameters.told(p), "fitness": f} for p, f in found.minima if np.isfinite(f)],
         residual_autocorrelation=correlation,
         residual_tests=tests,
         suspects=judgement.suspects,
@@ -159,18 +153,17 @@ def conclude(
         truth=dict(measurement.truth),
         data=measurement.origin,
         notes=[note for recording in measurement.recordings.values() for note in recording.notes],
-        model={"scene": model.scene.name, **model.problem.values, **_fitted(model.scene), **_chosen(stages)},
+        model={"scene": model.scene.name, **model.problem.values, **_fitted(model.scene), **selected},
         scenes={name: model.scene_at(point, name) for name in measurement.recordings},
         predicted=predicted,
         measurement=measurement,
-        covariance=_covariance(model, point, at),
+        covariance=intervals.covariance(model, point, at),
     )
 
 
 def _unseen(model: ForwardModel) -> Sensitivity:
     """What is known of the neighbourhood of an answer where there is no time to look: nothing."""
-    priors = sum(entry.parameter.prior is not None for entry in model.parameters.entries.values())
-    rows = len(model.rows.time) + priors
+    rows = len(model.rows.time) + len(model.parameters.priors)
     return Sensitivity(np.zeros(rows), np.zeros((rows, len(model.names))), np.inf, np.inf)
 
 
@@ -178,10 +171,6 @@ def _predicted(model: ForwardModel, point: Array, name: str) -> Array:
     """Channels of a recording at an answer, (samples, channels); nan where there is no time to run it."""
     nothing = np.full((1, *model.measurement.recordings[name].values.shape), np.nan)
     return np.asarray(unless_late(lambda: model.observe(point[None], name), nothing)[0])
-
-
-def _values_of(model: ForwardModel, point: Array) -> dict[str, float]:
-    return dict(zip(model.names, model.parameters.to_values(point).tolist(), strict=True))
 
 
 def _fitted(scene: Scene) -> dict[str, Any]:
@@ -193,23 +182,6 @@ def _fitted(scene: Scene) -> dict[str, Any]:
             found |= {f"bodies.{name}.elements": body.elements} if body.element != "rigid" else {}
             found |= {f"bodies.{name}.quadrature": body.quadrature} if body.element == "ancf-cable" else {}
     return found | {f"solver.{name}": getattr(scene.solver, name) for name in ("integrator", "step")}
-
-
-def _chosen(stages: list[Stage]) -> dict[str, Any]:
-    return {"selection": [stage.to_json() for stage in stages]} if stages else {}
-
-
-def _coarse(model: ForwardModel, mesh: float | None, tests: ResidualTests) -> str:
-    """A word where the mesh, and not the measurement, limits the answer; empty if it does not."""
-    if mesh is None:
-        return ""
-    if model.noise is not None and mesh > model.noise:
-        excess, wanted = f"exceeds the noise of {tests.sized(model.noise)}", model.noise
-    elif model.noise is None and mesh / _ALIKE < tests.size < mesh * _ALIKE:
-        excess, wanted = "is all that the fit leaves", mesh
-    else:
-        return ""
-    return f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted / 3:.1g} finds a better mesh"
 
 
 def _moved(outcome: Outcome, better: Descent) -> Outcome:
@@ -231,16 +203,7 @@ def _lower(model: ForwardModel, outcome: Outcome, profiled: dict[str, Profile]) 
 
 def _by_thing(model: ForwardModel, rows: Array | None) -> float | None:
     """Root mean square per observed thing."""
-    return None if rows is None else float(np.sqrt(np.sum(rows**2) / model.samples / model.things))
-
-
-def _slender(parameters: dict[str, Value], tests: ResidualTests, theory: float | None) -> str:
-    """A word where what slender beams neglect limits the answer; empty if it does not."""
-    limited = [n for n, v in parameters.items() if abs(v.theory or 0.0) > _NOTICED * (v.upper - v.lower) / 2]
-    if theory is None or not limited:
-        return ""
-    change = f"change the motion by about {tests.sized(theory)} and widen the interval of {', '.join(limited)}"
-    return f"shear and rotary inertia, which slender beams neglect, {change}"
+    return None if rows is None else float(np.sqrt(np.sum(rows**2) / model.rows.samples / model.rows.things))
 
 
 def _curved(
@@ -250,84 +213,3 @@ def _curved(
     if not outcome.ended or not outcome.converged or tests.limited or not seen.reliable:
         return []
     return unless_late(lambda: bent(model, outcome.point, at, seen), [])
-
-
-def _bent(model: ForwardModel, curved: list[int]) -> str:
-    names = ", ".join(model.names[k] for k in curved)
-    return f"the misfit is no parabola within the interval of {names}, which is that of the profile" if names else ""
-
-
-def _better(profiled: dict[str, Profile]) -> str:
-    names = ", ".join(name for name, found in profiled.items() if found.better)
-    return f"a better fit than the answer was found on the profile of {names}" if names else ""
-
-
-def _parameters(model: ForwardModel, point: Array, at: Linearisation, correction: Corrections) -> dict[str, Value]:
-    found = {}
-    for k, name in enumerate(model.names):
-        about = spread(lambda p, k=k: float(p[k]), point, at)  # type: ignore[misc]
-        span = model.upper[k] - model.lower[k]
-        at_bound = bool(min(point[k] - model.lower[k], model.upper[k] - point[k]) < 1e-6 * span)
-        shift = correction.of(lambda p, k=k: float(p[k]), point)  # type: ignore[misc]
-        told = about.fixed and not at_bound and about.std < span and not few(model)
-        known = _value(float(point[k]), about, told, shift, at_bound)
-        path = model.parameters.entries[name].parameter.path or ""
-        known = known.exponential() if model.parameters.logarithmic[k] else known
-        told = known.identifiable and _possible(model, path, known)
-        found[name] = replace(known, unit=unit(path), identifiable=told)
-    return found
-
-
-def _possible(model: ForwardModel, path: str, known: Value) -> bool:
-    """Whether an interval ends at values that can be: a mass whose interval reaches below zero is not known."""
-    head, _, name = path.partition(".")
-    if head == RESERVED:
-        return known.lower > 0.0 or name not in ("clock", "scale")
-    return not path or all(accepts(model.scene, path, end) for end in (known.lower, known.upper))
-
-
-def _spanning(ends: list[dict[str, Value]]) -> dict[str, Value]:
-    """The values of the first, with intervals that span those at all ends of its valley."""
-    first = ends[0]
-    lower = {name: min(end[name].lower for end in ends) for name in first}
-    upper = {name: max(end[name].upper for end in ends) for name in first}
-    return {name: replace(value, lower=lower[name], upper=upper[name]) for name, value in first.items()}
-
-
-def _covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:
-    """Of the values, (parameters, parameters): d exp(p) = exp(p) dp for those that are sought by their logarithm."""
-    slope = np.where(model.parameters.logarithmic, model.parameters.to_values(point), 1.0)
-    return np.asarray(slope[:, None] * at.covariance * slope)
-
-
-def _quantities(
-    model: ForwardModel, point: Array, at: Linearisation, correction: Corrections, curved: list[int]
-) -> dict[str, Value]:
-    found, entries = {}, list(model.parameters.entries.values())
-    doubtful = {entries[k].key for k in curved}
-    for name, text in model.problem.quantities.items():
-        for recording in model.measurement.recordings if _own(model, text) else [None]:
-
-            def value_at(p: Array, text: str = text, recording: str | None = recording) -> float:
-                named = model.parameters.named(p[None], recording)
-                return expression.evaluate(text, {key: float(x[0]) for key, x in named.items()})
-
-            about = spread(value_at, point, at)
-            shift = correction.of(value_at, point)
-            told = about.fixed and not doubtful & set(expression.names(text))
-            found[f"{recording}.{name}" if recording else name] = _value(value_at(point), about, told, shift, False)
-    return found
-
-
-def _own(model: ForwardModel, text: str) -> bool:
-    """Whether an expression has a value for each recording."""
-    keys = {entry.key for entry in model.parameters.entries.values() if entry.recording is not None}
-    return bool(expression.names(text) & keys)
-
-
-def _value(
-    value: float, about: Spread, identifiable: bool, shift: tuple[float | None, float | None], at_bound: bool
-) -> Value:
-    mesh, theory = shift
-    half = about.half + abs(mesh or 0.0) + abs(theory or 0.0)
-    return Value(value, about.std, value - half, value + half, bool(identifiable), mesh, at_bound, theory=theory)

@@ -1,24 +1,29 @@
-"""An estimate as a labelled data set: parameters with their covariance, and one recording with its fit."""
+"""An answer as a labelled data set: parameters with their covariance, and one recording with its fit."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.identification.units import of_channel, squared
+from shoal.identification.recording.measurement import Recording
+from shoal.identification.recording.units import of_channel, squared
+from shoal.identification.spread.value import Value
+from shoal.trajectory import Array
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from shoal.identification.estimate import Estimate
 
-
-def dataset(estimate: Estimate, recording: str | None = None) -> xr.Dataset:
+def dataset(
+    parameters: Mapping[str, Value], covariance: Array | None, recording: Recording, predicted: Array
+) -> xr.Dataset:
     """Over `parameter`: value, std, lower, upper, identifiable, covariance; over `time` and `marker`: of each quantity
-    of the recording (else the first) measured_x, predicted_x, residual_x (model minus measurement) and so on.
+    of the recording measured_x, predicted_x, residual_x (model minus measurement) and so on.
 
+    predicted: channels of the model at the recording's samples, (samples, channels)
     A gap in the data is nan, and so is a quantity that a marker was not measured in. Units are in the attributes; those
     of the parameters, which differ, are a coordinate. Raises InputError.
     """
@@ -26,24 +31,12 @@ def dataset(estimate: Estimate, recording: str | None = None) -> xr.Dataset:
         import xarray as xr
     except ModuleNotFoundError:
         raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
-    known = estimate.measurement.recordings
-    name = next(iter(known)) if recording is None else recording
-    if name not in known:
-        raise InputError(f"recording: there is no {name!r}; there are {', '.join(known)}")
-    attributes = {
-        "problem": estimate.problem,
-        "recording": name,
-        "verdict": str(estimate.verdict),
-        "method": estimate.method,
-        "engine": estimate.engine,
-    }
-    return xr.merge([_parameters(estimate), _signals(estimate, name)]).assign_attrs(attributes)
+    return xr.merge([_parameters(parameters, covariance), _signals(recording, predicted)])
 
 
-def _parameters(estimate: Estimate) -> xr.Dataset:
+def _parameters(values: Mapping[str, Value], covariance: Array | None) -> xr.Dataset:
     import xarray as xr
 
-    values = estimate.parameters
     units = [value.unit for value in values.values()]
     # Where all share a unit, it is that of the variables too.
     shared = {"units": units[0]} if len(set(units)) == 1 and units[0] else {}
@@ -52,17 +45,16 @@ def _parameters(estimate: Estimate) -> xr.Dataset:
         field: ("parameter", [getattr(value, field) for value in values.values()], shared) for field in fields
     }
     columns["identifiable"] = ("parameter", [value.identifiable for value in values.values()])
-    if estimate.covariance is not None:
+    if covariance is not None:
         units_of_it = {"units": squared(shared["units"])} if shared else {}
-        columns["covariance"] = (("parameter", "other_parameter"), estimate.covariance, units_of_it)
+        columns["covariance"] = (("parameter", "other_parameter"), covariance, units_of_it)
     names = list(values)
     return xr.Dataset(columns, {"parameter": names, "other_parameter": names, "unit": ("parameter", units)})
 
 
-def _signals(estimate: Estimate, name: str) -> xr.Dataset:
+def _signals(recording: Recording, predicted: Array) -> xr.Dataset:
     import xarray as xr
 
-    recording, predicted = estimate.measurement.recordings[name], estimate.predicted[name]
     markers = list(dict.fromkeys(channel.marker for channel in recording.channels))
     shape = (len(recording.times), len(markers))
     columns: dict[str, Any] = {}

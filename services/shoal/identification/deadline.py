@@ -5,13 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
-
-if TYPE_CHECKING:
-    from shoal.identification.forward import ForwardModel
 
 T = TypeVar("T")
 Run = Callable[[Scene, Array], Trajectory]
@@ -25,14 +22,7 @@ _STEPS, _MORE = 1000, 4.0
 
 
 class TimeIsUp(Exception):  # noqa: N818 - an end that is expected, not an error
-    """The time allowed for an identification has passed, or what comes next would take longer than is left.
-
-    model: whose best so far stands, where it is not the one that was asked
-    """
-
-    def __init__(self, model: ForwardModel | None = None) -> None:
-        super().__init__()
-        self.model = model
+    """The time allowed for an identification has passed, or what comes next would take longer than is left."""
 
 
 class Deadline:

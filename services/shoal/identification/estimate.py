@@ -2,71 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from shoal.identification.bootstrap import Bootstrap
-from shoal.identification.measurement import Measurement
-from shoal.identification.profiles import Profile
-from shoal.identification.residual_tests import ResidualTests
-from shoal.identification.suspects import Suspect
+from shoal.errors import InputError
+from shoal.identification.dataset import dataset
+from shoal.identification.judge.residual_tests import ResidualTests
+from shoal.identification.judge.suspects import Suspect
+from shoal.identification.judge.verdict import Verdict
+from shoal.identification.recording.measurement import Measurement
+from shoal.identification.spread.bootstrap import Bootstrap
+from shoal.identification.spread.profiles import Profile
+from shoal.identification.spread.value import Value
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-
-class Verdict(StrEnum):
-    """What may be made of an estimate. Only the first two are answers."""
-
-    IDENTIFIED = "identified"
-    COMBINATION = "identified up to a combination"
-    AMBIGUOUS = "ambiguous"
-    REJECTED = "model rejected"
-    UNFINISHED = "not at a minimum"
-    FAILED = "failed"
-
-    @property
-    def trusted(self) -> bool:
-        """Whether the answer can be used."""
-        return self in (Verdict.IDENTIFIED, Verdict.COMBINATION)
-
-
-@dataclass(frozen=True)
-class Value:
-    """An estimated number: its standard deviation, and a 95 % interval (Student's t) with the model's own error in it.
-
-    correction: what a mesh twice as fine would add to the value, None if not computed; it is not added, but is in
-    the interval
-    theory: what shear and rotary inertia would add where slender beams neglect them; likewise
-    unit: of all of them, empty where there is none or none is known
-    """
-
-    value: float
-    std: float
-    lower: float
-    upper: float
-    identifiable: bool
-    correction: float | None = None
-    at_bound: bool = False
-    unit: str = ""
-    theory: float | None = None
-
-    def exponential(self) -> Value:
-        """The value of a parameter that was sought by its logarithm."""
-        value = float(np.exp(self.value))
-        correction = None if self.correction is None else value * self.correction
-        with np.errstate(over="ignore"):
-            lower, upper = float(np.exp(self.lower)), float(np.exp(self.upper))
-        theory = None if self.theory is None else value * self.theory
-        return replace(
-            self, value=value, std=value * self.std, lower=lower, upper=upper, correction=correction, theory=theory
-        )
 
 
 @dataclass(frozen=True)
@@ -145,9 +98,13 @@ class Estimate:
 
         Raises InputError without xarray, and for a recording that there is not.
         """
-        from shoal.identification.dataset import dataset
-
-        return dataset(self, recording)
+        known = self.measurement.recordings
+        name = next(iter(known)) if recording is None else recording
+        if name not in known:
+            raise InputError(f"recording: there is no {name!r}; there are {', '.join(known)}")
+        told = {"problem": self.problem, "recording": name, "verdict": str(self.verdict)}
+        told |= {"method": self.method, "engine": self.engine}
+        return dataset(self.parameters, self.covariance, known[name], self.predicted[name]).assign_attrs(told)
 
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal identify --json` prints."""

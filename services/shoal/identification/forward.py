@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +14,12 @@ from shoal.engines import Engine, get_engine
 from shoal.errors import InputError
 from shoal.identification.checkpoint import Memory
 from shoal.identification.deadline import Deadline, TimeIsUp
-from shoal.identification.loss import flatten, noise_of, steepness
-from shoal.identification.measurement import Measurement
-from shoal.identification.observation import Camera, observe
+from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization
 from shoal.identification.problem import Problem
+from shoal.identification.recording.measurement import Measurement
+from shoal.identification.recording.observation import Camera, observe
+from shoal.identification.recording.rows import Rows
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.scene import Scene
 from shoal.swarm import EvaluationCounter
@@ -31,19 +34,6 @@ _PACES = 16
 
 Progress = Callable[[int, float, float], None]
 """Called with (iteration, best fitness, mean fitness of the iteration)."""
-
-
-@dataclass(frozen=True)
-class Rows:
-    """What the rows of a residual vector are, (rows,) each: number of the recording, time by its clock [s], channel.
-
-    weight: what a deviation was multiplied by; priors are not among them
-    """
-
-    recording: Array
-    time: Array
-    channel: Array
-    weight: Array
 
 
 @dataclass
@@ -98,6 +88,10 @@ class ForwardModel:
         """Upper bounds, (parameters,)."""
         return self.parameters.upper
 
+    def box_at(self, point: Array) -> tuple[Array, Array]:
+        """Bounds that no step from a point crosses, (parameters,) each; from outside none leads further out."""
+        return np.minimum(self.lower, point), np.maximum(self.upper, point)
+
     def sizes(self, point: Array) -> Array:
         """Size of each parameter at a point, at least a thousandth of its range, 1 of a logarithm, (parameters,)."""
         sizes = np.maximum(np.abs(point), 1e-3 * (self.upper - self.lower))
@@ -106,40 +100,15 @@ class ForwardModel:
     @cached_property
     def rows(self) -> Rows:
         """What the rows of the residuals are, but for those of priors at their end."""
-        parts = []
-        for number, recording in enumerate(self.measurement.recordings.values()):
-            sample, channel = np.nonzero(np.isfinite(recording.values))
-            parts.append((np.full(len(sample), number), recording.times[sample], channel))
-        numbers, times, channels = (np.concatenate(column) for column in zip(*parts, strict=True))
-        weight = np.ones(len(times)) if self.noise is None else self.noise / self._row_noise
-        return Rows(numbers, times, channels, weight)
-
-    @cached_property
-    def _row_noise(self) -> Array:
-        """Stated standard deviation of each row, (rows,), nan where it is not."""
-        runs = self.measurement.recordings.values()
-        return np.concatenate([np.broadcast_to(r.noise, r.values.shape)[np.isfinite(r.values)] for r in runs])
-
-    @cached_property
-    def noise(self) -> float | None:
-        """Standard deviation of a (weighted) residual if the noise of every channel is stated, else None."""
-        noise = self._row_noise
-        return float(np.exp(np.mean(np.log(noise)))) if np.all(np.isfinite(noise)) else None
-
-    @cached_property
-    def samples(self) -> int:
-        """How many instants were measured, over all recordings."""
-        return sum(int(np.any(np.isfinite(r.values), axis=1).sum()) for r in self.measurement.recordings.values())
-
-    @cached_property
-    def things(self) -> float:
-        """How many positions and angles an instant shows, on average."""
-        runs = self.measurement.recordings.values()
-        return sum(r.things * len(r.times) for r in runs) / sum(len(r.times) for r in runs)
+        return Rows.of(self.measurement)
 
     def until(self, end: float) -> ForwardModel:
         """The model of the samples up to a time [s]; its evaluations count here too."""
         return replace(self, measurement=self.measurement.until(end), whole=self.whole or self)
+
+    def aside(self, **changes: Any) -> ForwardModel:
+        """The model with some of its fields changed, whose runs nobody is charged for."""
+        return replace(self, memory=None, whole=None, **changes)
 
     def residuals(self, points: Array) -> Array:
         """Model minus measurement, (points, rows), and a row for each prior; inf where a simulation failed.
@@ -158,7 +127,7 @@ class ForwardModel:
 
     def cost(self, residuals: Array) -> Array:
         """Fitness of residuals (points, rows)."""
-        return np.asarray(np.sum(residuals**2, axis=1) / self.samples)
+        return np.asarray(np.sum(residuals**2, axis=1) / self.rows.samples)
 
     def observe(
         self,
@@ -236,11 +205,19 @@ class ForwardModel:
         kind = (self.engine.name, str(sized), scene.solver.integrator, scene.solver.step, lanes == 1)
         return self.deadline.run(kind, scene, times, run)
 
+    def off_the_clock(self) -> AbstractContextManager[None]:
+        """For what does not count against the deadline."""
+        return nullcontext() if self.deadline is None else self.deadline.paused()
+
     def warm_up(self) -> None:
         """Have the engine load or compile what it needs, so that no clock counts it."""
         start = self.parameters.start
         for points in (start[None], np.array([start, start])):
             replace(self, deadline=None).observe(points, times=np.array([min(1e-3, self.measurement.end)]))
+
+    def at_start(self, name: str) -> Array:
+        """Channels of a recording at the start of the parameters, (samples, channels)."""
+        return np.asarray(self.observe(self.parameters.start[None], name)[0])
 
     def poses(self, points: Array, name: str | None = None) -> Array:
         """Channels at time zero, (points, channels). No motion is simulated, so nothing is counted as an evaluation."""
@@ -324,21 +301,9 @@ class ForwardModel:
         return np.where(np.isfinite(rows), rows, np.inf)
 
     @cached_property
-    def spread(self) -> float:
-        """Standard deviation of the weighted data about the mean of each channel."""
-        parts = []
-        for recording in self.measurement.recordings.values():
-            deviation = recording.values - np.nanmean(recording.values, axis=0)
-            parts.append(deviation[np.isfinite(recording.values)])
-        return float(np.sqrt(np.mean((np.concatenate(parts) * self.rows.weight) ** 2)))
-
-    @cached_property
     def loss_scale(self) -> Array:
         """Size of a residual from which on it counts as an outlier, (rows,): by the noise, stated or estimated."""
-        sizes = [noise_of(recording) for recording in self.measurement.recordings.values()]
-        return np.array([sizes[r][c] for r, c in zip(self.rows.recording, self.rows.channel, strict=True)]) * (
-            self.rows.weight
-        )
+        return self.rows.estimated * self.rows.weight
 
     def steepness(self, residual: Array) -> Array:
         """What a Gauss-Newton step multiplies the rows of the Jacobian by, and divides the residual by, (rows,)."""
@@ -350,9 +315,8 @@ class ForwardModel:
 
     def _prior_rows(self, points: Array) -> Array:
         values = self.parameters.to_values(points)
-        priors = [(k, entry.parameter.prior) for k, entry in enumerate(self.parameters.entries.values())]
-        rows = [(values[:, k] - prior.mean) / prior.std for k, prior in priors if prior is not None]
-        return (self.noise or 1.0) * np.array(rows).reshape(len(rows), len(points)).T
+        rows = [(values[:, k] - prior.mean) / prior.std for k, prior in self.parameters.priors]
+        return (self.rows.noise or 1.0) * np.array(rows).reshape(len(rows), len(points)).T
 
 
 def _alike(ends: Array) -> Iterator[Array]:

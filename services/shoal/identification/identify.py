@@ -13,20 +13,20 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.identification.adapt import Stage, coarse_to_fine
+from shoal.identification.adapt import Stage, Stopped, coarse_to_fine
 from shoal.identification.checkpoint import Memory
 from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
-from shoal.identification.measurement import Measurement, measure
-from shoal.identification.methods import Outcome, get_method, prepare
-from shoal.identification.mirrors import with_mirror_images
-from shoal.identification.plausible import check_constant
+from shoal.identification.judge.mirrors import with_mirror_images
+from shoal.identification.measure import measure
+from shoal.identification.methods import Method, Outcome, get_method
+from shoal.identification.methods.starts import starting_points
 from shoal.identification.problem import Problem
-from shoal.identification.recording import EngineSource
-from shoal.identification.starts import starting_points
-from shoal.scene import Scene
+from shoal.identification.recording.measurement import Measurement
+from shoal.identification.recording.plausible import check_constant
+from shoal.identification.recording.source import EngineSource
 from shoal.versions import versions
 
 Watch = Callable[[int, float, float, int], None]
@@ -60,50 +60,46 @@ def identify(
     progress: is told how the search goes. Raises InputError, ComputationError.
     """
     name = method or problem.method
-    get_method(name)
+    search = get_method(name)
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
     scene = problem.load_scene(values)
     deadline = None if time_limit is None else Deadline(time_limit)
     computed = any(isinstance(source, EngineSource) for source in problem.sources.values())
     if measurement is None:
+        # Data are computed with the problem's values, not the user's.
         with deadline.paused() if deadline is not None and computed else nullcontext():
-            measurement = measure(problem, load_truth(problem), data)
+            measurement = measure(problem, problem.load_scene(), data)
     model = ForwardModel(problem, scene, get_engine(engine), measurement, deadline)
     if deadline is not None:
         with deadline.paused():
             model.warm_up()
-            prepare(name)
-    unless_late(lambda: check_constant(model), None)
+    unless_late(lambda: check_constant(model.measurement, model.at_start), None)
     if checkpoint is not None:
         model.memory = Memory(checkpoint, _fingerprint(model, name, seed, tolerance))
     with nullcontext() if model.memory is None else closing(model.memory):
         begin = time.perf_counter()
-        model, outcome, stages = _search(model, name, np.random.default_rng(seed), tolerance, progress)
+        model, outcome, stages = _search(model, search, np.random.default_rng(seed), tolerance, progress)
         wall = time.perf_counter() - begin
         return conclude(model, outcome, name, seed, wall, stages, wishes)
 
 
 def _search(
-    model: ForwardModel,
-    method: str,
-    rng: np.random.Generator,
-    tolerance: float | None,
-    watch: Watch,
+    model: ForwardModel, search: Method, rng: np.random.Generator, tolerance: float | None, watch: Watch
 ) -> tuple[ForwardModel, Outcome, list[Stage]]:
     """Run a method as long as it may; returns the model it ended with, where, and the models on the way."""
 
     def progress(iteration: int, best: float, mean: float) -> None:
         watch(iteration, best, mean, asked.counter.evaluations)
 
-    search, asked, stages = get_method(method), model, list[Stage]()
+    asked, stages = model, list[Stage]()
     try:
         if tolerance is None:
             outcome = search(model, rng, progress)
         else:
             model, outcome, stages = coarse_to_fine(model, search, tolerance, rng, progress)
     except TimeIsUp as end:
-        model = end.model or model
+        model = end.model if isinstance(end, Stopped) else model
         outcome = _best_so_far(model)
     if outcome.ended:
         found = outcome
@@ -111,11 +107,6 @@ def _search(
     if model.refusal and not np.isfinite(outcome.fitness):
         raise InputError(model.refusal)
     return model, outcome, stages
-
-
-def load_truth(problem: Problem) -> Scene:
-    """The scene of a problem as the data are computed from it: with the problem's values, not the user's."""
-    return problem.load_scene()
 
 
 def _best_so_far(model: ForwardModel) -> Outcome:

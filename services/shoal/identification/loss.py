@@ -1,16 +1,13 @@
-"""How deviations count: losses that let outliers weigh less, and the noise of a recording without any model."""
+"""How deviations count: losses that let outliers weigh less."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtri
 
-from shoal.identification.measurement import Recording
 from shoal.trajectory import Array
 
 _TUNING = {"huber": 1.345, "soft-l1": 1.345, "cauchy": 2.385}
 """Of the noise, where a deviation begins to weigh less: 95 % efficiency for normal noise (Huber 1981; Zhang 1997)."""
-_ORDER = 4
 _SMALL = 1e-12
 
 
@@ -50,24 +47,3 @@ def steepness(flat: Array, loss: str, noise: Array) -> Array:
             found = np.sqrt(np.maximum(rho, _SMALL) / -np.expm1(-np.maximum(rho, _SMALL)))
     steeper: Array = found
     return steeper
-
-
-def noise_of(recording: Recording) -> Array:
-    """Standard deviation of the noise of each channel, (channels,): as stated, else by differences of the data.
-
-    A smooth motion has small fourth differences, white noise has large ones: their median tells its size, and outliers
-    do not change it. Motion that the sampling does not resolve counts as noise.
-    """
-    estimated = np.array([differences(recording.values[:, k]) for k in range(len(recording.channels))])
-    return np.where(np.isfinite(recording.noise), recording.noise, estimated)
-
-
-def differences(signal: Array) -> float:
-    """Standard deviation of white noise on a smooth signal, from the median of its fourth differences."""
-    known = signal[np.isfinite(signal)]
-    if len(known) < _ORDER + 2:
-        return float("nan")
-    jumps = np.diff(known, _ORDER)
-    # Of white noise of variance one: the sum of the squared binomial coefficients 1 4 6 4 1.
-    size = float(np.median(np.abs(jumps)) / ndtri(0.75) / np.sqrt(70.0))
-    return max(size, 1e-12 * float(np.ptp(known)), 1e-300)

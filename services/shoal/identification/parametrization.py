@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
-from shoal.identification.problem import RESERVED, Parameter, Problem
-from shoal.identification.recording import Clocked
+from shoal.identification.problem import MEASUREMENT, RESERVED, Parameter, Prior, Problem
+from shoal.identification.recording.source import Clocked
 from shoal.scene import Scene, expression
 from shoal.trajectory import Array
 
@@ -56,6 +57,27 @@ class Parametrization:
         return tuple(self.entries)
 
     @cached_property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of the components, empty where one only stands in ties."""
+        return tuple(entry.parameter.path or "" for entry in self.entries.values())
+
+    @cached_property
+    def initial(self) -> npt.NDArray[np.bool_]:
+        """Which components are of the initial state, (components,), bool."""
+        return np.array([path.startswith("initial.") for path in self.paths])
+
+    @cached_property
+    def turning(self) -> npt.NDArray[np.bool_]:
+        """Which of them are angles, of which whole turns do not count, (components,), bool."""
+        return np.array([path.endswith(".angle") for path in self.paths]) & self.initial
+
+    @cached_property
+    def priors(self) -> list[tuple[int, Prior]]:
+        """Numbers of the components of which something is known beforehand, and what."""
+        known = enumerate(entry.parameter.prior for entry in self.entries.values())
+        return [(k, prior) for k, prior in known if prior is not None]
+
+    @cached_property
     def lower(self) -> Array:
         """Lower bounds, (components,)."""
         return self.to_vector(np.array([entry.parameter.lower for entry in self.entries.values()]))
@@ -75,7 +97,7 @@ class Parametrization:
         return np.where(np.isnan(given), (self.lower + self.upper) / 2, vector)
 
     @cached_property
-    def logarithmic(self) -> Array:
+    def logarithmic(self) -> npt.NDArray[np.bool_]:
         """Which components stand by their logarithm, (components,), bool."""
         return np.array([entry.parameter.logarithmic for entry in self.entries.values()])
 
@@ -87,6 +109,10 @@ class Parametrization:
     def to_values(self, points: Array) -> Array:
         """Parameters in their own units of components, (..., components)."""
         return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, points, 0.0)), points)
+
+    def told(self, point: Array) -> dict[str, float]:
+        """Parameters by name, in their own units, at a point (components,)."""
+        return dict(zip(self.names, self.to_values(point).tolist(), strict=True))
 
     def named(self, points: Array, recording: str | None) -> dict[str, Array]:
         """What expressions know at points (n, components): constants, and the parameters of a recording by name."""
@@ -114,21 +140,16 @@ class Parametrization:
     def measurement_values(self, points: Array, recording: str, stated: Clocked) -> dict[str, Array]:
         """clock, delay, scale, x, y, tilt -> one number per point: a parameter's, else what the recording states."""
         named = self.named(points, recording)
-        found = {
-            name: np.full(len(points), getattr(stated, name)) for name in ("clock", "delay", "scale", "x", "y", "tilt")
-        }
-        for entry in self.entries.values():
+        found = {name: np.full(len(points), getattr(stated, name)) for name in MEASUREMENT}
+        for path, entry in zip(self.paths, self.entries.values(), strict=True):
             if entry.parameter.of_measurement and entry.recording in (None, recording):
-                found[(entry.parameter.path or "").removeprefix(f"{RESERVED}.")] = named[entry.key]
+                found[path.removeprefix(f"{RESERVED}.")] = named[entry.key]
         return found
 
     def indices(self, recording: str, suffix: str) -> dict[str, int]:
         """Path -> component, of the initial state's fields `.angle` or `.rate` in a recording."""
         return {
-            entry.parameter.path: k
-            for k, entry in enumerate(self.entries.values())
-            if (entry.parameter.path or "").startswith("initial.")
-            and (entry.parameter.path or "").endswith(suffix)
-            and entry.recording in (None, recording)
-            and entry.parameter.path is not None
+            path: k
+            for k, (path, entry) in enumerate(zip(self.paths, self.entries.values(), strict=True))
+            if self.initial[k] and path.endswith(suffix) and entry.recording in (None, recording)
         }

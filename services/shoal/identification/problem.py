@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
-from shoal.identification.recording import Channel, EngineSource, FileSource, Source
+from shoal.identification.recording.source import Channel, EngineSource, FileSource, Source
 from shoal.scene import Scene, expression, load_scene
 from shoal.scene.load import names, read_named
 from shoal.scene.record import Positive, Record, one_line

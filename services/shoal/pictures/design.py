@@ -28,12 +28,12 @@ def _candidates(panel: Axes, found: Design) -> None:
     shown = found.ranked[:_SHOWN]
     beside = dict(found.second)
     places = np.arange(len(shown))
-    alone = [found.score(precision) for _, precision in shown]
-    pairs = [found.score(beside[candidate]) if candidate in beside else np.nan for candidate, _ in shown]
+    alone = [found.aim.score(precision) for _, precision in shown]
+    pairs = [found.aim.score(beside[candidate]) if candidate in beside else np.nan for candidate, _ in shown]
     dots: dict[str, Any] = {"linestyle": "none", "markersize": 9}
     panel.plot(alone, places, marker="o", color=BLUE, label="alone", **dots)
     panel.plot(pairs, places, marker="D", color=ORANGE, label=f"beside {shown[0][0].label}", **dots)
-    panel.axvline(found.score(found.now), color=BLACK, linestyle="--", linewidth=1, label="as now")
+    panel.axvline(found.aim.score(found.now), color=BLACK, linestyle="--", linewidth=1, label="as now")
     panel.set_xscale("log")
     log_ticks(panel)
     panel.set_yticks(places, [candidate.label for candidate, _ in shown])
@@ -66,16 +66,18 @@ def _durations(panel: Axes, found: Design) -> None:
 
 
 def _score(found: Design) -> str:
-    return f"std of {found.parameter} / range" if found.parameter else "largest std / range"
+    return f"std of {found.aim.parameter} / range" if found.aim.parameter else "largest std / range"
 
 
 def _says(found: Design) -> str:
     best, precision = found.ranked[0]
-    gain = found.score(found.now) / found.score(precision)
+    gain = found.aim.score(found.now) / found.aim.score(precision)
     parts = [f"{found.problem}: measure {best.label}"]
     if np.isfinite(gain) and gain > 1.05:
         parts.append(f"{gain:.2g} times sharper than now")
     if found.second:
         second, both = found.second[0]
-        parts.append(f"then {second.label}, {found.score(precision) / found.score(both):.2g} times sharper again")
+        parts.append(
+            f"then {second.label}, {found.aim.score(precision) / found.aim.score(both):.2g} times sharper again"
+        )
     return "; ".join(parts)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from shoal.identification import Estimate
-from shoal.identification.estimate import Value
+from shoal.identification.spread.value import Value
 from shoal.pictures import units
 from shoal.pictures.answer import Answer
 from shoal.pictures.drawn import Drawn

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shoal.identification import Estimate, Problem
-from shoal.identification.units import of_channels, squared, unit
+from shoal.identification.recording.units import of_channels, squared, unit
 
 _MIXED = "SI units"
 """Of numbers over channels of different units."""

@@ -137,6 +137,8 @@ def _applied(scene: Scene, name: str, rod: Rod) -> tuple[float, float]:
             moment += _constant(load.torque)
         elif isinstance(load, Spring | TorsionSpring) and name in {side.body for side in sides(load).values()}:
             force = np.nan
+        elif not isinstance(load, DistributedForce | Force | Torque | Spring | TorsionSpring):
+            raise NotImplementedError(f"prior: no force is known of a load of kind {load.kind}")
     return force, moment
 
 

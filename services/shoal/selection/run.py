@@ -37,11 +37,6 @@ class Rung:
         """Levels in words."""
         return ", ".join(f"{rod} {level}" for rod, level in self.levels.items()) or "as stated"
 
-    @property
-    def flexible(self) -> bool:
-        """Whether any rod is."""
-        return any(level.element != "rigid" for level in self.levels.values())
-
 
 def flexible_scene(scene: Scene, levels: Levels, fraction: float) -> Scene:
     """The scene on these levels, by leapfrog with a fraction of its longest stable step. Raises InputError."""

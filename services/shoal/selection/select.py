@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from shoal.engines.contract import sampling_times
+from shoal.engines.gauss import GaussEngine
+from shoal.engines.theory import left_out
 from shoal.errors import InputError
 from shoal.scene import Rod, Scene
 from shoal.selection.climb import YARDSTICK, Progress, Runs, climb
 from shoal.selection.levels import RIGID, Levels, open_rods
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
-from shoal.selection.theory import neglected
 from shoal.selection.trim import WITHIN, trim
 from shoal.trajectory import Array, Status, Trajectory, plain
 
@@ -122,7 +123,7 @@ def select(
         rungs=runs.rungs,
         priors=priors,
         rigid=rigid,
-        shear=neglected(chosen),
+        shear=left_out(chosen.trajectory, chosen.scene, GaussEngine()) or 0.0,
         wall_s=time.perf_counter() - begin,
     )
 

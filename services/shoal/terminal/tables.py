@@ -245,11 +245,11 @@ def design_table(found: Design) -> None:
     best = found.ranked[0][0]
     title = f"{found.problem}: what to measure, {found.duration:g} s at {found.rate:g} samples a second"
     table = screen.table(title, "marker", "weakest", "std", "A", "D", f"with {best.name}: weakest", "std")
-    now = found.weakest(found.now)
+    now = found.aim.weakest(found.now)
     table.add_row("as now", now[0], f"{now[1]:.2e}", f"{found.now.a:.1e}", f"{found.now.d:.1e}", "", "")
     for candidate, precision in found.ranked:
-        name, std = found.weakest(precision)
-        second = found.weakest(beside[candidate]) if candidate in beside else None
+        name, std = found.aim.weakest(precision)
+        second = found.aim.weakest(beside[candidate]) if candidate in beside else None
         pair = ("", "") if second is None else (second[0], f"{second[1]:.2e}")
         table.add_row(candidate.label, name, f"{std:.2e}", f"{precision.a:.1e}", f"{precision.d:.1e}", *pair)
     screen.out.print(table)

@@ -18,7 +18,7 @@ from scipy import optimize
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem, identify, load_problem, measure
 from shoal.identification.forward import ForwardModel
-from shoal.identification.starts import starting_points
+from shoal.identification.methods.starts import starting_points
 from shoal.trajectory import Array
 
 from shoal_validation.benchmarks.timing import undisturbed

@@ -16,15 +16,15 @@ from dataclasses import replace
 import numpy as np
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
-from shoal.identification.covariance import blocks_of
 from shoal.identification.forward import ForwardModel
-from shoal.identification.observation import observe
-from shoal.identification.residual_tests import residual_tests
-from shoal.identification.sensitivity import sensitivity
-from shoal.identification.suspects.candidate import with_parameters
-from shoal.identification.suspects.of_machine import of_machine
-from shoal.identification.suspects.of_measurement import of_measurement
-from shoal.identification.uncertainty import linearise, spread
+from shoal.identification.judge.residual_tests import residual_tests
+from shoal.identification.judge.suspects.candidate import with_parameters
+from shoal.identification.judge.suspects.of_machine import of_machine
+from shoal.identification.judge.suspects.of_measurement import of_measurement
+from shoal.identification.recording.observation import observe
+from shoal.identification.spread.covariance import blocks_of
+from shoal.identification.spread.sensitivity import sensitivity
+from shoal.identification.spread.uncertainty import linearise, spread
 from shoal.scene import Scene
 from shoal.trajectory import Array
 

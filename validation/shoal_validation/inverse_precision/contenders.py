@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize
-from shoal.identification import METHODS
 from shoal.identification.forward import ForwardModel, Progress
+from shoal.identification.methods import METHODS
 from shoal.identification.methods.least_squares import descend
 from shoal.trajectory import Array
 
@@ -53,9 +53,8 @@ class Contender:
 
 
 def contenders() -> list[Contender]:
-    """Everyone. A method with two names in METHODS, such as `auto`, takes part once."""
-    ours = {search: name for name, search in METHODS.items()}
-    found = [Contender(name, "shoal", search) for search, name in ours.items()]
+    """Everyone."""
+    found = [Contender(name, "shoal", search) for name, search in METHODS.items()]
     found.append(Contender("least-squares, random start", "shoal", random_descent))
     found += [Contender(name, "scipy", search) for name, search in SCIPY.items()]
     return found

@@ -57,11 +57,10 @@ def selection(problem: str, tolerance: float) -> Measured:
 def angles(problem: str, method: str) -> Measured:
     """A problem of identification: largest error of a parameter [rad]; the making of the data is not timed."""
     from shoal.identification import identify, load_problem
-    from shoal.identification.identify import load_truth
-    from shoal.identification.measurement import measure
+    from shoal.identification.measure import measure
 
     wanted = load_problem(problem)
-    data = measure(wanted, load_truth(wanted))
+    data = measure(wanted, wanted.load_scene())
     seconds, estimate = _timed(lambda: identify(wanted, method=method, measurement=data))
     error = max(abs(estimate.parameters[name].value - true) for name, true in estimate.truth.items())
     status = str(Status.OK) if estimate.verdict.trusted else str(estimate.verdict)

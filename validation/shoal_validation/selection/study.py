@@ -63,7 +63,7 @@ def study(machine: Draw, exhaustive: bool = False) -> Case:
         chosen.met,
         chosen.reason,
         chosen.chosen.name,
-        not chosen.chosen.flexible,
+        all(level == RIGID for level in chosen.chosen.levels.values()),
         chosen.chosen.error,
         error,
         yardstick.error if yardstick is not None else np.nan,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
-from shoal.identification.observation import STRAIGHT, Camera, observe
-from shoal.identification.suspects.size import Size, size_of
+from shoal.identification.judge.suspects.size import Size, size_of
+from shoal.identification.recording.observation import STRAIGHT, Camera, observe
 from shoal.scene import Scene
 from shoal.trajectory import Array
 

@@ -12,8 +12,8 @@ from shoal.engines import get_engine
 from shoal.identification import Verdict
 from shoal.identification.conclude import NOTHING, conclude
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.suspects import Suspect
 from shoal.identification.methods import get_method
-from shoal.identification.suspects import Suspect
 
 from shoal_validation.suspects.cases import case
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import ShoalError
-from shoal.identification.measurement import Recording
-from shoal.identification.units import QUANTITIES
+from shoal.identification.recording.measurement import Recording
+from shoal.identification.recording.units import QUANTITIES
 from shoal.pictures.answer import Answer
 from shoal.trajectory import Array
 

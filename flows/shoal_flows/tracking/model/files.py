@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import yaml
 from shoal.identification import Problem, load_problem
-from shoal.identification.measurement import Recording
+from shoal.identification.recording.measurement import Recording
 from shoal.scene import Scene
 
 from shoal_flows.jobs import Fit

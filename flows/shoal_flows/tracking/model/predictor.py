@@ -12,7 +12,7 @@ from mlflow.models import set_model
 from mlflow.pyfunc import PythonModel
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
-from shoal.identification.units import QUANTITIES
+from shoal.identification.recording.units import QUANTITIES
 from shoal.scene import load_scene
 
 TIME = "t [s]"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-from importlib import import_module
+from functools import partial
 
 from shoal.errors import InputError
 from shoal.identification.methods.auto import auto
@@ -15,17 +14,16 @@ from shoal.identification.methods.multi_start import multi_start
 from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Method, Outcome
 from shoal.identification.methods.progressive import progressive
-from shoal.identification.methods.swarms import afsa, iafsa, iafsa_printed, iafsa_unseeded
+from shoal.identification.methods.swarms import by_swarm, iafsa_unseeded
+from shoal.swarm import OPTIMIZERS
 
 METHODS: dict[str, Method] = {
     "auto": auto,
     "least-squares": least_squares,
     "progressive": progressive,
     "multiple-shooting": multiple_shooting,
-    "afsa": afsa,
-    "iafsa": iafsa,
+    **{name: partial(by_swarm, swarm) for name, swarm in OPTIMIZERS.items()},
     "iafsa-unseeded": iafsa_unseeded,
-    "iafsa-printed": iafsa_printed,
     "multi-start": multi_start,
     "hybrid": hybrid,
     "differential-evolution": differential_evolution,
@@ -35,23 +33,6 @@ METHODS: dict[str, Method] = {
 }
 
 
-_LATE = {
-    "multi-start": "scipy.stats",
-    "cma-es": "cma",
-    "casadi": "shoal.engines.casadi_shooting",
-    "casadi-multiple": "shoal.engines.casadi_multiple_shooting",
-}
-"""Modules that take a second or more to import, by the method that does so when it begins."""
-
-
-def prepare(name: str) -> None:
-    """Import what a method and the verdict import late, so that no clock counts it."""
-    for module in ("scipy.optimize", _LATE.get(name, "scipy.optimize")):
-        # The method itself says what is missing.
-        with suppress(ImportError, InputError):
-            import_module(module)
-
-
 def get_method(name: str) -> Method:
     """The method of that name. Raises InputError."""
     if name not in METHODS:
@@ -59,4 +40,4 @@ def get_method(name: str) -> Method:
     return METHODS[name]
 
 
-__all__ = ["METHODS", "Method", "Outcome", "get_method", "prepare"]
+__all__ = ["METHODS", "Method", "Outcome", "get_method"]

@@ -10,15 +10,15 @@ import numpy.typing as npt
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.loss import noise_of
 from shoal.identification.methods.growth import growth, swings
-from shoal.identification.methods.lanes import descend_many, distinct, linearise_many
-from shoal.identification.methods.least_squares import PATIENCE, from_starts, linearise
+from shoal.identification.methods.lanes import ENDS_APART, descend_many, differentiate_many, distance, distinct
+from shoal.identification.methods.least_squares import PATIENCE, differentiate, from_starts
 from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
-from shoal.identification.starts import scatter, starting_points
-from shoal.identification.units import of_channels
+from shoal.identification.methods.starts import scatter, starting_points
+from shoal.identification.recording.noise import noise_of
+from shoal.identification.recording.units import of_channels
 from shoal.trajectory import Array
 
 LARGE = 30.0
@@ -43,7 +43,7 @@ def auto(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> O
     A fit that leaves more than noise is followed by the next method, progressive horizon and then multiple shooting.
     """
     starts = starting_points(model)
-    first = linearise_many(model, starts)
+    first = differentiate_many(model, starts)
     # The growth is that of the start which fits best: it is nearest to the motion that was measured.
     grown = growth(model, first[1][int(np.argmin(model.cost(first[0])))])
     methods: dict[str, Callable[[], Outcome]] = {
@@ -80,13 +80,13 @@ def _first_that_explains(model: ForwardModel, methods: dict[str, Callable[[], Ou
             continue
         steps.append(f"{name}: {reason}")
         found.append(outcome)
-        if explains(model, outcome):
+        if explained(model, outcome):
             break
-        left = f"{np.sqrt(outcome.fitness / model.things):.2g} {of_channels(model.measurement)}"
+        left = f"{np.sqrt(outcome.fitness / model.rows.things):.2g} {of_channels(model.measurement)}"
         reason = f"the fit before left {left.rstrip()}"
     best = min(found, key=lambda outcome: outcome.fitness)
     ends = [(o.point, o.fitness) for o in found if o is not best] + [m for o in found for m in o.minima]
-    apart = [(point, fitness) for point, fitness in ends if _apart(model, point, best.point)]
+    apart = [(point, fitness) for point, fitness in ends if distance(model, point, best.point) > ENDS_APART]
     return replace(best, minima=apart, choice="; then ".join(steps))
 
 
@@ -97,9 +97,8 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
     motion on a large one hides it in the noise: so what is positive is looked at even where the fit explains the data.
     """
     free = model.parameters.logarithmic
-    if not explains(model, outcome):
-        others = [not (e.parameter.path or "").startswith("initial.") for e in model.parameters.entries.values()]
-        free = free | np.array(others)
+    if not explained(model, outcome):
+        free = free | ~model.parameters.initial
     points = _others(model, outcome.point, np.flatnonzero(free))
     if not len(points):
         return outcome
@@ -110,7 +109,7 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
         if len(chosen) <= _DESCENTS and all(np.max(np.abs((points[k] - p)[free])) > spacing for p in chosen):
             chosen.append(points[k])
     ends = distinct(model, descend_many(model, np.array(chosen), progress, patience=PATIENCE))
-    rivals = [d for d in ends if d.converged and _apart(model, d.point, outcome.point)]
+    rivals = [d for d in ends if d.converged and distance(model, d.point, outcome.point) > ENDS_APART]
     best = min(ends, key=lambda d: d.fitness, default=None)
     if best is None or best.fitness >= outcome.fitness * (1.0 - _GAINED):
         return replace(outcome, minima=[*outcome.minima, *((d.point, d.fitness) for d in rivals)])
@@ -118,10 +117,8 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
     rest = [(outcome.point, outcome.fitness), *outcome.minima, *((d.point, d.fitness) for d in rivals if d is not best)]
     names = ", ".join(model.names[k] for k in np.flatnonzero(free))
     choice = f"{outcome.choice}; then from other values of {names}"
-    message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
-    return Outcome(
-        best.point, best.fitness, [*outcome.iterations, *rows], message, rest, choice, converged=best.converged
-    )
+    rows = [*outcome.iterations, *rows]
+    return Outcome(best.point, best.fitness, rows, best.message, rest, choice, converged=best.converged)
 
 
 def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> Array:
@@ -137,14 +134,14 @@ def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> Ar
     return np.unique(np.clip(points, model.lower, model.upper), axis=0)
 
 
-def explains(model: ForwardModel, outcome: Outcome) -> bool:
+def explained(model: ForwardModel, outcome: Outcome) -> bool:
     """Whether a fit leaves no more than noise, as stated or as the data tell it, or little of what was measured."""
     rows = len(model.rows.time)
-    left = np.sqrt(outcome.fitness * model.samples / rows)
-    if model.noise is not None:
-        return bool(left <= _NOISES * model.noise)
+    left = np.sqrt(outcome.fitness * model.rows.samples / rows)
+    if model.rows.noise is not None:
+        return bool(left <= _NOISES * model.rows.noise)
     noise = max(float(np.max(np.nan_to_num(noise_of(r)))) for r in model.measurement.recordings.values())
-    return bool(left <= max(_UNEXPLAINED * model.spread, _NOISES * noise))
+    return bool(left <= max(_UNEXPLAINED * model.rows.signal, _NOISES * noise))
 
 
 def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]:
@@ -154,7 +151,7 @@ def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]
     line, and one for each step of all descents.
     """
     span = model.upper - model.lower
-    _, jacobian = linearise(model, point)
+    _, jacobian = differentiate(model, point)
     direction = np.linalg.svd(np.linalg.qr(jacobian * span, mode="r"))[2][-1]
     reach = _WIDTH / np.max(np.abs(direction))
     line = point + np.linspace(-reach, reach, _LINE)[:, None] * direction * span
@@ -165,8 +162,8 @@ def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]
         return []
     lowest = dips[np.argsort(values[dips])][:_LOOKED_AT]
     descents = descend_many(model, np.clip(line[lowest], model.lower, model.upper))
-    return [(d.point, d.fitness) for d in distinct(model, descents) if d.converged and _apart(model, d.point, point)]
-
-
-def _apart(model: ForwardModel, one: Array, other: Array) -> bool:
-    return bool(np.max(np.abs(one - other) / (model.upper - model.lower)) > 1e-3)
+    return [
+        (d.point, d.fitness)
+        for d in distinct(model, descents)
+        if d.converged and distance(model, d.point, point) > ENDS_APART
+    ]

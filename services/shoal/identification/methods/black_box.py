@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy import optimize
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import descend_many
-from shoal.identification.methods.multi_start import concluded
-from shoal.identification.methods.outcome import Outcome
+from shoal.identification.methods.lanes import Course, descend_many
+from shoal.identification.methods.outcome import Outcome, concluded
 from shoal.trajectory import Array
 
 CONTRACTED = 1e-3
@@ -23,13 +23,11 @@ _HUGE = 1e30
 
 def differential_evolution(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """Storn and Price 1997, as scipy has it; a generation is one call of the model."""
-    from scipy import optimize
-
-    rows = _Rows(progress)
+    course = Course(progress)
     span = model.upper - model.lower
 
     def fitness(columns: Any) -> Any:
-        return rows.note(model.fitness(np.atleast_2d(np.asarray(columns).T)))
+        return course.note(model.fitness(np.atleast_2d(np.asarray(columns).T)))
 
     def contracted(intermediate_result: Any) -> bool:
         return bool(np.all(np.ptp(intermediate_result.population, axis=0) <= CONTRACTED * span))
@@ -38,17 +36,18 @@ def differential_evolution(model: ForwardModel, rng: np.random.Generator, progre
     settings: dict[str, Any] = {"vectorized": True, "updating": "deferred", "polish": False, "tol": 0.0}
     settings |= {"callback": contracted, "maxiter": GENERATIONS}
     found = optimize.differential_evolution(fitness, bounds, rng=rng, **settings)
-    return _polished(model, np.atleast_2d(found.x), rows, progress)
+    return concluded(model, descend_many(model, np.atleast_2d(found.x), progress), course)
 
 
 def cma_es(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """Covariance matrix adaptation in the unit box, restarted with twice the population (Auger and Hansen 2005)."""
-    import cma
+    with model.off_the_clock():  # slow to import
+        import cma
 
     # The package takes no box of one dimension; a second one is not looked at.
     size = max(2, len(model.lower))
     population = 4 + int(3 * np.log(size))
-    rows = _Rows(progress)
+    course = Course(progress)
     ends = []
 
     def place(unit: Array) -> Array:
@@ -66,27 +65,7 @@ def cma_es(model: ForwardModel, rng: np.random.Generator, progress: Progress) ->
         strategy = cma.CMAEvolutionStrategy(rng.random(size), 0.3, options)
         while not strategy.stop():
             unit = strategy.ask()
-            values = rows.note(model.fitness(place(np.array(unit))))
+            values = course.note(model.fitness(place(np.array(unit))))
             strategy.tell(unit, np.nan_to_num(values, posinf=_HUGE).tolist())
         ends.append(place(np.asarray(strategy.best.x)))
-    return _polished(model, np.array(ends), rows, progress)
-
-
-class _Rows(list[tuple[int, float, float]]):
-    """Rows of (generation, best, mean), one for each call of the model."""
-
-    def __init__(self, progress: Progress) -> None:
-        super().__init__()
-        self._progress = progress
-
-    def note(self, values: Array) -> Array:
-        """Add the row of a generation; returns its values."""
-        finite = values[np.isfinite(values)]
-        best = min([*finite.tolist(), self[-1][1] if self else np.inf])
-        self.append((len(self), best, float(finite.mean()) if finite.size else float("inf")))
-        self._progress(*self[-1])
-        return values
-
-
-def _polished(model: ForwardModel, ends: Array, rows: _Rows, progress: Progress) -> Outcome:
-    return concluded(model, descend_many(model, ends, progress), rows)
+    return concluded(model, descend_many(model, np.array(ends), progress), course)

@@ -11,8 +11,8 @@ from shoal.errors import InputError
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.recording import Clocked
-from shoal.identification.starts import starting_points
+from shoal.identification.methods.starts import starting_points
+from shoal.identification.recording.source import Clocked
 
 if TYPE_CHECKING:
     from shoal.engines.casadi_shooting import ShootingResult
@@ -20,14 +20,16 @@ if TYPE_CHECKING:
 
 def casadi(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """IPOPT on CasADi's own model, from the better start; initial angles and rates from one marker's position only."""
-    from shoal.engines.casadi_shooting import identify_initial_angles
+    with model.off_the_clock():  # slow to import
+        from shoal.engines.casadi_shooting import identify_initial_angles
 
     return _shoot(model, identify_initial_angles, progress)
 
 
 def casadi_multiple(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """The same with the record in segments whose first states are unknowns too, for long and chaotic motions."""
-    from shoal.engines.casadi_multiple_shooting import identify_by_segments
+    with model.off_the_clock():  # slow to import
+        from shoal.engines.casadi_multiple_shooting import identify_by_segments
 
     return _shoot(model, identify_by_segments, progress)
 
@@ -51,20 +53,18 @@ def _shoot(model: ForwardModel, search: Callable[..., ShootingResult], progress:
 
 def _question(model: ForwardModel) -> tuple[list[str], str]:
     """Paths of the parameters and the observed marker. Raises InputError for what shooting does not answer."""
-    entries = model.parameters.entries.values()
-    paths = [entry.parameter.path or "" for entry in entries]
     recording = model.measurement.first
     channels = recording.channels
     if len(model.measurement.recordings) > 1 or model.problem.ties or recording.stated != Clocked():
         raise InputError("method: casadi takes one recording without ties, clock and camera; use least-squares")
-    if model.problem.loss != "squares" or any(entry.parameter.prior for entry in entries):
+    if model.problem.loss != "squares" or model.parameters.priors:
         raise InputError("method: casadi takes no priors and no loss but squares; use least-squares")
     if not np.allclose(model.rows.weight, 1.0):
         raise InputError("method: casadi takes channels of equal noise; use least-squares")
-    if not all(path.startswith("initial.") for path in paths) or np.any(model.parameters.logarithmic):
+    if not np.all(model.parameters.initial) or np.any(model.parameters.logarithmic):
         raise InputError("method: casadi finds initial angles and rates only; use least-squares for other parameters")
     if not np.all(np.isfinite(recording.values)):
         raise InputError("method: casadi takes no gaps; use least-squares")
     if len({c.marker for c in channels}) != 1 or [c.quantity for c in channels] != ["x", "y"]:
         raise InputError("method: casadi takes x and y of one marker; use least-squares for other channels")
-    return paths, channels[0].marker
+    return list(model.parameters.paths), channels[0].marker

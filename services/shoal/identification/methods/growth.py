@@ -19,8 +19,7 @@ def growth(model: ForwardModel, jacobian: Array) -> float:
     chaotic motion says that the deviation is large, not how large: finite differences end where it is as large as the
     machine (Lorenz, J. Atmos. Sci. 26, 1969).
     """
-    entries = model.parameters.entries.values()
-    initial = np.array([(entry.parameter.path or "").startswith("initial.") for entry in entries])
+    initial = model.parameters.initial
     scaled = jacobian[: len(model.rows.time)] * (model.upper - model.lower)
     scaled = scaled[:, initial] if np.any(initial) else scaled
     largest = []

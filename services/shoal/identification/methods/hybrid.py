@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import descend_many
-from shoal.identification.methods.multi_start import best_apart, concluded
-from shoal.identification.methods.outcome import Outcome
+from shoal.identification.methods.lanes import best_apart, descend_many
+from shoal.identification.methods.outcome import Outcome, concluded
 from shoal.identification.methods.swarms import school
 from shoal.swarm import Iafsa
 

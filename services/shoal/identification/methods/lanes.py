@@ -7,8 +7,9 @@ squares problems, 2004).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from shoal.identification.forward import ForwardModel, Progress
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
+
+T = TypeVar("T")
 
 DIFFERENCE = 1e-6
 """Step of the finite differences, relative to the size of a parameter (at least 1e-3 of its range)."""
@@ -25,6 +28,10 @@ _SMALL_STEP = 1e-9
 _SMALL_GAIN = 1e-8
 """A step that promises to lower the fitness by less than this fraction is the end."""
 _LARGE_DAMPING = 1e12
+_APART = 0.02
+"""Two starts are different if a parameter differs by more than this fraction of its range."""
+ENDS_APART = 1e-3
+"""Two minima are different if a parameter differs by more than this fraction of its range."""
 _SAME = 1e-4
 """Two points are the same if no parameter differs by more than this fraction of its range."""
 
@@ -40,6 +47,11 @@ class Descent:
     rows: list[tuple[int, float, float]]
     converged: bool
 
+    @property
+    def message(self) -> str:
+        """Why it is no answer; empty if it has converged."""
+        return "" if self.converged else f"no convergence after {len(self.rows)} iterations"
+
 
 def descend_many(
     model: ForwardModel,
@@ -51,35 +63,35 @@ def descend_many(
 ) -> list[Descent]:
     """Minimise the squared residuals within the bounds from each start, (starts, parameters), in that order.
 
-    first: what `linearise_many` gives for the starts, if it is known.
+    first: what `differentiate_many` gives for the starts, if it is known.
     A descent leaves when it has converged, when it has come to where a better one is, and when after two steps even
     what its next step promises is more than `patience` times the best one's fitness. Those that leave early have not
     converged.
     """
-    searches = [_Search(model, *at) for at in zip(starts, *(first or linearise_many(model, starts)), strict=True)]
+    searches = [_Search(model, *at) for at in zip(starts, *(first or differentiate_many(model, starts)), strict=True)]
 
-    def linearise(_: Sequence[int], trials: Sequence[Array]) -> tuple[Sequence[Array], Sequence[Array]]:
-        residuals, jacobians = linearise_many(model, np.array(trials))
+    def differentiate(_: Sequence[int], trials: Sequence[Array]) -> tuple[Sequence[Array], Sequence[Array]]:
+        residuals, jacobians = differentiate_many(model, np.array(trials))
         return list(residuals), list(jacobians)
 
-    return _descend(searches, linearise, progress, patience)
+    return _descend(searches, differentiate, progress, patience)
 
 
-Linearise = Callable[[Sequence[int], Sequence[Array]], tuple[Sequence[Array], Sequence[Array]]]
+Differentiate = Callable[[Sequence[int], Sequence[Array]], tuple[Sequence[Array], Sequence[Array]]]
 """Residuals and Jacobians at points of some of several models, which are told by their numbers."""
 
 
 def descend_each(
-    models: Sequence[ForwardModel], starts: Sequence[Array], linearise: Linearise, *, patience: float, most: int
+    models: Sequence[ForwardModel], starts: Sequence[Array], differentiate: Differentiate, *, patience: float, most: int
 ) -> list[Descent]:
     """As `descend_many`, of several models with as many rows, from a start of each side by side; most: iterations."""
-    first = linearise(range(len(models)), starts)
+    first = differentiate(range(len(models)), starts)
     searches = [_Search(*at) for at in zip(models, starts, *first, strict=True)]
-    return _descend(searches, linearise, lambda *_: None, patience, most)
+    return _descend(searches, differentiate, lambda *_: None, patience, most)
 
 
 def _descend(
-    searches: list[_Search], linearise: Linearise, progress: Progress, patience: float, most: int = _ITERATIONS
+    searches: list[_Search], differentiate: Differentiate, progress: Progress, patience: float, most: int = _ITERATIONS
 ) -> list[Descent]:
     """Take steps until all have converged or left."""
     active, number = searches, {id(search): k for k, search in enumerate(searches)}
@@ -91,22 +103,21 @@ def _descend(
         if not going:
             break
         active, trials = [search for search, _ in going], [trial for _, trial in going]
-        seen = linearise([number[id(search)] for search in active], trials)
+        seen = differentiate([number[id(search)] for search in active], trials)
         for search, trial, residual, jacobian in zip(active, trials, *seen, strict=True):
             search.tell(trial, residual, jacobian)
         _report(iteration, searches, active, progress)
     return [search.descent() for search in searches]
 
 
-def linearise_many(model: ForwardModel, points: Array) -> tuple[Array, Array]:
+def differentiate_many(model: ForwardModel, points: Array) -> tuple[Array, Array]:
     """Residuals at points, (points, rows), and their forward-difference Jacobians, (points, rows, parameters).
 
     1 + parameters lanes for each point, in one call if the integrator's steps are fixed. Adaptive integrators take the
     same steps in all lanes of a tile, so a point and its neighbours stand in one: differences of runs that were stepped
     differently are those of the integrator's errors.
     """
-    steps = DIFFERENCE * np.array([model.sizes(point) for point in points])
-    steps = np.where(points + steps > model.upper, -steps, steps)
+    steps = np.array([difference_at(model, point) for point in points])
     count, size = points.shape
     shifted = points[:, None] + np.concatenate([np.zeros((count, 1, size)), steps[:, None] * np.eye(size)], axis=1)
     together = _together(model) or count
@@ -115,6 +126,12 @@ def linearise_many(model: ForwardModel, points: Array) -> tuple[Array, Array]:
     with np.errstate(invalid="ignore"):
         jacobians = np.moveaxis((found[:, 1:] - found[:, :1]) / steps[:, :, None], 1, 2)
     return found[:, 0], np.where(np.isfinite(jacobians), jacobians, 0.0)
+
+
+def difference_at(model: ForwardModel, point: Array) -> Array:
+    """Step of the finite differences at a point, inwards at an upper bound, (parameters,)."""
+    step = DIFFERENCE * model.sizes(point)
+    return np.where(point + step > model.upper, -step, step)
 
 
 def _together(model: ForwardModel) -> int:
@@ -130,17 +147,37 @@ def history(descents: Sequence[Descent]) -> list[tuple[int, float, float]]:
     for iteration in range(max(len(descent.rows) for descent in descents)):
         current = [descent.rows[iteration] for descent in descents if iteration < len(descent.rows)]
         best = min([row[1] for row in current] + [row[1] for row in rows[-1:]])
-        rows.append((iteration, best, _mean([row[2] for row in current])))
+        rows.append((iteration, best, mean_of(np.array([row[2] for row in current]))))
     return rows
 
 
-def distinct(model: ForwardModel, descents: Sequence[Descent], apart: float = 1e-3) -> list[Descent]:
-    """The descents, best first, without those that ended where a better one did; apart: a fraction of the ranges."""
-    found: list[Descent] = []
-    for descent in sorted(descents, key=lambda d: d.fitness):
-        if np.isfinite(descent.fitness) and all(_distance(model, descent, other) > apart for other in found):
-            found.append(descent)
-    return found
+def distinct(model: ForwardModel, descents: Sequence[Descent]) -> list[Descent]:
+    """The descents, best first, without those that ended where a better one did."""
+    finite = [descent for descent in descents if np.isfinite(descent.fitness)]
+    best_first = sorted(finite, key=lambda d: d.fitness)
+    return kept_apart(best_first, lambda one, other: distance(model, one.point, other.point) > ENDS_APART)
+
+
+def best_apart(model: ForwardModel, points: Array, values: Array, count: int) -> Array:
+    """The best points that are not close to a better one, one to `count`, (starts, parameters)."""
+    best_first = [points[k] for k in np.argsort(values, kind="stable") if np.isfinite(values[k])]
+    found = kept_apart(best_first, lambda one, other: distance(model, one, other) > _APART)
+    return np.array(found[:count] or [points[0]])
+
+
+class Course(list[tuple[int, float, float]]):
+    """Rows of (iteration, best, mean fitness), one for each population of a search; `progress` is told of each."""
+
+    def __init__(self, progress: Progress) -> None:
+        super().__init__()
+        self._progress = progress
+
+    def note(self, values: Array) -> Array:
+        """Add the row of a population; returns its values."""
+        best = min([*values[np.isfinite(values)].tolist(), self[-1][1] if self else np.inf])
+        self.append((len(self), best, mean_of(values)))
+        self._progress(*self[-1])
+        return values
 
 
 @dataclass
@@ -161,19 +198,19 @@ class _Search:
     rows: list[tuple[int, float, float]] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.cost = _cost(self.residual)
+        self.cost = squares(self.residual)
         self.scale = np.full(len(self.point), 1e-300)
         self.rows = [(0, self.fitness, self.fitness)]
 
     @property
     def fitness(self) -> float:
         """Mean squared deviation at the point."""
-        return self.cost / self.model.samples
+        return self.cost / self.model.rows.samples
 
     @property
     def promise(self) -> float:
         """Fitness after the step asked for last, if the model were linear."""
-        return (self.cost - self.predicted) / self.model.samples
+        return (self.cost - self.predicted) / self.model.rows.samples
 
     def ask(self) -> Array | None:
         """Where to look next, (parameters,), or None at the end."""
@@ -185,7 +222,7 @@ class _Search:
             wanted = self.point + self._step()
             trial = np.clip(wanted, model.lower, model.upper)
             moved = trial - self.point
-            self.predicted = self.cost - _cost(self.residual + self.jacobian @ moved)
+            self.predicted = self.cost - squares(self.residual + self.jacobian @ moved)
             # A step that a bound cuts may lead uphill: a shorter one does not.
             cut = np.any(trial != wanted) and self.predicted < _SMALL_GAIN * self.cost
             if not cut or self.damping > _LARGE_DAMPING:
@@ -197,7 +234,7 @@ class _Search:
 
     def tell(self, trial: Array, residual: Array, jacobian: Array) -> None:
         """Take residuals (rows,) and Jacobian (rows, parameters) of the trial point."""
-        cost = _cost(residual)
+        cost = squares(residual)
         if cost < self.cost:
             ratio = (self.cost - cost) / self.predicted
             self.point, self.residual, self.jacobian, self.cost = trial, residual, jacobian, cost
@@ -207,49 +244,62 @@ class _Search:
             self.damping *= self.growth
             self.growth *= 2
             self.converged = self.damping > _LARGE_DAMPING
-        self.rows.append((len(self.rows), self.fitness, cost / self.model.samples))
+        self.rows.append((len(self.rows), self.fitness, cost / self.model.rows.samples))
 
     def descent(self) -> Descent:
         """What came out."""
         return Descent(self.point, self.residual, self.jacobian, self.fitness, self.rows, self.converged)
 
     def _step(self) -> Array:
-        """Damped least-squares step in parameters scaled by the columns of the Jacobian (Marquardt 1963).
-
-        Parameters that stand at a bound and are driven against it stay there.
-        """
+        """Damped step, where parameters that stand at a bound and are driven against it stay there."""
         downhill = -self.jacobian.T @ self.residual
         held = (self.point <= self.model.lower) & (downhill < 0) | (self.point >= self.model.upper) & (downhill > 0)
         steeper = self.model.steepness(self.residual)
-        jacobian = np.where(held, 0.0, steeper[:, None] * self.jacobian / self.scale)
-        stacked = np.concatenate([jacobian, np.sqrt(self.damping) * np.eye(len(self.scale))])
-        wanted = np.concatenate([-self.residual / steeper, np.zeros(len(self.scale))])
-        return np.asarray(np.linalg.lstsq(stacked, wanted, rcond=None)[0] / self.scale)
+        jacobian = np.where(held, 0.0, steeper[:, None] * self.jacobian)
+        return damped_step(self.residual / steeper, jacobian, self.scale, self.damping)
 
 
 def _apart(searches: Sequence[_Search]) -> list[_Search]:
     """The searches without those that came to where a better one is."""
-    kept: list[_Search] = []
-    for search in sorted(searches, key=lambda s: s.cost):
-        if all(other.model is not search.model or _distance(search.model, search, other) > _SAME for other in kept):
-            kept.append(search)
+
+    def apart(one: _Search, other: _Search) -> bool:
+        return one.model is not other.model or distance(one.model, one.point, other.point) > _SAME
+
+    return kept_apart(sorted(searches, key=lambda s: s.cost), apart)
+
+
+def kept_apart(found: Iterable[T], apart: Callable[[T, T], bool]) -> list[T]:
+    """Those that lie apart from all that were kept before them."""
+    kept: list[T] = []
+    for one in found:
+        if all(apart(one, other) for other in kept):
+            kept.append(one)
     return kept
 
 
-def _distance(model: ForwardModel, one: _Search | Descent, other: _Search | Descent) -> float:
+def distance(model: ForwardModel, one: Array, other: Array) -> float:
     """Largest difference of a parameter, as a fraction of its range."""
-    return float(np.max(np.abs(one.point - other.point) / (model.upper - model.lower)))
+    return float(np.max(np.abs(one - other) / (model.upper - model.lower)))
+
+
+def damped_step(residual: Array, jacobian: Array, scale: Array, damping: float) -> Array:
+    """Least-squares step from residuals (rows,) by a Jacobian (rows, p), damped in units `scale` (Marquardt 1963)."""
+    stacked = np.concatenate([jacobian / scale, np.sqrt(damping) * np.eye(len(scale))])
+    wanted = np.concatenate([-residual, np.zeros(len(scale))])
+    return np.asarray(np.linalg.lstsq(stacked, wanted, rcond=None)[0] / scale)
 
 
 def _report(iteration: int, searches: Sequence[_Search], active: Sequence[_Search], progress: Progress) -> None:
-    progress(iteration, min(search.fitness for search in searches), _mean([search.rows[-1][2] for search in active]))
+    last = np.array([search.rows[-1][2] for search in active])
+    progress(iteration, min(search.fitness for search in searches), mean_of(last))
 
 
-def _mean(values: Sequence[float]) -> float:
+def mean_of(values: Array) -> float:
     """Mean of those that are finite; inf if none is."""
-    finite = [value for value in values if np.isfinite(value)]
-    return float(np.mean(finite)) if finite else float("inf")
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else float("inf")
 
 
-def _cost(residual: Array) -> float:
+def squares(residual: Array) -> float:
+    """Sum of the squares of a residual (rows,); inf where the motion failed."""
     return float(residual @ residual) if np.all(np.isfinite(residual)) else float("inf")

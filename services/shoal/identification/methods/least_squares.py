@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import Descent, descend_many, history, linearise_many
+from shoal.identification.methods.lanes import Descent, descend_many, differentiate_many, history
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.starts import starting_points
+from shoal.identification.methods.starts import starting_points
 from shoal.trajectory import Array
 
-__all__ = ["Descent", "descend", "from_starts", "least_squares", "linearise"]
+__all__ = ["Descent", "descend", "differentiate", "from_starts", "least_squares"]
 
 PATIENCE = 100.0
 """A rival that after two steps is still worse by this factor than the best start is given up."""
@@ -19,19 +19,18 @@ PATIENCE = 100.0
 def least_squares(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """Descend from every start side by side."""
     starts = starting_points(model)
-    return from_starts(model, starts, linearise_many(model, starts), progress)
+    return from_starts(model, starts, differentiate_many(model, starts), progress)
 
 
 def from_starts(model: ForwardModel, starts: Array, first: tuple[Array, Array], progress: Progress) -> Outcome:
-    """Descend from starts with residuals and Jacobians known there, as `linearise_many` gives them.
+    """Descend from starts with residuals and Jacobians known there, as `differentiate_many` gives them.
 
     Rivals that are given up are listed with the fitness they had.
     """
     descents = descend_many(model, starts, progress, first=first, patience=PATIENCE)
     best = min(descents, key=lambda d: d.fitness)
     others = [(d.point, d.fitness) for d in descents if d is not best]
-    message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
-    return Outcome(best.point, best.fitness, history(descents), message, others, converged=best.converged)
+    return Outcome(best.point, best.fitness, history(descents), best.message, others, converged=best.converged)
 
 
 def descend(model: ForwardModel, start: Array, progress: Progress) -> Descent:
@@ -39,7 +38,7 @@ def descend(model: ForwardModel, start: Array, progress: Progress) -> Descent:
     return descend_many(model, start[None], progress)[0]
 
 
-def linearise(model: ForwardModel, point: Array) -> tuple[Array, Array]:
+def differentiate(model: ForwardModel, point: Array) -> tuple[Array, Array]:
     """Residuals at a point, (m,), and their forward-difference Jacobian, (m, parameters); 1 + parameters lanes."""
-    residuals, jacobians = linearise_many(model, point[None])
+    residuals, jacobians = differentiate_many(model, point[None])
     return residuals[0], jacobians[0]

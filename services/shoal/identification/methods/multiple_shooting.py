@@ -12,17 +12,18 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg.lapack import dgglse
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.measurement import Measurement, Recording
-from shoal.identification.methods.lanes import linearise_many
+from shoal.identification.methods.lanes import differentiate_many
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import progressive
+from shoal.identification.methods.starts import starting_points
 from shoal.identification.problem import Parameter
-from shoal.identification.recording import Channel
-from shoal.identification.starts import starting_points
+from shoal.identification.recording.measurement import Measurement, Recording
+from shoal.identification.recording.source import Channel
 from shoal.scene import Scene
 from shoal.scene.joints import Attachment, Revolute
 from shoal.scene.loads import DistributedForce, Force, Spring, Torque, TorsionSpring
@@ -56,8 +57,7 @@ def multiple_shooting(model: ForwardModel, rng: np.random.Generator, progress: P
         point = progressive(model, rng, progress).point
         states = segments.simulated(point)
     end = descend(model, segments.meet(point, states), progress)
-    message = "" if end.converged else f"no convergence after {len(end.rows)} iterations"
-    return Outcome(end.point, end.fitness, end.rows, message)
+    return Outcome(end.point, end.fitness, end.rows, end.message)
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Segments:
         """The parameters whose motion is nearest to the data, from states at the segments' begins."""
         point = point.copy()
         for iteration in range(_ITERATIONS):
-            seen, jacobian = self._linearise(point, states)
+            seen, jacobian = self._differentiate(point, states)
             if not np.all(np.isfinite(seen)):
                 break
             if iteration == 0:
@@ -130,11 +130,11 @@ class Segments:
                 break
         return point
 
-    def _linearise(self, point: Array, states: Array) -> tuple[Array, Array]:
+    def _differentiate(self, point: Array, states: Array) -> tuple[Array, Array]:
         """Channels and states (segments, instants, seen) and their derivatives (..., states and others)."""
         points = np.column_stack([states, np.tile(point[self.others], (len(states), 1))])
         instants = self.short.measurement.first.times
-        seen, jacobian = linearise_many(self.short, points)
+        seen, jacobian = differentiate_many(self.short, points)
         shape = (len(points), len(instants), -1)
         return seen.reshape(shape), jacobian.reshape(*shape, points.shape[1])
 
@@ -161,8 +161,6 @@ class Segments:
             squares, numbers = squares + float(np.sum((weight * off) ** 2)), numbers + len(off)
         trust = np.sqrt(squares / numbers) / _TRUST / np.concatenate([np.ones(count * width), self._span])
         equations, wanted = self._equations(states, seen, jacobian, columns, shared)
-        from scipy.linalg.lapack import dgglse  # slow to import
-
         matrix, vector = np.concatenate([*rows, np.diag(trust)]), np.concatenate([*right, np.zeros(size)])
         found: Array = np.asarray(dgglse(matrix, equations, vector, wanted)[3])
         return found[: count * width].reshape(count, width), found[count * width :]
@@ -212,7 +210,7 @@ class Segments:
     @property
     def _weights(self) -> Array:
         """Weight of each channel, (channels,)."""
-        noise = self.model.noise
+        noise = self.model.rows.noise
         return np.ones(len(self.recording.channels)) if noise is None else noise / self.recording.noise
 
 
@@ -230,7 +228,7 @@ def cut(model: ForwardModel) -> Segments:
     instants, where = np.unique(
         np.round(np.concatenate([times - begins[number], np.diff(begins)]), 9), return_inverse=True
     )
-    others = [k for k, entry in enumerate(model.parameters.entries.values()) if not _is_state(entry.parameter)]
+    others = np.flatnonzero(~model.parameters.initial).tolist()
     short = _short(model, instants, others)
     return Segments(model, short, begins, number, where[: len(times)], where[len(times) :], others)
 
@@ -283,14 +281,10 @@ def _state_paths(scene: Scene) -> list[str]:
     return [f"initial.{body}.{quantity}" for body in scene.bodies for quantity in ("angle", "rate")]
 
 
-def _is_state(parameter: Parameter) -> bool:
-    return (parameter.path or "").startswith("initial.")
-
-
 def _check(model: ForwardModel) -> None:
     """Raise InputError, with the reason, where segments cannot be told from their state or do not fit the record."""
     scene, instead = model.scene, "use progressive"
-    paths = [*(e.parameter.path or "" for e in model.parameters.entries.values()), *model.problem.ties]
+    paths = [*model.parameters.paths, *model.problem.ties]
     joints = list(scene.joints.values())
     reasons = {
         "takes one recording": len(model.measurement.recordings) > 1,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
+from shoal.identification.methods.lanes import Descent, distinct, history
 from shoal.trajectory import Array
 
 
@@ -32,3 +33,13 @@ class Outcome:
 
 
 Method = Callable[[ForwardModel, np.random.Generator, Progress], Outcome]
+
+
+def concluded(model: ForwardModel, descents: Sequence[Descent], before: Sequence[tuple[int, float, float]]) -> Outcome:
+    """The outcome of descents: the best, the other minima in order, and the rows of the search before and of theirs."""
+    best, *others = distinct(model, descents) or [descents[0]]
+    rows = list(before)
+    for _, lowest, mean in history(descents):
+        rows.append((len(rows), min(lowest, rows[-1][1]) if rows else lowest, mean))
+    minima = [(descent.point, descent.fitness) for descent in others if descent.converged]
+    return Outcome(best.point, best.fitness, rows, best.message, minima)

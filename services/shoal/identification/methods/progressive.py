@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.lanes import descend_many, distinct, history
-from shoal.identification.methods.least_squares import linearise
+from shoal.identification.methods.lanes import descend_many, distance, distinct, history, kept_apart, squares
+from shoal.identification.methods.least_squares import differentiate
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.starts import starting_points
+from shoal.identification.methods.starts import starting_points
 from shoal.trajectory import Array
 
 FIRST, _PART = 0.5, 0.1
@@ -63,8 +63,7 @@ def extend(model: ForwardModel, starts: Array, progress: Progress) -> Outcome:
     descents = descend_many(model, np.array([branch.point for branch in branches]), progress)
     best = min(descents, key=lambda d: d.fitness)
     others = [(d.point, d.fitness) for d in distinct(model, descents) if d is not best]
-    message = "" if best.converged else f"no convergence after {len(best.rows)} iterations"
-    return Outcome(best.point, best.fitness, history(descents), message, others)
+    return Outcome(best.point, best.fitness, history(descents), best.message, others)
 
 
 def first_horizon(model: ForwardModel) -> float:
@@ -84,9 +83,9 @@ def fit(model: ForwardModel, start: Array) -> Branch:
     """
     span = model.upper - model.lower
     point, damping = start, 1e-3
-    residual, jacobian = linearise(model, point)
+    residual, jacobian = differentiate(model, point)
     for _ in range(_ITERATIONS):
-        cost = _squares(residual)
+        cost = squares(residual)
         if not np.isfinite(cost):
             break
         trust = np.sqrt(cost / len(residual)) / _TRUST / span
@@ -95,11 +94,11 @@ def fit(model: ForwardModel, start: Array) -> Branch:
         gradient = jacobian.T @ residual + trust**2 * (point - start)
         step = np.linalg.solve(normal / scale / scale[:, None], gradient / scale) / scale
         trial = np.clip(point - step, model.lower, model.upper)
-        predicted = cost - _squares(residual + jacobian @ (trial - point))
+        predicted = cost - squares(residual + jacobian @ (trial - point))
         if predicted < _GAIN * cost:
             break
-        there = linearise(model, trial)
-        if _squares(there[0]) < cost:
+        there = differentiate(model, trial)
+        if squares(there[0]) < cost:
             point, (residual, jacobian) = trial, there
             damping /= 10
         else:
@@ -109,25 +108,17 @@ def fit(model: ForwardModel, start: Array) -> Branch:
 
 def _survivors(model: ForwardModel, branches: list[Branch]) -> list[Branch]:
     """The branches worth going on with, best first: none that is much worse than the best, none twice."""
-    span = model.upper - model.lower
-    found: list[Branch] = []
-    for branch in sorted(branches, key=lambda b: b.fitness):
-        new = all(np.max(np.abs(branch.point - other.point) / span) > 1e-5 for other in found)
-        if not found or (new and branch.fitness <= _HOPELESS * found[0].fitness):
-            found.append(branch)
-    return found
+    best, *others = sorted(branches, key=lambda b: b.fitness)
+    worth = [best, *(branch for branch in others if branch.fitness <= _HOPELESS * best.fitness)]
+    return kept_apart(worth, lambda one, other: distance(model, one.point, other.point) > 1e-5)
 
 
 def _reach(model: ForwardModel, branch: Branch, horizon: float) -> float:
     """The next horizon [s] of a branch: where its prediction leaves the data."""
     part = model.until(min(_MOST * horizon, model.measurement.end))
     residual = part.residuals(branch.point[None])[0, : len(part.rows.time)]
-    allowed = max(_PREDICTED * model.spread, _NOTICED * float(np.sqrt(branch.fitness)))
+    allowed = max(_PREDICTED * model.rows.signal, _NOTICED * float(np.sqrt(branch.fitness)))
     off = part.rows.time[np.abs(residual) > allowed]
     off = off[off > horizon]
     reached = float(np.min(off)) if off.size else part.measurement.end
     return min(max(reached, _LEAST * horizon), model.measurement.end)
-
-
-def _squares(residual: Array) -> float:
-    return float(residual @ residual) if np.all(np.isfinite(residual)) else float("inf")

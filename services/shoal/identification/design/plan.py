@@ -1,0 +1,196 @@
+"""What to measure: which marker, for how long and how often would sharpen the parameter that is known worst.
+
+The sensitivities of every place to the parameters, at all times, come from one set of runs. With noise of a given size
+they tell the standard deviation of every parameter beforehand (Cramer-Rao bound; Atkinson, Donev, Tobias, Optimum
+Experimental Designs, 2007), to first order about one set of values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.errors import ComputationError, InputError
+from shoal.identification.design.asked import grid, noise_in, stated_noise, today_of
+from shoal.identification.design.precision import Aim, Bundle, Precision
+from shoal.identification.design.sensors import Sensor, columns_of, sensors_of
+from shoal.identification.forward import ForwardModel
+from shoal.identification.identify import identify
+from shoal.identification.problem import Problem
+from shoal.identification.recording.measurement import Measurement, Recording
+from shoal.identification.recording.source import Channel, EngineSource
+from shoal.identification.spread.sensitivity import AGREED, sensitivity
+from shoal.scene import Scene
+from shoal.trajectory import Array, plain
+
+_DURATIONS = (0.25, 0.5, 1.0, 1.5, 2.0)
+_RATES = (0.25, 0.5, 1.0, 2.0)
+_COURSE = 40
+
+
+@dataclass(frozen=True)
+class Design:
+    """Sensors, the best first, at the duration [s] and rate [1/s] of today, for given noise [m], [rad].
+
+    aim: what is to be sharpened; now: with the channels of the problem; second: each sensor beside the best one
+    table: score by the best marker, (durations, rates)
+    course: score of each sensor until `times` [s], (sensors, times)
+    doubt: relative difference of two steps of the sensitivities
+    """
+
+    problem: str
+    aim: Aim
+    values: dict[str, float]
+    noise: float
+    angle_noise: float | None
+    duration: float
+    rate: float
+    now: Precision
+    ranked: list[tuple[Sensor, Precision]]
+    second: list[tuple[Sensor, Precision]]
+    durations: Array
+    rates: Array
+    table: Array
+    times: Array
+    course: Array
+    doubt: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether the best sensor tells the parameter, by sensitivities that can be believed."""
+        return bool(np.isfinite(self.aim.score(self.ranked[0][1])) and self.doubt <= AGREED)
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal design --json` prints; null where nothing is told."""
+
+        def told(precision: Precision) -> dict[str, Any]:
+            std = dict(zip(self.aim.names, precision.std.tolist(), strict=True))
+            return {"std": std, "a": precision.a, "d": precision.d, "unknown": precision.unknown}
+
+        def rows(found: list[tuple[Sensor, Precision]]) -> list[dict[str, Any]]:
+            return [
+                {"marker": c.name, "body": c.body, "point": c.point, "quantity": c.quantity} | told(p) for c, p in found
+            ]
+
+        stated = ("problem", "values", "noise", "angle_noise", "duration", "rate")
+        return plain(  # type: ignore[no-any-return]
+            {"status": "ok" if self.ok else "failed", **{name: getattr(self, name) for name in stated}}
+            | {"weakest": self.aim.weakest(self.now)[0], "parameter": self.aim.parameter, "now": told(self.now)}
+            | {"ranked": rows(self.ranked), "second": rows(self.second), "durations": self.durations}
+            | {"rates": self.rates, "table": self.table, "doubt": self.doubt}
+        )
+
+
+def design(
+    problem: Problem,
+    *,
+    at: Mapping[str, float] | None = None,
+    values: Mapping[str, Any] | None = None,
+    measurement: Measurement | None = None,
+    noise: float | None = None,
+    angle_noise: float | None = None,
+    duration: float | None = None,
+    rate: float | None = None,
+    parameter: str | None = None,
+) -> Design:
+    """Rank what could be measured in (the first recording of) a problem. Raises InputError.
+
+    at: values of the parameters, else their starts; values: fields of the scene; measurement: whose duration and rate
+    are today's, where `duration` [s] and `rate` [1/s] are not given; noise [m], angle_noise [rad]: standard deviations,
+    else the problem's; parameter: to sharpen, else whichever has the largest standard deviation for its range
+    """
+    source = next(iter(problem.sources.values()))
+    noise, angle_noise = stated_noise(problem, noise, angle_noise)
+    duration, rate = today_of(source, measurement, duration, rate)
+    scene, sensors = sensors_of(problem.load_scene(values))
+    present = problem.channels_of(source)
+    channels = (*present, *(channel for sensor in sensors for channel in sensor.channels))
+    model = _model(problem, scene, channels, grid(duration, rate))
+    aim = Aim(model.names, model.upper - model.lower, parameter)
+    if parameter is not None and parameter not in aim.names:
+        raise InputError(f"parameter: no parameter {parameter!r}; there are {', '.join(aim.names)}")
+    point = _point(model, at)
+    seen = sensitivity(model, point)
+    if not np.all(np.isfinite(seen.residual)):
+        reason = model.refusal or "it fails"
+        raise InputError(f"{problem.name}: the motion about these values cannot be simulated: {reason}")
+    size = np.array([noise_in(channel, noise, angle_noise) for channel in channels])
+    bundle = Bundle.of(model.measurement.first.times, seen.jacobian, size, aim.span, len(present))
+    now = bundle.precision(range(bundle.present), duration)
+
+    def order(pair: tuple[Sensor, Precision]) -> tuple[float, int, float]:
+        return aim.score(pair[1]), pair[1].unknown, pair[1].a
+
+    columns = columns_of(bundle, sensors, angle_noise is not None)
+    ranked = sorted(((c, bundle.precision(own, duration)) for c, own in columns.items()), key=order)
+    best = columns[ranked[0][0]]
+    others = ((c, bundle.precision([*best, *own], duration)) for c, own in columns.items() if own != best)
+    durations, steps = duration * np.array(_DURATIONS), [round(2 / factor) for factor in _RATES]
+    course = np.linspace(0.0, 2 * duration, _COURSE + 1)[1:]
+    return Design(
+        problem=problem.name,
+        aim=aim,
+        values=model.parameters.told(point),
+        noise=noise,
+        angle_noise=angle_noise,
+        duration=duration,
+        rate=rate,
+        now=now,
+        ranked=ranked,
+        second=sorted(others, key=order),
+        durations=durations,
+        rates=rate * np.array(_RATES),
+        table=np.array([[aim.score(bundle.precision(best, end, step)) for step in steps] for end in durations]),
+        times=course,
+        course=np.array([[aim.score(bundle.precision(columns[c], end)) for end in course] for c, _ in ranked]),
+        doubt=seen.doubt,
+    )
+
+
+def _model(problem: Problem, scene: Scene, channels: tuple[Channel, ...], times: Array) -> ForwardModel:
+    """Of the first recording, with other channels at other times, of which nothing was measured yet."""
+    name, source = next(iter(problem.sources.items()))
+    # Standard deviations are told in the parameters' own units, but for those that are stated to be logarithms.
+    scales = {n: p.model_copy(update={"scale": "linear"}) for n, p in problem.parameters.items() if p.scale == "auto"}
+    changes = {"loss": "squares", "recordings": {name: source} if problem.recordings else {}}
+    changes["parameters"] = {**problem.parameters, **scales}
+    zeros, unknown = np.zeros((len(times), len(channels))), np.full(len(channels), np.nan)
+    nothing = Measurement({name: Recording(times, channels, zeros, "", unknown, source.as_stated())})
+    return ForwardModel(problem.model_copy(update=changes), scene, get_engine("gauss"), nothing)
+
+
+def has_data(problem: Problem) -> bool:
+    """Whether a problem brings its own data."""
+    return all(isinstance(source, EngineSource) or source.path for source in problem.sources.values())
+
+
+def about_answer(
+    problem: Problem,
+    data: str | Mapping[str, str] | None = None,
+    values: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> Design:
+    """A design about what the problem's data (or `data`) tell; options: of `design`.
+
+    Raises InputError, ComputationError where the answer cannot be trusted.
+    """
+    found = identify(problem, data=data, values=values)
+    if not found.verdict.trusted:
+        raise ComputationError(
+            f"{problem.name}: {found.verdict} ({found.message}); a design about the starts does without"
+        )
+    at = {name: value.value for name, value in found.parameters.items()}
+    return design(problem, at=at, values=values, measurement=found.measurement, **options)
+
+
+def _point(model: ForwardModel, at: Mapping[str, float] | None) -> Array:
+    if at is None:
+        return model.parameters.start
+    missing = [name for name in model.names if name not in at]
+    if missing:
+        raise InputError(f"at: no value for {missing[0]}; there are {', '.join(at)}")
+    return model.parameters.to_vector(np.array([at[name] for name in model.names]))

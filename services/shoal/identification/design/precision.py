@@ -1,0 +1,86 @@
+"""What a measurement would tell: the precision of the parameters by some of the channels, until a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.identification.spread.uncertainty import RANK_TOLERANCE
+from shoal.trajectory import Array
+
+
+@dataclass(frozen=True)
+class Precision:
+    """What a measurement would tell: standard deviation of each parameter (of its logarithm where that is sought).
+
+    std: inf where nothing is told, (parameters,); the others relative to the ranges between the bounds
+    a: root of the mean variance; d: geometric mean over the axes of the ellipsoid; unknown: directions left open
+    """
+
+    std: Array
+    a: float
+    d: float
+    unknown: int
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Sensitivities over the noise, (times, channels, parameters): `present` channels of today, then the sensors'."""
+
+    times: Array
+    table: Array
+    prior: Array
+    span: Array
+    present: int
+
+    @classmethod
+    def of(cls, times: Array, jacobian: Array, noise: Array, span: Array, present: int) -> Bundle:
+        """From a Jacobian (rows and priors, parameters) at all times, of channels with some noise, (channels,)."""
+        rows = len(times) * len(noise)
+        table = jacobian[:rows].reshape(len(times), len(noise), -1) / noise[:, None]
+        return cls(times, table, jacobian[rows:], span, present)
+
+    def precision(self, columns: Sequence[int], end: float, every: int = 2) -> Precision:
+        """By some of the channels until a time [s], every so many instants."""
+        # The grid is twice as fine as today's sampling.
+        keep = (self.times <= end * (1 + 1e-9))[every - 1 :: every]
+        rows = self.table[every - 1 :: every][keep][:, list(columns)].reshape(-1, len(self.span))
+        return precision(np.concatenate([rows, self.prior]), self.span)
+
+
+def precision(jacobian: Array, span: Array) -> Precision:
+    """What rows of sensitivities over the noise tell, (rows, parameters), for ranges `span` (parameters,)."""
+    count = len(span)
+    rows = np.concatenate([jacobian * span, np.zeros((count, count))])
+    _, singular, right = np.linalg.svd(np.linalg.qr(rows, mode="r"))
+    known = singular > RANK_TOLERANCE * singular[0] if singular[0] > 0 else np.zeros(count, dtype=bool)
+    inverse = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
+    relative = np.sqrt(np.sum((right.T * inverse) ** 2, axis=1))
+    hidden = np.linalg.norm(right[~known], axis=0) > 1e-3
+    relative = np.where(hidden, np.inf, relative)
+    d = float(np.exp(np.mean(np.log(inverse)))) if np.all(known) else np.inf
+    return Precision(relative * span, float(np.sqrt(np.mean(relative**2))), d, int(np.sum(~known)))
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What is to be sharpened: a parameter by its name, or None for the weakest, whichever that is.
+
+    names: of the parameters; span: their ranges between the bounds, (parameters,)
+    """
+
+    names: tuple[str, ...]
+    span: Array
+    parameter: str | None
+
+    def weakest(self, found: Precision) -> tuple[str, float]:
+        """The parameter that counts, and its standard deviation."""
+        k = int(np.argmax(found.std / self.span)) if self.parameter is None else self.names.index(self.parameter)
+        return self.names[k], float(found.std[k])
+
+    def score(self, found: Precision) -> float:
+        """Standard deviation of the parameter that counts over its range: the smaller the better."""
+        name, std = self.weakest(found)
+        return std / float(self.span[self.names.index(name)])

@@ -1,0 +1,211 @@
+"""What the residuals say about the model: their size against the noise, whether they are white, outliers."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtrc  # scipy.stats has it too, and takes a second to import
+
+from shoal.identification.forward import ForwardModel
+from shoal.identification.recording.noise import noise_of
+from shoal.identification.recording.units import of_channels
+from shoal.identification.spread.covariance import Block, Noise
+from shoal.trajectory import Array, plain
+
+_LARGE = 3.0
+"""Times a noise that is only estimated, from where on a residual is more than noise and its own uncertainty."""
+_LOUD = 1.5
+"""Times the stated noise: a white residual up to here is a noise that was stated too small, a larger one is not."""
+_SURE = 1e-6
+"""Chance below which an estimated noise counts as exceeded; models are looked at for many reasons, so it is small."""
+_DOUBT = 1e-3
+"""Chance below which a test against a stated noise, or of whiteness, counts as failed: a right model fails 1 in 500."""
+_NO_FIT = 0.05
+"""Of the signal: a systematic residual above this is a wrong model, one below it an imperfect one."""
+_HARDLY = 0.3
+"""Of the signal: a residual above this that is not white is none of a right model, whatever the noise may be."""
+_MOSTLY = 0.5
+"""Of the signal: a residual above this may be noise, but nobody said so."""
+_OUTLIER = 5.0
+_DIGITS = 1e-12
+"""Of the data: no deviation below is held against a model, as a motion is computed to this tolerance by default."""
+_MAD = 1.4826
+"""Standard deviation over the median absolute deviation of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class ResidualTests:
+    """Sizes are RMS over (weighted) rows, in SI units; priors do not count.
+
+    noise: the stated one, else what the data show without any model; signal: spread of the data about their means
+    mesh: the model's own error, 0 if unknown; chance_of_size: that noise of this size and correlation leaves such a
+    residual (chi-square); chance_of_white: that white noise is so correlated (Ljung and Box 1978), by the worst channel
+    excess: size of what is systematic in it, 0 where the residual is white
+    refined: size of the residual that a finer mesh and theory would leave
+    outliers: beyond five robust standard deviations of their channel; rows: how many there are
+    unit: of the sizes; empty where channels of different units are taken together, whose sizes mean something only
+    against each other
+    """
+
+    size: float
+    noise: float
+    noise_stated: bool
+    signal: float
+    mesh: float
+    chance_of_size: float
+    chance_of_white: float
+    outliers: int
+    rows: int
+    unit: str = ""
+    excess: float = 0.0
+    refined: float = np.inf
+
+    @property
+    def explained(self) -> float:
+        """What noise and mesh explain."""
+        return max(float(np.hypot(self.noise, self.mesh)), 1e-300)
+
+    @property
+    def ratio(self) -> float:
+        """Size over what noise and mesh explain."""
+        return min(self.size, self.refined) / self.explained
+
+    @property
+    def white(self) -> bool:
+        """Whether the residuals may be white noise."""
+        return self.chance_of_white > _DOUBT
+
+    @property
+    def too_large(self) -> bool:
+        """Whether the residual is larger than the stated noise, by a chance that leaves little doubt."""
+        return self.noise_stated and self.ratio > 1.0 and self.chance_of_size < _DOUBT
+
+    @property
+    def systematic(self) -> bool:
+        """Whether the residual is more than noise: larger than stated, and not white; or much larger."""
+        if self.noise_stated:
+            return self.too_large and (not self.white or self.ratio > _LOUD)
+        return self.ratio > _LARGE and self.chance_of_size < _SURE
+
+    @property
+    def limited(self) -> bool:
+        """Whether the model, and not the noise, limits what the fit tells."""
+        return self.systematic or self.excess > 0.0
+
+    @property
+    def explains_nothing(self) -> bool:
+        """Whether a constant would fit as well, or hardly worse where nobody said that the noise is so large."""
+        if self.noise_stated:
+            return self.too_large and self.size >= self.signal > 0.0
+        return self.size >= _MOSTLY * self.signal > 0.0
+
+    @property
+    def wrong_model(self) -> bool:
+        """Whether the model is refuted: against a stated noise, against a good part of the signal, or a constant."""
+        if self.noise_stated:
+            return self.systematic or self.explains_nothing
+        hardly = not self.white and self.ratio > 1.0 and self.size > _HARDLY * self.signal
+        return hardly or self.explains_nothing or (self.systematic and self.size > _NO_FIT * self.signal)
+
+    def sized(self, size: float) -> str:
+        """A size with its unit."""
+        return f"{size:.2g} {self.unit}".strip()
+
+    def sentences(self) -> list[str]:
+        """The tests in words."""
+        kind = "the stated noise" if self.noise_stated else "the noise that the data show without a model"
+        size = f"{self.sized(self.size)} (RMS), " if self.unit else ""
+        times = self.size / max(self.noise, 1e-300)
+        against = f"{_digits(times, 2)} times {kind}" if np.isfinite(times) else "against a noise that is not known"
+        found = [f"size: {size}{against}"]
+        if self.signal > 0:
+            found[0] += f", {_digits(100 * self.size / self.signal, 1)} % of the spread of the data"
+        found.append("correlation: none, like white noise" if self.white else "correlation: not white noise")
+        found.append(f"outliers: {self.outliers} of {self.rows} samples" if self.outliers else "outliers: none")
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """All fields, and what follows from them."""
+        told = {"ratio": self.ratio, "systematic": self.systematic, "wrong_model": self.wrong_model}
+        return plain({**asdict(self), **told})  # type: ignore[no-any-return]
+
+
+def residual_tests(
+    model: ForwardModel,
+    residual: Array,
+    blocks: list[Block],
+    noise: tuple[Noise, ...],
+    mesh: float = 0.0,
+    refined: Array | None = None,
+) -> ResidualTests:
+    """Test the residuals (rows,) of an answer; blocks, noise: as estimated with it.
+
+    mesh: size of the model's own error; refined: residuals (rows,) that the answer of a better mesh and theory would
+    leave, whose whiteness is then what counts
+    """
+    measured = [(b, n) for b, n in zip(blocks, noise, strict=True) if not b.known]
+    rows = np.concatenate([block.rows for block, _ in measured])
+    left = residual if refined is None else refined
+    size, smaller = (float(np.sqrt(np.mean(r[rows] ** 2))) for r in (residual, left))
+    seen = model.rows.noise if model.rows.noise is not None else _without_model(model)
+    # Chi-square with as many samples as the residual's memory leaves independent for its variance (Bartlett 1935),
+    # less the parameters.
+    independent = sum(len(b.rows) * (1.0 - n.rho**2) / (1.0 + n.rho**2) for b, n in measured) - len(model.names)
+    freedom = max(1.0, independent)
+    beyond = min(size, smaller) / max(float(np.hypot(seen, mesh)), 1e-300)
+    whiteness = [ljung_box(left[block.rows]) for block, _ in measured]
+    white = min(1.0, min(whiteness) * len(whiteness))
+    outlying = [_outlying(residual[block.rows]) for block, _ in measured]
+    return ResidualTests(
+        size=size,
+        noise=seen,
+        noise_stated=model.rows.noise is not None,
+        signal=model.rows.signal,
+        mesh=mesh,
+        # A product overflows to infinity, which has chance zero; a power would raise OverflowError.
+        chance_of_size=float(chdtrc(freedom, freedom * beyond * beyond)),
+        chance_of_white=white,
+        outliers=sum(outlying),
+        rows=len(rows),
+        unit=of_channels(model.measurement),
+        excess=0.0 if white > _DOUBT else _excess([left[block.rows] for block, _ in measured], seen, mesh),
+        refined=smaller,
+    )
+
+
+def _excess(residuals: list[Array], noise: float, mesh: float) -> float:
+    """Size of what is systematic in residuals (samples,) of the channels: beyond the noise, or alike in neighbours."""
+    count = sum(len(part) for part in residuals)
+    power = sum(float(part @ part) for part in residuals) / count
+    alike = sum(float(part[1:] @ part[:-1]) for part in residuals) / count
+    return float(np.sqrt(max(0.0, power - noise**2 - mesh**2, alike - mesh**2)))
+
+
+def ljung_box(signal: Array, lags: int = 10) -> float:
+    """Chance that white noise is as correlated as a signal (samples,) over its first lags."""
+    count, power = len(signal), float(signal @ signal)
+    lags = min(lags, count // 5)
+    if lags < 1 or power == 0.0:
+        return 1.0
+    rho = np.array([signal[lag:] @ signal[:-lag] for lag in range(1, lags + 1)]) / power
+    return float(chdtrc(lags, count * (count + 2) * np.sum(rho**2 / (count - np.arange(1, lags + 1)))))
+
+
+def _without_model(model: ForwardModel) -> float:
+    """The noise that the data show, and at least what is beyond the digits of the solver."""
+    recordings = model.measurement.recordings.values()
+    sizes = [np.maximum(noise_of(r), _DIGITS * np.max(np.abs(np.nan_to_num(r.values)), axis=0)) for r in recordings]
+    squares = [sizes[r][c] ** 2 for r, c in zip(model.rows.recording, model.rows.channel, strict=True)]
+    return float(np.sqrt(np.mean(squares * model.rows.weight**2)))
+
+
+def _digits(number: float, digits: int) -> str:
+    """A number to a few digits, without a power of ten where it can be read without."""
+    return f"{float(f'{number:.{digits}g}'):g}"
+
+
+def _outlying(residual: Array) -> int:
+    deviation = np.abs(residual - np.median(residual))
+    return int(np.sum(deviation > _OUTLIER * _MAD * max(float(np.median(deviation)), 1e-300)))

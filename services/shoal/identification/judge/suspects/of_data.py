@@ -1,0 +1,106 @@
+"""Other readings of the recorded numbers: units, mirrored and exchanged axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.suspects.size import size_of
+from shoal.identification.recording.measurement import Recording
+from shoal.trajectory import Array
+
+_UNITS = (1e3, 1e2, 25.4, float(np.degrees(1.0)))
+"""Between metres, millimetres, centimetres and inches (by millimetres), degrees and radians."""
+_TO_INCHES = 0.0254
+_FAR = 4.0
+"""Positions are read in a unit in which they lie within so many times the machine's reach, and not within 1 over it."""
+_SWINGS = (0.3, 60.0)
+"""Time is read in a unit in which a record lasts so many radians of a swing."""
+_TURNS = (0.02, 100.0)
+"""Angles are read in a unit in which they go so far [rad]."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A model whose recordings are read otherwise.
+
+    factor: of its positions or angles over those stated, by which its misfit is larger; value: that or 1 over it as
+    the suspect tells it
+    """
+
+    name: str
+    change: str
+    model: ForwardModel
+    value: float
+    factor: float = 1.0
+
+
+def of_data(model: ForwardModel) -> Iterator[Reading]:
+    """The readings of a model's recordings."""
+    kinds = {c.quantity for recording in model.measurement.recordings.values() for c in recording.channels}
+    axes = {"x", "y"} & kinds
+    machine = size_of(model.scene)
+    runs = model.measurement.recordings.values()
+    for factor in sorted({*_UNITS, *(1 / unit for unit in _UNITS), _TO_INCHES, 1 / _TO_INCHES}) if axes else ():
+        if 1 / _FAR < factor * _largest(runs, axes) / machine.reach < _FAR:
+            name, change = "unit of the positions", f"a factor of {factor:.4g}"
+            yield Reading(name, change, _read(model, _scaled(axes, factor)), factor, factor)
+    turning = {"angle", "rate"} & kinds
+    for factor in (_UNITS[3], 1 / _UNITS[3]) if turning else ():
+        if _TURNS[0] < factor * _largest(runs, turning) < _TURNS[1]:
+            name, change = "unit of the angles", f"a factor of {factor:.4g}"
+            yield Reading(name, change, _read(model, _scaled(turning, factor)), factor, factor)
+    for factor in (1e-3, 1e3, 1e-2, 1e2, 1 / 60.0, 60.0):
+        if not _SWINGS[0] < factor * model.measurement.end * machine.rate < _SWINGS[1]:
+            continue
+        slower = _read(model, lambda run, factor=factor: replace(run, times=run.times * factor))  # type: ignore[misc]
+        yield Reading("unit of the time", f"a factor of {factor:.4g}", slower, factor)
+    for axis in sorted(axes):
+        yield Reading(f"{axis} axis", "mirrored, it", _read(model, _scaled({axis}, -1.0)), -1.0)
+    if len(axes) == 2:
+        yield Reading("x and y axes", "exchanged, they", _read(model, _exchanged), -1.0)
+        turned = _read(model, _scaled(axes, -1.0))
+        yield Reading("x and y axes", "both mirrored, they", turned, -1.0)
+    if "angle" in kinds:
+        mirrored = _read(model, _scaled({"angle", "rate"}, -1.0))
+        yield Reading("sense of the angles", "mirrored, it", mirrored, -1.0)
+
+
+def _largest(runs: Iterable[Recording], quantities: set[str]) -> float:
+    """The largest number among channels of some quantities."""
+    return max(
+        float(np.nanmax(np.abs(run.values[:, k])))
+        for run in runs
+        for k, channel in enumerate(run.channels)
+        if channel.quantity in quantities
+    )
+
+
+def _read(model: ForwardModel, change: Callable[[Recording], Recording]) -> ForwardModel:
+    return model.aside(measurement=model.measurement.changed(change))
+
+
+def _scaled(quantities: set[str], factor: float) -> Callable[[Recording], Recording]:
+    def change(run: Recording) -> Recording:
+        factors = np.array([factor if channel.quantity in quantities else 1.0 for channel in run.channels])
+        return replace(run, values=run.values * factors, noise=run.noise * np.abs(factors))
+
+    return change
+
+
+def _exchanged(run: Recording) -> Recording:
+    """With x and y of each marker that has both exchanged."""
+    order: dict[tuple[str, str], int] = {(c.marker, c.quantity): k for k, c in enumerate(run.channels)}
+    other = {"x": "y", "y": "x"}
+    columns: list[int] = [
+        order.get((channel.marker, other.get(channel.quantity, "")), k) for k, channel in enumerate(run.channels)
+    ]
+    return replace(run, values=run.values[:, columns], noise=run.noise[columns])
+
+
+def misfit(residual: Array) -> float:
+    """Root mean square, infinite where a motion failed."""
+    return float(np.sqrt(np.mean(residual**2))) if np.all(np.isfinite(residual)) else float("inf")

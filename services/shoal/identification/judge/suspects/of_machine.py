@@ -1,0 +1,153 @@
+"""What a scene states or leaves out of a machine: friction, masses, lengths, pivots, rates at the start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.size import Size, size_of
+from shoal.identification.problem import Parameter
+from shoal.mechanics.start.start import is_direct
+from shoal.scene import PointMass, RigidBody, Rod, Scene
+from shoal.scene.joints import GROUND, Attachment, Revolute, Slider, places
+
+_FACTORS = 2.0
+_STEP = 1e-3
+"""Of the largest value that is looked for: the change by which an effect is measured."""
+_SHIFT = 0.2
+"""Of the size of the machine, how far off a pivot is looked for."""
+_NOTHING = 1e-6
+"""Of the machine: a further mass that is none."""
+
+
+def of_machine(model: ForwardModel) -> Iterator[Candidate]:
+    """The candidates of a model's scene."""
+    scene = model.scene
+    size = size_of(scene)
+    yield from _friction(scene, size)
+    yield from _masses(scene, size)
+    yield from _lengths(scene)
+    yield from _pivots(scene, size)
+    yield from _rates(scene, size)
+
+
+def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
+    """Viscous and dry, of each joint that has a place for them."""
+    force = size.mass * size.gravity
+    for name, joint in scene.joints.items():
+        if not isinstance(joint, Revolute | Slider):
+            continue
+        turning = isinstance(joint, Revolute)
+        most = {
+            "friction": force * size.length / size.rate if turning else force / (size.rate * size.length),
+            "coulomb": 0.5 * force * (size.length if turning else 1.0),
+        }
+        for field, upper in most.items():
+            stated = float(getattr(joint, field))
+            free = Parameter(path=f"joints.{name}.{field}", lower=0.0, upper=max(upper, 4 * stated), scale="linear")
+            words = "friction" if field == "friction" else "dry friction"
+            yield Candidate.single(f"{words} of {name}", stated, free, stated + _STEP * upper)
+
+
+def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
+    """A further mass at each marker, and the mass of each body."""
+    loaded, seen = scene.model_dump(mode="json"), dict[str, str]()
+    for name, marker in scene.markers.items():
+        place = str((marker.body, scene.location(marker)))
+        if place in seen.values():
+            continue
+        further, seen[name] = f"further-{name}", place
+        loaded["bodies"][further] = {"kind": "point-mass", "mass": _NOTHING * size.mass}
+        loaded["joints"][further] = {"first": loaded["markers"][name], "second": {"body": further}}
+    with suppress(InputError):
+        with_masses = Scene.parse(loaded)
+        for name in seen:
+            path = f"bodies.further-{name}.mass"
+            free = Parameter(path=path, lower=_NOTHING * size.mass, upper=size.mass, scale="linear")
+            yield Candidate.single(f"mass at {name}", 0.0, free, _STEP * size.mass, scene=with_masses)
+    for name, body in scene.bodies.items() if len(scene.bodies) > 1 else ():
+        field = "density" if isinstance(body, Rod) else "mass"
+        yield _ratio(f"mass of {name}", f"bodies.{name}.{field}", float(getattr(body, field)))
+    for name, body in scene.bodies.items():
+        if isinstance(body, RigidBody) and body.inertia > 0:
+            yield _ratio(f"inertia of {name}", f"bodies.{name}.inertia", body.inertia)
+            for axis, where in enumerate(body.centre_of_mass):
+                if where:
+                    path = f"bodies.{name}.centre_of_mass.{axis}"
+                    yield _ratio(f"centre of mass of {name}", path, where)
+
+
+def _lengths(scene: Scene) -> Iterator[Candidate]:
+    for name, body in scene.bodies.items():
+        if isinstance(body, Rod):
+            yield _ratio(f"length of {name}", f"bodies.{name}.length", body.length)
+        elif isinstance(body, RigidBody):
+            for point, place in body.named_points.items():
+                axis = int(np.argmax(np.abs(place)))
+                if place[axis]:
+                    words = f"place of {point} on {name}"
+                    yield _ratio(words, f"bodies.{name}.named_points.{point}.{axis}", place[axis])
+
+
+def _ratio(name: str, path: str, stated: float) -> Candidate:
+    """A number known to within a factor."""
+    lower, upper = sorted((stated / _FACTORS, stated * _FACTORS))
+    free = Parameter(path=path, lower=lower, upper=upper, scale="log" if stated > 0 else "linear")
+    return Candidate.single(name, stated, free, stated * (1 + _STEP), factor=True)
+
+
+def _pivots(scene: Scene, size: Size) -> Iterator[Candidate]:
+    """Places on the ground; where there is only one, a shift of it is one of the camera."""
+    places = {
+        (name, field): side.point
+        for name, joint in scene.joints.items()
+        if isinstance(joint, Revolute | Slider)
+        for field, side in (("first", joint.first), ("second", joint.second))
+        if side.body == GROUND and not isinstance(side.point, str)
+    }
+    for (name, field), place in places.items() if len(places) > 1 else ():
+        for axis, stated in enumerate(place):
+            path, width = f"joints.{name}.{field}.point.{axis}", _SHIFT * size.length
+            free = Parameter(path=path, lower=stated - width, upper=stated + width, scale="linear")
+            yield Candidate.single(f"{'xy'[axis]} of the pivot {name}", stated, free, stated + _STEP * width)
+    yield from _joints_on_bodies(scene)
+
+
+def _joints_on_bodies(scene: Scene) -> Iterator[Candidate]:
+    """Places of joints on rigid rods, along the rod."""
+    explicit, found = scene.model_dump(mode="json"), list[tuple[str, str, float, float]]()
+    for name, joint in scene.joints.items():
+        for field in ("first", "second") if isinstance(joint, Revolute) else ():
+            side: Attachment = getattr(joint, field)
+            body = scene.bodies.get(side.body)
+            if not isinstance(body, Rod) or body.element != "rigid":
+                continue
+            along, across = scene.location(side)
+            explicit["joints"][name][field]["point"] = [along, across]
+            found.append((name, field, along, body.length))
+    with suppress(InputError):
+        stated = Scene.parse(explicit)
+        for name, field, along, length in found:
+            path, width = f"joints.{name}.{field}.point.0", _SHIFT * length
+            free = Parameter(path=path, lower=along - width, upper=along + width, scale="linear")
+            words = f"place of {name} on {getattr(scene.joints[name], field).body}"
+            yield Candidate.single(words, along, free, along + _STEP * width, scene=stated)
+
+
+def _rates(scene: Scene, size: Size) -> Iterator[Candidate]:
+    """Rates at the start; in a closed loop of what stands on the ground only, as those of others follow."""
+    direct = is_direct(scene)
+    grounded = {side.body for joint in scene.joints.values() if (on := places(joint)) for side in on
+                if any(other.body == GROUND for other in on)}  # fmt: skip
+    for name, body in scene.bodies.items():
+        if isinstance(body, PointMass) or not (direct or name in grounded):
+            continue
+        rate, most = scene.start(name).rate, 10.0 * size.rate
+        free = Parameter(path=f"initial.{name}.rate", lower=rate - most, upper=rate + most, scale="linear")
+        words = f"rate of {name} at the start"
+        yield Candidate.single(words, rate, free, rate + _STEP * size.rate, alone=not direct)

@@ -1,0 +1,44 @@
+"""What a recording states: clock, scale, place and tilt of the camera, the release, and the gravity there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.problem import RESERVED, Parameter
+
+_FACTORS = 2.0
+"""Clock, scale and gravity are looked for within this factor."""
+_LATE = 0.2
+_EARLY = 0.5
+"""Of the record: how much may be missing after the release, and how long the machine may be held before it."""
+_STEP = 1e-4
+
+
+def of_measurement(model: ForwardModel) -> Iterator[Candidate]:
+    """The candidates of a model's recordings, by what the first one states."""
+    first = model.measurement.first
+    channels = [c for recording in model.measurement.recordings.values() for c in recording.channels]
+    positions = any(channel.is_position for channel in channels)
+    reach = float(np.nanmax(np.abs(np.nan_to_num(first.values)))) + 1e-9
+    end = model.measurement.end
+    for name in ("clock", "scale") if positions else ("clock",):
+        stated = float(getattr(first.stated, name))
+        free = Parameter(path=f"{RESERVED}.{name}", lower=stated / _FACTORS, upper=stated * _FACTORS, scale="log")
+        yield Candidate.single(name, stated, free, stated * (1 + _STEP), "measurement", factor=True)
+    shifts = {"tilt": np.pi / 2} | ({"x": reach, "y": reach} if positions else {})
+    for name, width in shifts.items():
+        stated = float(getattr(first.stated, name))
+        free = Parameter(path=f"{RESERVED}.{name}", lower=stated - width, upper=stated + width, scale="linear")
+        yield Candidate.single(name, stated, free, stated + _STEP * width, "measurement")
+    stated = first.stated.delay
+    free = Parameter(path=f"{RESERVED}.delay", lower=stated - _EARLY * end, upper=stated + _LATE * end, scale="linear")
+    yield Candidate.single("delay", stated, free, stated + _STEP * end, "measurement")
+    size = model.scene.gravity[1]
+    if size != 0.0 and model.scene.gravity[0] == 0.0:
+        lower, upper = sorted((size / _FACTORS, size * _FACTORS))
+        free = Parameter(path="gravity.1", lower=lower, upper=upper, scale="linear")
+        yield Candidate.single("gravity", size, free, size * (1 + _STEP), "measurement", factor=True)

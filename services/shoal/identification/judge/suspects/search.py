@@ -1,0 +1,289 @@
+"""Where a model does not fit: which of the things taken as known would explain it.
+
+A wrong clock or an omitted mass is a fault that no fit of the parameters shows. Each candidate is freed in turn and the
+residual is regressed on its effect, the parameters following (a score test: Rao 1948); the most promising are then
+fitted together with the parameters, until one leaves no more than noise. A misfit that is a good part of the signal may
+also come from another reading of the numbers. Where nothing explains it, values of each candidate are tried over its
+whole range.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from shoal.identification.deadline import TimeIsUp
+from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.suspects.bending import bending
+from shoal.identification.judge.suspects.candidate import Candidate
+from shoal.identification.judge.suspects.fits import Together, groups_of
+from shoal.identification.judge.suspects.of_data import Reading, misfit, of_data
+from shoal.identification.judge.suspects.of_machine import of_machine
+from shoal.identification.judge.suspects.of_measurement import of_measurement
+from shoal.identification.judge.suspects.shaken import shaken
+from shoal.identification.judge.suspects.suspect import Suspect, explains, penalty
+from shoal.identification.methods.lanes import Descent, descend_many
+from shoal.identification.methods.starts import starting_points
+from shoal.identification.recording.units import of_channels
+from shoal.trajectory import Array
+
+_FITTED = 8
+"""Candidates that are fitted at a time."""
+_DEAR = 2
+"""Fitted at most of a kind that takes long to simulate; its scores are those of many values, and can be trusted."""
+_READ = 6
+"""Readings that are fitted, at most; and so many candidates after a scan."""
+_AFTER_SCAN = 3
+_HOPELESS = 0.98
+"""Of the present misfit: a promise of no less is not followed."""
+_GROSS = 0.05
+"""Of the signal: from this misfit on the numbers may have been read wrongly."""
+_SHARES = np.array([1.0, 0.5, 0.2, 0.05, 0.0])
+"""Of the change that the regression promises, from the best of which a fit starts."""
+_SCAN = 11
+_UNSEEN = 1e-6
+_ALIKE = 0.999
+"""Cosine of two effects beyond what the parameters follow: from here on small faults are not told from each other."""
+_BETTER = 0.99
+"""Of the misfit: a lower one with nothing changed is that of a better minimum."""
+_PATIENCE = 10.0
+_CONSTANT = 0.5
+"""Of the signal: an explanation that leaves more is none, as a constant leaves hardly more."""
+_FAR = 3.0
+"""Times the misfit of the best: what leaves more is not listed."""
+_WHOLLY = 1.1
+"""Times the noise: what leaves no more explains a misfit wholly."""
+_SMALL = 3.0
+"""Times the noise: a misfit that several causes may explain wholly."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The suspects, those that explain most first; better: a minimum of the model itself that fits better, if met."""
+
+    suspects: list[Suspect] = field(default_factory=list)
+    better: Descent | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Scored:
+    """A candidate of a group, where to fit it from, and the misfit over the present one that this promises.
+
+    effect: the unit vector of its effect beyond what the parameters follow, (rows,); empty after a scan
+    """
+
+    together: Together
+    number: int
+    promise: float
+    starts: Array
+    effect: Array
+
+    @property
+    def candidate(self) -> Candidate:
+        return self.together.group[self.number]
+
+
+def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array, noise: float = 0.0) -> Findings:
+    """What explains the residual at an answer, the best first. Runs are not counted.
+
+    noise: what no explanation can go below [RMS]. Past the model's deadline it ends with what was found until then.
+    """
+    search = _Search(model, point, residual, jacobian, noise)
+    with suppress(TimeIsUp):
+        search.run()
+    rows = len(residual)
+    # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
+    told = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.rows.signal)
+    found = sorted(told, key=lambda s: (float(f"{s.cost(rows):.2e}"), s.name))
+    listed = [suspect for suspect in found if suspect.after <= _FAR * found[0].after]
+    return Findings([replace(s, alike=search.alike(s.name)) for s in listed], search.better)
+
+
+class _Search:
+    """One search, whose finds stay when its time is up."""
+
+    def __init__(self, model: ForwardModel, point: Array, residual: Array, jacobian: Array, noise: float) -> None:
+        self.model = model.aside()
+        self.point, self.residual, self.noise = point, residual, noise
+        self.before = misfit(residual)
+        left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
+        seen = singular > 1e-8 * max(float(singular[0]), 1e-300)
+        self.basis = left[:, seen]
+        self.inverse = (right[seen].T / singular[seen]) @ left[:, seen].T
+        self.found: list[Suspect] = []
+        self.effects: dict[str, Array] = {}
+        self.ends: list[tuple[float, Array]] = []
+        self.better: Descent | None = None
+
+    def run(self) -> None:
+        """Candidates near the answer, other readings, candidates far from it; then whether a better minimum was met."""
+        simple = [*of_measurement(self.model), *of_machine(self.model)]
+        self._try(simple)
+        gross = _GROSS * self.model.rows.signal
+        if gross > 0.0 and self._least > gross:
+            self._read()
+        if not self._explained and self.before > self.noise:
+            for dear in (shaken(self.model), bending(self.model)):
+                self._fit(self._near(self._promising([*dear]))[:_DEAR])
+        # What lies near an answer that leaves little shows in the regression.
+        if self._least > gross and not self._explained:
+            places = np.vstack([self.point, starting_points(self.model)[:3]])
+            scans = [s for group in self._groups(simple) for s in self._scanned(group, places)]
+            self._fit(sorted(scans, key=lambda s: s.promise)[:_AFTER_SCAN])
+        self._look_back()
+
+    def _groups(self, candidates: list[Candidate]) -> list[Together]:
+        """The candidates that are not sought themselves, those of one machine together."""
+        sought = {*self.model.parameters.paths, *self.model.problem.ties}
+        return [Together(self.model, group) for group in groups_of(c for c in candidates if not c.paths & sought)]
+
+    def _try(self, candidates: list[Candidate]) -> None:
+        """Fit the most promising, then the next ones, until one explains the misfit wholly."""
+        scored = self._promising(candidates)
+        # A small fault does what its derivative says, a large one may do better.
+        scored = scored if self.before > _GROSS * self.model.rows.signal else self._near(scored)
+        for k in range(0, len(scored), _FITTED):
+            self._fit(scored[k : k + _FITTED])
+            if self._explained:
+                break
+
+    def _promising(self, candidates: list[Candidate]) -> list[_Scored]:
+        """Those that promise something, the best first."""
+        scored = [s for group in self._groups(candidates) for s in self._scored(group) if s.promise < _HOPELESS]
+        return sorted(scored, key=lambda s: s.promise)
+
+    def _near(self, scored: list[_Scored]) -> list[_Scored]:
+        """Those that promise hardly less than the best."""
+        return [s for s in scored if s.promise < _FAR * scored[0].promise]
+
+    def alike(self, name: str) -> tuple[str, ...]:
+        """Candidates whose small faults have the same effect as that of one by name."""
+        mine = self.effects.get(name)
+        if mine is None:
+            return ()
+        same = (other for other, effect in self.effects.items() if abs(float(mine @ effect)) > _ALIKE)
+        return tuple(other for other in same if other != name)
+
+    @property
+    def _least(self) -> float:
+        """The misfit of the best explanation."""
+        return min([self.before, *(suspect.after for suspect in self.found)])
+
+    @property
+    def _explained(self) -> bool:
+        """Whether the best explanation leaves no more than noise, of what was so large that another would not."""
+        return self._least <= _WHOLLY * self.noise and self.before > _SMALL * self.noise
+
+    def _scored(self, together: Together) -> list[_Scored]:
+        """The regressions of the residual on the effects of candidates of one machine, by one call."""
+        owners, points = list[int](), list[Array]()
+        for k, candidate in enumerate(together.group):
+            for probe in candidate.probes.reshape(-1, len(candidate.parameters)):
+                owners.append(k)
+                points.append(np.append(self.point, candidate.vector(probe)))
+        seen = together.residuals(owners, points) - self.residual
+        found = []
+        for k, candidate in enumerate(together.group):
+            effects = seen[np.array(owners) == k].reshape(*candidate.probes.shape[:2], -1)
+            ways = [self._score(together, k, way, effect) for way, effect in enumerate(effects)]
+            known = [way for way in ways if way is not None]
+            if known:
+                found.append(best := min(known, key=lambda s: s.promise))
+                self.effects[candidate.name] = best.effect
+        return found
+
+    def _score(self, together: Together, number: int, way: int, effects: Array) -> _Scored | None:
+        """Of one way, whose effects are (effects, rows)."""
+        if not np.all(np.isfinite(effects)):
+            return None
+        candidate = together.group[number]
+        own = effects - effects @ self.basis @ self.basis.T
+        if np.linalg.norm(own) <= _UNSEEN * np.linalg.norm(effects):
+            return None
+        left = self.residual - self.basis @ (self.basis.T @ self.residual)
+        wanted = np.linalg.lstsq(own.T, -left)[0]
+        amounts = candidate.amounts(way, candidate.at(way, wanted))
+        smaller = float(np.linalg.norm(left + amounts @ own)) / float(np.linalg.norm(self.residual))
+        starts = []
+        for share in _SHARES if candidate.law != "inverse" else (1.0,):
+            amount = share * amounts
+            shifted = self.point - self.inverse @ (self.residual + amount @ effects)
+            shifted = np.clip(shifted if share else self.point, self.model.lower, self.model.upper)
+            starts.append(np.append(shifted, candidate.vector(candidate.at(way, amount))))
+        promise = smaller * float(np.sqrt(penalty(len(candidate.parameters), len(left))))
+        along = amounts @ own
+        return _Scored(together, number, promise, np.array(starts), along / max(float(np.linalg.norm(along)), 1e-300))
+
+    def _scanned(self, together: Together, places: Array) -> list[_Scored]:
+        """To be fitted from the best of a scan of their values, at each of the places (points, parameters)."""
+        found = []
+        for k, candidate in enumerate(together.group):
+            if len(candidate.parameters) > 1:
+                continue
+            free = candidate.freed(self.model)
+            values = np.linspace(free.lower[-1], free.upper[-1], _SCAN)
+            points = np.column_stack([np.repeat(places, len(values), axis=0), np.tile(values, len(places))])
+            residuals = free.uncounted(points)
+            best = int(np.argmin(free.cost(residuals)))
+            promise = misfit(residuals[best]) / self.before
+            found.append(_Scored(together, k, promise, points[[best]], np.empty(0)))
+        return found
+
+    def _fit(self, scored: list[_Scored]) -> None:
+        """Fit candidates with the parameters, and keep those that explain the misfit."""
+        for together in dict.fromkeys(entry.together for entry in scored):
+            mine = [entry for entry in scored if entry.together is together]
+            numbers = [entry.number for entry in mine]
+            tried = [(entry.number, start) for entry in mine for start in entry.starts]
+            costs = self.model.cost(together.residuals(*zip(*tried, strict=True)))
+            ends, starts = np.cumsum([len(entry.starts) for entry in mine]), []
+            for entry, end in zip(mine, ends, strict=True):
+                starts.append(entry.starts[int(np.argmin(costs[end - len(entry.starts) : end]))])
+            for k, end in zip(numbers, together.fit(numbers, starts), strict=True):
+                self._keep(together.group[k], end)
+
+    def _keep(self, candidate: Candidate, end: Descent) -> None:
+        """Note where a fit ended, and the suspect that it makes if it explains the misfit."""
+        known, after = len(self.point), misfit(end.residual)
+        free = candidate.freed(self.model)
+        values = free.parameters.to_values(end.point)[known:]
+        self.ends.append((after, end.point[:known]))
+        if not explains(self.before, after, self.noise, len(self.residual)):
+            return
+        value, change = candidate.told(values)
+        stated = 0.0 if candidate.tell else candidate.stated[0]
+        told = (candidate.name, stated, value, self.before, after, change, of_channels(self.model.measurement))
+        self.found.append(Suspect(*told, candidate.kind, len(values)))
+
+    def _read(self) -> None:
+        """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
+        begun: list[tuple[float, int, Reading, Array]] = []
+        for reading in of_data(self.model):
+            if reading.model.rows.signal == 0.0:  # at rest every reading is the same
+                continue
+            starts = starting_points(reading.model)
+            costs = reading.model.cost(reading.model.uncounted(starts))
+            begun.append(
+                (float(np.min(costs)) / reading.model.rows.signal**2, len(begun), reading, starts[np.argsort(costs)])
+            )
+        for _, _, reading, starts in sorted(begun, key=lambda entry: entry[:2])[:_READ]:
+            ends = descend_many(reading.model, starts[:3], patience=_PATIENCE)
+            after = min(misfit(end.residual) for end in ends) * self.model.rows.signal / reading.model.rows.signal
+            if explains(self.before, after, self.noise, len(self.residual)):
+                self.found.append(_of_reading(reading, self.before, after, of_channels(self.model.measurement)))
+
+    def _look_back(self) -> None:
+        """Whether the refits met a better minimum: what was freed goes back to its stated value."""
+        promising = [end for after, end in sorted(self.ends, key=lambda end: end[0])[:2] if after < self.before]
+        if not promising:
+            return
+        ends = descend_many(self.model, np.array(promising), patience=_PATIENCE)
+        best = min(ends, key=lambda end: end.fitness)
+        if misfit(best.residual) < _BETTER * self.before:
+            self.better = best
+
+
+def _of_reading(reading: Reading, before: float, after: float, unit: str) -> Suspect:
+    return Suspect(reading.name, 1.0, reading.value, before, after, reading.change, unit, "data")

@@ -1,0 +1,175 @@
+"""The verdict: what the evidence allows to say about an answer, why, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from shoal.identification.deadline import TimeIsUp
+from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.exchanged import exchanged
+from shoal.identification.judge.residual_tests import ResidualTests
+from shoal.identification.judge.rivals import relation, rivals_of, within
+from shoal.identification.judge.stationarity import downhill, sentence
+from shoal.identification.judge.suspects import Findings, Suspect, suspects
+from shoal.identification.methods.lanes import Descent
+from shoal.identification.methods.outcome import Outcome
+from shoal.identification.spread.intervals import few
+from shoal.identification.spread.sensitivity import Sensitivity
+from shoal.identification.spread.uncertainty import Linearisation
+from shoal.identification.spread.value import Value
+from shoal.trajectory import Array
+
+_DECISIVE = 5.0
+"""A property of the measurement that lowers even a small misfit by this factor refutes what was stated of it."""
+_NEGLIGIBLE = 1e-4
+"""Of the signal: a misfit below it is not looked into."""
+_OTHERS = 3
+"""Suspects that explain less than the best, and are named beside it."""
+
+
+class Verdict(StrEnum):
+    """What may be made of an estimate. Only the first two are answers."""
+
+    IDENTIFIED = "identified"
+    COMBINATION = "identified up to a combination"
+    AMBIGUOUS = "ambiguous"
+    REJECTED = "model rejected"
+    UNFINISHED = "not at a minimum"
+    FAILED = "failed"
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the answer can be used."""
+        return self in (Verdict.IDENTIFIED, Verdict.COMBINATION)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict, why, what to do next, and what would explain a misfit.
+
+    better: a minimum that fits better, if the search for suspects met one: go on from there
+    """
+
+    verdict: Verdict
+    message: str = ""
+    advice: list[str] = field(default_factory=list)
+    suspects: list[Suspect] = field(default_factory=list)
+    better: Descent | None = None
+
+
+def judge(
+    model: ForwardModel,
+    outcome: Outcome,
+    seen: Sensitivity,
+    at: Linearisation,
+    tests: ResidualTests,
+    parameters: Mapping[str, Value],
+    unknown: list[str],
+) -> Judgement:
+    """The verdict on an outcome: failures first, then the minimum, the model, rivals, and what is identifiable."""
+    if not outcome.ended:
+        advice = ["allow more time, or start from a better place"]
+        return Judgement(Verdict.FAILED, outcome.message or "the method did not come to its end", advice)
+    if few(model):
+        reason = f"{tests.rows} measured numbers for {len(parameters)} unknown: too few to tell how uncertain they are"
+        return Judgement(Verdict.FAILED, reason, ["measure more, or state the noise of the channels"])
+    if unfinished := _unfinished(model, outcome.point, seen):
+        advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
+        return Judgement(Verdict.UNFINISHED, unfinished, advice)
+    looked = Findings()
+    if (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal:
+        looked = suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained)
+    if looked.better is not None:
+        reason = f"a better minimum was met, of fitness {looked.better.fitness:.3g} instead of {outcome.fitness:.3g}"
+        advice = ["look for another minimum (--method multi-start)"]
+        return Judgement(Verdict.FAILED, reason, advice, looked.suspects, looked.better)
+    found = looked.suspects
+    if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
+        return _rejected(model, tests, found)
+    if not outcome.converged:
+        advice = ["start from a better place, or look for another minimum (--method multi-start)"]
+        return Judgement(Verdict.FAILED, outcome.message or "the search did not converge", advice, found)
+    rivals = [rival for rival in rivals_of(model, outcome, at) if not within(model, rival, parameters)]
+    if rivals:
+        kinds = {relation(model, outcome.point, rival) for rival in rivals}
+        message = f"{1 + len(rivals)} parameter sets fit equally well ({', '.join(sorted(kinds))})"
+        advice = ["measure another marker or a longer motion, or narrow the bounds to the set that is meant"]
+        return Judgement(Verdict.AMBIGUOUS, message, advice, found)
+    return _identifiable(seen, tests, parameters, unknown, found)
+
+
+def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
+    """Why a point is no end of a search; empty if it may be one."""
+    outside = (point < model.lower) | (point > model.upper)
+    if np.any(outside):
+        names = ", ".join(name for name, out in zip(model.names, outside, strict=True) if out)
+        return f"{names} ended outside the bounds of the search"
+    try:
+        better = downhill(model, point, seen)
+    except TimeIsUp:
+        return "no time was left to see whether the answer is a minimum"
+    return "" if better is None else sentence(model, point, better)
+
+
+def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -> Judgement:
+    reason = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
+    advice = []
+    if found:
+        reason += f"; {found[0]}"
+        # A clock and gravity, for instance, have the same effect on a free swing.
+        best, *equals = (suspect.words for suspect in found if suspect.equals(found[0], tests.rows))
+        reason += f" (as would {', '.join(equals)})" if equals else ""
+        others = [suspect.words for suspect in found if suspect.words not in (best, *equals)][:_OTHERS]
+        advice.append(f"check the {' or the '.join([best, *equals])}, or seek it as a parameter")
+        advice += [f"less likely: the {' or the '.join(others)}"] if others else []
+    if (exchange := exchanged(model)) is not None:
+        reason += f"; {exchange}"
+        advice.append("check which column is which marker")
+    advice.append("look for another minimum (--method multi-start)")
+    if not found:
+        advice.append("check lengths, masses and friction of the model, and which bodies bend")
+    return Judgement(Verdict.REJECTED, reason, advice, found)
+
+
+def _against(tests: ResidualTests) -> str:
+    if tests.explains_nothing:
+        less = "no less" if tests.size >= tests.signal else "hardly less"
+        advice = "" if tests.noise_stated else " (state the noise if it is so large)"
+        return f"{less} than a constant: the data vary by {tests.sized(tests.signal)}{advice}"
+    if tests.noise_stated:
+        kind = "which is like white noise" if tests.white else "which is not white noise"
+        return f"{tests.ratio:.2g} times the noise of {tests.sized(tests.noise)}, {kind}"
+    return f"and not by noise; the data vary by {tests.sized(tests.signal)}"
+
+
+def _identifiable(
+    seen: Sensitivity, tests: ResidualTests, parameters: Mapping[str, Value], unknown: list[str], found: list[Suspect]
+) -> Judgement:
+    """Identified, wholly or up to a combination, with what has to be said beside."""
+    reasons, notes, advice = [], [], []
+    if at_bound := [name for name, value in parameters.items() if value.at_bound]:
+        reasons.append(f"{', '.join(at_bound)} ended at a bound and is not identified")
+        advice.append("widen the bound, or give the parameter its value there")
+    if unknown:
+        reasons.append(f"only combinations are known: {len(unknown)} direction(s) leave the motion unchanged")
+        advice.append("fix one parameter of each combination, or rely on the quantities that are identifiable")
+    elif vague := [name for name, v in parameters.items() if not v.identifiable and not v.at_bound]:
+        reasons.append(f"{', '.join(vague)}: less certain than the range of what is possible")
+        advice.append("measure longer or with less noise, or add what is known as a prior")
+    if not seen.reliable:
+        known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"
+        notes.append(f"the motion is chaotic, or its steps coarse: the intervals {known}")
+        advice.append("shorten the motion, or tighten the solver's tolerances")
+    if tests.limited and tests.size > _NEGLIGIBLE * tests.signal > 0.0:
+        share = 100 * tests.excess / tests.signal
+        size = f"{tests.sized(tests.excess)} ({share:.2g} % of the signal)"
+        notes.append(f"a systematic residual of {size} widens the intervals: the model, not the noise, limits them")
+        notes += [str(found[0])] if found else []
+    elif tests.too_large:
+        notes.append(f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found")
+    verdict = Verdict.COMBINATION if reasons else Verdict.IDENTIFIED
+    return Judgement(verdict, "; ".join([*reasons, *notes]), advice, found)

@@ -1,0 +1,104 @@
+"""Measured motion: from recordings, or computed by another engine than the one that is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.errors import ComputationError, InputError
+from shoal.identification.problem import RESERVED, Problem
+from shoal.identification.recording.measurement import Measurement, Recording
+from shoal.identification.recording.observation import camera, observe
+from shoal.identification.recording.plausible import check_units
+from shoal.identification.recording.reading import described, read
+from shoal.identification.recording.source import Channel, EngineSource, FileSource
+from shoal.scene import Scene
+from shoal.trajectory import Array
+
+
+def measure(problem: Problem, scene: Scene, data: str | Mapping[str, str] | None = None) -> Measurement:
+    """The measurement of a problem. Raises InputError, ComputationError.
+
+    data: a file (CSV, Parquet, or a recording's YAML) instead of the problem's own, or one for each recording by name
+    """
+    files = _named(problem, data)
+    recordings, truth = {}, dict[str, float]()
+    for name, source in problem.sources.items():
+        where = name if problem.recordings else problem.name
+        if isinstance(source, EngineSource):
+            if name in files:
+                raise InputError(f"data: {where} computes its data; it takes no file")
+            recordings[name], known = _computed(problem, source, scene, where)
+            prefix = f"{name}." if problem.recordings else ""
+            truth |= {(f"{prefix}{n}" if problem.parameters[n].own else n): x for n, x in known.items()}
+            continue
+        path = files.get(name) or source.path
+        if path is None:
+            raise InputError(
+                f"data: {where} needs a recording; give one as data=FILE (on the command line: --data FILE)"
+            )
+        recordings[name] = _recorded(problem, scene, source, Path(path))
+    return Measurement(recordings, truth)
+
+
+def _named(problem: Problem, data: str | Mapping[str, str] | None) -> dict[str, str]:
+    if data is None:
+        return {}
+    names = list(problem.sources)
+    if isinstance(data, str):
+        if len(names) > 1:
+            raise InputError(f"data: {problem.name} has several recordings; give NAME=FILE for {', '.join(names)}")
+        return {names[0]: data}
+    for name in data:
+        if name not in names:
+            raise InputError(f"data: no recording {name!r} in {problem.name}; there are {', '.join(names)}")
+    return dict(data)
+
+
+def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) -> tuple[Recording, dict[str, float]]:
+    truth = scene.with_values({**source.known, **source.values})
+    times = np.linspace(0.0, source.stop, source.count + 1)[1:]
+    channels = problem.channels_of(source)
+    trajectory = get_engine(source.engine).simulate(truth, times / source.clock + source.delay)
+    if not trajectory.ok:
+        raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
+    values = observe(trajectory, channels, camera(source))[0]
+    values = values + source.noise * np.random.default_rng(source.seed).standard_normal(values.shape)
+    origin = ", ".join([source.engine, *(f"{path}={value}" for path, value in source.values.items())])
+    origin = origin if source.noise == 0 else f"{origin}, noise {source.noise:g}"
+    recording = Recording(times, channels, values, origin, _noise(problem, channels), source.as_stated())
+    paths = {name: parameter.path for name, parameter in problem.parameters.items()}
+    return recording, {name: _true(truth, source, path) for name, path in paths.items() if path}
+
+
+def _true(scene: Scene, source: EngineSource, path: str) -> float:
+    head, _, rest = path.partition(".")
+    return float(getattr(source, rest) if head == RESERVED else scene.value(path))
+
+
+def _recorded(problem: Problem, scene: Scene, source: FileSource, path: Path) -> Recording:
+    source = FileSource.model_validate(described(source.model_dump(exclude_unset=True), path))
+    channels = problem.channels_of(source)
+    problem.check_channels(channels, scene, path.name)
+    found = read(source, channels)
+    sized = any(parameter.path == f"{RESERVED}.scale" for parameter in problem.parameters.values())
+    check_units(source, channels, found.times, found.values, scene, sized)
+    notes = (*found.notes, *_without_scale(problem, source, channels))
+    return replace(found, noise=_noise(problem, channels), stated=source.as_stated(), notes=notes)
+
+
+def _without_scale(problem: Problem, source: FileSource, channels: tuple[Channel, ...]) -> tuple[str, ...]:
+    """A note where nothing says how large a picture element is."""
+    sized = source.scale != 1.0 or any(p.path == f"{RESERVED}.scale" for p in problem.parameters.values())
+    if sized or not any(channel.unit == "px" and channel.scale == 1.0 for channel in channels):
+        return ()
+    return (f"positions in px count as metres; state `scale`, or seek it by a parameter {RESERVED}.scale",)
+
+
+def _noise(problem: Problem, channels: tuple[Channel, ...]) -> Array:
+    sizes = [channel.noise if channel.noise is not None else problem.noise for channel in channels]
+    return np.array([np.nan if size is None else size for size in sizes])

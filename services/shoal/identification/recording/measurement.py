@@ -1,0 +1,95 @@
+"""Measured motion as samples: one recording, or several with what is known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.identification.recording.source import Channel, Clocked
+from shoal.trajectory import Array
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Samples of one run. times [s]: (samples,), by the recording's clock, from the start of the motion to fit on.
+
+    values: (samples, channels) in SI units, nan where nothing was measured
+    noise: standard deviation of each channel, (channels,), nan where it is not stated
+    stated: clock, position of the camera, fields of the scene of this run
+    origin: where the data come from; notes: what was found and mended in them
+    """
+
+    times: Array
+    channels: tuple[Channel, ...]
+    values: Array
+    origin: str
+    noise: Array
+    stated: Clocked = field(default_factory=Clocked)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def things(self) -> int:
+        """How many things are observed: positions (x and y count as one) and angles."""
+        return len({(c.marker, "position" if c.is_position else c.quantity) for c in self.channels})
+
+    def until(self, end: float) -> Recording:
+        """The samples up to a time [s]."""
+        keep = self.times <= end + 1e-12
+        return replace(self, times=self.times[keep], values=self.values[keep])
+
+    def every(self, step: int) -> Recording:
+        """Every `step`-th sample."""
+        return replace(self, times=self.times[::step], values=self.values[::step])
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """The recordings by name, and the parameters of computed data (`truth`), for the report."""
+
+    recordings: Mapping[str, Recording]
+    truth: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def single(
+        cls,
+        times: Array,
+        channels: tuple[Channel, ...],
+        values: Array,
+        origin: str,
+        truth: Mapping[str, float] | None = None,
+        noise: float | None = None,
+    ) -> Measurement:
+        """One recording without a name. noise: standard deviation of its channels, if known. Raises InputError."""
+        if noise is not None and not (np.isfinite(noise) and noise > 0):
+            raise InputError(
+                f"noise: a standard deviation above 0, or None if it is not known, is needed, found {noise:g}"
+            )
+        sizes = np.full(len(channels), np.nan if noise is None else noise)
+        return cls({"recording": Recording(times, channels, values, origin, sizes)}, truth or {})
+
+    @property
+    def first(self) -> Recording:
+        """The first of the recordings."""
+        return next(iter(self.recordings.values()))
+
+    @property
+    def origin(self) -> str:
+        """Where the data come from."""
+        many = len(self.recordings) > 1
+        return "; ".join(f"{name}: {r.origin}" if many else r.origin for name, r in self.recordings.items())
+
+    @property
+    def end(self) -> float:
+        """The last time of a sample [s]."""
+        return max(float(recording.times[-1]) for recording in self.recordings.values())
+
+    def until(self, end: float) -> Measurement:
+        """The samples up to a time [s]."""
+        return self.changed(lambda recording: recording.until(end))
+
+    def changed(self, change: Callable[[Recording], Recording]) -> Measurement:
+        """With a change of every recording."""
+        return replace(self, recordings={name: change(recording) for name, recording in self.recordings.items()})

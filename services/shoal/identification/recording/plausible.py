@@ -1,0 +1,155 @@
+"""What no search need find out: a recording in other units than was taken for granted, and a channel that stands still.
+
+A machine that only swings by gravity has a time scale and a size of its own. A recording that contradicts them by far
+is refused with the unit that it seems to have; who states the unit is believed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.identification.recording.measurement import Measurement
+from shoal.identification.recording.source import Channel, FileSource
+from shoal.scene import Scene
+from shoal.scene.joints import Revolute, Weld, places
+from shoal.trajectory import Array
+
+_SLOWER = 50.0
+"""Times the period of the machine stretched out: no swing is slower, but near a balance."""
+_FASTER = 10.0
+"""Times the angular frequency of the shortest body: no swing turns faster without a hundredfold energy."""
+_FARTHER = 10.0
+"""Times the machine's size to either side."""
+_PARTS = 50.0
+"""Of the shortest period: rates are taken over that time, so that noise does not count."""
+_STILL = 1e-9
+"""Of a channel's size: what moves less does not move."""
+_FEWEST = 3
+"""Samples, without which there is no motion."""
+_LENGTHS = {"cm": 100.0, "mm": 1000.0, "um": 1e6}
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A machine under gravity alone: period of all its bodies stretched out, of the shortest [s], and size [m]."""
+
+    slow: float
+    fast: float
+    size: float
+
+
+def swing(scene: Scene) -> Swing | None:
+    """The scales of a machine that is held by pivots and that gravity alone moves; None for any other."""
+    gravity = math.hypot(*scene.gravity)
+    held = {place.body for joint in scene.joints.values() for place in places(joint)}
+    pivoted = all(isinstance(joint, Revolute | Weld) for joint in scene.joints.values())
+    if gravity == 0.0 or scene.loads or scene.ground_points or not pivoted or not held >= set(scene.bodies):
+        return None
+    attached = [*(place for joint in scene.joints.values() for place in places(joint)), *scene.markers.values()]
+    lengths = []
+    for name, body in scene.bodies.items():
+        used = {*(scene.location(place) for place in attached if place.body == name), *body.points.values()}
+        lengths.append(max((math.dist(a, b) for a, b in combinations(used, 2)), default=0.0))
+    if not (longest := sum(lengths)):
+        return None
+    shortest = min(length for length in lengths if length > 0.0)
+    slow, fast = (2 * math.pi * math.sqrt(length / gravity) for length in (longest, shortest))
+    return Swing(slow, fast, longest)
+
+
+def check_units(
+    source: FileSource, channels: tuple[Channel, ...], times: Array, values: Array, scene: Scene, sized: bool
+) -> None:
+    """Refuse a recording whose unit of time, length or angle is not stated and cannot be what it counts as.
+
+    times [s]: (samples,); values: (samples, channels); sized: whether the scale of positions is sought. Raises
+    InputError.
+    """
+    scales = swing(scene)
+    if scales is None:
+        return
+    stated = source.model_fields_set & {"time_scale", "rate", "clock"}
+    paces = [pace for signal in values.T if (pace := _pace(times, signal)) is not None]
+    if paces and not stated and min(paces) > _SLOWER * scales.slow:
+        raise InputError(
+            f"{source.path}: time_scale: the recording lasts {times[-1] - times[0]:.4g} s and moves within about "
+            f"{min(paces):.2g} s, while gravity swings {scene.name} in {scales.slow:.2g} s; are its times in "
+            "milliseconds? time_scale: 1.0e-3 (time_scale: 1 if they are in s)"
+        )
+    for channel, signal in zip(channels, values.T, strict=True):
+        if channel.unit is not None or channel.scale != 1.0:
+            continue
+        where = f"{source.path}: column {channel.column!r}"
+        width = float(np.nanmax(signal) - np.nanmin(signal))
+        if channel.quantity == "angle":
+            rate = _rate(times, signal, scales.fast / _PARTS)
+            if rate > _FASTER * 2 * math.pi / scales.fast:
+                raise InputError(
+                    f"{where}: values range over {width:.3g} and turn by up to {rate:.3g} in a second; degrees? "
+                    "unit: deg (unit: rad if they are radians)"
+                )
+        elif channel.is_position and not sized and source.scale == 1.0 and width > 2 * _FARTHER * scales.size:
+            fitting = [unit for unit, parts in _LENGTHS.items() if width / parts <= 2 * scales.size]
+            guess = f"{fitting[0]}? unit: {fitting[0]}" if fitting else "another unit?"
+            raise InputError(
+                f"{where}: values range over {width:.3g} m, but {scene.name} is {scales.size:.3g} m long; {guess} "
+                "(unit: m if they are metres)"
+            )
+
+
+def check_constant(measurement: Measurement, simulated: Callable[[str], Array]) -> None:
+    """Refuse a recorded channel without any change where the model's moves. Raises InputError.
+
+    simulated: channels (samples, channels) of a recording, by its name, as the model has them
+    """
+    if measurement.truth:
+        return
+    for name, recording in measurement.recordings.items():
+        seen_often = np.isfinite(recording.values).sum(axis=0) >= _FEWEST
+        still = [k for k in np.flatnonzero(seen_often) if _spread(recording.values[:, k]) <= _STILL]
+        # A machine that rests shows in all channels; that a single one stands still tells no rest.
+        if not still or 1 < len(still) == len(seen_often):
+            continue
+        seen = simulated(name)
+        for k in still:
+            channel, moved = recording.channels[k], np.ptp(seen[:, k]) if np.all(np.isfinite(seen[:, k])) else 0.0
+            if moved > _STILL * max(1.0, float(np.max(np.abs(seen[:, k])))):
+                what = f"column {channel.column!r}" if channel.column else f"{channel.marker} {channel.quantity}"
+                value = float(np.nanmean(recording.values[:, k]))
+                raise InputError(
+                    f"{recording.origin}: {what} is constant ({value:.6g}), while {channel.marker} {channel.quantity} "
+                    "moves in the model; is it the right column?"
+                )
+
+
+def _pace(times: Array, signal: Array) -> float | None:
+    """The period [s] of a harmonic signal of the same size and speed; None without a motion."""
+    known = np.isfinite(signal)
+    t, x = times[known], signal[known]
+    if len(t) < 3 or _spread(x) <= _STILL:
+        return None
+    speed = float(np.sqrt(np.mean((np.diff(x) / np.diff(t)) ** 2)))
+    return 2 * math.pi * float(np.std(x)) / speed
+
+
+def _rate(times: Array, signal: Array, least: float) -> float:
+    """How fast a signal changes at most, but for a twentieth of the time, over steps of at least so many seconds."""
+    known = np.isfinite(signal)
+    t, x = times[known], signal[known]
+    if len(t) < 3:
+        return 0.0
+    every = max(1, math.ceil(least / float(np.median(np.diff(t)))))
+    t, x = t[::every], x[::every]
+    return float(np.percentile(np.abs(np.diff(x) / np.diff(t)), 95)) if len(t) > 1 else 0.0
+
+
+def _spread(signal: Array) -> float:
+    """Range of a signal over its size."""
+    known = signal[np.isfinite(signal)]
+    return float(np.ptp(known)) / max(float(np.max(np.abs(known))), 1e-300) if known.size else 0.0

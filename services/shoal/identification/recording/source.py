@@ -1,0 +1,133 @@
+"""How measured motion is stated: which column is which signal, in which units, by which clock."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from shoal.scene.record import NonNegative, Positive, Record
+
+Quantity = Literal["x", "y", "angle", "rate"]
+LengthUnit = Literal["m", "cm", "mm", "um", "in", "px"]
+AngleUnit = Literal["rad", "deg", "rev"]
+
+SI: dict[str, float] = {
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "in": 0.0254,
+    "px": 1.0,
+    "rad": 1.0,
+    "deg": 0.017453292519943295,
+    "rev": 6.283185307179586,
+}
+"""Metres or radians in a unit; of a picture element the recording's `scale` tells the size."""
+
+
+class Channel(Record):
+    """One measured signal: a marker's x, y [m], angle [rad] or rate of its angle [rad/s].
+
+    The signal is offset + scale * unit * (column - origin); where the y axis grows down, y, angle and rate change sign
+    before `offset` is added.
+    column, origin: names of columns; origin is that of a point that stands still, such as a tracked pivot
+    unit: of the column; a rate is in the unit per second
+    noise: standard deviation in SI units; offset: in SI units
+    """
+
+    marker: str
+    quantity: Quantity
+    column: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+    origin: str | None = None
+    unit: LengthUnit | AngleUnit | None = None
+    noise: Positive | None = None
+
+    @model_validator(mode="after")
+    def _unit_of_its_quantity(self) -> Self:
+        lengths = self.quantity in ("x", "y")
+        if self.unit is not None and lengths != (self.unit in LengthUnit.__args__):  # type: ignore[attr-defined]
+            right = LengthUnit.__args__ if lengths else AngleUnit.__args__  # type: ignore[attr-defined]
+            raise ValueError(f"unit: {self.quantity} is measured in one of {', '.join(right)}, found {self.unit!r}")
+        return self
+
+    @property
+    def is_position(self) -> bool:
+        """Whether it is a coordinate of a marker, in metres."""
+        return self.quantity in ("x", "y")
+
+
+class Clocked(Record):
+    """What a recording of any kind says: the motion's time is recorded time / clock + delay [s] after its start.
+
+    So `clock` is how many seconds the recording's clock shows in one second: 1.26 is a clock that is fast by 26 %.
+    A marker at X [m] is recorded at rotation(-tilt) (X - [x, y]) / scale, angles less `tilt`: clock, delay, scale, x, y
+    and tilt may be parameters, with the paths `measurement.clock` and so on.
+    known: fields of the scene that are different in this recording
+    channels: instead of those of the problem
+    """
+
+    clock: Positive = 1.0
+    delay: float = 0.0
+    scale: Positive = 1.0
+    x: float = 0.0
+    y: float = 0.0
+    tilt: float = 0.0
+    known: dict[str, Any] = {}
+    channels: Annotated[list[Channel], Field(min_length=1)] | None = None
+
+    def as_stated(self) -> Clocked:
+        """What it says of clock, camera and scene, without where the data come from."""
+        return Clocked(**{name: getattr(self, name) for name in Clocked.model_fields})
+
+
+class EngineSource(Clocked):
+    """Data computed by another engine: the scene with `values` set (the truth), sampled `count` times up to `stop` s.
+
+    noise: standard deviation of white noise that is added, in SI units; seed: of its random numbers
+    """
+
+    kind: Literal["engine"] = "engine"
+    engine: str = "exudyn"
+    values: dict[str, Any] = {}
+    stop: Positive
+    count: Annotated[int, Field(ge=2)]
+    noise: NonNegative = 0.0
+    seed: int = 0
+
+
+class FileSource(Clocked):
+    """Data from a CSV (gzip allowed) or Parquet file: `duration` s from `start` s on, every `every`-th sample.
+
+    start: when the motion's time is zero, by the table's clock [s]; left out, 0 where the table begins about there,
+    else its first sample
+    path: beside the YAML file that names it; may itself be the YAML of a FileSource, whose fields then hold instead
+    columns: names, where the file has no header line
+    time: the column of time, in `time_scale` s; or rate: samples per second, for files without one
+    y_axis: whether y grows up or down; down, angles and rates are clockwise and change their sign too
+    swaps: whether samples with two markers exchanged are mended
+    """
+
+    kind: Literal["file"] = "file"
+    path: str | None = None
+    columns: list[str] | None = None
+    time: str = "t"
+    time_scale: Positive = 1.0
+    rate: Positive | None = None
+    start: float | None = None
+    duration: Positive | None = None
+    every: Annotated[int, Field(ge=1)] = 1
+    y_axis: Literal["up", "down"] = "up"
+    swaps: bool = True
+
+    @model_validator(mode="after")
+    def _with_columns(self) -> Self:
+        for channel in self.channels or ():
+            if not channel.column:
+                raise ValueError(f"channels: name the `column` of {channel.marker} {channel.quantity}")
+        return self
+
+
+Source = Annotated[EngineSource | FileSource, Field(discriminator="kind")]

@@ -1,0 +1,84 @@
+"""Intervals without theory: refits to data whose residuals are drawn anew, in blocks that keep their correlation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from shoal.identification.deadline import TimeIsUp
+from shoal.identification.forward import ForwardModel
+from shoal.identification.methods.least_squares import descend
+from shoal.identification.recording.measurement import Recording
+from shoal.trajectory import Array, plain
+
+
+@dataclass(frozen=True)
+class Bootstrap:
+    """Draws of the parameters in their own units, (draws, parameters); failed: refits without a finite end."""
+
+    names: tuple[str, ...]
+    draws: Array
+    failed: int
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """The 2.5 and 97.5 percentiles."""
+        column = self.draws[:, self.names.index(name)]
+        low, high = np.percentile(column, [2.5, 97.5]) if len(column) else (np.nan, np.nan)
+        return float(low), float(high)
+
+    def to_json(self) -> dict[str, Any]:
+        """Intervals and standard deviations by parameter."""
+        stds = np.std(self.draws, axis=0, ddof=1) if len(self.draws) > 1 else np.full(len(self.names), np.nan)
+        table = {n: {"interval": self.interval(n), "std": s} for n, s in zip(self.names, stds, strict=True)}
+        return plain({"draws": len(self.draws), "failed": self.failed, "parameters": table})  # type: ignore[no-any-return]
+
+
+def bootstrap(
+    model: ForwardModel, point: Array, predicted: dict[str, Array], rho: float, draws: int, rng: np.random.Generator
+) -> Bootstrap:
+    """Moving blocks (Kuensch 1989) of the residuals at an answer on the predicted channels, refitted from the answer.
+
+    rho: lag-1 correlation of the residuals, which sets the length of the blocks; fewer draws where time ends
+    """
+    found, failed = [], 0
+    for _ in range(draws):
+        recordings = {
+            name: _redrawn(recording, predicted[name], rho, len(point), rng)
+            for name, recording in model.measurement.recordings.items()
+        }
+        drawn = model.aside(measurement=replace(model.measurement, recordings=recordings))
+        try:
+            end = descend(drawn, point, lambda *_: None)
+        except TimeIsUp:
+            break
+        if np.isfinite(end.fitness):
+            found.append(model.parameters.to_values(end.point))
+        else:
+            failed += 1
+    return Bootstrap(model.names, np.array(found).reshape(-1, len(point)), failed)
+
+
+def block_length(count: int, rho: float) -> int:
+    """Samples in a block: the best for the variance of a mean of an AR(1) series (Carlstein 1986), at least one."""
+    rho = min(max(rho, 0.0), 0.999)
+    best = count ** (1 / 3) * (2 * rho / (1 - rho**2)) ** (2 / 3)
+    return int(np.clip(np.ceil(best), 1, max(1, count // 3)))
+
+
+def _redrawn(
+    recording: Recording, predicted: Array, rho: float, parameters: int, rng: np.random.Generator
+) -> Recording:
+    """The recording with residuals drawn in blocks of neighbouring samples, all channels together; gaps stay."""
+    residual = recording.values - predicted
+    residual = residual - np.nanmean(residual, axis=0)
+    count = len(residual)
+    # Residuals are smaller than the noise by what the parameters have followed.
+    rows = np.isfinite(residual).sum()
+    residual = residual * np.sqrt(rows / max(1, rows - parameters))
+    length = block_length(count, rho)
+    first = rng.integers(0, count - length + 1, size=-(-count // length))
+    order = (first[:, None] + np.arange(length)).ravel()[:count]
+    fresh = np.where(np.isfinite(residual[order]), residual[order], 0.0)
+    return replace(recording, values=np.where(np.isfinite(recording.values), predicted + fresh, np.nan))

@@ -1,0 +1,97 @@
+"""The intervals of parameters and quantities at an answer: by its linearisation, with the model's own error in them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shoal.identification.forward import ForwardModel, accepts
+from shoal.identification.problem import RESERVED
+from shoal.identification.recording.units import unit
+from shoal.identification.spread.model_error import Corrections
+from shoal.identification.spread.uncertainty import Linearisation, Spread, spread
+from shoal.identification.spread.value import Value
+from shoal.scene import expression
+from shoal.trajectory import Array
+
+_FEWEST = 3
+"""More numbers than parameters that have to be measured for what the fit leaves to tell the noise."""
+
+
+def parameters(model: ForwardModel, point: Array, at: Linearisation, correction: Corrections) -> dict[str, Value]:
+    """Of every parameter by its name, in its own units."""
+    found = {}
+    for k, name in enumerate(model.names):
+        about = spread(lambda p, k=k: float(p[k]), point, at)  # type: ignore[misc]
+        span = model.upper[k] - model.lower[k]
+        at_bound = bool(min(point[k] - model.lower[k], model.upper[k] - point[k]) < 1e-6 * span)
+        shift = correction.of(lambda p, k=k: float(p[k]), point)  # type: ignore[misc]
+        told = about.fixed and not at_bound and about.std < span and not few(model)
+        known = _value(float(point[k]), about, told, shift, at_bound)
+        known = known.exponential() if model.parameters.logarithmic[k] else known
+        path = model.parameters.paths[k]
+        told = known.identifiable and _possible(model, path, known)
+        found[name] = replace(known, unit=unit(path), identifiable=told)
+    return found
+
+
+def quantities(
+    model: ForwardModel, point: Array, at: Linearisation, correction: Corrections, curved: list[int]
+) -> dict[str, Value]:
+    """Of every quantity by its name; of those that depend on parameters `curved` none is identifiable."""
+    found, entries = {}, list(model.parameters.entries.values())
+    doubtful = {entries[k].key for k in curved}
+    for name, text in model.problem.quantities.items():
+        for recording in model.measurement.recordings if _own(model, text) else [None]:
+
+            def value_at(p: Array, text: str = text, recording: str | None = recording) -> float:
+                named = model.parameters.named(p[None], recording)
+                return expression.evaluate(text, {key: float(x[0]) for key, x in named.items()})
+
+            about = spread(value_at, point, at)
+            shift = correction.of(value_at, point)
+            told = about.fixed and not doubtful & set(expression.names(text))
+            found[f"{recording}.{name}" if recording else name] = _value(value_at(point), about, told, shift, False)
+    return found
+
+
+def spanning(ends: list[dict[str, Value]]) -> dict[str, Value]:
+    """The values of the first, with intervals that span those at all ends of its valley."""
+    first = ends[0]
+    lower = {name: min(end[name].lower for end in ends) for name in first}
+    upper = {name: max(end[name].upper for end in ends) for name in first}
+    return {name: replace(value, lower=lower[name], upper=upper[name]) for name, value in first.items()}
+
+
+def covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:
+    """Of the values, (parameters, parameters): d exp(p) = exp(p) dp for those that are sought by their logarithm."""
+    slope = np.where(model.parameters.logarithmic, model.parameters.to_values(point), 1.0)
+    return np.asarray(slope[:, None] * at.covariance * slope)
+
+
+def few(model: ForwardModel) -> bool:
+    """Whether so little was measured that its noise, which is not stated, cannot be told: then no interval can."""
+    return model.rows.noise is None and len(model.rows.time) < len(model.names) + _FEWEST
+
+
+def _possible(model: ForwardModel, path: str, known: Value) -> bool:
+    """Whether an interval ends at values that can be: a mass whose interval reaches below zero is not known."""
+    head, _, name = path.partition(".")
+    if head == RESERVED:
+        return known.lower > 0.0 or name not in ("clock", "scale")
+    return not path or all(accepts(model.scene, path, end) for end in (known.lower, known.upper))
+
+
+def _own(model: ForwardModel, text: str) -> bool:
+    """Whether an expression has a value for each recording."""
+    keys = {entry.key for entry in model.parameters.entries.values() if entry.recording is not None}
+    return bool(expression.names(text) & keys)
+
+
+def _value(
+    value: float, about: Spread, identifiable: bool, shift: tuple[float | None, float | None], at_bound: bool
+) -> Value:
+    mesh, theory = shift
+    half = about.half + abs(mesh or 0.0) + abs(theory or 0.0)
+    return Value(value, about.std, value - half, value + half, bool(identifiable), mesh, at_bound, theory=theory)

@@ -1,0 +1,132 @@
+"""The model's own error at an answer: what a finer mesh and a fuller theory would change of motion and answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.engines.theory import WITH_SHEAR, slender_share
+from shoal.errors import InputError
+from shoal.identification.forward import ForwardModel
+from shoal.mechanics.simulate import stable_step
+from shoal.scene import Rod, Scene
+from shoal.trajectory import Array
+
+_STABLE = 0.9
+"""Of the stable step at the start: it varies by a few percent along the motion."""
+_MATTERS = 0.1
+"""Of the mesh error and of what noise leaves uncertain: a theory error from here on is computed, not just estimated."""
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """What either error adds to a point, (parameters,), None where there is none."""
+
+    mesh: Array | None
+    theory: Array | None
+
+    def of(self, function: Callable[[Array], float], point: Array) -> tuple[float | None, float | None]:
+        """What they add to a function of the parameters."""
+        mesh, theory = (
+            None if shift is None else function(point + shift) - function(point) for shift in (self.mesh, self.theory)
+        )
+        return mesh, theory
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """Motion of a better model minus that of the one that was fitted, (rows,), with zeros for priors.
+
+    mesh: by twice as many elements; theory: by shear and rotary inertia, beyond what the mesh does. None for scenes
+    without any of it, and where the better model cannot be run.
+    """
+
+    mesh: Array | None
+    theory: Array | None
+
+    def corrections(self, pseudo_inverse: Array) -> Corrections:
+        """To first order, by the pseudo-inverse (parameters, rows) of the Jacobian."""
+        mesh, theory = (None if part is None else -pseudo_inverse @ part for part in (self.mesh, self.theory))
+        return Corrections(mesh, theory)
+
+    def refined(self, residual: Array, jacobian: Array, pseudo_inverse: Array) -> Array | None:
+        """Residuals (rows,) that the better model would leave when it is fitted, to first order."""
+        parts = [part for part in (self.mesh, self.theory) if part is not None]
+        if not parts:
+            return None
+        changed = np.sum(parts, axis=0)
+        return np.asarray(residual + changed - jacobian @ (pseudo_inverse @ changed))
+
+
+def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array], residual: Array) -> ModelError:
+    """At a point whose channels by recording, and residuals (rows,), are known."""
+    flexible = {
+        name: body for name, body in model.scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"
+    }
+    if not flexible:
+        return ModelError(None, None)
+    finer = _finer(model.scene, flexible)
+    mesh = None if finer is None else _difference(model, point, predicted, finer)
+    slender = {name: rod for name, rod in flexible.items() if rod.element != "ancf-full"}
+    if not slender or model.engine.name in WITH_SHEAR:
+        return ModelError(mesh, None)
+    theory = _softened(model, point, predicted, slender)
+    uncertain = rms_of(residual) / np.sqrt(len(residual))
+    matters = theory is None or rms_of(theory) > _MATTERS * max(uncertain, 0.0 if mesh is None else rms_of(mesh))
+    if finer is not None and mesh is not None and matters:
+        sheared = _sheared(model, point, predicted, finer)
+        theory = theory if sheared is None else sheared - mesh
+    return ModelError(mesh, theory)
+
+
+def _softened(
+    model: ForwardModel, point: Array, predicted: Mapping[str, Array], slender: Mapping[str, Rod]
+) -> Array | None:
+    """By order of magnitude: in bending a rod with shear moves like one of a lower Young's modulus."""
+    softer = {f"bodies.{name}.youngs_modulus": 1.0 / (1.0 + slender_share(rod)) for name, rod in slender.items()}
+    return _difference(model, point, predicted, model.scene, softer)
+
+
+def _sheared(model: ForwardModel, point: Array, predicted: Mapping[str, Array], finer: Scene) -> Array | None:
+    """By the geometrically exact beams of another engine; None where it is not installed or cannot run the scene."""
+    try:
+        return _difference(replace(model, engine=get_engine(WITH_SHEAR[0])), point, predicted, finer)
+    except (ImportError, InputError):
+        return None
+
+
+def _finer(scene: Scene, flexible: Mapping[str, Rod]) -> Scene | None:
+    """Twice as many elements, and half the step: that takes away three quarters of a time error of second order."""
+    try:
+        finer = scene.with_values({f"bodies.{name}.elements": 2 * rod.elements for name, rod in flexible.items()})
+        integrator = scene.solver.integrator
+        limit = np.inf if integrator == "auto" else stable_step(finer, integrator)
+        return finer.with_values({"solver.step": min(scene.solver.step / 2, _STABLE * limit)})
+    except InputError:
+        return None
+
+
+def _difference(
+    model: ForwardModel,
+    point: Array,
+    predicted: Mapping[str, Array],
+    scene: Scene,
+    factors: Mapping[str, float] | None = None,
+) -> Array | None:
+    columns = []
+    for name, recording in model.measurement.recordings.items():
+        try:
+            error = model.observe(point[None], name, scene=scene, factors=factors)[0] - predicted[name]
+        except InputError:
+            return None
+        columns.append(error[np.isfinite(recording.values)])
+    rows = np.concatenate(columns) * model.rows.weight
+    return np.append(rows, np.zeros(len(model.parameters.priors))) if np.all(np.isfinite(rows)) else None
+
+
+def rms_of(rows: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(rows**2)))

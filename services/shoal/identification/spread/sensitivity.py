@@ -1,0 +1,142 @@
+"""Derivatives of the residuals that can be believed: differences of two step sizes that agree.
+
+A chaotic motion magnifies the step of a difference until the difference says nothing (a step of 1e-6 may be off by five
+orders of magnitude); a step that is too small drowns in round-off. Both show when two steps are compared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shoal.identification.forward import ForwardModel
+from shoal.trajectory import Array
+
+_STEPS = 10.0 ** np.arange(-3.0, -12.0, -1.0)
+"""Relative to the size of a parameter (see ForwardModel.sizes), largest first."""
+_USUAL = _STEPS[2:4]
+"""Enough where they agree at once."""
+_SURE = 1e-4
+"""Relative difference of two derivatives between which no other step need decide."""
+AGREED = 1e-2
+"""Relative difference of two derivatives that count as one."""
+
+
+_NOTHING = 1e-6
+_ROUNDS = 4
+_WELL_CONDITIONED = 1e3
+_NONE = 1e-200
+_SHORTER = 0.75 ** np.arange(1, 9)
+"""Parts of a record that are tried where the derivatives of the whole cannot be believed."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Residuals at a point, (rows,), and their Jacobian, (rows, parameters).
+
+    doubt: relative difference of two step sizes, the worst of all directions
+    growth: largest over smallest singular value, of parameters in units of their size
+    end: until when the derivatives can be believed [s by the clock]; those of later rows are zero; None: all can
+    """
+
+    residual: Array
+    jacobian: Array
+    doubt: float
+    growth: float
+    end: float | None = None
+
+    @property
+    def reliable(self) -> bool:
+        """Whether two steps agree in every direction."""
+        return self.doubt <= AGREED
+
+
+def sensitivity(model: ForwardModel, point: Array) -> Sensitivity:
+    """Central differences, in each direction with the neighbouring steps that agree best. Not counted.
+
+    Errors along the strongest direction would hide the weakest, so that the differences are repeated along the
+    singular directions found, until these stay. At a bound the difference is taken to the inner side.
+    """
+    sizes = model.sizes(point)
+    basis = np.eye(len(point))
+    residual, columns, doubt = _differences(model, point, sizes, basis, _USUAL)
+    if np.max(doubt) < _SURE and (growth := _growth(columns)) < _WELL_CONDITIONED:
+        return Sensitivity(residual, columns / sizes, float(np.max(doubt)), growth)
+    for _ in range(_ROUNDS):
+        residual, columns, doubt = _differences(model, point, sizes, basis, _STEPS)
+        turned = np.linalg.svd(columns, full_matrices=False)[2]
+        growth = _growth(columns)
+        if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(turned) - np.eye(len(point)))) < AGREED / growth:
+            break
+        basis = basis @ turned.T
+    return Sensitivity(residual, columns @ basis.T / sizes, float(np.max(doubt)), growth)
+
+
+def believed(model: ForwardModel, point: Array) -> Sensitivity:
+    """As `sensitivity`, but of a chaotic motion only of the beginning that has derivatives, where there is one.
+
+    Intervals that rest on the beginning are too wide rather than too narrow: what follows is not held to tell anything.
+    """
+    seen = sensitivity(model, point)
+    if seen.reliable:
+        return seen
+    for end in _SHORTER * model.measurement.end:
+        part = model.until(float(end))
+        if len(part.rows.time) <= len(point):
+            break
+        early = sensitivity(part, point)
+        if early.reliable:
+            jacobian = np.zeros_like(seen.jacobian)
+            kept = np.append(model.rows.time <= end + 1e-12, np.ones(len(seen.residual) - len(model.rows.time), bool))
+            jacobian[kept] = early.jacobian
+            return replace(seen, jacobian=jacobian, end=float(end))
+    return seen
+
+
+def _growth(columns: Array) -> float:
+    singular = np.linalg.svd(columns, compute_uv=False)
+    return float(singular[0] / singular[-1]) if singular[-1] > _NONE * singular[0] else np.inf
+
+
+def _differences(
+    model: ForwardModel, point: Array, sizes: Array, basis: Array, widths: Array
+) -> tuple[Array, Array, Array]:
+    """Residuals, their derivatives along the columns of `basis` (scaled parameters), and the doubt of each."""
+    count = len(point)
+    steps = np.concatenate([step * sizes * basis.T for step in widths])
+    ahead, behind = (_inside(model, point, move) for move in (steps, -steps))
+    seen = model.uncounted(np.concatenate([point[None], point + ahead, point + behind]))
+    width = np.linalg.norm((ahead - behind) / sizes, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slopes = (seen[1 : 1 + len(steps)] - seen[1 + len(steps) :]) / width[:, None]
+    slopes = slopes.reshape(len(widths), count, -1)
+    columns, doubts = np.zeros((slopes.shape[2], count)), np.full(count, np.inf)
+    least = np.zeros(count)
+    for k in range(count):
+        table = slopes[:, k]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            size = np.linalg.norm(table, axis=1)
+            doubt = np.linalg.norm(table[:-1] - table[1:], axis=1) / np.minimum(size[:-1], size[1:])
+        # What changes nothing at all is no reason to doubt.
+        doubt[(size[:-1] == 0.0) & (size[1:] == 0.0)] = 0.0
+        best = int(np.argmin(np.where(np.isfinite(doubt), doubt, np.inf)))
+        # Round-off adds to a difference, so that the smallest says the most where they disagree.
+        least[k] = np.min(size[np.isfinite(size)], initial=np.inf)
+        if np.all(np.isfinite(table[best])):
+            columns[:, k], doubts[k] = table[best], doubt[best]
+    # Where two steps never agree and next to nothing changes, there is nothing but round-off. The spread of the data is
+    # the measure of that, and not what chaos magnifies.
+    size = np.linalg.norm(columns, axis=0)
+    usual = min(float(np.max(size)), np.sqrt(columns.shape[0]) * model.rows.signal)
+    nothing = (doubts > AGREED) & (np.minimum(size, least) < _NOTHING * usual)
+    columns[:, nothing], doubts[nothing] = 0.0, 0.0
+    return seen[0], columns, doubts
+
+
+def _inside(model: ForwardModel, point: Array, moves: Array) -> Array:
+    """Moves that stay within the bounds, or lead no further out of them; one that would not is not made."""
+    there = point + moves
+    low, high = model.box_at(point)
+    good = np.all((there >= low) & (there <= high), axis=1)
+    return np.where(good[:, None], moves, 0.0)

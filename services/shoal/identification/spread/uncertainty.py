@@ -1,0 +1,99 @@
+"""How well the parameters are known: covariance with correlated noise, intervals, and what the data leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from shoal.identification.spread.covariance import Block, Noise, correlate, estimate_noise
+from shoal.trajectory import Array
+
+RANK_TOLERANCE = 1e-6
+"""Singular values below this fraction of the largest (columns scaled to the parameters' size) carry nothing."""
+LEVEL = 0.95
+"""Of the intervals."""
+ABSORBED = 4.0
+"""Times the part of a model's error that is left in the residual: the part that the parameters have followed."""
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """What is known near the answer, to first order.
+
+    unknown: directions the data do not fix, in scaled parameters, (p, k); pseudo_inverse: (p, rows); scale: (p,)
+    parts: the share of each block of residuals in the covariance, (blocks, p, p); noise: of each block
+    systematic: norm of what is systematic in the residual. A model error moves the parameters by the part of it that
+    they can follow, which leaves no residual; taken as ABSORBED times what is left, in the worst direction, it holds
+    the truth for 95 % of random wrong models (python -m shoal_validation.coverage.systematic)
+    """
+
+    unknown: Array
+    pseudo_inverse: Array
+    scale: Array
+    parts: Array
+    noise: tuple[Noise, ...]
+    systematic: float = 0.0
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the parameters, (p, p)."""
+        return np.asarray(np.sum(self.parts, axis=0))
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Of a number that depends on the parameters: standard deviation, half of its interval, whether the data fix it."""
+
+    std: float
+    half: float
+    fixed: bool
+
+
+def linearise(jacobian: Array, residual: Array, scale: Array, blocks: list[Block]) -> Linearisation:
+    """Uncertainty from the Jacobian (m, p) and residuals (m,) at the optimum; scale: size of each parameter, (p,).
+
+    The covariance is the sandwich (J'J)^-1 J' R J (J'J)^-1 of an unweighted fit, R being the covariance of the noise
+    (Seber and Wild, Nonlinear Regression, 1989, 6.2).
+    """
+    left, singular, right = np.linalg.svd(jacobian * scale, full_matrices=False)
+    known = singular > RANK_TOLERANCE * singular[0] if singular[0] > 0 else np.zeros(len(singular), dtype=bool)
+    inverse = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
+    pseudo_inverse = scale[:, None] * (right.T * inverse) @ left.T
+    noise = estimate_noise(residual, left[:, known], blocks)
+    parts = []
+    for block, seen in zip(blocks, noise, strict=True):
+        rows = pseudo_inverse.T[block.rows]
+        parts.append(seen.variance * rows.T @ correlate(block, seen.rho, rows))
+    return Linearisation(right[~known].T, pseudo_inverse, scale, np.array(parts), tuple(noise))
+
+
+def spread(function: Callable[[Array], float], point: Array, at: Linearisation) -> Spread:
+    """Uncertainty of a function of the parameters."""
+    steps = 1e-6 * at.scale
+    gradient = np.array([(function(point + step) - function(point - step)) for step in np.diag(steps)]) / (2 * steps)
+    scaled = gradient * at.scale
+    hidden = np.linalg.norm(scaled @ at.unknown) if at.unknown.size else 0.0
+    fixed = bool(hidden <= 1e-3 * max(float(np.linalg.norm(scaled)), 1e-300))
+    shares = np.maximum(np.einsum("i,bij,j->b", gradient, at.parts, gradient), 0.0)
+    std = float(np.sqrt(np.sum(shares)))
+    lever = float(np.linalg.norm(gradient @ at.pseudo_inverse))
+    return Spread(std, float(np.hypot(quantile(shares, at.noise) * std, ABSORBED * lever * at.systematic)), fixed)
+
+
+def quantile(shares: Array, noise: tuple[Noise, ...]) -> float:
+    """Student's t for a variance whose shares (blocks,) are known with the freedom of each (Welch 1947)."""
+    total = float(np.sum(shares))
+    if total <= 0.0:
+        return 0.0
+    doubt = float(np.sum([(share / total) ** 2 / seen.freedom for share, seen in zip(shares, noise, strict=True)]))
+    return float(stdtrit(1.0 / max(doubt, 1e-9), 0.5 + LEVEL / 2))
+
+
+def autocorrelation(residual: Array, blocks: list[Block]) -> float:
+    """Lag-1 autocorrelation of residuals (rows,) within channels, pooled over them."""
+    measured = [residual[block.rows] for block in blocks if not block.known]
+    power = sum(float(part @ part) for part in measured)
+    return sum(float(part[1:] @ part[:-1]) for part in measured) / power if power > 0 else 0.0

@@ -1,6 +1,0 @@
-"""Where a model does not fit: which of the things taken as known would explain it."""
-
-from shoal.identification.suspects.search import Findings, suspects
-from shoal.identification.suspects.suspect import Suspect, explains
-
-__all__ = ["Findings", "Suspect", "explains", "suspects"]

@@ -1,0 +1,121 @@
+"""Other places that fit: mirror images that the channels cannot tell apart, and places in the answer's own valley."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.engines import get_engine
+from shoal.identification import Problem, Verdict, identify
+from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.mirrors import images
+from shoal.identification.judge.rivals import connected
+from shoal.identification.measure import measure
+from shoal.identification.problem import Parameter
+
+GRAVITIES = [(0.0, -9.81), (0.0, 9.81), (-9.81, 0.0), (9.81, 0.0)]
+
+
+def problem(
+    scene: str, parameters: dict[str, Any], channels: list[str], truth: dict[str, float], **more: Any
+) -> Problem:
+    tip = "A" if scene == "single-pendulum" else "B"
+    measured = [{"marker": tip, "quantity": quantity, "noise": 1e-3} for quantity in channels]
+    source = {"kind": "engine", "engine": "gauss", "stop": 1.2, "count": 60, "noise": 1e-3, "seed": 5, "values": truth}
+    stated = {"name": "one", "scene": scene, "parameters": parameters, "channels": measured, "source": source}
+    return Problem.parse({**stated, **more}, "one")
+
+
+def drawn(rng: np.random.Generator) -> tuple[Problem, bool]:
+    """A pendulum with random gravity, bounds and channels, and whether its mirror image is a solution too.
+
+    Reflected about the axis of gravity a machine moves as before; what is measured along the axis stays, and only that.
+    """
+    scene, bodies = [("single-pendulum", ["OA"]), ("rigid-double-pendulum", ["OA", "AB"])][rng.integers(2)]
+    gravity = GRAVITIES[rng.integers(4)]
+    along = "x" if gravity[0] else "y"
+    channels = [[along], [along], ["y" if along == "x" else "x"], ["x", "y"], ["angle", along]][rng.integers(5)]
+    angles = {body: float(rng.uniform(-2.5, 2.5)) for body in bodies}
+    wide = rng.random() < 0.6
+    bounds = {body: (-3.3, 3.3) if wide else (angle - 0.6, angle + 0.5) for body, angle in angles.items()}
+    parameters = {b: {"path": f"initial.{b}.angle", "lower": low, "upper": high} for b, (low, high) in bounds.items()}
+    image = {body: (np.pi if along == "y" else 0.0) - angle for body, angle in angles.items()}
+    turns = 2 * np.pi * np.arange(-1, 2)
+    inside = all(np.any((bounds[b][0] <= a + turns) & (a + turns <= bounds[b][1])) for b, a in image.items())
+    other = any(abs(np.sin((image[b] - angles[b]) / 2)) > 0.01 for b in bodies)
+    truth = {f"initial.{body}.angle": angle for body, angle in angles.items()}
+    found = problem(scene, parameters, channels, truth, values={"gravity": list(gravity)})
+    return found, channels == [along] and inside and other
+
+
+@pytest.mark.parametrize("seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6, 206))])
+def test_mirror_images_are_ambiguous_where_the_bounds_hold_both(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    stated, mirrored = drawn(rng)
+    found = identify(stated, method="least-squares" if len(stated.parameters) == 1 else None)
+    assert found.verdict is (Verdict.AMBIGUOUS if mirrored else Verdict.IDENTIFIED), found.message
+    if mirrored:
+        assert "mirror images" in found.message
+
+
+def model(stated: Problem) -> ForwardModel:
+    return ForwardModel(stated, stated.load_scene(), get_engine("gauss"), measure(stated, stated.load_scene()))
+
+
+ANGLE = {"path": "initial.OA.angle", "lower": -3.0, "upper": 3.0}
+
+
+def test_images_respect_the_bounds() -> None:
+    narrow = {"path": "initial.AB.angle", "lower": -1.0, "upper": 1.0}
+    seen = model(problem("rigid-double-pendulum", {"one": ANGLE, "two": narrow}, ["y"], {}))
+    found = images(seen, np.array([0.8, 0.4]))
+    assert len(found)
+    assert np.all((found >= seen.lower) & (found <= seen.upper))
+    assert any(np.allclose(point, (np.pi - 0.8, -0.4)) for point in found)
+
+
+def test_a_curved_valley_is_one_place_and_a_mirror_image_another() -> None:
+    """A free swing tells clock and gravity only together: g goes with the square of the clock."""
+    parameters = {
+        "angle": ANGLE,
+        "clock": {"path": "measurement.clock", "lower": 0.5, "upper": 2.0},
+        "g": {"path": "gravity.1", "lower": -25.0, "upper": -3.0},
+    }
+    truth = {"initial.OA.angle": 0.6}
+    seen = model(problem("single-pendulum", parameters, ["y"], truth))
+    there = seen.parameters.to_vector(np.array([0.6, 1.0, -9.81]))
+    limit = 1.2 * float(seen.cost(seen.uncounted(there[None]))[0])
+    beside = seen.parameters.to_vector(np.array([0.6, 1.4, -9.81 * 1.4**2]))
+    assert connected(seen, there, beside, limit)
+    image = seen.parameters.to_vector(np.array([np.pi - 0.6, 1.0, -9.81]))
+    assert not connected(seen, there, image, limit)
+
+
+@pytest.mark.parametrize(
+    ("path", "lower", "scale", "logarithmic"),
+    [
+        ("bodies.OA.density", 1.0, "auto", True),
+        ("bodies.OA.density", 1.0, "linear", False),
+        ("joints.O.friction", 0.0, "auto", False),
+        ("initial.OA.angle", 0.1, "auto", False),
+        ("bodies.OA.centre_of_mass.0", 0.1, "auto", False),
+        ("bodies.OA.centre_of_mass.0", 0.1, "log", True),
+        ("measurement.clock", 0.5, "auto", True),
+        ("measurement.delay", 0.5, "auto", False),
+    ],
+)
+def test_positive_quantities_are_sought_by_their_logarithm(
+    path: str, lower: float, scale: Any, logarithmic: bool
+) -> None:
+    assert Parameter(path=path, lower=lower, upper=10.0, scale=scale).logarithmic is logarithmic
+
+
+def test_an_interval_that_reaches_what_cannot_be_is_not_known() -> None:
+    """Friction of which the record tells only that it is small."""
+    parameters = {"angle": ANGLE, "k": {"path": "joints.O.friction", "lower": 0.0, "upper": 10.0}}
+    found = identify(problem("single-pendulum", parameters, ["x", "y"], {"initial.OA.angle": 0.6}))
+    k = found.parameters["k"]
+    assert k.lower < 0.0
+    assert not k.identifiable
+    assert found.parameters["angle"].identifiable

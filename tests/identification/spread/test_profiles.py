@@ -1,0 +1,85 @@
+"""Profiles and the bootstrap against what linear theory and known answers say."""
+
+import numpy as np
+import pytest
+from shoal.identification import Problem, identify
+from shoal.identification.conclude import Wishes
+from shoal.identification.methods.least_squares import descend
+from shoal.identification.spread.bootstrap import block_length, bootstrap
+from shoal.identification.spread.covariance import blocks_of
+from shoal.identification.spread.profiles import profile
+from shoal.identification.spread.uncertainty import linearise, spread
+from shoal_validation.coverage.cases import Case, cases
+
+CASES = {case.name: case for case in cases()}
+
+
+def fitted(case: Case) -> tuple:  # type: ignore[type-arg]
+    model = case.model(seed=5)
+    truth = model.parameters.to_vector(np.array([case.truth[name] for name in model.names]))
+    end = descend(model, truth, lambda *_: None)
+    at = linearise(end.jacobian, end.residual, model.sizes(end.point), blocks_of(model, len(end.residual)))
+    return model, end, at
+
+
+@pytest.mark.parametrize("name", ["angles; white", "angles; AR(1) 0.9"])
+def test_a_well_known_parameter_has_the_interval_of_linear_theory(name: str) -> None:
+    """Where the misfit is a parabola, profile and covariance agree, correlated noise included."""
+    model, end, at = fitted(CASES[name])
+    for k in range(2):
+        half = spread(lambda p, k=k: float(p[k]), end.point, at).half  # type: ignore[misc]
+        found = profile(model, end.point, at, k)
+        assert not found.open
+        assert not found.better
+        assert found.upper - end.point[k] == pytest.approx(half, rel=0.05)
+        assert end.point[k] - found.lower == pytest.approx(half, rel=0.05)
+        assert np.all(np.diff(found.values) > 0)
+
+
+def test_a_parameter_without_effect_is_open_on_both_sides() -> None:
+    """The first rod's density multiplies nothing when both densities and the friction may change with it."""
+    case = CASES["angles, mass, friction; white"]
+    both = case.problem.model_dump()
+    both["parameters"]["first"] = {"path": "bodies.OA.density", "lower": 500.0, "upper": 2000.0, "scale": "log"}
+    both["parameters"]["density"]["upper"] = 1e5
+    wide = Case(case.name, Problem.parse(both, "wide"), {**case.truth}, 0.0)
+    model = wide.model(seed=5)
+    truth = model.parameters.to_vector(np.array([{**case.truth, "first": 1000.0}[name] for name in model.names]))
+    end = descend(model, truth, lambda *_: None)
+    at = linearise(end.jacobian, end.residual, model.sizes(end.point), blocks_of(model, len(end.residual)))
+    found = profile(model, end.point, at, model.names.index("first"))
+    assert found.lower_open
+    assert found.upper_open
+    assert found.lower == pytest.approx(500.0)
+    assert found.upper == pytest.approx(2000.0)
+
+
+def test_blocks_are_as_long_as_the_noise_remembers() -> None:
+    assert block_length(200, 0.0) == 1
+    assert 20 <= block_length(200, 0.9) <= 66
+
+
+@pytest.mark.parametrize("name", ["angles; white", "angles; AR(1) 0.9"])
+def test_the_bootstrap_scatters_as_the_covariance_says(name: str) -> None:
+    """Refits of redrawn residuals; for correlated noise the plain deviation would be a third of it."""
+    model, end, at = fitted(CASES[name])
+    predicted = {key: model.observe(end.point[None], key)[0] for key in model.measurement.recordings}
+    found = bootstrap(model, end.point, predicted, at.noise[0].rho, 60, np.random.default_rng(0))
+    assert found.failed == 0
+    for k, key in enumerate(model.names):
+        std = float(np.std(found.draws[:, k], ddof=1))
+        assert std == pytest.approx(np.sqrt(at.covariance[k, k]), rel=0.5)
+        low, high = found.interval(key)
+        assert low < end.point[k] < high
+
+
+def test_wishes_are_part_of_the_estimate() -> None:
+    case = CASES["angles; white"]
+    model = case.model(seed=1)
+    wishes = Wishes(profiles=True, bootstrap=5)
+    estimate = identify(case.problem, method="least-squares", measurement=model.measurement, wishes=wishes)
+    answer = estimate.to_json()
+    assert set(answer["profiles"]) == {"theta1", "theta2"}
+    assert answer["bootstrap"]["draws"] == 5
+    again = identify(case.problem, method="least-squares", measurement=model.measurement, wishes=wishes)
+    assert again.to_json()["bootstrap"] == answer["bootstrap"]

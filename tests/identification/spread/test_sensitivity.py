@@ -1,0 +1,129 @@
+"""Derivatives against two independent ways: CasADi's exact ones, and variational equations by short segments."""
+
+import numpy as np
+import pytest
+from shoal.engines import get_engine
+from shoal.engines.casadi_shooting import shot
+from shoal.identification import Measurement, Problem, identify
+from shoal.identification.forward import ForwardModel
+from shoal.identification.methods.least_squares import differentiate as naive
+from shoal.identification.spread.covariance import blocks_of
+from shoal.identification.spread.sensitivity import believed, sensitivity
+from shoal.identification.spread.uncertainty import linearise
+from shoal_validation.coverage.cases import tip
+from shoal_validation.inverse_precision.cases import rigid_problem, textbook
+
+PATHS = ("initial.OA.angle", "initial.AB.angle")
+STATE = (*PATHS, "initial.OA.rate", "initial.AB.rate")
+CHAOTIC = np.array([3 * np.pi / 4, 2.6]) - np.pi / 2
+"""From the downward vertical 3 pi/4 and 2.6 rad."""
+FINE = {"solver.relative_tolerance": 1e-11, "solver.absolute_tolerance": 1e-11}
+
+
+def model_of(start: np.ndarray, horizon: float, noise: float = 1e-3) -> ForwardModel:
+    """Both angles from the tip at 100 Hz, data by scipy."""
+    data = {
+        "name": "sensitivity",
+        "scene": "rigid-double-pendulum",
+        "parameters": {
+            name: {"path": path, "lower": -4.8, "upper": 4.8} for name, path in zip("ab", PATHS, strict=True)
+        },
+        "channels": [{"marker": "B", "quantity": q, "column": q} for q in ("x", "y")],
+        "noise": noise,
+        "source": {"kind": "file"},
+    }
+    problem = Problem.parse(data, "sensitivity")
+    times = np.arange(1, round(100 * horizon) + 1) / 100
+    points = tip(times, *start) + noise * np.random.default_rng(0).standard_normal((len(times), 2))
+    measurement = Measurement.single(times, tuple(problem.channels), points, "scipy DOP853", noise=noise)
+    return ForwardModel(problem, problem.load_scene(FINE), get_engine("gauss"), measurement)
+
+
+def by_segments(model: ForwardModel, start: np.ndarray, samples: int = 25, step: float = 1e-6) -> np.ndarray:
+    """Derivatives of the tip in the initial angles, (rows, 2), by the variational equations of short segments.
+
+    Angles and rates at the starts of segments come from one run. In a segment of so many samples nothing grows much, so
+    that central differences in its first state are exact to ten digits; the chain rule joins the segments.
+    """
+    times, scene = model.measurement.first.times, model.scene
+    whole = model.engine.simulate(scene.with_values(dict(zip(PATHS, start.tolist(), strict=True))), times)
+    assert whole.rates is not None
+    states = np.column_stack([whole.angles[:, :, 0], whole.rates[:, :, 0]])
+    first = np.concatenate([[*start, 0.0, 0.0], states[samples - 1 : -1 : samples].ravel()]).reshape(-1, 4)
+    moved = first[:, None] + step * np.concatenate([np.eye(4), -np.eye(4)])
+    values = dict(zip(STATE, moved.reshape(-1, 4).T, strict=True))
+    runs = model.engine.simulate_many(scene, values, times[:samples])
+    assert runs.rates is not None
+    seen = runs.points[:, runs.markers.index("B")].reshape(samples, 2, -1, 2, 4)
+    last = np.concatenate([runs.angles[-1], runs.rates[-1]]).reshape(4, -1, 2, 4)
+    slopes = (seen[:, :, :, 0] - seen[:, :, :, 1]) / (2 * step)
+    transition = (last[:, :, 0] - last[:, :, 1]) / (2 * step)
+    carried, rows = np.eye(4)[:, :2], []
+    for k in range(len(first)):
+        rows.append(slopes[:, :, k] @ carried)
+        carried = transition[:, k] @ carried
+    return np.concatenate(rows).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("horizon", [0.5, 2.0])
+def test_differences_are_the_exact_derivatives_of_casadi(horizon: float) -> None:
+    model, start = model_of(np.array([np.pi / 4, np.pi / 6]), horizon), np.array([np.pi / 4, np.pi / 6])
+    motion = shot(model.scene, PATHS, model.measurement.first.times, "B", 1e-3, 2)
+    exact = np.array(motion(start))[2:].reshape(2, 2, -1)
+    seen = sensitivity(model, start)
+    assert seen.reliable
+    assert np.allclose(seen.jacobian.reshape(-1, 2, 2), np.moveaxis(exact, -1, 0).swapaxes(1, 2), atol=1e-6)
+
+
+def test_segments_agree_with_casadi() -> None:
+    """The second way is itself checked."""
+    model, start = model_of(np.array([np.pi / 4, np.pi / 6]), 2.0), np.array([np.pi / 4, np.pi / 6])
+    exact = np.array(shot(model.scene, PATHS, model.measurement.first.times, "B", 1e-3, 2)(start))[2:].reshape(2, 2, -1)
+    assert np.allclose(by_segments(model, start).reshape(-1, 2, 2), np.moveaxis(exact, -1, 0).swapaxes(1, 2), atol=1e-6)
+
+
+def test_the_weak_direction_of_a_chaotic_motion() -> None:
+    """1 mm of noise over 10 s leaves 2.6e-5 rad in the weak direction; differences of one step say a fraction of it."""
+    model = model_of(CHAOTIC, 10.0)
+
+    def weak(jacobian: np.ndarray) -> float:
+        return 1e-3 / float(np.linalg.svd(jacobian, compute_uv=False)[-1])
+
+    second = weak(by_segments(model, CHAOTIC))
+    first = sensitivity(model, CHAOTIC)
+    assert 1e-5 < second < 1e-4
+    assert weak(first.jacobian) == pytest.approx(second, rel=0.1)
+    assert first.reliable
+    assert weak(naive(model, CHAOTIC)[1]) < 0.1 * second
+    at = linearise(first.jacobian, first.residual, model.sizes(CHAOTIC), blocks_of(model, len(first.residual)))
+    assert at.unknown.size == 0
+    assert np.sqrt(np.linalg.eigvalsh(at.covariance)[-1]) == pytest.approx(second, rel=0.3)
+
+
+def test_steps_that_never_agree_are_not_reliable() -> None:
+    """At solver tolerances of 1e-5 the neighbourhood of a chaotic motion is noise, and the derivatives say so."""
+    model = model_of(CHAOTIC, 10.0)
+    model.scene = model.scene.with_values({"solver.relative_tolerance": 1e-5, "solver.absolute_tolerance": 1e-5})
+    seen = sensitivity(model, CHAOTIC)
+    assert not seen.reliable
+    assert seen.doubt > 1e-2
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_intervals_of_a_chaotic_record_rest_on_its_beginning_and_hold(seed: int) -> None:
+    """Data by scipy's integrator; derivatives of 10 s, and intervals with them, are off by orders of magnitude."""
+    problem = rigid_problem()
+    found = identify(problem, measurement=textbook(problem, 10.0, 0.01, seed=seed))
+    assert "the intervals rest on the first" in found.message
+    for name, true in found.truth.items():
+        value = found.parameters[name]
+        assert abs(value.value - true) < 4 * value.std
+        assert value.std < 1e-2
+
+
+def test_derivatives_that_hold_are_those_of_the_whole_record() -> None:
+    model = model_of(np.array([0.5, 0.2]), 1.0)
+    point = np.array([0.5, 0.2])
+    one, other = sensitivity(model, point), believed(model, point)
+    assert other.end is None
+    assert np.array_equal(one.jacobian, other.jacobian)
