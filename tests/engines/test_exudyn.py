@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 from shoal.engines.exudyn import ExudynEngine
-from shoal.engines.exudyn_build import build, library
-from shoal.engines.exudyn_cable import CablePart
-from shoal.engines.exudyn_checks import judge
-from shoal.engines.exudyn_record import Record, Steps, choose_steps
+from shoal.engines.exudyn.build import build, library
+from shoal.engines.exudyn.cable import CablePart
+from shoal.engines.exudyn.checks import judge
+from shoal.engines.exudyn.record import Record, Steps, choose_steps
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Status

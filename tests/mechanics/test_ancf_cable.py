@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from shoal.engines.casadi_element import cable_element
+from shoal.engines.casadi.element import cable_element
 from shoal.mechanics.elements import ancf_cable
 from shoal.mechanics.elements.ancf_cable import AncfCables
 from shoal.mechanics.numerics.tile import SINGLE, WIDE

@@ -13,6 +13,7 @@ Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full"]
 Quadrature = Literal["full", "reduced"]
 Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
 
+_SHEARS = {"rigid": False, "ancf-cable": False, "ancf-quintic": False, "ancf-full": True}
 _POINTS = 24
 """Quadrature points along a curved rod."""
 _ONLY_FLEXIBLE = {
@@ -95,6 +96,11 @@ class Rod(Record):
             if self.poisson_ratio >= 0.5:
                 raise ValueError(f"poisson_ratio {self.poisson_ratio:g} must be below 0.5 for ancf-full")
         return self
+
+    @property
+    def shears(self) -> bool:
+        """Whether its element has shear and the rotary inertia of its sections."""
+        return _SHEARS[self.element]
 
     @property
     def tapered(self) -> bool:

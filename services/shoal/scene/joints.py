@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
 from shoal.scene.function import Function
-from shoal.scene.record import Angle, NonNegative, Positive, Record, Vector
+from shoal.scene.record import Angle, NonNegative, Positive, Record, Vector, kinds
 
 GROUND = "ground"
 
@@ -36,6 +36,7 @@ class Revolute(Record):
     """
 
     kind: Literal["revolute"] = "revolute"
+    turned: ClassVar[tuple[str, ...]] = ()
     first: Attachment
     second: Attachment
     friction: NonNegative = 0.0
@@ -47,6 +48,7 @@ class Weld(Record):
     """Two places stay together and the bodies keep their relative angle [rad] (default: that of the start)."""
 
     kind: Literal["weld"] = "weld"
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
     first: Attachment
     second: Attachment
     angle: Angle | None = None
@@ -60,6 +62,7 @@ class Slider(Record):
     """
 
     kind: Literal["slider"] = "slider"
+    turned: ClassVar[tuple[str, ...]] = ("first",)
     first: Attachment
     second: Attachment
     direction: Angle = 0.0
@@ -73,6 +76,7 @@ class Distance(Record):
     """Two places keep a distance [m] (default: that of the start), or one that is a function of time."""
 
     kind: Literal["distance"] = "distance"
+    turned: ClassVar[tuple[str, ...]] = ()
     first: Attachment
     second: Attachment
     length: Function | None = None
@@ -82,6 +86,7 @@ class Parallel(Record):
     """The directions of two bodies stay parallel."""
 
     kind: Literal["parallel"] = "parallel"
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
     first: Attachment
     second: Attachment
 
@@ -90,6 +95,7 @@ class Perpendicular(Record):
     """The directions of two bodies stay perpendicular."""
 
     kind: Literal["perpendicular"] = "perpendicular"
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
     first: Attachment
     second: Attachment
 
@@ -98,6 +104,7 @@ class DrivenAngle(Record):
     """The angle [rad] from the first body's direction to the second's is a function of time."""
 
     kind: Literal["driven-angle"] = "driven-angle"
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
     first: Attachment
     second: Attachment
     angle: Function
@@ -115,6 +122,7 @@ class Coupling(Record):
     """The sum of factor * coordinate equals a function of time [m]."""
 
     kind: Literal["coupling"] = "coupling"
+    turned: ClassVar[tuple[str, ...]] = ()
     terms: Annotated[tuple[CoupledCoordinate, ...], Field(min_length=1)]
     value: Function = Function(number=0.0)
 
@@ -131,14 +139,19 @@ Joint = Annotated[
     BeforeValidator(_revolute_if_unsaid),
 ]
 """A joint without a kind is a revolute one."""
-JOINT_KINDS = ("revolute", "weld", "slider", "distance", "parallel", "perpendicular", "driven-angle", "coupling")
+JOINT_KINDS = kinds(Joint)
 
 
-def sides(joint: Joint) -> dict[str, Attachment]:
-    """The attachments of a joint, by the path of their field."""
-    if isinstance(joint, Coupling):
-        return {f"terms.{number}.at": term.at for number, term in enumerate(joint.terms)}
-    return {"first": joint.first, "second": joint.second}
+def sides(record: Record) -> dict[str, Attachment]:
+    """The attachments of a joint or a load, by the path of their field."""
+    found = {}
+    for field, value in record:
+        if isinstance(value, Attachment):
+            found[field] = value
+        for number, part in enumerate(value if isinstance(value, tuple) else ()):
+            if isinstance(part, Record):
+                found |= {f"{field}.{number}.{inner}": at for inner, at in sides(part).items()}
+    return found
 
 
 def places(joint: Joint) -> tuple[Attachment, ...]:
@@ -148,8 +161,6 @@ def places(joint: Joint) -> tuple[Attachment, ...]:
 
 def turned(joint: Joint) -> dict[str, Attachment]:
     """The attachments of whose bodies' directions a joint speaks, by the path of their field."""
-    if isinstance(joint, Parallel | Perpendicular | DrivenAngle) or (
-        isinstance(joint, Weld) and joint.angle is not None
-    ):
-        return {"first": joint.first, "second": joint.second}
-    return {"first": joint.first} if isinstance(joint, Slider) else {}
+    if isinstance(joint, Weld) and joint.angle is None:
+        return {}
+    return {side: getattr(joint, side) for side in joint.turned}

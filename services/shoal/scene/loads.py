@@ -8,7 +8,8 @@ from pydantic import Field
 
 from shoal.scene.function import Function
 from shoal.scene.joints import Attachment
-from shoal.scene.record import NonNegative, Record, Vector
+from shoal.scene.joints import sides as sides
+from shoal.scene.record import NonNegative, Record, Vector, kinds
 
 
 class Spring(Record):
@@ -75,15 +76,4 @@ class DistributedForce(Record):
 
 
 Load = Annotated[Spring | TorsionSpring | Force | Torque | DistributedForce, Field(discriminator="kind")]
-LOAD_KINDS = ("spring", "torsion-spring", "force", "torque", "distributed-force")
-
-
-def sides(load: Load) -> dict[str, Attachment]:
-    """The attachments of a load, by the name of their field."""
-    if isinstance(load, Spring | TorsionSpring):
-        return {"first": load.first, "second": load.second}
-    if isinstance(load, Force):
-        return {"at": load.at}
-    if isinstance(load, Torque):
-        return {"at": load.at} if load.reaction is None else {"at": load.at, "reaction": load.reaction}
-    return {}
+LOAD_KINDS = kinds(Load)

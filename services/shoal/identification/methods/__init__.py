@@ -38,8 +38,8 @@ METHODS: dict[str, Method] = {
 _LATE = {
     "multi-start": "scipy.stats",
     "cma-es": "cma",
-    "casadi": "shoal.engines.casadi_shooting",
-    "casadi-multiple": "shoal.engines.casadi_multiple_shooting",
+    "casadi": "shoal.engines.casadi.shooting",
+    "casadi-multiple": "shoal.engines.casadi.multiple_shooting",
 }
 """Modules that take a second or more to import, by the method that does so when it begins."""
 

@@ -15,19 +15,19 @@ from shoal.identification.recording import Clocked
 from shoal.identification.starts import starting_points
 
 if TYPE_CHECKING:
-    from shoal.engines.casadi_shooting import ShootingResult
+    from shoal.engines.casadi.shooting import ShootingResult
 
 
 def casadi(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """IPOPT on CasADi's own model, from the better start; initial angles and rates from one marker's position only."""
-    from shoal.engines.casadi_shooting import identify_initial_angles
+    from shoal.engines.casadi.shooting import identify_initial_angles
 
     return _shoot(model, identify_initial_angles, progress)
 
 
 def casadi_multiple(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """The same with the record in segments whose first states are unknowns too, for long and chaotic motions."""
-    from shoal.engines.casadi_multiple_shooting import identify_by_segments
+    from shoal.engines.casadi.multiple_shooting import identify_by_segments
 
     return _shoot(model, identify_by_segments, progress)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shoal.engines.exudyn_bodies import Place
+from shoal.engines.exudyn.bodies import Place
 from shoal.engines.sections import Sections
 from shoal.scene import Rod
 from shoal.trajectory import Array

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import casadi as ca
 import numpy as np
 
-from shoal.engines.casadi_element import CableElement, cable_element
+from shoal.engines.casadi.element import CableElement, cable_element
 from shoal.engines.sections import Sections
 from shoal.scene import Rod
 from shoal.scene.record import Vector

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.exudyn_bodies import Energy, Motion, Place, System
-from shoal.engines.exudyn_chain import Chain, cross, gauss
-from shoal.engines.poses import Pose
+from shoal.engines.exudyn.bodies import Energy, Motion, Place, System
+from shoal.engines.exudyn.chain import Chain, cross, gauss
+from shoal.engines.poses import InitialPose
 from shoal.engines.sections import Sections
 from shoal.errors import InputError
 from shoal.scene import Rod
@@ -28,7 +28,7 @@ class BeamPart(Chain):
     nodes: list[Any]
 
     @classmethod
-    def add(cls, system: System, rod: Rod, pose: Pose) -> BeamPart:
+    def add(cls, system: System, rod: Rod, pose: InitialPose) -> BeamPart:
         """Enter a straight rod at its initial pose."""
         items, sections = system.items, Sections.of(rod)
         nodes, columns = [], []

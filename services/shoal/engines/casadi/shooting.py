@@ -11,11 +11,13 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from shoal.engines.casadi_fixed_step import runge_kutta
-from shoal.engines.casadi_model import CasadiModel, casadi_model
+from shoal.engines.capabilities import require
+from shoal.engines.casadi.engine import CasadiEngine
+from shoal.engines.casadi.fixed_step import runge_kutta
+from shoal.engines.casadi.model import CasadiModel, casadi_model
 from shoal.engines.contract import sampling_times
 from shoal.errors import InputError
-from shoal.scene import Scene, Spring, TorsionSpring
+from shoal.scene import Scene
 from shoal.trajectory import Array, Status
 
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -157,6 +159,7 @@ def box(paths: Sequence[str], *sides: Sequence[float] | Array) -> tuple[Array, A
 
 def shot(scene: Scene, paths: Sequence[str], times: Array, marker: str, step: float, directions: int) -> Any:
     """Function parameters -> path of the marker [m] with its derivatives below, (2 + 2 directions, samples)."""
+    require(CasadiEngine(), scene)
     model = casadi_model(scene)
     p, size = ca.SX.sym("p", len(paths)), 2 * model.unknowns + 1
     initial = initial_state(model, scene, paths, p)
@@ -174,9 +177,8 @@ def shot(scene: Scene, paths: Sequence[str], times: Array, marker: str, step: fl
 def initial_state(model: CasadiModel, scene: Scene, paths: Sequence[str], p: Any) -> Any:
     """The state x at the start as an expression in the parameters p. Raises InputError."""
     for name, load in scene.loads.items():
-        if isinstance(load, Spring | TorsionSpring):
-            field = "length" if isinstance(load, Spring) else "angle"
-            if getattr(load, field) is None:
+        for field in ("length", "angle"):
+            if getattr(load, field, 0.0) is None:
                 raise InputError(f"loads.{name}.{field}: shooting moves the start, so say where the spring rests")
     angles: list[Any] = [scene.start(body).angle for body in model.bodies]
     rates: list[Any] = [scene.start(body).rate for body in model.bodies]

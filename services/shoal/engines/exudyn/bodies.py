@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from shoal.engines.course import Clock
-from shoal.engines.poses import Pose, normal
+from shoal.engines.poses import InitialPose, normal
 from shoal.scene import PointMass, RigidBody, Rod
 from shoal.trajectory import Array
 
@@ -113,7 +113,7 @@ class RigidPart:
     """Angle [rad] at the start, from which Exudyn counts."""
 
     @classmethod
-    def add(cls, system: System, given: Rod | RigidBody | PointMass, pose: Pose) -> RigidPart:
+    def add(cls, system: System, given: Rod | RigidBody | PointMass, pose: InitialPose) -> RigidPart:
         """Enter a rigid body at its initial pose."""
         items, mbs = system.items, system.mbs
         if isinstance(given, PointMass):

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from shoal.engines.exudyn_bodies import Motion, Part, Place, System
-from shoal.engines.exudyn_chain import Chain
-from shoal.engines.poses import Pose, lead, local, owner
+from shoal.engines.exudyn.bodies import Motion, Part, Place, System
+from shoal.engines.exudyn.chain import Chain
+from shoal.engines.poses import InitialPose, owner, start_of
 from shoal.errors import InputError
+from shoal.mechanics.start.closure import lead
 from shoal.scene import Attachment, PointMass, Scene
 from shoal.trajectory import Array
 
@@ -20,7 +21,7 @@ class Ends:
     scene: Scene
     system: System
     parts: dict[str, Part]
-    poses: dict[str, Pose]
+    poses: dict[str, InitialPose]
 
     def part(self, at: Attachment) -> tuple[Part, Place]:
         """The part that an attachment is on, and its place there [m]."""
@@ -49,12 +50,12 @@ class Ends:
 
     def start(self, at: Attachment) -> Array:
         """Where an attachment is at the start [m], (2,)."""
-        return self.poses[owner(at)].position(local(self.scene, at))
+        return start_of(self.scene, self.poses, at)
 
     def start_turn(self, first: Attachment, second: Attachment) -> float:
         """Angle from the first direction to the second at the start, over full turns [rad]."""
         one, other = (self.poses[owner(side)].angle + lead(self.scene, side) for side in (first, second))
-        return other - one
+        return float(other - one)
 
     def is_point(self, at: Attachment) -> bool:
         """Whether an attachment is on a point mass, which has no direction."""

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from shoal.engines.course import Course
-from shoal.engines.exudyn_bodies import Energy, Motion, Place, RigidPart, System
-from shoal.engines.poses import Pose
+from shoal.engines.exudyn.bodies import Energy, Motion, Place, RigidPart, System
+from shoal.engines.poses import InitialPose
 from shoal.errors import InputError
 from shoal.scene import Function, MovingPoint, PointMass
 from shoal.trajectory import Array
@@ -55,7 +55,7 @@ class GroundPart:
         return np.zeros(len(q))
 
 
-def add_moving_point(system: System, ground: GroundPart, name: str, path: MovingPoint, pose: Pose) -> RigidPart:
+def add_moving_point(system: System, ground: GroundPart, name: str, path: MovingPoint, pose: InitialPose) -> RigidPart:
     """Enter a point of the ground that moves: a body whose three coordinates are all driven, so its mass is idle."""
     part = RigidPart.add(system, PointMass(mass=1.0), pose)
     for axis, f in enumerate((path.x, path.y)):

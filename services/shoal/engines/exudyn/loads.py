@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from shoal.engines.capabilities import of_kind
 from shoal.engines.course import Course
-from shoal.engines.exudyn_beam import BeamPart
-from shoal.engines.exudyn_cable import CablePart
-from shoal.engines.exudyn_chain import gauss
-from shoal.engines.exudyn_connectors import Exchange, Law, add_spring, add_torsion
-from shoal.engines.exudyn_ends import Ends
+from shoal.engines.exudyn.beam import BeamPart
+from shoal.engines.exudyn.cable import CablePart
+from shoal.engines.exudyn.chain import gauss
+from shoal.engines.exudyn.connectors import Exchange, Law, add_spring, add_torsion
+from shoal.engines.exudyn.ends import Ends
 from shoal.errors import InputError
 from shoal.scene import DistributedForce, Force, Function, Load, Rod, Spring, Torque, TorsionSpring
 from shoal.trajectory import Array
@@ -19,18 +21,7 @@ from shoal.trajectory import Array
 
 def add_load(ends: Ends, name: str, load: Load) -> Exchange:
     """Enter a load. Raises InputError."""
-    if isinstance(load, Spring | TorsionSpring):
-        law = Law(load.stiffness, load.cubic, load.damping, elastic=load.elastic)
-        if isinstance(load, Spring):
-            return add_spring(ends, load.first, load.second, law, load.length)
-        ends.require_direction(f"loads.{name}", load.first, load.second)
-        return add_torsion(ends, load.first, load.second, law, load.angle)
-    if isinstance(load, Force):
-        return _add_force(ends, load, _course(ends, f"loads.{name}.scale", load.scale))
-    if isinstance(load, Torque):
-        ends.require_direction(f"loads.{name}", load.at)
-        return _add_torque(ends, load, _course(ends, f"loads.{name}.torque", load.torque))
-    return _add_distributed(ends, load, _course(ends, f"loads.{name}.scale", load.scale))
+    return of_kind(LOADS, load.kind, f"loads.{name}")(ends, f"loads.{name}", load)
 
 
 def _course(ends: Ends, field: str, f: Function) -> Course:
@@ -40,7 +31,21 @@ def _course(ends: Ends, field: str, f: Function) -> Course:
         raise InputError(f"{field}: {str(error).removeprefix('function: ')}") from None
 
 
-def _add_force(ends: Ends, load: Force, scale: Course) -> Exchange:
+def _add_spring(ends: Ends, where: str, load: Spring) -> Exchange:
+    return add_spring(ends, load.first, load.second, _law(load), load.length)
+
+
+def _add_torsion(ends: Ends, where: str, load: TorsionSpring) -> Exchange:
+    ends.require_direction(where, load.first, load.second)
+    return add_torsion(ends, load.first, load.second, _law(load), load.angle)
+
+
+def _law(load: Spring | TorsionSpring) -> Law:
+    return Law(load.stiffness, load.cubic, load.damping, elastic=load.elastic)
+
+
+def _add_force(ends: Ends, where: str, load: Force) -> Exchange:
+    scale = _course(ends, f"{where}.scale", load.scale)
     marker = ends.turn(load.at) if load.follows else ends.hold(load.at)
     ends.system.mbs.AddLoad(
         ends.system.items.LoadForceVector(
@@ -60,7 +65,9 @@ def _add_force(ends: Ends, load: Force, scale: Course) -> Exchange:
     return Exchange(_nothing, power)
 
 
-def _add_torque(ends: Ends, load: Torque, torque: Course) -> Exchange:
+def _add_torque(ends: Ends, where: str, load: Torque) -> Exchange:
+    ends.require_direction(where, load.at)
+    torque = _course(ends, f"{where}.torque", load.torque)
     for side, sign in ((load.at, 1.0), (load.reaction, -1.0)):
         if side is not None:
             ends.system.mbs.AddLoad(
@@ -77,7 +84,8 @@ def _add_torque(ends: Ends, load: Torque, torque: Course) -> Exchange:
     return Exchange(_nothing, power)
 
 
-def _add_distributed(ends: Ends, load: DistributedForce, scale: Course) -> Exchange:
+def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange:
+    scale = _course(ends, f"{where}.scale", load.scale)
     part, rod, system = ends.parts[load.body], ends.scene.bodies[load.body], ends.system
     assert isinstance(rod, Rod)
     force = np.array(load.force)
@@ -117,3 +125,12 @@ def _scaled(vector: list[float], scale: Course, keyword: str) -> dict[str, Any]:
 
 def _nothing(t: Array, q: Array, v: Array) -> Array:
     return np.zeros(len(t))
+
+
+LOADS: dict[str, Callable[[Ends, str, Any], Exchange]] = {
+    "spring": _add_spring,
+    "torsion-spring": _add_torsion,
+    "force": _add_force,
+    "torque": _add_torque,
+    "distributed-force": _add_distributed,
+}

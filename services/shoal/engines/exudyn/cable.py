@@ -15,14 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.exudyn_bodies import Energy, Motion, Place, System
-from shoal.engines.exudyn_chain import Chain, cross, gauss
-from shoal.engines.poses import Pose, normal
+from shoal.engines.exudyn.bodies import Energy, Motion, Place, System
+from shoal.engines.exudyn.chain import Chain, cross, gauss
+from shoal.engines.poses import InitialPose, normal
 from shoal.engines.sections import Sections
 from shoal.scene import Rod
 from shoal.trajectory import Array
 
 LOBATTO_3 = (np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3)
+RULES = {"full": (0, gauss(5), gauss(3)), "reduced": (2, LOBATTO_3, gauss(2))}
+"""Exudyn's number of a quadrature; its points and weights, axial then bending."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class CablePart(Chain):
     rest: Array
 
     @classmethod
-    def add(cls, system: System, rod: Rod, pose: Pose) -> CablePart:
+    def add(cls, system: System, rod: Rod, pose: InitialPose) -> CablePart:
         """Enter an unstrained rod at its initial pose."""
         items, sections = system.items, Sections.of(rod)
         nodes, columns, vectors = [], [], []
@@ -62,7 +64,7 @@ class CablePart(Chain):
                 axialDamping=rod.retardation * sections.axial[k],
                 nodeNumbers=list(pair),
                 strainIsRelativeToReference=float(bool(rod.curvature)),
-                useReducedOrderIntegration=0 if rod.quadrature == "full" else 2,
+                useReducedOrderIntegration=RULES[rod.quadrature][0],
             )
             elements.append(system.mbs.AddObject(cable))
             system.weigh(elements[-1])
@@ -109,7 +111,7 @@ class CablePart(Chain):
     @property
     def _rules(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         """Points and weights, axial then bending."""
-        return (gauss(5), gauss(3)) if self.rod.quadrature == "full" else (LOBATTO_3, gauss(2))
+        return RULES[self.rod.quadrature][1:]
 
     @cached_property
     def _rest(self) -> tuple[Array, Array]:

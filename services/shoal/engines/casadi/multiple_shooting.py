@@ -16,9 +16,9 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from shoal.engines.casadi_fixed_step import runge_kutta
-from shoal.engines.casadi_model import casadi_model
-from shoal.engines.casadi_shooting import OPTIONS, ShootingResult, box, calls, initial_state, left, record, shot
+from shoal.engines.casadi.fixed_step import runge_kutta
+from shoal.engines.casadi.model import casadi_model
+from shoal.engines.casadi.shooting import OPTIONS, ShootingResult, box, calls, initial_state, left, record, shot
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status

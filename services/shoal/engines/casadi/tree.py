@@ -7,16 +7,18 @@ hangs on its parent its position is an expression in the parent's coordinates, s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from shoal.engines.casadi_bodies import Placed, PlacedCable, PlacedGround, PlacedRigid, cable_place, turned
-from shoal.engines.casadi_element import cable_element
-from shoal.scene import GROUND, Attachment, PointMass, Revolute, Rod, Scene
+from shoal.engines.capabilities import of_kind
+from shoal.engines.casadi.bodies import Placed, PlacedCable, PlacedGround, PlacedRigid, cable_place, turned
+from shoal.engines.casadi.element import cable_element
+from shoal.errors import InputError
+from shoal.scene import GROUND, Attachment, PointMass, Revolute, RigidBody, Rod, Scene
 from shoal.scene.record import Vector
 
 
@@ -57,17 +59,10 @@ def build_tree(scene: Scene) -> Tree:
         body, angle = scene.bodies[name], angles[name]
         straight[name] = rest = PlacedRigid(straight[parent.body].point(outer) - turned(angle, inner), angle)
         anchor = placed[parent.body].point(outer)
-        if isinstance(body, Rod) and body.element == "ancf-cable":
-            placed[name], free = _place_cable(name, body, inner, anchor)
-            start += _straight_cable(body, inner, rest)
-        elif isinstance(body, PointMass):
-            free = []
-            placed[name] = PlacedRigid(anchor, ca.SX(0))
-        else:
-            free = [ca.SX.sym(f"{name}_angle")]
-            placed[name] = PlacedRigid(anchor - turned(free[0], inner), free[0])
-            start.append(angle)
+        place = of_kind(ELEMENTS, body.element, f"bodies.{name}.element")
+        placed[name], free, straight_free = place(name, body, inner, anchor, rest)
         coordinates += free
+        start += straight_free
         entry[name] = inner
         on_ground = parent.body == GROUND
         root[name] = outer if on_ground else root[parent.body]
@@ -85,19 +80,43 @@ def build_tree(scene: Scene) -> Tree:
 
 def _links(scene: Scene) -> Iterator[tuple[Attachment, Attachment]]:
     """Joints from the ground outwards, each as (place on the parent, place on the child)."""
-    reached, waiting = {GROUND}, list(scene.joints.values())
+    reached, waiting = {GROUND}, dict(scene.joints)
     while waiting:
-        for joint in list(waiting):
-            assert isinstance(joint, Revolute)
+        for name, joint in list(waiting.items()):
+            if not isinstance(joint, Revolute):
+                raise InputError(f"joints.{name}: engine casadi cannot do {joint.kind}")
             known = [side.body in reached for side in (joint.first, joint.second)]
             if any(known):
                 parent, child = (joint.first, joint.second) if known[0] else (joint.second, joint.first)
-                waiting.remove(joint)
+                waiting.pop(name)
                 reached.add(child.body)
                 yield parent, child
 
 
-def _place_cable(name: str, rod: Rod, inner: Vector, anchor: Any) -> tuple[PlacedCable, list[Any]]:
+def _place_rigid(
+    name: str, body: Rod | RigidBody | PointMass, inner: Vector, anchor: Any, rest: PlacedRigid
+) -> tuple[Placed, list[Any], list[Any]]:
+    if isinstance(body, PointMass):
+        return PlacedRigid(anchor, ca.SX(0)), [], []
+    angle = ca.SX.sym(f"{name}_angle")
+    return PlacedRigid(anchor - turned(angle, inner), angle), [angle], [rest.turn]
+
+
+def _place_cable(
+    name: str, rod: Rod, inner: Vector, anchor: Any, rest: PlacedRigid
+) -> tuple[Placed, list[Any], list[Any]]:
+    placed, free = _hung_cable(name, rod, inner, anchor)
+    return placed, free, _straight_cable(rod, inner, rest)
+
+
+ELEMENTS: dict[str, Callable[..., tuple[Placed, list[Any], list[Any]]]] = {
+    "rigid": _place_rigid,
+    "ancf-cable": _place_cable,
+}
+"""A body of each element on its anchor [m], its free coordinates, and where those are in the straight body."""
+
+
+def _hung_cable(name: str, rod: Rod, inner: Vector, anchor: Any) -> tuple[PlacedCable, list[Any]]:
     """The cable whose place `inner` sits on the anchor [m], (2,), and its free coordinates.
 
     The held node's position follows from the anchor, because the Hermite field is linear in it.
@@ -115,7 +134,7 @@ def _place_cable(name: str, rod: Rod, inner: Vector, anchor: Any) -> tuple[Place
 
 
 def _straight_cable(rod: Rod, inner: Vector, rest: PlacedRigid) -> list[Any]:
-    """The free coordinates of a straight cable, in the order of `_place_cable`."""
+    """The free coordinates of a straight cable, in the order of `_hung_cable`."""
     held = _held_node(rod, inner)
     slope = turned(rest.turn, (1.0, 0.0))
     positions = [rest.point((k * rod.length / rod.elements, 0.0)) for k in range(rod.elements + 1)]

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shoal.engines.exudyn_chain import cross
-from shoal.engines.exudyn_ends import Ends
+from shoal.engines.exudyn.chain import cross
+from shoal.engines.exudyn.ends import Ends
 from shoal.mechanics.fitting import fit_law
 from shoal.mechanics.halts import marks
 from shoal.scene import Attachment, Function
