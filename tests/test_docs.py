@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from shoal.cli import main
-from shoal.engines import ENGINES
 from shoal.identification import METHODS
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -70,9 +69,41 @@ def test_tutorial_finds_the_angle_that_it_recorded(tmp_path: Path, monkeypatch: 
     assert json.loads(result.stdout)["parameters"]["angle"]["value"] == pytest.approx(0.4, abs=1e-6)
 
 
-def test_engine_of_its_page_agrees_with_ours(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(ENGINES, "pendulum", ENGINES["gauss"])
-    assert run("extend/engine.md")["largest"] < 1e-8
+NEW = re.compile(r"`((?:mechanics|engines|swarm|identification)/\S+\.py)`:$", re.MULTILINE)
+CHANGED = re.compile(r"^\+\+\+ b/services/shoal/(\S+)$", re.MULTILINE)
+FILES = {"element": 3, "joint": 3, "integrator": 3, "engine": 2}
+"""How many files a new kind touches, by its page."""
+
+
+def extend(page: str, folder: Path) -> str:
+    """Write the files of a page below a folder and apply its changes there; the code that uses them."""
+    *files, use = blocks(page)
+    for name, text in zip(NEW.findall((DOCS / page).read_text(encoding="utf-8")), files, strict=True):
+        (folder / "services" / "shoal" / name).write_text(text)
+    for change in blocks(page, "diff"):
+        subprocess.run(["git", "apply", "-"], cwd=folder, input=change, text=True, check=True)
+    return use
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_new_kind_touches_few_files(kind: str) -> None:
+    page = f"extend/{kind}.md"
+    changed = [name for change in blocks(page, "diff") for name in CHANGED.findall(change)]
+    new = NEW.findall((DOCS / page).read_text(encoding="utf-8"))
+    assert len({*new, *changed}) <= FILES[kind]
+
+
+def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
+    """On a copy of the engines that goes before those of the package, whose kernels are compiled."""
+    shutil.copytree(DOCS.parent / "services/shoal/engines", tmp_path / "services/shoal/engines")
+    use = extend("extend/engine.md", tmp_path)
+    first = f"import shoal\nshoal.__path__.insert(0, {str(tmp_path / 'services/shoal')!r})\n"
+    last = "\nimport json\nprint(json.dumps([largest, estimated, refusal]))"
+    done = subprocess.run([sys.executable, "-c", first + use + last], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    largest, estimated, refusal = json.loads(done.stdout)
+    assert max(largest, estimated) < 1e-8
+    assert refusal == "joints.S: engine pendulum cannot do slider; use gauss or exudyn or exudyn-ge"
 
 
 def test_optimiser_of_its_page_finds_the_angles(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,15 +118,7 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What the pages leave behind that change the mechanics: on a copy of the package, with all their changes in it."""
     folder = tmp_path_factory.mktemp("copy")
     shutil.copytree(DOCS.parent / "services", folder / "services", ignore=shutil.ignore_patterns("__pycache__"))
-    uses = []
-    for page in ("extend/element.md", "extend/joint.md", "extend/integrator.md"):
-        *files, use = blocks(page)
-        names = re.findall(r"`(mechanics/\S+\.py)`:$", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE)
-        for name, text in zip(names, files, strict=True):
-            (folder / "services" / "shoal" / name).write_text(text)
-        for change in blocks(page, "diff"):
-            subprocess.run(["git", "apply", "-"], cwd=folder, input=change, text=True, check=True)
-        uses.append(use)
+    uses = [extend(page, folder) for page in ("extend/element.md", "extend/joint.md", "extend/integrator.md")]
     wanted = "gaps=gaps, gap=float(gap), balanced=balanced, order=float(order)"
     program = "\n".join([*uses, f"import json\nprint(json.dumps(dict({wanted})))"])
     place = {"PYTHONPATH": str(folder / "services"), "SHOAL_HOME": str(folder / "home"), "NUMBA_CACHE_DIR": ""}

@@ -13,7 +13,9 @@ from typing import Any, Literal
 
 import click
 
+from shoal.engines import COMPARED, ENGINES
 from shoal.errors import InputError, ShoalError
+from shoal.ports import PORTS
 from shoal.whole import whole
 
 EXIT_UNTRUSTED = 3
@@ -147,7 +149,7 @@ def option_json(command: Command) -> Command:
 
 def option_engine(command: Command) -> Command:
     """--engine."""
-    text = "gauss, exudyn, exudyn-ge, casadi, or the address of a service (see `shoal serve`)."
+    text = f"{', '.join(ENGINES)}, or the address of a service (see `shoal serve`)."
     return click.option("--engine", default="gauss", show_default=True, help=text)(command)
 
 
@@ -513,7 +515,7 @@ def sweep(
 
 @main.command()
 @click.argument("scene")
-@click.option("--engines", default="gauss,exudyn,casadi", show_default=True, help="Names, separated by commas.")
+@click.option("--engines", default=",".join(COMPARED), show_default=True, help="Names, separated by commas.")
 @option_set
 @click.option("--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s].")
 @option_json
@@ -576,9 +578,14 @@ def ui(host: str, port: int) -> None:
 
 
 @main.command()
-@click.argument("engine", type=click.Choice(["gauss", "exudyn", "exudyn-ge", "casadi"]))
+@click.argument("engine", type=click.Choice(list(ENGINES)))
 @click.option("--host", default="127.0.0.1", show_default=True)
-@click.option("--port", type=click.IntRange(1, 65535), metavar="PORT", help="8001 gauss, 8002 exudyn, 8003 casadi.")
+@click.option(
+    "--port",
+    type=click.IntRange(1, 65535),
+    metavar="PORT",
+    help=", ".join(f"{port} {engine}" for engine, port in PORTS.items()) + ".",
+)
 @click.option("--certificate", type=click.Path(path_type=Path), help="Serve https with this certificate (PEM).")
 @click.option("--key", type=click.Path(path_type=Path), help="The certificate's private key (PEM).")
 def serve(engine: str, host: str, port: int | None, certificate: Path | None, key: Path | None) -> None:
