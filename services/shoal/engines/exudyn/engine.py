@@ -90,6 +90,7 @@ class ExudynEngine:
         started = time.perf_counter()
         wanted = sampling_times(scene, times)
         require(self, scene)
+        damped = self._integrator(scene) == "generalized-alpha"
         exu = library()
         machine = build(exu, scene, self.beam, float(wanted[-1]))
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
@@ -102,7 +103,6 @@ class ExudynEngine:
                 return self.simulate(scene.with_values({"solver.step": float(shorter)}), wanted)
             failure = f"exudyn: a step leaps over a narrow part of an elastic law; solver.step needs {shorter:.3g} s"
         verdict = judge(machine, record, failure)
-        damped = self._integrator(scene) == "generalized-alpha"
         weak = damped and scene.solver.spectral_radius == 1.0 and verdict.message
         return Trajectory(
             engine=self.name,
@@ -181,15 +181,16 @@ class ExudynEngine:
         integration.verboseMode = 0
         integration.newton.useModifiedNewton = self.modified_newton
         integration.newton.absoluteTolerance = machine.scene.solver.newton_tolerance
-        name = of_kind(INTEGRATORS, self._integrator(machine.scene), "integrator")
-        integration.solverType = getattr(exu.DynamicSolverType, name)
+        integration.solverType = getattr(exu.DynamicSolverType, INTEGRATORS[self._integrator(machine.scene)])
         integration.generalizedAlpha.spectralRadius = machine.scene.solver.spectral_radius
         return settings
 
     def _integrator(self, scene: Scene) -> str:
-        """The integrator of a run."""
+        """The integrator of a run. Raises InputError for one that Exudyn has not."""
         stated = scene.solver.integrator
-        return self.integrator or (stated if stated == "generalized-alpha" else "trapezoidal")
+        name = self.integrator or (stated if stated == "generalized-alpha" else "trapezoidal")
+        of_kind(INTEGRATORS, name, "integrator")
+        return name
 
     def _model(self, exu: Any, machine: Machine, steps: Steps) -> dict[str, Any]:
         integrator = self._integrator(machine.scene)
