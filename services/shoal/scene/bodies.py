@@ -119,11 +119,6 @@ class Rod(Record):
         return self.width * self.height
 
     @property
-    def mass_per_length(self) -> float:
-        """Line density at the start [kg/m]."""
-        return self.density * self.area
-
-    @property
     def mass(self) -> float:
         """Mass [kg]."""
         total: float = sum(mass for mass, _ in self._pieces())

@@ -29,7 +29,16 @@ class MovingPoint(Record):
     y: Function = Function(number=0.0)
 
 
-class Revolute(Record):
+class Tie(Record):
+    """Joins two places. turned: the sides of whose bodies' directions it speaks."""
+
+    kind: str
+    turned: ClassVar[tuple[str, ...]]
+    first: Attachment
+    second: Attachment
+
+
+class Revolute(Tie):
     """Two places stay together; the bodies turn freely but for friction.
 
     friction: viscous [N m s/rad]; coulomb: dry friction torque [N m], smoothed as tanh(rate / coulomb_speed).
@@ -37,24 +46,20 @@ class Revolute(Record):
 
     kind: Literal["revolute"] = "revolute"
     turned: ClassVar[tuple[str, ...]] = ()
-    first: Attachment
-    second: Attachment
     friction: NonNegative = 0.0
     coulomb: NonNegative = 0.0
     coulomb_speed: Positive = 1e-2
 
 
-class Weld(Record):
+class Weld(Tie):
     """Two places stay together and the bodies keep their relative angle [rad] (default: that of the start)."""
 
     kind: Literal["weld"] = "weld"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
-    first: Attachment
-    second: Attachment
     angle: Angle | None = None
 
 
-class Slider(Record):
+class Slider(Tie):
     """The second place moves on a line through the first one, fixed to the first body.
 
     direction: angle [rad] of the line in the first body's frame. rotation: whether the second body may turn against
@@ -63,8 +68,6 @@ class Slider(Record):
 
     kind: Literal["slider"] = "slider"
     turned: ClassVar[tuple[str, ...]] = ("first",)
-    first: Attachment
-    second: Attachment
     direction: Angle = 0.0
     rotation: Literal["free", "locked"] = "free"
     friction: NonNegative = 0.0
@@ -72,41 +75,33 @@ class Slider(Record):
     coulomb_speed: Positive = 1e-2
 
 
-class Distance(Record):
+class Distance(Tie):
     """Two places keep a distance [m] (default: that of the start), or one that is a function of time."""
 
     kind: Literal["distance"] = "distance"
     turned: ClassVar[tuple[str, ...]] = ()
-    first: Attachment
-    second: Attachment
     length: Function | None = None
 
 
-class Parallel(Record):
+class Parallel(Tie):
     """The directions of two bodies stay parallel."""
 
     kind: Literal["parallel"] = "parallel"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
-    first: Attachment
-    second: Attachment
 
 
-class Perpendicular(Record):
+class Perpendicular(Tie):
     """The directions of two bodies stay perpendicular."""
 
     kind: Literal["perpendicular"] = "perpendicular"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
-    first: Attachment
-    second: Attachment
 
 
-class DrivenAngle(Record):
+class DrivenAngle(Tie):
     """The angle [rad] from the first body's direction to the second's is a function of time."""
 
     kind: Literal["driven-angle"] = "driven-angle"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
-    first: Attachment
-    second: Attachment
     angle: Function
 
 

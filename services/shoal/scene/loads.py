@@ -12,7 +12,18 @@ from shoal.scene.joints import sides as sides
 from shoal.scene.record import NonNegative, Record, Vector, kinds
 
 
-class Spring(Record):
+class Elastic(Record):
+    """What springs have: a polynomial law and a damper between two places."""
+
+    kind: str
+    first: Attachment
+    second: Attachment
+    stiffness: float = 0.0
+    cubic: float = 0.0
+    damping: NonNegative = 0.0
+
+
+class Spring(Elastic):
     """A spring and damper between two places, along the line that joins them.
 
     stiffness [N/m], cubic [N/m^3], damping [N s/m]; length: where it pulls with no force [m] (default: the
@@ -20,16 +31,11 @@ class Spring(Record):
     """
 
     kind: Literal["spring"] = "spring"
-    first: Attachment
-    second: Attachment
-    stiffness: float = 0.0
-    cubic: float = 0.0
-    damping: NonNegative = 0.0
     length: NonNegative | None = None
     elastic: Function | None = None
 
 
-class TorsionSpring(Record):
+class TorsionSpring(Elastic):
     """A spring and damper between the directions of two bodies.
 
     stiffness [N m/rad], cubic [N m/rad^3], damping [N m s/rad]; angle: relative angle of rest [rad] (default: that of
@@ -38,11 +44,6 @@ class TorsionSpring(Record):
     """
 
     kind: Literal["torsion-spring"] = "torsion-spring"
-    first: Attachment
-    second: Attachment
-    stiffness: float = 0.0
-    cubic: float = 0.0
-    damping: NonNegative = 0.0
     angle: float | None = None
     elastic: Function | None = None
 

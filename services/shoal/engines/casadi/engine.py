@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from shoal.engines.capabilities import of_kind, require
+from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
+from shoal.errors import InputError
 from shoal.mechanics.reach import MARGIN, stretch
 from shoal.mechanics.start.start import started
 from shoal.scene import Scene
@@ -111,7 +112,14 @@ class CasadiEngine:
         """States at the instants of `grid`, (2 unknowns + 1, samples), and the number of steps."""
         if grid.size == 0:
             return np.empty((x0.numel(), 0)), 0
-        return of_kind(_INTEGRATORS, self.integrator, "integrator")(self, model, scene, x0, grid.tobytes())
+        if self.integrator == "rk4":
+            run, substeps, steps = _runge_kutta(model, grid.tobytes(), scene.solver.step)
+            return run(x0, substeps).full(), steps
+        if self.integrator != "cvodes":
+            raise InputError(f"integrator: engine casadi has cvodes and rk4, found {self.integrator}")
+        integrator = _cvodes(model, grid.tobytes(), self.tolerance, self.max_steps)
+        states = integrator(x0=x0)["xf"].full()
+        return states, int(integrator.stats()["nsteps"])
 
 
 @dataclass(frozen=True)
@@ -122,20 +130,6 @@ class _Run:
     energy_drift: float
     steps: int
     message: str
-
-
-def _by_cvodes(engine: CasadiEngine, model: CasadiModel, scene: Scene, x0: Any, grid: bytes) -> tuple[Array, int]:
-    integrator = _cvodes(model, grid, engine.tolerance, engine.max_steps)
-    states = integrator(x0=x0)["xf"].full()
-    return states, int(integrator.stats()["nsteps"])
-
-
-def _by_runge_kutta(engine: CasadiEngine, model: CasadiModel, scene: Scene, x0: Any, grid: bytes) -> tuple[Array, int]:
-    run, substeps, steps = _runge_kutta(model, grid, scene.solver.step)
-    return run(x0, substeps).full(), steps
-
-
-_INTEGRATORS = {"cvodes": _by_cvodes, "rk4": _by_runge_kutta}
 
 
 @lru_cache(maxsize=64)

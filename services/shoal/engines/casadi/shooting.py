@@ -104,20 +104,32 @@ def identify_initial_angles(
     built = time.perf_counter()
     values = optimise(x0=first, lbx=low, ubx=high)["x"].full().ravel()
     wall = time.perf_counter() - built
-    stats = optimise.stats()
-    fitness = float(fitness_at(values))
-    forward = 1 + calls(stats, "nlp_f", "nlp_fg")
-    gradient = calls(stats, "nlp_grad_f", "nlp_jac_fg", "nlp_hess_l")
+    return result(values, float(fitness_at(values)), optimise.stats(), solver, 1, len(paths), wall, built - began)
+
+
+def result(
+    values: Array,
+    fitness: float,
+    stats: dict[str, Any],
+    solver: str,
+    more: int,
+    directions: int,
+    wall_s: float,
+    build_s: float,
+) -> ShootingResult:
+    """What an optimiser found, by its statistics. more: simulations beside its own; directions: of a derivative."""
+    forward = more + _calls(stats, "nlp_f", "nlp_fg", "nlp_g")
+    gradient = _calls(stats, "nlp_grad_f", "nlp_jac_fg", "nlp_jac_g", "nlp_hess_l")
     trusted = bool(stats["success"]) and np.isfinite(fitness)
     return ShootingResult(
         values=values,
         fitness=fitness,
-        evaluations=forward + (1 + len(paths)) * gradient,
+        evaluations=forward + (1 + directions) * gradient,
         forward_evaluations=forward,
         gradient_evaluations=gradient,
         iterations=int(stats["iter_count"]),
-        wall_s=wall,
-        build_s=built - began,
+        wall_s=wall_s,
+        build_s=build_s,
         status=Status.OK if trusted else Status.FAILED,
         message="" if trusted else f"{solver}: {stats['return_status']}",
     )
@@ -128,7 +140,7 @@ def left(limit: float | None, began: float) -> dict[str, Any]:
     return {} if limit is None else {"ipopt.max_wall_time": max(limit - (time.perf_counter() - began), _LEAST)}
 
 
-def calls(stats: dict[str, Any], *names: str) -> int:
+def _calls(stats: dict[str, Any], *names: str) -> int:
     """How often the optimiser called its functions of these names; IPOPT and SQP name theirs differently."""
     return sum(int(stats.get(f"n_call_{name}", 0)) for name in names)
 

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from shoal.engines.capabilities import of_kind
-from shoal.engines.casadi.bodies import Placed, PlacedCable, PlacedGround, PlacedRigid, cable_place, turned
+from shoal.engines.casadi.bodies import Placed, PlacedCable, PlacedRigid, cable_place, turned
 from shoal.engines.casadi.element import cable_element
 from shoal.errors import InputError
 from shoal.scene import GROUND, Attachment, PointMass, Revolute, RigidBody, Rod, Scene
@@ -46,8 +46,8 @@ class Tree:
 
 def build_tree(scene: Scene) -> Tree:
     """Place every body of a scene of open chains, which `capabilities.require` has accepted."""
-    placed: dict[str, Placed] = {GROUND: PlacedGround()}
-    straight: dict[str, Placed] = {GROUND: PlacedGround()}
+    ground: Placed = PlacedRigid(ca.SX.zeros(2), ca.SX(0))
+    placed, straight = {GROUND: ground}, {GROUND: ground}
     entry: dict[str, Vector] = {}
     root: dict[str, Vector] = {}
     length: dict[str, float] = {}
@@ -105,8 +105,24 @@ def _place_rigid(
 def _place_cable(
     name: str, rod: Rod, inner: Vector, anchor: Any, rest: PlacedRigid
 ) -> tuple[Placed, list[Any], list[Any]]:
-    placed, free = _hung_cable(name, rod, inner, anchor)
-    return placed, free, _straight_cable(rod, inner, rest)
+    """The held node's position follows from the anchor, because the Hermite field is linear in it."""
+    h, knots = rod.length / rod.elements, range(rod.elements + 1)
+    index, s = cable_place(rod, inner)
+    held = index + int(s > h / 2)
+
+    def free(positions: list[Any], slopes: list[Any]) -> list[Any]:
+        return [part for k in knots for part in ([] if k == held else [positions[k]]) + [slopes[k]]]
+
+    slopes = [ca.SX.sym(f"{name}_slope{k}", 2) for k in knots]
+    positions = [ca.SX.sym(f"{name}_node{k}", 2) for k in knots]
+    unknowns = free(positions, slopes)
+    positions[held] = ca.SX.zeros(2)
+    others = PlacedCable(rod, _nodes(positions, slopes)).point(inner)
+    unit = np.eye(8)[4 * (held - index)]
+    weight = float(cable_element(rod.quadrature).field(unit, s, h)[0][0])
+    positions[held] = (anchor - others) / weight
+    straight = free([rest.point((k * h, 0.0)) for k in knots], [turned(rest.turn, (1.0, 0.0))] * len(knots))
+    return PlacedCable(rod, _nodes(positions, slopes)), unknowns, straight
 
 
 ELEMENTS: dict[str, Callable[..., tuple[Placed, list[Any], list[Any]]]] = {
@@ -114,37 +130,6 @@ ELEMENTS: dict[str, Callable[..., tuple[Placed, list[Any], list[Any]]]] = {
     "ancf-cable": _place_cable,
 }
 """A body of each element on its anchor [m], its free coordinates, and where those are in the straight body."""
-
-
-def _hung_cable(name: str, rod: Rod, inner: Vector, anchor: Any) -> tuple[PlacedCable, list[Any]]:
-    """The cable whose place `inner` sits on the anchor [m], (2,), and its free coordinates.
-
-    The held node's position follows from the anchor, because the Hermite field is linear in it.
-    """
-    slopes = [ca.SX.sym(f"{name}_slope{k}", 2) for k in range(rod.elements + 1)]
-    positions = [ca.SX.sym(f"{name}_node{k}", 2) for k in range(rod.elements + 1)]
-    (index, s), held = cable_place(rod, inner), _held_node(rod, inner)
-    free = [part for k in range(rod.elements + 1) for part in ([] if k == held else [positions[k]]) + [slopes[k]]]
-    positions[held] = ca.SX.zeros(2)
-    others = PlacedCable(rod, _nodes(positions, slopes)).point(inner)
-    unit = np.eye(8)[4 * (held - index)]
-    weight = float(cable_element(rod.quadrature).field(unit, s, rod.length / rod.elements)[0][0])
-    positions[held] = (anchor - others) / weight
-    return PlacedCable(rod, _nodes(positions, slopes)), free
-
-
-def _straight_cable(rod: Rod, inner: Vector, rest: PlacedRigid) -> list[Any]:
-    """The free coordinates of a straight cable, in the order of `_hung_cable`."""
-    held = _held_node(rod, inner)
-    slope = turned(rest.turn, (1.0, 0.0))
-    positions = [rest.point((k * rod.length / rod.elements, 0.0)) for k in range(rod.elements + 1)]
-    return [part for k in range(rod.elements + 1) for part in ([] if k == held else [positions[k]]) + [slope]]
-
-
-def _held_node(rod: Rod, inner: Vector) -> int:
-    """The node nearest to the place `inner`."""
-    index, s = cable_place(rod, inner)
-    return index + int(s > rod.length / rod.elements / 2)
 
 
 def _nodes(positions: list[Any], slopes: list[Any]) -> tuple[Any, ...]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.exudyn.bodies import Energy, Motion, Place, System
+from shoal.engines.exudyn.bodies import Energy, Motion, Part, Place, System
 from shoal.engines.exudyn.chain import Chain, cross, gauss
 from shoal.engines.poses import InitialPose
 from shoal.engines.sections import Sections
@@ -22,7 +22,7 @@ from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class BeamPart(Chain):
+class BeamPart(Chain, Part):
     """A chain of three-node ObjectBeamGeometricallyExact2D; coordinates of a node: r and the section's angle."""
 
     nodes: list[Any]
@@ -100,10 +100,6 @@ class BeamPart(Chain):
         kinetic = self.total(weights, speed[..., 0] + speed[..., 1], self.sections.mass / 2)
         kinetic += self.total(weights, speed[..., 2], self.sections.inertia / 2)
         return Energy(kinetic, elastic, self.total(weights, self.values(shape, q)[..., :2], self.sections.mass))
-
-    def damping(self, q: Array, v: Array) -> Array:
-        """See Part."""
-        return np.zeros(len(q))
 
     def _shapes(self, xi: Array) -> tuple[Array, Array]:
         """Quadratic Lagrange polynomials and their derivative by s [1/m], (points, 3) each."""

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from shoal.engines.course import Clock
+from shoal.engines.course import Clock, Course
 from shoal.engines.poses import InitialPose, normal
-from shoal.scene import PointMass, RigidBody, Rod
+from shoal.errors import InputError
+from shoal.scene import Function, PointMass, RigidBody, Rod
 from shoal.trajectory import Array
 
 Place = tuple[float, float]
@@ -35,28 +36,32 @@ class Energy(NamedTuple):
     moment: Array
 
 
-class Part(Protocol):
-    """One body of the scene. q, v: all coordinates and velocities of the system, (rows, unknowns)."""
+class Holder(Protocol):
+    """What has places: a body or the ground. q, v: all coordinates and velocities of the system, (rows, unknowns)."""
 
     def hold(self, system: System, place: Place) -> Any:
-        """A new marker at a place [m] in the body's frame, for joints."""
+        """A new marker at a place [m] in its frame, for joints."""
         ...
 
     def turn(self, system: System, place: Place, angle: float = 0.0) -> Any:
-        """A new marker that turns with the body there, `angle` [rad] ahead of it. Raises InputError."""
+        """A new marker that turns with it there, `angle` [rad] ahead. Raises InputError."""
         ...
 
     def motion(self, q: Array, v: Array, place: Place) -> Motion:
         """Motion of a place."""
         ...
 
+
+class Part(Holder, Protocol):
+    """One body of the scene."""
+
     def energy(self, q: Array, v: Array) -> Energy:
         """Energy of the whole body."""
         ...
 
     def damping(self, q: Array, v: Array) -> Array:
-        """Power lost in the material [W], (rows,)."""
-        ...
+        """Power lost in the material [W], (rows,); none unless a part says otherwise."""
+        return np.zeros(len(q))
 
 
 @dataclass
@@ -74,6 +79,17 @@ class System:
         columns = list(range(self.unknowns, self.unknowns + len(item.referenceCoordinates)))
         self.unknowns += len(columns)
         return self.mbs.AddNode(item), columns
+
+    def course(self, f: Function, field: str, *, held: bool = False) -> Course:
+        """A function of time, as the clock has it. Raises InputError that names the field."""
+        try:
+            return self.clock.course(f, held=held)
+        except InputError as error:
+            raise InputError(f"{field}: {str(error).removeprefix('function: ')}") from None
+
+    def object(self, kind: str, **options: Any) -> Any:
+        """Enter an object of Exudyn's class `kind`."""
+        return self.mbs.AddObject(getattr(self.items, kind)(**options))
 
     def marker(self, kind: str, body: Any, local: Place) -> Any:
         """Enter a marker of Exudyn's class `kind` at a local position [m] of one of its bodies."""
@@ -97,7 +113,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class RigidPart:
+class RigidPart(Part):
     """ObjectRigidBody2D, its node at the origin of the body's frame: zero inertia about the centre of mass is legal.
 
     A point mass is a rigid body held at its centre of mass, where nothing turns it; its inertia is of no consequence.
@@ -126,8 +142,8 @@ class RigidPart:
             )
         )
         inertia = about_centre + given.mass * (centre[0] ** 2 + centre[1] ** 2)
-        body = mbs.AddObject(
-            items.ObjectRigidBody2D(mass=given.mass, inertia=inertia, centerOfMass=[*centre], nodeNumber=node)
+        body = system.object(
+            "ObjectRigidBody2D", mass=given.mass, inertia=inertia, centerOfMass=[*centre], nodeNumber=node
         )
         marker = system.marker("MarkerBodyPosition", body, centre)
         weight = [given.mass * system.gravity[0], given.mass * system.gravity[1], 0.0]
@@ -153,10 +169,6 @@ class RigidPart:
         centre = self.motion(q, v, self.centre)
         kinetic = self.mass * np.sum(centre.velocity**2, axis=1) / 2 + self.inertia * centre.rate**2 / 2
         return Energy(kinetic, np.zeros(len(q)), self.mass * centre.position)
-
-    def damping(self, q: Array, v: Array) -> Array:
-        """See Part."""
-        return np.zeros(len(q))
 
     def _arm(self, q: Array, place: Place) -> Array:
         axis = np.stack([np.cos(q[:, self.columns[2]]), np.sin(q[:, self.columns[2]])], axis=1)

@@ -11,7 +11,7 @@ import numpy as np
 from shoal.engines.capabilities import of_kind
 from shoal.engines.course import Clock
 from shoal.engines.exudyn.beam import BeamPart
-from shoal.engines.exudyn.bodies import Part, RigidPart, System
+from shoal.engines.exudyn.bodies import Holder, Part, RigidPart, System
 from shoal.engines.exudyn.cable import CablePart
 from shoal.engines.exudyn.connectors import Exchange
 from shoal.engines.exudyn.ends import Ends
@@ -87,7 +87,8 @@ class Machine:
         shares = [part.energy(q[rows], v[rows]) for part in self.parts.values()]
         moving = np.sum([share.kinetic + share.elastic for share in shares], axis=0)
         # A torsion spring counts its turns along all times.
-        moving = moving + sum((exchange.stored(t, q, v)[rows] for exchange in self.exchanges), np.zeros(len(rows)))
+        stored = (exchange.stored(t, q, v)[rows] for exchange in self.exchanges if exchange.stored is not None)
+        moving = moving + sum(stored, np.zeros(len(rows)))
         height = np.sum([share.moment for share in shares], axis=0) @ np.array(self.scene.gravity)
         return moving - height, moving
 
@@ -119,7 +120,7 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None) -> Machi
         part = of_kind(PARTS[beam], body.element, f"bodies.{name}.element")
         parts[name] = part.add(system, body, poses[name])
     ground = GroundPart.add(system)
-    places: dict[str, Part] = {**parts, GROUND: ground}
+    places: dict[str, Holder] = {**parts, GROUND: ground}
     for point, path in scene.ground_points.items():
         name = moving(point)
         places[name] = add_moving_point(system, ground, point, path, poses[name])

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.exudyn.bodies import Energy, Motion, Place, System
+from shoal.engines.exudyn.bodies import Energy, Motion, Part, Place, System
 from shoal.engines.exudyn.chain import Chain, cross, gauss
 from shoal.engines.poses import InitialPose, normal
 from shoal.engines.sections import Sections
@@ -28,7 +28,7 @@ RULES = {"full": (0, gauss(5), gauss(3)), "reduced": (2, LOBATTO_3, gauss(2))}
 
 
 @dataclass(frozen=True)
-class CablePart(Chain):
+class CablePart(Chain, Part):
     """A chain of ObjectANCFCable2D; coordinates of a node: r and r'.
 
     rest: the nodal vectors of the unstrained elements, (elements, 4, 2).

@@ -42,8 +42,7 @@ def add_friction(ends: Ends, name: str, joint: Joint) -> Exchange | None:
 
 
 def _add_pin(ends: Ends, where: str, joint: Revolute | Weld) -> None:
-    markers = [ends.hold(joint.first), ends.hold(joint.second)]
-    ends.system.mbs.AddObject(ends.system.items.ObjectJointRevolute2D(markerNumbers=markers))
+    ends.system.object("ObjectJointRevolute2D", markerNumbers=[ends.hold(joint.first), ends.hold(joint.second)])
 
 
 def _add_weld(ends: Ends, where: str, joint: Weld) -> None:
@@ -57,9 +56,7 @@ def _add_turn(ends: Ends, where: str, joint: Weld | Parallel | Perpendicular, pl
     """Keep the angle between two bodies; place: 1 if their places stay together as well."""
     ends.require_direction(where, joint.first, joint.second)
     markers = ends.level(joint.first, joint.second, _turn(ends, joint))
-    ends.system.mbs.AddObject(
-        ends.system.items.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=[place, place, 0, 0, 0, 1])
-    )
+    ends.system.object("ObjectJointGeneric", markerNumbers=markers, constrainedAxes=[place, place, 0, 0, 0, 1])
 
 
 def _add_slider(ends: Ends, where: str, joint: Slider) -> None:
@@ -67,23 +64,19 @@ def _add_slider(ends: Ends, where: str, joint: Slider) -> None:
     locked = joint.rotation == "locked"
     # Exudyn's normal belongs to its marker 1, which is therefore the body with the line.
     along = joint.direction - (_turn(ends, joint) if locked else 0.0)
-    ends.system.mbs.AddObject(
-        ends.system.items.ObjectJointPrismatic2D(
-            markerNumbers=[ends.turn(joint.second), ends.turn(joint.first)],
-            axisMarker0=[np.cos(along), np.sin(along), 0.0],
-            normalMarker1=[-np.sin(joint.direction), np.cos(joint.direction), 0.0],
-            constrainRotation=locked and not (ends.is_point(joint.first) or ends.is_point(joint.second)),
-        )
+    ends.system.object(
+        "ObjectJointPrismatic2D",
+        markerNumbers=[ends.turn(joint.second), ends.turn(joint.first)],
+        axisMarker0=[np.cos(along), np.sin(along), 0.0],
+        normalMarker1=[-np.sin(joint.direction), np.cos(joint.direction), 0.0],
+        constrainRotation=locked and not (ends.is_point(joint.first) or ends.is_point(joint.second)),
     )
 
 
 def _add_distance(ends: Ends, where: str, joint: Distance) -> None:
-    first, second = joint.first, joint.second
-    length = float(np.linalg.norm(ends.start(second) - ends.start(first)))
-    if joint.length is not None:
-        length = value_of(joint.length)
-    markers = [ends.hold(first), ends.hold(second)]
-    ends.system.mbs.AddObject(ends.system.items.ObjectConnectorDistance(markerNumbers=markers, distance=length))
+    length = ends.start_distance(joint.first, joint.second) if joint.length is None else value_of(joint.length)
+    markers = [ends.hold(joint.first), ends.hold(joint.second)]
+    ends.system.object("ObjectConnectorDistance", markerNumbers=markers, distance=length)
 
 
 def _add_drive(ends: Ends, where: str, joint: DrivenAngle) -> None:
@@ -99,14 +92,7 @@ def _add_drive(ends: Ends, where: str, joint: DrivenAngle) -> None:
         raise InputError(f"{where}: drives the angle of a flexible rod; weld a rigid body to it instead")
 
     course = driven(ends.system, joint.angle, f"{where}.angle")
-    begin = course.value(0.0)
-    drive(
-        ends.system,
-        coordinate(joint.first),
-        coordinate(joint.second),
-        lambda t: course.value(t) - begin,
-        course.slope,
-    )
+    drive(ends.system, coordinate(joint.first), coordinate(joint.second), course)
 
 
 def _rub_pin(ends: Ends, where: str, joint: Revolute, law: Law) -> Exchange:

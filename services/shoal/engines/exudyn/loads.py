@@ -14,21 +14,13 @@ from shoal.engines.exudyn.cable import CablePart
 from shoal.engines.exudyn.chain import gauss
 from shoal.engines.exudyn.connectors import Exchange, Law, add_spring, add_torsion
 from shoal.engines.exudyn.ends import Ends
-from shoal.errors import InputError
-from shoal.scene import DistributedForce, Force, Function, Load, Rod, Spring, Torque, TorsionSpring
+from shoal.scene import DistributedForce, Force, Load, Rod, Spring, Torque, TorsionSpring
 from shoal.trajectory import Array
 
 
 def add_load(ends: Ends, name: str, load: Load) -> Exchange:
     """Enter a load. Raises InputError."""
     return of_kind(LOADS, load.kind, f"loads.{name}")(ends, f"loads.{name}", load)
-
-
-def _course(ends: Ends, field: str, f: Function) -> Course:
-    try:
-        return ends.system.clock.course(f)
-    except InputError as error:
-        raise InputError(f"{field}: {str(error).removeprefix('function: ')}") from None
 
 
 def _add_spring(ends: Ends, where: str, load: Spring) -> Exchange:
@@ -45,7 +37,7 @@ def _law(load: Spring | TorsionSpring) -> Law:
 
 
 def _add_force(ends: Ends, where: str, load: Force) -> Exchange:
-    scale = _course(ends, f"{where}.scale", load.scale)
+    scale = ends.system.course(load.scale, f"{where}.scale")
     marker = ends.turn(load.at) if load.follows else ends.hold(load.at)
     ends.system.mbs.AddLoad(
         ends.system.items.LoadForceVector(
@@ -62,12 +54,12 @@ def _add_force(ends: Ends, where: str, load: Force) -> Exchange:
             force = force * np.exp(1j * here.direction)
         return -(force.real * here.velocity[:, 0] + force.imag * here.velocity[:, 1])
 
-    return Exchange(_nothing, power)
+    return Exchange(power)
 
 
 def _add_torque(ends: Ends, where: str, load: Torque) -> Exchange:
     ends.require_direction(where, load.at)
-    torque = _course(ends, f"{where}.torque", load.torque)
+    torque = ends.system.course(load.torque, f"{where}.torque")
     for side, sign in ((load.at, 1.0), (load.reaction, -1.0)):
         if side is not None:
             ends.system.mbs.AddLoad(
@@ -81,11 +73,11 @@ def _add_torque(ends: Ends, where: str, load: Torque) -> Exchange:
         against = 0.0 if load.reaction is None else ends.motion(load.reaction, q, v).rate
         return -torque(t) * (ends.motion(load.at, q, v).rate - against)
 
-    return Exchange(_nothing, power)
+    return Exchange(power)
 
 
 def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange:
-    scale = _course(ends, f"{where}.scale", load.scale)
+    scale = ends.system.course(load.scale, f"{where}.scale")
     part, rod, system = ends.parts[load.body], ends.scene.bodies[load.body], ends.system
     assert isinstance(rod, Rod)
     force = np.array(load.force)
@@ -108,7 +100,7 @@ def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange
         flow = sum(w * part.motion(q, v, place).velocity for w, place in zip(weights, places, strict=True))
         return np.asarray(-scale(t) * (flow @ force))
 
-    return Exchange(_nothing, power)
+    return Exchange(power)
 
 
 def _scaled(vector: list[float], scale: Course, keyword: str) -> dict[str, Any]:
@@ -121,10 +113,6 @@ def _scaled(vector: list[float], scale: Course, keyword: str) -> dict[str, Any]:
         return [factor * part for part in vector]
 
     return {"loadVector": vector, keyword: load}
-
-
-def _nothing(t: Array, q: Array, v: Array) -> Array:
-    return np.zeros(len(t))
 
 
 LOADS: dict[str, Callable[[Ends, str, Any], Exchange]] = {
