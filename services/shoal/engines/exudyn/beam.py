@@ -30,20 +30,16 @@ class BeamPart(Chain, Part):
     @classmethod
     def add(cls, system: System, rod: Rod, pose: InitialPose) -> BeamPart:
         """Enter a straight rod at its initial pose."""
-        items, sections = system.items, Sections.of(rod)
-        nodes, columns = [], []
+        sections = Sections.of(rod)
+        nodes, columns, elements = [], [], []
         for s in np.linspace(0.0, rod.length, 2 * rod.elements + 1):
-            node, places = system.node(
-                items.NodeRigidBody2D(
-                    referenceCoordinates=[*pose.position((s, 0.0)), pose.angle],
-                    initialVelocities=[*pose.speed((s, 0.0)), pose.rate],
-                )
-            )
+            begin, rates = [*pose.position((s, 0.0)), pose.angle], [*pose.speed((s, 0.0)), pose.rate]
+            node, places = system.node("NodeRigidBody2D", begin, rates)
             nodes.append(node)
             columns.append(places)
-        elements = []
         for k in range(rod.elements):
-            beam = items.ObjectBeamGeometricallyExact2D(
+            beam = system.add(
+                "ObjectBeamGeometricallyExact2D",
                 nodeNumbers=nodes[2 * k : 2 * k + 3],
                 length=rod.length / rod.elements,
                 massPerLength=sections.mass[k],
@@ -53,8 +49,8 @@ class BeamPart(Chain, Part):
                 shearStiffness=sections.shear[k],
                 includeReferenceRotations=True,
             )
-            elements.append(system.mbs.AddObject(beam))
-            system.weigh(elements[-1])
+            elements.append(beam)
+            system.weigh(beam)
         per_element = [columns[i] + columns[i + 1] + columns[i + 2] for i in range(0, 2 * rod.elements, 2)]
         return cls(rod, sections, elements, np.array(per_element), nodes)
 
@@ -72,7 +68,7 @@ class BeamPart(Chain, Part):
             )
         if angle:
             raise InputError("joints: engine exudyn-ge keeps no angle of a flexible rod but 0; use exudyn")
-        return system.mbs.AddMarker(system.items.MarkerNodeRigid(nodeNumber=self.nodes[index]))
+        return system.add("MarkerNodeRigid", nodeNumber=self.nodes[index])
 
     def motion(self, q: Array, v: Array, place: Place) -> Motion:
         """See Part."""

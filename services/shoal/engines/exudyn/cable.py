@@ -39,23 +39,19 @@ class CablePart(Chain, Part):
     @classmethod
     def add(cls, system: System, rod: Rod, pose: InitialPose) -> CablePart:
         """Enter an unstrained rod at its initial pose."""
-        items, sections = system.items, Sections.of(rod)
-        nodes, columns, vectors = [], [], []
+        sections = Sections.of(rod)
+        nodes, columns, vectors, elements = [], [], [], []
         for s in np.linspace(0.0, rod.length, rod.elements + 1):
             axis, lead = complex(rod.axis(s)), pose.angle + float(rod.turn(s))
             place, slope = (axis.real, axis.imag), np.array([np.cos(lead), np.sin(lead)])
-            node, places = system.node(
-                items.NodePoint2DSlope1(
-                    referenceCoordinates=[*pose.position(place), *slope],
-                    initialVelocities=[*pose.speed(place), *(pose.rate * normal(slope))],
-                )
-            )
+            begin, rates = [*pose.position(place), *slope], [*pose.speed(place), *(pose.rate * normal(slope))]
+            node, places = system.node("NodePoint2DSlope1", begin, rates)
             vectors.append([pose.position(place), slope])
             nodes.append(node)
             columns.append(places)
-        elements = []
         for k, pair in enumerate(pairwise(nodes)):
-            cable = items.ObjectANCFCable2D(
+            cable = system.add(
+                "ObjectANCFCable2D",
                 length=rod.length / rod.elements,
                 massPerLength=sections.mass[k],
                 bendingStiffness=sections.bending[k],
@@ -66,8 +62,8 @@ class CablePart(Chain, Part):
                 strainIsRelativeToReference=float(bool(rod.curvature)),
                 useReducedOrderIntegration=RULES[rod.quadrature][0],
             )
-            elements.append(system.mbs.AddObject(cable))
-            system.weigh(elements[-1])
+            elements.append(cable)
+            system.weigh(cable)
         rest = np.array([first + last for first, last in pairwise(vectors)])
         return cls(rod, sections, elements, np.array([first + last for first, last in pairwise(columns)]), rest)
 

@@ -80,7 +80,7 @@ def add_spring(ends: Ends, first: Attachment, second: Attachment, law: Law, leng
         return distance, np.sum(apart * (b.velocity - a.velocity), axis=1) / np.maximum(distance, 1e-300)
 
     rest = ends.start_distance(first, second) if length is None else length
-    ends.system.object(
+    ends.system.add(
         "ObjectConnectorSpringDamper",
         markerNumbers=[ends.hold(first), ends.hold(second)],
         referenceLength=rest,
@@ -93,17 +93,17 @@ def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, ang
     """Enter a law over the angle between two bodies; angle: where x is 0 [rad], else that of the start."""
     start = ends.start_turn(first, second)
     rest = start if angle is None else angle
-    items, mbs, options = ends.system.items, ends.system.mbs, law.options("springTorqueUserFunction")
+    system, options = ends.system, law.options("springTorqueUserFunction")
     if law.stiffness or law.cubic or law.elastic:
         # A data coordinate lets Exudyn count full turns.
         options |= {
             "markerNumbers": ends.level(first, second, start),
-            "nodeNumber": mbs.AddNode(items.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1)),
+            "nodeNumber": system.add("NodeGenericData", initialCoordinates=[0.0], numberOfDataCoordinates=1),
             "offset": rest - start,
         }
     else:
         options["markerNumbers"] = [ends.turn(first), ends.turn(second)]
-    ends.system.object("ObjectConnectorTorsionalSpringDamper", **options)
+    system.add("ObjectConnectorTorsionalSpringDamper", **options)
 
     def measure(q: Array, v: Array) -> tuple[Array, Array]:
         a, b = ends.motion(first, q, v), ends.motion(second, q, v)
@@ -115,7 +115,7 @@ def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, ang
 
 def add_rail(ends: Ends, first: Attachment, second: Attachment, direction: float, law: Law) -> Exchange:
     """Enter a law over the way along a line of the first body; direction: its angle [rad] in that body."""
-    ends.system.object(
+    ends.system.add(
         "ObjectConnectorLinearSpringDamper",
         markerNumbers=[ends.turn(first), ends.turn(second)],
         axisMarker0=[np.cos(direction), np.sin(direction), 0.0],

@@ -28,7 +28,7 @@ class GroundPart(Holder):
     @classmethod
     def add(cls, system: System) -> GroundPart:
         """Enter the ground."""
-        return cls(system.object("ObjectGround"), system.mbs.AddNode(system.items.NodePointGround()))
+        return cls(system.add("ObjectGround"), system.add("NodePointGround"))
 
     def hold(self, system: System, place: Place) -> Any:
         """See Holder."""
@@ -64,11 +64,11 @@ def driven(system: System, f: Function, field: str) -> Course:
 def drive(system: System, first: Coordinate, second: Coordinate, course: Course) -> None:
     """Let second - first follow a function of time; Exudyn counts coordinates from the start."""
     markers = [
-        system.mbs.AddMarker(system.items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
+        system.add("MarkerNodeCoordinate", nodeNumber=node, coordinate=coordinate)
         for node, coordinate in (first, second)
     ]
     begin = course.value(0.0)
-    system.object(
+    system.add(
         "ObjectConnectorCoordinate",
         markerNumbers=markers,
         offsetUserFunction=lambda mbs, t, item, given: course.value(t) - begin,

@@ -42,7 +42,7 @@ def add_friction(ends: Ends, name: str, joint: Joint) -> Exchange | None:
 
 
 def _add_pin(ends: Ends, where: str, joint: Revolute | Weld) -> None:
-    ends.system.object("ObjectJointRevolute2D", markerNumbers=[ends.hold(joint.first), ends.hold(joint.second)])
+    ends.system.add("ObjectJointRevolute2D", markerNumbers=[ends.hold(joint.first), ends.hold(joint.second)])
 
 
 def _add_weld(ends: Ends, where: str, joint: Weld) -> None:
@@ -56,7 +56,7 @@ def _add_turn(ends: Ends, where: str, joint: Weld | Parallel | Perpendicular, pl
     """Keep the angle between two bodies; place: 1 if their places stay together as well."""
     ends.require_direction(where, joint.first, joint.second)
     markers = ends.level(joint.first, joint.second, _turn(ends, joint))
-    ends.system.object("ObjectJointGeneric", markerNumbers=markers, constrainedAxes=[place, place, 0, 0, 0, 1])
+    ends.system.add("ObjectJointGeneric", markerNumbers=markers, constrainedAxes=[place, place, 0, 0, 0, 1])
 
 
 def _add_slider(ends: Ends, where: str, joint: Slider) -> None:
@@ -64,7 +64,7 @@ def _add_slider(ends: Ends, where: str, joint: Slider) -> None:
     locked = joint.rotation == "locked"
     # Exudyn's normal belongs to its marker 1, which is therefore the body with the line.
     along = joint.direction - (_turn(ends, joint) if locked else 0.0)
-    ends.system.object(
+    ends.system.add(
         "ObjectJointPrismatic2D",
         markerNumbers=[ends.turn(joint.second), ends.turn(joint.first)],
         axisMarker0=[np.cos(along), np.sin(along), 0.0],
@@ -76,7 +76,7 @@ def _add_slider(ends: Ends, where: str, joint: Slider) -> None:
 def _add_distance(ends: Ends, where: str, joint: Distance) -> None:
     length = ends.start_distance(joint.first, joint.second) if joint.length is None else value_of(joint.length)
     markers = [ends.hold(joint.first), ends.hold(joint.second)]
-    ends.system.object("ObjectConnectorDistance", markerNumbers=markers, distance=length)
+    ends.system.add("ObjectConnectorDistance", markerNumbers=markers, distance=length)
 
 
 def _add_drive(ends: Ends, where: str, joint: DrivenAngle) -> None:
