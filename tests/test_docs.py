@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from shoal.cli import main
-from shoal.identification import METHODS
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -71,7 +70,7 @@ def test_tutorial_finds_the_angle_that_it_recorded(tmp_path: Path, monkeypatch: 
 
 NEW = re.compile(r"`((?:mechanics|engines|swarm|identification)/\S+\.py)`:$", re.MULTILINE)
 CHANGED = re.compile(r"^\+\+\+ b/services/shoal/(\S+)$", re.MULTILINE)
-FILES = {"element": 3, "joint": 3, "integrator": 3, "engine": 2}
+FILES = {"element": 3, "joint": 3, "integrator": 3, "optimiser": 2, "swarm": 2, "engine": 2}
 """How many files a new kind touches, by its page."""
 
 
@@ -93,24 +92,34 @@ def test_a_new_kind_touches_few_files(kind: str) -> None:
     assert len({*new, *changed}) <= FILES[kind]
 
 
-def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
-    """On a copy of the engines that goes before those of the package, whose kernels are compiled."""
-    shutil.copytree(DOCS.parent / "services/shoal/engines", tmp_path / "services/shoal/engines")
-    use = extend("extend/engine.md", tmp_path)
-    first = f"import shoal\nshoal.__path__.insert(0, {str(tmp_path / 'services/shoal')!r})\n"
-    last = "\nimport json\nprint(json.dumps([largest, estimated, refusal]))"
-    done = subprocess.run([sys.executable, "-c", first + use + last], capture_output=True, text=True, check=False)
+def used(page: str, room: str, folder: Path, wanted: str) -> Any:
+    """What the code of a page finds with a copy of a room that has its changes and goes before that of the package.
+
+    The rest is the package's own, whose kernels are compiled.
+    """
+    shutil.copytree(DOCS.parent / "services/shoal" / room, folder / "services/shoal" / room)
+    use = extend(page, folder)
+    first = f"import json, shoal\nshoal.__path__.insert(0, {str(folder / 'services/shoal')!r})\n"
+    program = f"{first}{use}\nprint(json.dumps({wanted}))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    largest, estimated, refusal = json.loads(done.stdout)
+    return json.loads(done.stdout)
+
+
+def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
+    largest, estimated, refusal = used("extend/engine.md", "engines", tmp_path, "[largest, estimated, refusal]")
     assert max(largest, estimated) < 1e-8
     assert refusal == "joints.S: engine pendulum cannot do slider; use gauss or exudyn or exudyn-ge"
 
 
-def test_optimiser_of_its_page_finds_the_angles(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, "nelder-mead", METHODS["auto"])
-    found = run("extend/optimiser.md")
-    assert found["estimate"].verdict.trusted, found["estimate"].message
-    assert found["error"] < 1e-5
+@pytest.mark.parametrize(
+    ("page", "room"),
+    [("optimiser", "identification"), pytest.param("swarm", "swarm", marks=pytest.mark.slow)],
+)
+def test_method_of_its_page_finds_the_angles(page: str, room: str, tmp_path: Path) -> None:
+    trusted, error = used(f"extend/{page}.md", room, tmp_path, "[estimate.verdict.trusted, error]")
+    assert trusted
+    assert error < 1e-5
 
 
 @pytest.fixture(scope="module")

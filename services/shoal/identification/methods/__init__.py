@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 
 from shoal.errors import InputError
@@ -15,17 +16,16 @@ from shoal.identification.methods.multi_start import multi_start
 from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Method, Outcome
 from shoal.identification.methods.progressive import progressive
-from shoal.identification.methods.swarms import afsa, iafsa, iafsa_printed, iafsa_unseeded
+from shoal.identification.methods.swarms import by_swarm, iafsa_unseeded
+from shoal.swarm import OPTIMIZERS
 
 METHODS: dict[str, Method] = {
     "auto": auto,
     "least-squares": least_squares,
     "progressive": progressive,
     "multiple-shooting": multiple_shooting,
-    "afsa": afsa,
-    "iafsa": iafsa,
+    **{name: partial(by_swarm, swarm) for name, swarm in OPTIMIZERS.items()},
     "iafsa-unseeded": iafsa_unseeded,
-    "iafsa-printed": iafsa_printed,
     "multi-start": multi_start,
     "hybrid": hybrid,
     "differential-evolution": differential_evolution,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,22 +11,17 @@ from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.least_squares import least_squares
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.starts import starting_points
-from shoal.swarm import Afsa, Iafsa, IafsaPrinted, minimize
+from shoal.swarm import Iafsa, minimize
 from shoal.trajectory import Array
 
 ITERATIONS = 100
 
 
-def afsa(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
-    """AFSA as published; it knows only the box."""
-    return _search(model, Afsa(lower=model.lower, upper=model.upper), rng, progress)
-
-
-def iafsa(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
-    """IAFSA as repaired, with both seeds."""
-    traditional, previous = seeds(model, rng)
-    optimizer = Iafsa(lower=model.lower, upper=model.upper, traditional=traditional, previous=previous)
-    return _search(model, optimizer, rng, progress)
+def by_swarm(swarm: type[Any], model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
+    """A swarm in the box of a problem, with the paper's two additional fish where it has places for them."""
+    has_places = {"traditional", "previous"} <= {field.name for field in fields(swarm)}
+    fish = seeds(model, rng) if has_places else {}
+    return _search(model, swarm(lower=model.lower, upper=model.upper, **fish), rng, progress)
 
 
 def iafsa_unseeded(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
@@ -33,22 +29,14 @@ def iafsa_unseeded(model: ForwardModel, rng: np.random.Generator, progress: Prog
     return _search(model, Iafsa(lower=model.lower, upper=model.upper), rng, progress)
 
 
-def iafsa_printed(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
-    """IAFSA exactly as printed in the paper, with both seeds."""
-    traditional, previous = seeds(model, rng)
-    optimizer = IafsaPrinted(lower=model.lower, upper=model.upper, traditional=traditional, previous=previous)
-    return _search(model, optimizer, rng, progress)
-
-
-def seeds(model: ForwardModel, rng: np.random.Generator) -> tuple[Array, Array]:
+def seeds(model: ForwardModel, rng: np.random.Generator) -> dict[str, Array]:
     """The paper's two additional fish, for the inverse problem; their evaluations are counted.
 
-    The optimum of a traditional method is that of least squares; in place of the
-    previous time step's optimum, which the inverse problem does not have, stands the pose that the first
-    samples fix.
+    The optimum of a traditional method is that of least squares; in place of the previous time step's optimum, which
+    the inverse problem does not have, stands the pose that the first samples fix.
     """
     pose = starting_points(model)[0]
-    return least_squares(model, rng, lambda *_: None).point, pose
+    return {"traditional": least_squares(model, rng, lambda *_: None).point, "previous": pose}
 
 
 def school(
