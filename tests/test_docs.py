@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import runpy
 import shutil
 import subprocess
 import sys
@@ -13,12 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import shoal
 from click.testing import CliRunner
-from shoal import swarm
 from shoal.cli import main
-from shoal.engines import ENGINES
-from shoal.identification import METHODS, methods
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -73,39 +68,58 @@ def test_tutorial_finds_the_angle_that_it_recorded(tmp_path: Path, monkeypatch: 
     assert json.loads(result.stdout)["parameters"]["angle"]["value"] == pytest.approx(0.4, abs=1e-6)
 
 
-def test_engine_of_its_page_agrees_with_ours(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(ENGINES, "pendulum", ENGINES["gauss"])
-    assert run("extend/engine.md")["largest"] < 1e-8
+NEW = re.compile(r"`((?:mechanics|engines|swarm|identification)/\S+\.py)`:$", re.MULTILINE)
+CHANGED = re.compile(r"^\+\+\+ b/services/shoal/(\S+)$", re.MULTILINE)
+FILES = {"element": 3, "joint": 3, "integrator": 3, "optimiser": 2, "swarm": 2, "engine": 2}
+"""How many files a new kind touches, by its page."""
 
 
-@pytest.mark.slow  # A swarm takes thousands of runs.
-def test_a_method_and_a_swarm_are_two_files_each_and_find_the_angles(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The files and diffs of the page, applied to a copy of both folders, from which the lists are then read."""
-    page, text = "extend/optimiser.md", (DOCS / "extend/optimiser.md").read_text(encoding="utf-8")
+def extend(page: str, folder: Path) -> str:
+    """Write the files of a page below a folder and apply its changes there; the code that uses them."""
     *files, use = blocks(page)
-    names, changes = re.findall(r"`([a-z_/]+\.py)`:$", text, re.MULTILINE), blocks(page, "diff")
-    assert len(files) == len(names) == len(changes) == 2
-    package = tmp_path / "services" / "shoal"
-    for folder in (swarm, methods):
-        (place,) = folder.__path__
-        copied = package / Path(place).relative_to(Path(shoal.__path__[0]))
-        shutil.copytree(place, copied, ignore=shutil.ignore_patterns("__pycache__"))
-        monkeypatch.setattr(folder, "__path__", [place, str(copied)])
-    for name, code, change in zip(names, files, changes, strict=True):
-        (package / name).write_text(code)
-        assert change.count("+++ ") == 1
-        subprocess.run(["git", "apply", "-"], cwd=tmp_path, input=change, text=True, check=True)
-    listed = runpy.run_path(str(package / "swarm" / "__init__.py"))["OPTIMIZERS"]
-    monkeypatch.setattr(swarm, "OPTIMIZERS", listed)
-    listed = runpy.run_path(str(package / "identification" / "methods" / "__init__.py"))["METHODS"]
-    for name in set(listed) - set(METHODS):
-        monkeypatch.setitem(METHODS, name, listed[name])
-    found: dict[str, Any] = {}
-    exec(compile(use, page, "exec", dont_inherit=True), found)
-    assert set(found["errors"]) == {"nelder-mead", "cross-entropy"}
-    assert max(found["errors"].values()) < 1e-5
+    for name, text in zip(NEW.findall((DOCS / page).read_text(encoding="utf-8")), files, strict=True):
+        (folder / "services" / "shoal" / name).write_text(text)
+    for change in blocks(page, "diff"):
+        subprocess.run(["git", "apply", "-"], cwd=folder, input=change, text=True, check=True)
+    return use
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_new_kind_touches_few_files(kind: str) -> None:
+    page = f"extend/{kind}.md"
+    changed = [name for change in blocks(page, "diff") for name in CHANGED.findall(change)]
+    new = NEW.findall((DOCS / page).read_text(encoding="utf-8"))
+    assert len({*new, *changed}) <= FILES[kind]
+
+
+def used(page: str, room: str, folder: Path, wanted: str) -> Any:
+    """What the code of a page finds with a copy of a room that has its changes and goes before that of the package.
+
+    The rest is the package's own, whose kernels are compiled.
+    """
+    shutil.copytree(DOCS.parent / "services/shoal" / room, folder / "services/shoal" / room)
+    use = extend(page, folder)
+    first = f"import json, shoal\nshoal.__path__.insert(0, {str(folder / 'services/shoal')!r})\n"
+    program = f"{first}{use}\nprint(json.dumps({wanted}))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
+    largest, estimated, refusal = used("extend/engine.md", "engines", tmp_path, "[largest, estimated, refusal]")
+    assert max(largest, estimated) < 1e-8
+    assert refusal == "joints.S: engine pendulum cannot do slider; use gauss or exudyn or exudyn-ge"
+
+
+@pytest.mark.parametrize(
+    ("page", "room"),
+    [("optimiser", "identification"), pytest.param("swarm", "swarm", marks=pytest.mark.slow)],
+)
+def test_method_of_its_page_finds_the_angles(page: str, room: str, tmp_path: Path) -> None:
+    trusted, error = used(f"extend/{page}.md", room, tmp_path, "[estimate.verdict.trusted, error]")
+    assert trusted
+    assert error < 1e-5
 
 
 @pytest.fixture(scope="module")
@@ -113,15 +127,7 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What the pages leave behind that change the mechanics: on a copy of the package, with all their changes in it."""
     folder = tmp_path_factory.mktemp("copy")
     shutil.copytree(DOCS.parent / "services", folder / "services", ignore=shutil.ignore_patterns("__pycache__"))
-    uses = []
-    for page in ("extend/element.md", "extend/joint.md", "extend/integrator.md"):
-        *files, use = blocks(page)
-        names = re.findall(r"`(mechanics/\S+\.py)`:$", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE)
-        for name, text in zip(names, files, strict=True):
-            (folder / "services" / "shoal" / name).write_text(text)
-        for change in blocks(page, "diff"):
-            subprocess.run(["git", "apply", "-"], cwd=folder, input=change, text=True, check=True)
-        uses.append(use)
+    uses = [extend(page, folder) for page in ("extend/element.md", "extend/joint.md", "extend/integrator.md")]
     wanted = "gaps=gaps, gap=float(gap), balanced=balanced, order=float(order)"
     program = "\n".join([*uses, f"import json\nprint(json.dumps(dict({wanted})))"])
     place = {"PYTHONPATH": str(folder / "services"), "SHOAL_HOME": str(folder / "home"), "NUMBA_CACHE_DIR": ""}

@@ -21,7 +21,6 @@ TITLES |= {SAME_MESH[case]: f"{title}, same mesh" for case, title in TITLES.item
 SWARMS = ("afsa", "iafsa-printed", "iafsa", "iafsa-unseeded")
 METHODS = ("least-squares", *SWARMS, "casadi")
 SLOWEST_FIRST = ("iafsa-printed", "casadi", "afsa", "iafsa", "iafsa-unseeded", "least-squares")
-ENGINES = ("gauss", "exudyn", "casadi")
 SEED = 0
 
 MESHES = (

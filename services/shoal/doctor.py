@@ -18,13 +18,14 @@ import numpy as np
 
 from shoal.errors import ShoalError
 from shoal.home import compiled, home, kernel_cache
+from shoal.ports import PORTS
 
 _PACKAGES = {
     "pipeline": ("prefect", "mlflow"),
     "services": ("fastapi", "uvicorn", "orjson"),
 }
 """What the extras bring that has no check of its own."""
-_PORTS = {5000: "MLflow", 4200: "Prefect", 8001: "gauss", 8002: "exudyn", 8003: "casadi"}
+_PORTS = {"MLflow": 5000, "Prefect": 4200, **PORTS}
 """Where `make up`, `shoal ui` and `shoal serve` listen unless told otherwise."""
 PATIENCE = 3.0
 """Seconds that a server has to answer."""
@@ -54,7 +55,7 @@ def examine() -> list[Check]:
         check_server("Prefect", "PREFECT_API_URL", "a flow starts its own"),
         check_server("MLflow", "MLFLOW_TRACKING_URI", "runs go to a database in the state folder"),
         check_nights(os.environ.get("PREFECT_API_URL") or "http://127.0.0.1:4200/api"),
-        *(check_port(number, what) for number, what in _PORTS.items()),
+        *(check_port(number, what) for what, number in _PORTS.items()),
     ]
 
 

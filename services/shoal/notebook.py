@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from shoal.engines import COMPARED
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Trajectory
@@ -91,7 +92,7 @@ def sweep(
 
 def compare(
     scene: Scene | str,
-    engines: Sequence[str] = ("gauss", "exudyn", "casadi"),
+    engines: Sequence[str] = COMPARED,
     times: Times | None = None,
     *,
     values: Values | None = None,

@@ -1,10 +1,14 @@
-"""Whether a server can listen somewhere, asked before it is started."""
+"""Where engines are served, and whether a server can listen somewhere, asked before it is started."""
 
 from __future__ import annotations
 
 import socket
 
+from shoal.engines import ENGINES
 from shoal.errors import InputError
+
+PORTS = {name: 8001 + k for k, name in enumerate(dict.fromkeys(name.partition("-")[0] for name in ENGINES))}
+"""Where an engine is served unless somebody says otherwise; its variants, as exudyn-ge of exudyn, take its place."""
 
 
 def check_free(host: str, port: int, setting: str = "port") -> None:

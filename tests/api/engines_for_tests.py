@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from shoal.engines import ENGINES, Capabilities
-from shoal.engines.contract import sampling_times
+from shoal.engines import ENGINES
+from shoal.engines.contract import Capabilities, sampling_times
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.engines import get_engine
-from shoal.engines.capabilities import CAPABILITIES, needs
+from shoal.engines.capabilities import needs
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
 
@@ -380,7 +380,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """A test with `exudyn_case` or `casadi_case` runs for every case that the engine can do."""
     for engine in ("exudyn", "casadi"):
         if f"{engine}_case" in metafunc.fixturenames:
-            able = [case for case in CASES if {need for _, need in needs(case.scene)} <= CAPABILITIES[engine].all]
+            able = [
+                case for case in CASES if {need for _, need in needs(case.scene)} <= get_engine(engine).capabilities.all
+            ]
             metafunc.parametrize(f"{engine}_case", able, ids=lambda case: case.scene.name)
 
 

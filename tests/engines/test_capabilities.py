@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.engines import ENGINES, get_engine
-from shoal.engines.capabilities import CAPABILITIES, FEATURES, needs
+from shoal.engines.capabilities import FEATURES, needs
 from shoal.errors import InputError
 from shoal.scene import JOINT_KINDS, LOAD_KINDS, Scene
 
+CAPABILITIES = {name: get_engine(name).capabilities for name in ENGINES}
 NAMES = sorted(CAPABILITIES["gauss"].all)
 
 
@@ -30,7 +31,6 @@ def test_every_engine_does_what_it_says_and_refuses_the_rest(
 ) -> None:
     pytest.importorskip(engine.partition("-")[0] if engine != "gauss" else "numpy")
     asking = sorted((machine for machine in scenes if name in wants(machine)), key=lambda machine: len(wants(machine)))
-    assert get_engine(engine).capabilities is CAPABILITIES[engine]
     if name in CAPABILITIES[engine].all:
         machine = next(machine for machine in asking if able(engine, machine))
         step = {"step": 1e-5, "duration": 0.002, "integrator": "rk4"}
@@ -45,7 +45,6 @@ def test_every_engine_does_what_it_says_and_refuses_the_rest(
 
 
 def test_every_name_is_a_kind_or_a_feature() -> None:
-    assert list(CAPABILITIES) == list(ENGINES)
     assert {"rigid", *JOINT_KINDS, *LOAD_KINDS, *FEATURES} <= set(NAMES)
     assert all(capabilities.all <= set(NAMES) for capabilities in CAPABILITIES.values())
 

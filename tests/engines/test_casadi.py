@@ -9,9 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 from shoal.engines.casadi import CasadiEngine
-from shoal.engines.casadi_element import cable_element
-from shoal.engines.casadi_model import casadi_model
-from shoal.engines.casadi_shooting import identify_initial_angles
+from shoal.engines.casadi.element import cable_element
+from shoal.engines.casadi.model import casadi_model
+from shoal.engines.casadi.shooting import identify_initial_angles
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Status

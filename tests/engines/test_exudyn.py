@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 from shoal.engines.exudyn import ExudynEngine
-from shoal.engines.exudyn_build import build, library
-from shoal.engines.exudyn_cable import CablePart
-from shoal.engines.exudyn_checks import judge
-from shoal.engines.exudyn_record import Record, Steps, choose_steps
+from shoal.engines.exudyn.build import build, library
+from shoal.engines.exudyn.cable import CablePart
+from shoal.engines.exudyn.checks import judge
+from shoal.engines.exudyn.record import Record, Steps, choose_steps
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Status
@@ -336,7 +336,7 @@ def test_names_of_the_variants():
 
 def test_thinned_record_is_read_between_its_kept_steps() -> None:
     """A parabola is what cubic Hermite interpolation gives back, whatever steps were kept."""
-    steps = Steps(np.array([0.5, 0.95, 1.0]), 10, 0.1, np.array([0, 4, 8, 10]))
+    steps = Steps(np.array([0.5, 0.95, 1.0]), 10, 0.1, np.array([0, 4, 8, 10]), ((10, 1.0),))
     record = Record(steps, np.zeros(1))
     record.q[:, 0], record.v[:, 0] = record.times**2, 2 * record.times
     q, v = record.at_wanted()

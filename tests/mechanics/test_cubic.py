@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numba import njit
-from shoal.engines.casadi_element import cable_element
+from shoal.engines.casadi.element import cable_element
 from shoal.mechanics.elements import beam, cubic, families
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from prefect import flow
+from shoal.engines import COMPARED
 from shoal.errors import InputError
 
 from shoal_flows.flows import tables
@@ -15,7 +16,7 @@ from shoal_flows.results import Compared
 @flow(name="compare", flow_run_name="compare {scene}")
 def compare(
     scene: SceneName = "flexible-double-pendulum",
-    engines: Engines = ["gauss", "exudyn", "casadi"],  # noqa: B006 - Prefect shows the default in its form
+    engines: Engines = list(COMPARED),  # noqa: B006 - Prefect shows the default in its form
     values: Values = {},  # noqa: B006
 ) -> Compared:
     """Simulate a scene on several engines and log how far apart they come out.

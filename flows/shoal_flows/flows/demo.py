@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 
 from prefect import flow
+from shoal.engines import COMPARED
 from shoal.engines.compare import Comparison
 
 from shoal_flows.flows.runner import side_by_side
@@ -12,7 +13,7 @@ from shoal_flows.flows.study import Draw, Running, open_running
 from shoal_flows.flows.tasks import measure, run_engines
 from shoal_flows.jobs import Cell
 from shoal_flows.pictures import Picture, draw_convergence, draw_mesh_error, draw_residuals, draw_trajectory
-from shoal_flows.plan import CASES, ENGINES, SAME_MESH, SLOWEST_FIRST, TITLES, mesh_cells, method_cells, same_mesh_cells
+from shoal_flows.plan import CASES, SAME_MESH, SLOWEST_FIRST, TITLES, mesh_cells, method_cells, same_mesh_cells
 from shoal_flows.results import Compared, DemoResult, Study
 
 METHOD_PICTURES: dict[str, Draw] = {
@@ -26,7 +27,7 @@ METHOD_PICTURES: dict[str, Draw] = {
 def demo() -> DemoResult:
     """Identify both cases by every method and on four meshes; compare the engines on both scenes."""
     measured = {case: measure.submit(case, None) for case in (*CASES, *SAME_MESH.values())}
-    compared = {case: run_engines.submit(scene, ENGINES, {}) for case, scene in CASES.items()}
+    compared = {case: run_engines.submit(scene, COMPARED, {}) for case, scene in CASES.items()}
     with ExitStack() as stack:
 
         def begin(what: str, cells: list[Cell]) -> Running:

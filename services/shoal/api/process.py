@@ -18,7 +18,7 @@ from shoal.api import models, tasks
 from shoal.api.limits import TooMuch
 from shoal.api.settings import Settings
 from shoal.api.tasks import Bench, Note
-from shoal.engines import Engine
+from shoal.engines.contract import Engine
 from shoal.errors import InputError, ShoalError
 from shoal.identification import Problem, problem_names
 from shoal.scene import Scene, load_scene, scene_names

@@ -12,10 +12,8 @@ from shoal.api.program import create_program
 from shoal.api.settings import Settings
 from shoal.engines.remote import loopback
 from shoal.errors import InputError
-from shoal.ports import check_free
+from shoal.ports import PORTS, check_free
 
-PORTS = {"gauss": 8001, "exudyn": 8002, "exudyn-ge": 8002, "casadi": 8003}
-"""Where an engine is served unless somebody says otherwise."""
 log = logging.getLogger("shoal.api")
 
 
@@ -27,11 +25,12 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None = N
         _check_pair(certificate, key)
     elif program.state.keys and not loopback(host):
         log.warning("API keys cross the network readable: give --certificate and --key, or put a proxy with TLS ahead")
-    check_free(host, port or PORTS[engine])
+    port = port or PORTS[engine.partition("-")[0]]
+    check_free(host, port)
     uvicorn.run(
         program,
         host=host,
-        port=port or PORTS[engine],
+        port=port,
         ssl_certfile=certificate,
         ssl_keyfile=key,
         limit_concurrency=settings.connections,

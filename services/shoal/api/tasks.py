@@ -13,7 +13,7 @@ from shoal.api.content import problem_of, scene_of, written
 from shoal.api.limits import check_end, check_lanes, check_scene, within
 from shoal.api.schemas import IdentifyRequest, SimulateRequest
 from shoal.api.settings import Settings
-from shoal.engines import Engine
+from shoal.engines.contract import Engine
 from shoal.errors import InputError
 from shoal.identification import identify
 from shoal.identification.conclude import Wishes

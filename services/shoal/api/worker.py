@@ -17,7 +17,7 @@ from typing import Any
 from shoal.api import entry
 from shoal.api.refusal import Refusal
 from shoal.api.settings import Settings
-from shoal.engines import Engine
+from shoal.engines.contract import Engine
 
 MakeEngine = Callable[[], Engine]
 Note = Callable[[Any], None]

@@ -6,6 +6,7 @@ import click
 
 from shoal.commands import options
 from shoal.commands.options import Out, Times, Values
+from shoal.engines import COMPARED
 from shoal.errors import InputError, check_trusted
 
 
@@ -93,7 +94,7 @@ def sweep(
 
 @click.command()
 @click.argument("scene")
-@click.option("--engines", default="gauss,exudyn,casadi", show_default=True, help="Names, separated by commas.")
+@click.option("--engines", default=",".join(COMPARED), show_default=True, help="Names, separated by commas.")
 @options.values
 @options.at
 @options.as_json

@@ -9,12 +9,18 @@ import click
 from shoal.commands import options
 from shoal.commands.options import Out, Values
 from shoal.errors import check_trusted
+from shoal.ports import PORTS
 
 
 @click.command()
 @click.argument("engine", type=options.EngineName())
 @click.option("--host", default="127.0.0.1", show_default=True)
-@click.option("--port", type=click.IntRange(1, 65535), metavar="PORT", help="8001 gauss, 8002 exudyn, 8003 casadi.")
+@click.option(
+    "--port",
+    type=click.IntRange(1, 65535),
+    metavar="PORT",
+    help=", ".join(f"{port} {engine}" for engine, port in PORTS.items()) + ".",
+)
 @click.option("--certificate", type=click.Path(path_type=Path), help="Serve https with this certificate (PEM).")
 @click.option("--key", type=click.Path(path_type=Path), help="The certificate's private key (PEM).")
 def serve(engine: str, host: str, port: int | None, certificate: Path | None, key: Path | None) -> None:

@@ -1,11 +1,14 @@
-"""The engines: one list, one contract. Each is imported when it is first asked for."""
+"""The engines: one list, one contract. Each is imported when it is first asked for; reading the names costs nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from shoal.engines.contract import Capabilities, Engine
+from shoal.engines.known import ENGINES
 from shoal.errors import InputError
+
+if TYPE_CHECKING:
+    from shoal.engines.contract import Engine
 
 
 def _gauss() -> Engine:
@@ -32,12 +35,14 @@ def _casadi() -> Engine:
     return CasadiEngine()
 
 
-ENGINES: dict[str, Callable[[], Engine]] = {
+ENGINES |= {
     "gauss": _gauss,
     "exudyn": _exudyn,
     "exudyn-ge": _exudyn_ge,
     "casadi": _casadi,
 }
+COMPARED = ("gauss", "exudyn", "casadi")
+"""Compared unless somebody names others: three derivations of the same equations."""
 
 
 def _remote(url: str) -> Engine:
@@ -57,4 +62,4 @@ def get_engine(name: str) -> Engine:
     return ENGINES[name]()
 
 
-__all__ = ["ENGINES", "Capabilities", "Engine", "get_engine"]
+__all__ = ["COMPARED", "ENGINES", "get_engine"]

@@ -1,31 +1,17 @@
-"""What every engine can do, what a scene needs, and the one line that refuses a scene that needs more."""
+"""What a scene needs of an engine, and the one line that refuses a scene that needs more than an engine can do."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import get_args
+from collections.abc import Iterator, Mapping
+from typing import TypeVar
 
-from shoal.engines.contract import Capabilities
+from shoal.engines.contract import Engine
+from shoal.engines.known import ENGINES
 from shoal.errors import InputError
-from shoal.scene import (
-    GROUND,
-    JOINT_KINDS,
-    LOAD_KINDS,
-    Coupling,
-    Distance,
-    Function,
-    PointMass,
-    Revolute,
-    Rod,
-    Scene,
-    Slider,
-    Spring,
-    TorsionSpring,
-)
-from shoal.scene.bodies import Element
-from shoal.scene.joints import Joint, places
-from shoal.scene.loads import Load
+from shoal.scene import GROUND, Function, Joint, Load, PointMass, Rod, Scene
+from shoal.scene.joints import places
 
+T = TypeVar("T")
 FEATURES = (
     "point masses",
     "free bodies",
@@ -39,39 +25,8 @@ FEATURES = (
     "tapered flexible rods",
     "damped flexible rods",
 )
-
-_EXUDYN = Capabilities(
-    elements=frozenset({"rigid", "ancf-cable"}),
-    joints=frozenset(JOINT_KINDS) - {"coupling"},
-    loads=frozenset(LOAD_KINDS),
-    features=frozenset(FEATURES) - {"varying distances"},
-    lanes=False,
-)
-
-CAPABILITIES = {
-    "gauss": Capabilities(
-        elements=frozenset(get_args(Element)),
-        joints=frozenset(JOINT_KINDS),
-        loads=frozenset(LOAD_KINDS),
-        features=frozenset(FEATURES),
-        lanes=True,
-    ),
-    "exudyn": _EXUDYN,
-    "exudyn-ge": Capabilities(
-        elements=_EXUDYN.elements,
-        joints=_EXUDYN.joints,
-        loads=_EXUDYN.loads,
-        features=_EXUDYN.features - {"curved flexible rods", "damped flexible rods"},
-        lanes=False,
-    ),
-    "casadi": Capabilities(
-        elements=frozenset({"rigid", "ancf-cable"}),
-        joints=frozenset({"revolute"}),
-        loads=frozenset(LOAD_KINDS),
-        features=frozenset({"point masses", "dry friction", "tapered flexible rods"}),
-        lanes=False,
-    ),
-}
+_LAWS = {"elastic": "nonlinear springs", "length": "varying distances"}
+"""Fields whose functions need more than functions of time."""
 
 
 def needs(scene: Scene) -> Iterator[tuple[str, str]]:
@@ -93,30 +48,20 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
     for name in scene.ground_points:
         yield f"ground_points.{name}", "moving ground points"
     for name, joint in scene.joints.items():
-        yield f"joints.{name}", joint.kind
-        yield from ((f"joints.{name}.{field}", need) for field, need in _joint_needs(joint))
+        yield from _item(f"joints.{name}", joint)
     yield from ((f"joints.{name}", "closed loops") for name in loops(scene))
     for name, load in scene.loads.items():
-        yield f"loads.{name}", load.kind
-        yield from ((f"loads.{name}.{field}", need) for field, need in _load_needs(load))
+        yield from _item(f"loads.{name}", load)
 
 
-def _joint_needs(joint: Joint) -> Iterator[tuple[str, str]]:
-    if isinstance(joint, Revolute | Slider) and joint.coulomb:
-        yield "coulomb", "dry friction"
-    if isinstance(joint, Distance) and joint.length is not None and joint.length.number is None:
-        yield "length", "varying distances"
-    if isinstance(joint, Coupling) and joint.value.number is None:
-        yield "value", "functions of time"
-
-
-def _load_needs(load: Load) -> Iterator[tuple[str, str]]:
-    if isinstance(load, Spring | TorsionSpring) and load.elastic is not None:
-        yield "elastic", "nonlinear springs"
-    for field in ("scale", "torque"):
-        value = getattr(load, field, None)
-        if isinstance(value, Function) and value.number is None:
-            yield field, "functions of time"
+def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:
+    """The kind of a joint or a load, and what its fields need beyond that."""
+    yield where, item.kind
+    for field, value in item:
+        if field == "coulomb" and value:
+            yield f"{where}.{field}", "dry friction"
+        if isinstance(value, Function) and (value.number is None or field == "elastic"):
+            yield f"{where}.{field}", _LAWS.get(field, "functions of time")
 
 
 def loops(scene: Scene) -> Iterator[str]:
@@ -130,11 +75,19 @@ def loops(scene: Scene) -> Iterator[str]:
         group = {body: first if owner in joined else owner for body, owner in group.items()}
 
 
-def require(engine: str, scene: Scene) -> None:
+def require(engine: Engine, scene: Scene) -> None:
     """Raises InputError, one line, where a scene needs more than the engine can do."""
-    able = CAPABILITIES[engine].all
+    able = engine.capabilities.all
     for field, need in needs(scene):
         if need not in able:
             wanted = {what for _, what in needs(scene)}
-            others = [name for name, other in CAPABILITIES.items() if wanted <= other.all]
-            raise InputError(f"{field}: engine {engine} cannot do {need}; use {' or '.join(others)}")
+            others = [name for name, make in ENGINES.items() if wanted <= make().capabilities.all]
+            use = f"; use {' or '.join(others)}" if others else ""
+            raise InputError(f"{field}: engine {engine.name} cannot do {need}{use}")
+
+
+def of_kind(table: Mapping[str, T], kind: str, where: str) -> T:
+    """The entry for a kind that a field names. Raises InputError for a kind that somebody forgot."""
+    if kind not in table:
+        raise InputError(f"{where}: {kind} is not among {', '.join(table)}")
+    return table[kind]

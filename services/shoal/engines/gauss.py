@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import get_args
 
-from shoal.engines.capabilities import CAPABILITIES
+from shoal.engines.capabilities import FEATURES
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
-from shoal.scene import Scene
+from shoal.errors import InputError
+from shoal.scene import JOINT_KINDS, LOAD_KINDS, Scene
+from shoal.scene.bodies import Element
 from shoal.trajectory import Array, Trajectory
 
 
@@ -24,14 +27,21 @@ class GaussEngine:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can simulate."""
-        return CAPABILITIES[self.name]
+        """All that a scene may state: scenes are made for this engine, and the mechanics refuse what they lack."""
+        return Capabilities(
+            elements=frozenset(get_args(Element)),
+            joints=frozenset(JOINT_KINDS),
+            loads=frozenset(LOAD_KINDS),
+            features=frozenset(FEATURES),
+            lanes=True,
+        )
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene, under `auto` by the first integrator that can; see `Engine`."""
         from shoal.engines import swarm_motion
         from shoal.mechanics.persist import persist
 
+        _check_acceleration(scene)
         wanted = sampling_times(scene, times)
         if swarm_motion.asked_for(scene):
             return swarm_motion.simulate(scene, wanted)
@@ -44,5 +54,16 @@ class GaussEngine:
         from shoal.engines import swarm_motion
         from shoal.mechanics.simulate import simulate
 
+        _check_acceleration(scene)
         swarm_motion.refuse_lanes(scene, check_lanes(scene, values))
         return simulate(scene, sampling_times(scene, times), values, threads=self.threads)
+
+
+def _check_acceleration(scene: Scene) -> None:
+    """Raises InputError for a way to the acceleration that neither the mechanics nor the swarms have."""
+    from shoal.mechanics.least.principle import METHODS
+    from shoal.swarm import OPTIMIZERS
+
+    known = (*METHODS, *OPTIMIZERS)
+    if (name := scene.solver.acceleration) not in known:
+        raise InputError(f"solver.acceleration: no way {name!r}; there are {', '.join(known)}")

@@ -24,7 +24,7 @@ def left_out(trajectory: Trajectory, scene: Scene, native: Engine) -> float | No
     """
     rods = {name: body for name, body in scene.bodies.items() if isinstance(body, Rod)}
     shearing = trajectory.engine in WITH_SHEAR
-    full = [name for name, rod in rods.items() if rod.element != "rigid" and (shearing or rod.element == "ancf-full")]
+    full = [name for name, rod in rods.items() if rod.shears or (shearing and rod.element != "rigid")]
     slender = {name: rod for name, rod in rods.items() if name not in full and not rod.rotary_inertia}
     flexible = [rod for rod in rods.values() if rod.element != "rigid"]
     # A place on a curved rod is told by its arc length where it is flexible, by its coordinates where it is rigid.

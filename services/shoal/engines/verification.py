@@ -14,9 +14,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+from shoal.engines.capabilities import of_kind
 from shoal.engines.contract import Engine
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import left_out
@@ -26,7 +28,7 @@ from shoal.mechanics.integrators import facts
 from shoal.mechanics.persist import DAMPED, as_run
 from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import STEP_MARGIN, stable_step
-from shoal.scene import GROUND, Revolute, Rod, Scene, Slider, Solver
+from shoal.scene import GROUND, Rod, Scene, Solver
 from shoal.scene.joints import places
 from shoal.trajectory import Array, Status, Trajectory, plain
 
@@ -120,6 +122,8 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
     """Estimate the errors of a run of a scene by more careful ones. native: the native solver, else the one here."""
     scene = as_run(scene, trajectory)
     scale = _scale(trajectory, scene)
+    if "unknowns" not in trajectory.model:
+        return Verification(None, None, scale, f"errors not estimated: {trajectory.engine} does not tell its unknowns")
     native = native or GaussEngine()
     second = partial(_second, native, trajectory, scene)
     careful, note = second("time", lambda: _careful(scene, trajectory), 1)
@@ -156,12 +160,12 @@ def _friction_error(trajectory: Trajectory, scene: Scene, second: Second) -> tup
 
     It holds better still where even so it would creep far in the time of the run.
     """
-    rubbing = {n: joint for n, joint in scene.joints.items() if isinstance(joint, Revolute | Slider) and joint.coulomb}
+    rubbing: dict[str, Any] = {n: joint for n, joint in scene.joints.items() if getattr(joint, "coulomb", 0.0)}
     if not rubbing:
         return None, ""
-    sharp = SHARPER
-    for joint in rubbing.values():
-        far = CREEP * (span(scene) if isinstance(joint, Slider) else 1.0)
+    sharp, sizes = SHARPER, {"revolute": 1.0, "slider": span(scene)}
+    for name, joint in rubbing.items():
+        far = CREEP * of_kind(sizes, joint.kind, f"joints.{name}.coulomb")
         sharp = min(sharp, far / (joint.coulomb_speed * max(float(trajectory.times[-1]), scene.solver.step)))
     sharper = {f"joints.{name}.coulomb_speed": sharp * joint.coulomb_speed for name, joint in rubbing.items()}
     held, note = second("friction", lambda: _able(scene.with_values(sharper), scene.solver.step), 1)

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines import Engine, get_engine
+from shoal.engines import get_engine
+from shoal.engines.contract import Engine
 from shoal.errors import InputError
 from shoal.identification.checkpoint import Memory
 from shoal.identification.deadline import Deadline, TimeIsUp

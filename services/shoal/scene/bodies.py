@@ -13,6 +13,7 @@ Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full"]
 Quadrature = Literal["full", "reduced"]
 Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
 
+_SHEARS = {"rigid": False, "ancf-cable": False, "ancf-quintic": False, "ancf-full": True}
 _POINTS = 24
 """Quadrature points along a curved rod."""
 _ONLY_FLEXIBLE = {
@@ -97,6 +98,11 @@ class Rod(Record):
         return self
 
     @property
+    def shears(self) -> bool:
+        """Whether its element has shear and the rotary inertia of its sections."""
+        return _SHEARS[self.element]
+
+    @property
     def tapered(self) -> bool:
         """Whether the section changes along the rod."""
         return self.end_height is not None or self.end_width is not None
@@ -111,11 +117,6 @@ class Rod(Record):
     def area(self) -> float:
         """Cross-section at the start [m^2]."""
         return self.width * self.height
-
-    @property
-    def mass_per_length(self) -> float:
-        """Line density at the start [kg/m]."""
-        return self.density * self.area
 
     @property
     def mass(self) -> float:

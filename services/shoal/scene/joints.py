@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field
 
 from shoal.scene.function import Function
-from shoal.scene.record import Angle, NonNegative, Positive, Record, Vector
+from shoal.scene.record import Angle, NonNegative, Positive, Record, Vector, kinds
 
 GROUND = "ground"
 
@@ -29,30 +29,37 @@ class MovingPoint(Record):
     y: Function = Function(number=0.0)
 
 
-class Revolute(Record):
+class Tie(Record):
+    """Joins two places. turned: the sides of whose bodies' directions it speaks."""
+
+    kind: str
+    turned: ClassVar[tuple[str, ...]]
+    first: Attachment
+    second: Attachment
+
+
+class Revolute(Tie):
     """Two places stay together; the bodies turn freely but for friction.
 
     friction: viscous [N m s/rad]; coulomb: dry friction torque [N m], smoothed as tanh(rate / coulomb_speed).
     """
 
     kind: Literal["revolute"] = "revolute"
-    first: Attachment
-    second: Attachment
+    turned: ClassVar[tuple[str, ...]] = ()
     friction: NonNegative = 0.0
     coulomb: NonNegative = 0.0
     coulomb_speed: Positive = 1e-2
 
 
-class Weld(Record):
+class Weld(Tie):
     """Two places stay together and the bodies keep their relative angle [rad] (default: that of the start)."""
 
     kind: Literal["weld"] = "weld"
-    first: Attachment
-    second: Attachment
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
     angle: Angle | None = None
 
 
-class Slider(Record):
+class Slider(Tie):
     """The second place moves on a line through the first one, fixed to the first body.
 
     direction: angle [rad] of the line in the first body's frame. rotation: whether the second body may turn against
@@ -60,8 +67,7 @@ class Slider(Record):
     """
 
     kind: Literal["slider"] = "slider"
-    first: Attachment
-    second: Attachment
+    turned: ClassVar[tuple[str, ...]] = ("first",)
     direction: Angle = 0.0
     rotation: Literal["free", "locked"] = "free"
     friction: NonNegative = 0.0
@@ -69,37 +75,33 @@ class Slider(Record):
     coulomb_speed: Positive = 1e-2
 
 
-class Distance(Record):
+class Distance(Tie):
     """Two places keep a distance [m] (default: that of the start), or one that is a function of time."""
 
     kind: Literal["distance"] = "distance"
-    first: Attachment
-    second: Attachment
+    turned: ClassVar[tuple[str, ...]] = ()
     length: Function | None = None
 
 
-class Parallel(Record):
+class Parallel(Tie):
     """The directions of two bodies stay parallel."""
 
     kind: Literal["parallel"] = "parallel"
-    first: Attachment
-    second: Attachment
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
 
 
-class Perpendicular(Record):
+class Perpendicular(Tie):
     """The directions of two bodies stay perpendicular."""
 
     kind: Literal["perpendicular"] = "perpendicular"
-    first: Attachment
-    second: Attachment
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
 
 
-class DrivenAngle(Record):
+class DrivenAngle(Tie):
     """The angle [rad] from the first body's direction to the second's is a function of time."""
 
     kind: Literal["driven-angle"] = "driven-angle"
-    first: Attachment
-    second: Attachment
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
     angle: Function
 
 
@@ -115,6 +117,7 @@ class Coupling(Record):
     """The sum of factor * coordinate equals a function of time [m]."""
 
     kind: Literal["coupling"] = "coupling"
+    turned: ClassVar[tuple[str, ...]] = ()
     terms: Annotated[tuple[CoupledCoordinate, ...], Field(min_length=1)]
     value: Function = Function(number=0.0)
 
@@ -131,14 +134,19 @@ Joint = Annotated[
     BeforeValidator(_revolute_if_unsaid),
 ]
 """A joint without a kind is a revolute one."""
-JOINT_KINDS = ("revolute", "weld", "slider", "distance", "parallel", "perpendicular", "driven-angle", "coupling")
+JOINT_KINDS = kinds(Joint)
 
 
-def sides(joint: Joint) -> dict[str, Attachment]:
-    """The attachments of a joint, by the path of their field."""
-    if isinstance(joint, Coupling):
-        return {f"terms.{number}.at": term.at for number, term in enumerate(joint.terms)}
-    return {"first": joint.first, "second": joint.second}
+def sides(record: Record) -> dict[str, Attachment]:
+    """The attachments of a joint or a load, by the path of their field."""
+    found = {}
+    for field, value in record:
+        if isinstance(value, Attachment):
+            found[field] = value
+        for number, part in enumerate(value if isinstance(value, tuple) else ()):
+            if isinstance(part, Record):
+                found |= {f"{field}.{number}.{inner}": at for inner, at in sides(part).items()}
+    return found
 
 
 def places(joint: Joint) -> tuple[Attachment, ...]:
@@ -148,8 +156,6 @@ def places(joint: Joint) -> tuple[Attachment, ...]:
 
 def turned(joint: Joint) -> dict[str, Attachment]:
     """The attachments of whose bodies' directions a joint speaks, by the path of their field."""
-    if isinstance(joint, Parallel | Perpendicular | DrivenAngle) or (
-        isinstance(joint, Weld) and joint.angle is not None
-    ):
-        return {"first": joint.first, "second": joint.second}
-    return {"first": joint.first} if isinstance(joint, Slider) else {}
+    if isinstance(joint, Weld) and joint.angle is None:
+        return {}
+    return {side: getattr(joint, side) for side in joint.turned}

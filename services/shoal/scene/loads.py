@@ -8,10 +8,22 @@ from pydantic import Field
 
 from shoal.scene.function import Function
 from shoal.scene.joints import Attachment
-from shoal.scene.record import NonNegative, Record, Vector
+from shoal.scene.joints import sides as sides
+from shoal.scene.record import NonNegative, Record, Vector, kinds
 
 
-class Spring(Record):
+class Elastic(Record):
+    """What springs have: a polynomial law and a damper between two places."""
+
+    kind: str
+    first: Attachment
+    second: Attachment
+    stiffness: float = 0.0
+    cubic: float = 0.0
+    damping: NonNegative = 0.0
+
+
+class Spring(Elastic):
     """A spring and damper between two places, along the line that joins them.
 
     stiffness [N/m], cubic [N/m^3], damping [N s/m]; length: where it pulls with no force [m] (default: the
@@ -19,16 +31,11 @@ class Spring(Record):
     """
 
     kind: Literal["spring"] = "spring"
-    first: Attachment
-    second: Attachment
-    stiffness: float = 0.0
-    cubic: float = 0.0
-    damping: NonNegative = 0.0
     length: NonNegative | None = None
     elastic: Function | None = None
 
 
-class TorsionSpring(Record):
+class TorsionSpring(Elastic):
     """A spring and damper between the directions of two bodies.
 
     stiffness [N m/rad], cubic [N m/rad^3], damping [N m s/rad]; angle: relative angle of rest [rad] (default: that of
@@ -37,11 +44,6 @@ class TorsionSpring(Record):
     """
 
     kind: Literal["torsion-spring"] = "torsion-spring"
-    first: Attachment
-    second: Attachment
-    stiffness: float = 0.0
-    cubic: float = 0.0
-    damping: NonNegative = 0.0
     angle: float | None = None
     elastic: Function | None = None
 
@@ -75,15 +77,4 @@ class DistributedForce(Record):
 
 
 Load = Annotated[Spring | TorsionSpring | Force | Torque | DistributedForce, Field(discriminator="kind")]
-LOAD_KINDS = ("spring", "torsion-spring", "force", "torque", "distributed-force")
-
-
-def sides(load: Load) -> dict[str, Attachment]:
-    """The attachments of a load, by the name of their field."""
-    if isinstance(load, Spring | TorsionSpring):
-        return {"first": load.first, "second": load.second}
-    if isinstance(load, Force):
-        return {"at": load.at}
-    if isinstance(load, Torque):
-        return {"at": load.at} if load.reaction is None else {"at": load.at, "reaction": load.reaction}
-    return {}
+LOAD_KINDS = kinds(Load)

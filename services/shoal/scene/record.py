@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -28,22 +28,20 @@ Angle = Annotated[float, AfterValidator(_plausible_angle)]
 Vector = tuple[float, float]
 
 
-_TAGS = {
-    "bodies": {"rod", "rigid-body", "point-mass"},
-    "joints": {
-        "revolute", "prismatic", "spherical", "fixed", "weld", "slider", "distance", "parallel", "perpendicular",
-        "driven-angle", "coupling",
-    },
-    "loads": {"spring", "torsion-spring", "force", "torque", "distributed-force"},
-}  # fmt: skip
-"""Kinds by which pydantic tells the members of a field apart; it puts them into the path after the member's name."""
+def kinds(annotation: Any) -> tuple[str, ...]:
+    """The kinds of the records that a type is made of, in their order."""
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        return (annotation.model_fields["kind"].default,) if "kind" in annotation.model_fields else ()
+    return tuple(kind for part in get_args(annotation) for kind in kinds(part))
 
 
-def one_line(error: ValidationError, what: str) -> InputError:
-    """Turn pydantic's report into one line that names the field, the value and what is right."""
+def one_line(error: ValidationError, what: str, model: type[Record] | None = None) -> InputError:
+    """Turn pydantic's report on a model into one line that names the field, the value and what is right."""
     first = error.errors()[0]
     parts = [str(part) for part in first["loc"]]
-    if parts[2:] and parts[2] in _TAGS.get(parts[0], ()):
+    field = model.model_fields.get(parts[0]) if model and parts[2:] else None
+    # Pydantic puts the kind that tells the members of a field apart into the path, after the member's name.
+    if field and parts[2] in kinds(field.annotation):
         del parts[2]
     path = ".".join(part for part in parts if part not in {"file", "engine"})
     message = first["msg"].removeprefix("Value error, ")

@@ -13,7 +13,6 @@ from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
 from shoal.scene import joints as joint_types
-from shoal.scene import loads as load_types
 from shoal.scene.bodies import Body
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
 from shoal.scene.loads import DistributedForce, Force, Load
@@ -91,7 +90,7 @@ class Scene(Record):
             if not isinstance(joint, joint_types.Coupling) and joint.first.body == joint.second.body:
                 raise ValueError(f"joints.{name}: joins {joint.first.body!r} to itself; a joint needs two bodies")
         for name, load in self.loads.items():
-            for field, side in load_types.sides(load).items():
+            for field, side in joint_types.sides(load).items():
                 self._check_attachment(f"loads.{name}.{field}", side)
             if isinstance(load, DistributedForce) and getattr(self.bodies.get(load.body), "kind", "") != "rod":
                 raise ValueError(f"loads.{name}.body: {load.body!r} is not a rod of this scene")
@@ -178,7 +177,7 @@ class Scene(Record):
         try:
             return cls.model_validate(data)
         except ValidationError as error:
-            raise one_line(error, source) from None
+            raise one_line(error, source, cls) from None
 
     def location(self, attachment: Attachment) -> Vector:
         """Coordinates [m] of an attachment in its body's (or the ground's) frame; on a flexible rod (s, y)."""

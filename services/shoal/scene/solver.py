@@ -8,9 +8,8 @@ from pydantic import Field
 
 from shoal.scene.record import Positive, Record
 
-Acceleration = Literal[
-    "projection", "kkt", "augmented-lagrangian", "proximal", "baumgarte", "afsa", "iafsa", "iafsa-printed"
-]
+Acceleration = Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
+"""A name that the native engine knows: among them are the swarms, of which a scene need not know the list."""
 IntegratorName = Literal[
     "auto",
     "leapfrog",

@@ -97,8 +97,8 @@ def test_multi_start_draws_the_waterfall() -> None:
 def test_multiple_shooting_holds_where_single_shooting_is_lost() -> None:
     """Over 5 s from a start that is off by a tenth of a radian; data by scipy, model by CasADi's own equations."""
     pytest.importorskip("casadi")
-    from shoal.engines.casadi_multiple_shooting import identify_by_segments
-    from shoal.engines.casadi_shooting import identify_initial_angles
+    from shoal.engines.casadi.multiple_shooting import identify_by_segments
+    from shoal.engines.casadi.shooting import identify_initial_angles
 
     model = made(5.0)
     scene = model.scene.with_values({"solver.step": 2e-3})

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from shoal.engines import get_engine
-from shoal.engines.casadi_shooting import shot
+from shoal.engines.casadi.shooting import shot
 from shoal.identification import Measurement, Problem, identify
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.least_squares import differentiate as naive

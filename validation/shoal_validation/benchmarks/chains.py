@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from shoal.engines.exudyn_build import library
+from shoal.engines.exudyn.build import library
 from shoal.engines.tree.articulated import accelerate
 from shoal.engines.tree.description import SpatialChain
 from shoal.engines.tree.march import march

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.exudyn import ExudynEngine
-from shoal.engines.exudyn_build import build as build_exudyn
-from shoal.engines.exudyn_build import library
-from shoal.engines.exudyn_record import choose_steps
+from shoal.engines.exudyn.build import build as build_exudyn
+from shoal.engines.exudyn.build import library
+from shoal.engines.exudyn.record import choose_steps
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import choose, halting
 from shoal.mechanics.march import march

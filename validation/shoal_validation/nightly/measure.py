@@ -39,7 +39,7 @@ def motion(problem: str, engine: str, values: Mapping[str, object], verify: bool
 
     wanted, chosen = get_problem(problem), get_engine(engine)
     scene = wanted.scene().with_values(dict(values))
-    require(engine, scene)
+    require(chosen, scene)
     if verify:
         return _motion(problem, lambda: verified(chosen, scene, wanted.times))
     return _motion(problem, lambda: chosen.simulate(scene, wanted.times))

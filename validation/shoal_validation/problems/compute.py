@@ -11,7 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from shoal.engines import Engine, get_engine
+from shoal.engines import get_engine
+from shoal.engines.contract import Engine
 from shoal.engines.exudyn import ExudynEngine
 from shoal.errors import ComputationError
 from shoal.trajectory import Array

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from shoal.engines import Engine
+from shoal.engines.contract import Engine
 from shoal.engines.verification import verify
 from shoal.errors import InputError
 from shoal.scene import Scene

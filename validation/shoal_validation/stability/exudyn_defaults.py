@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
-from shoal.engines.capabilities import CAPABILITIES, require
+from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, sampling_times
-from shoal.engines.exudyn_build import Machine, build, library
+from shoal.engines.exudyn import ExudynEngine
+from shoal.engines.exudyn.build import Machine, build, library
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 
@@ -31,13 +32,13 @@ class ExudynDefaults:
     @property
     def capabilities(self) -> Capabilities:
         """What it can simulate."""
-        return CAPABILITIES["exudyn"]
+        return ExudynEngine().capabilities
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run and believe what Exudyn says; not a number from where it gave up. Raises InputError."""
         began = time.perf_counter()
         wanted = sampling_times(scene, times)
-        require(self.name, scene)
+        require(self, scene)
         exu = library()
         machine = build(exu, scene, "ancf-cable")
         path, failure = _solve(exu, machine, float(wanted[-1]), scene.solver.step)

@@ -19,7 +19,7 @@ STEPS = (100, 500, 1000, 1500, 2500, 5000)
 
 def methods(problem: Problem, brief: bool) -> list[Method]:
     """CVODES (Adams) and RK4; brief: the scene's own mesh. Raises InputError."""
-    require("casadi", problem.scene())
+    require(CasadiEngine(), problem.scene())
     meshes = (MESHES[:1] if brief else MESHES) if problem.flexible else ("",)
     return [
         *(_cvodes(mesh) for mesh in meshes),

@@ -29,11 +29,11 @@ RIGID = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
 
 def methods(problem: Problem, brief: bool) -> list[Method]:
     """Both beams, both quadratures, both integrators; brief: on few meshes. Raises InputError."""
-    require("exudyn", problem.scene())
     cable, damped = (
         ExudynEngine(modified_newton=True),
         ExudynEngine(modified_newton=True, integrator="generalized-alpha"),
     )
+    require(cable, problem.scene())
     if not problem.flexible:
         steps = counted(problem, RIGID)
         return [_method(engine, "", steps) for engine in (cable, damped)]

@@ -15,13 +15,13 @@ from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.source import Clocked
 
 if TYPE_CHECKING:
-    from shoal.engines.casadi_shooting import ShootingResult
+    from shoal.engines.casadi.shooting import ShootingResult
 
 
 def casadi(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """IPOPT on CasADi's own model, from the better start; initial angles and rates from one marker's position only."""
     with model.off_the_clock():  # slow to import
-        from shoal.engines.casadi_shooting import identify_initial_angles
+        from shoal.engines.casadi.shooting import identify_initial_angles
 
     return _shoot(model, identify_initial_angles, progress)
 
@@ -29,7 +29,7 @@ def casadi(model: ForwardModel, rng: np.random.Generator, progress: Progress) ->
 def casadi_multiple(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """The same with the record in segments whose first states are unknowns too, for long and chaotic motions."""
     with model.off_the_clock():  # slow to import
-        from shoal.engines.casadi_multiple_shooting import identify_by_segments
+        from shoal.engines.casadi.multiple_shooting import identify_by_segments
 
     return _shoot(model, identify_by_segments, progress)
 

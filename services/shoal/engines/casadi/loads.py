@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from shoal.engines.casadi_bodies import PlacedCable
-from shoal.engines.casadi_tree import Tree
-from shoal.engines.poses import initial_poses, owner
+from shoal.engines.capabilities import of_kind
+from shoal.engines.casadi.bodies import PlacedCable
+from shoal.engines.casadi.tree import Tree
+from shoal.engines.poses import initial_poses, start_of
 from shoal.errors import InputError
 from shoal.scene import (
     Attachment,
@@ -33,7 +34,7 @@ def with_rest(scene: Scene) -> Scene:
     poses, loads = initial_poses(scene), dict(scene.loads)
     for name, load in loads.items():
         if isinstance(load, Spring) and load.length is None:
-            first, second = (poses[owner(s)].position(scene.location(s)) for s in (load.first, load.second))
+            first, second = (start_of(scene, poses, side) for side in (load.first, load.second))
             loads[name] = load.model_copy(update={"length": float(np.linalg.norm(second - first))})
         if isinstance(load, TorsionSpring):
             turn = poses[load.second.body].angle - poses[load.first.body].angle
@@ -48,10 +49,8 @@ def with_rest(scene: Scene) -> Scene:
 def stored(scene: Scene, tree: Tree) -> Any:
     """Energy of the springs [J]."""
     energy = ca.SX(0)
-    for name, load in scene.loads.items():
-        if isinstance(load, Spring | TorsionSpring):
-            x = _elongation(scene, tree, name, load)
-            energy += load.stiffness / 2 * x**2 + load.cubic / 4 * x**4
+    for load, x in _springs(scene, tree):
+        energy += load.stiffness / 2 * x**2 + load.cubic / 4 * x**4
     return energy
 
 
@@ -70,10 +69,9 @@ def dissipation(scene: Scene, tree: Tree, v: Any) -> Any:
             size = ca.fabs(rate) / joint.coulomb_speed
             rub = joint.coulomb * joint.coulomb_speed * (size + ca.log1p(ca.exp(-2 * size)))
             total += joint.friction / 2 * rate**2 + (rub if joint.coulomb else 0)
-    for name, load in scene.loads.items():
-        if isinstance(load, Spring | TorsionSpring) and load.damping:
-            rate = ca.jtimes(_elongation(scene, tree, name, load), tree.coordinates, v)
-            total += load.damping / 2 * rate**2
+    for load, x in _springs(scene, tree):
+        if load.damping:
+            total += load.damping / 2 * ca.jtimes(x, tree.coordinates, v) ** 2
     return total
 
 
@@ -81,42 +79,65 @@ def applied(scene: Scene, tree: Tree) -> Any:
     """Generalised forces of the applied loads, all constant but for the direction of following ones, (unknowns,)."""
     total = ca.SX.zeros(tree.coordinates.numel())
     for name, load in scene.loads.items():
-        if isinstance(load, Force):
-            placed, place = tree.placed[load.at.body], scene.location(load.at)
-            assert load.scale.number is not None
-            force = load.scale.number * ca.SX(load.force)
-            if load.follows:
-                c, s = (f(_angle(scene, tree, f"loads.{name}", load.at)) for f in (ca.cos, ca.sin))
-                force = ca.vertcat(c * force[0] - s * force[1], s * force[0] + c * force[1])
-            total += ca.jtimes(placed.point(place), tree.coordinates, force, True)
-        elif isinstance(load, Torque):
-            assert load.torque.number is not None
-            for side, sign in _turned(load):
-                angle = _angle(scene, tree, f"loads.{name}", side)
-                total += sign * load.torque.number * ca.gradient(angle, tree.coordinates)
-        elif isinstance(load, DistributedForce):
-            assert load.scale.number is not None
-            way = ca.dot(load.scale.number * ca.SX(load.force), _integral(scene, tree, load.body))
-            total += ca.gradient(way, tree.coordinates)
+        if load.kind not in ELONGATIONS:
+            total += of_kind(FORCES, load.kind, f"loads.{name}")(scene, tree, f"loads.{name}", load)
     return total
 
 
-def _turned(load: Torque) -> Iterator[tuple[Attachment, float]]:
-    yield load.at, 1.0
+def _force(scene: Scene, tree: Tree, where: str, load: Force) -> Any:
+    assert load.scale.number is not None
+    force = load.scale.number * ca.SX(load.force)
+    if load.follows:
+        c, s = (f(_angle(scene, tree, where, load.at)) for f in (ca.cos, ca.sin))
+        force = ca.vertcat(c * force[0] - s * force[1], s * force[0] + c * force[1])
+    point = tree.placed[load.at.body].point(scene.location(load.at))
+    return ca.jtimes(point, tree.coordinates, force, True)
+
+
+def _torque(scene: Scene, tree: Tree, where: str, load: Torque) -> Any:
+    assert load.torque.number is not None
+    turn = _angle(scene, tree, where, load.at)
     if load.reaction is not None:
-        yield load.reaction, -1.0
+        turn = turn - _angle(scene, tree, where, load.reaction)
+    return load.torque.number * ca.gradient(turn, tree.coordinates)
 
 
-def _elongation(scene: Scene, tree: Tree, name: str, load: Spring | TorsionSpring) -> Any:
-    """Length or angle from rest [m or rad]."""
-    if isinstance(load, Spring):
-        first, second = (tree.placed[side.body].point(scene.location(side)) for side in (load.first, load.second))
-        return ca.norm_2(second - first) - load.length
-    first, second = (_angle(scene, tree, f"loads.{name}", side) for side in (load.first, load.second))
+def _distributed(scene: Scene, tree: Tree, where: str, load: DistributedForce) -> Any:
+    assert load.scale.number is not None
+    way = ca.dot(load.scale.number * ca.SX(load.force), _integral(scene, tree, load.body))
+    return ca.gradient(way, tree.coordinates)
+
+
+FORCES: dict[str, Callable[[Scene, Tree, str, Any], Any]] = {
+    "force": _force,
+    "torque": _torque,
+    "distributed-force": _distributed,
+}
+
+
+def _springs(scene: Scene, tree: Tree) -> Iterator[tuple[Any, Any]]:
+    """The springs, each with its length or angle from rest [m or rad]."""
+    for name, load in scene.loads.items():
+        if load.kind in ELONGATIONS:
+            yield load, ELONGATIONS[load.kind](scene, tree, f"loads.{name}", load)
+
+
+def _stretch(scene: Scene, tree: Tree, where: str, load: Spring) -> Any:
+    """Length from rest [m]."""
+    first, second = (tree.placed[side.body].point(scene.location(side)) for side in (load.first, load.second))
+    return ca.norm_2(second - first) - load.length
+
+
+def _twist(scene: Scene, tree: Tree, where: str, load: TorsionSpring) -> Any:
+    """Angle from rest [rad]."""
+    first, second = (_angle(scene, tree, where, side) for side in (load.first, load.second))
     x = second - first - load.angle
     # The direction of a cable is known up to full turns only.
     flexible = any(_is_flexible(scene, side) for side in (load.first, load.second))
     return ca.atan2(ca.sin(x), ca.cos(x)) if flexible else x
+
+
+ELONGATIONS: dict[str, Callable[[Scene, Tree, str, Any], Any]] = {"spring": _stretch, "torsion-spring": _twist}
 
 
 def _integral(scene: Scene, tree: Tree, body: str) -> Any:

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from shoal.engines.course import Clock
-from shoal.engines.poses import Pose, normal
-from shoal.scene import PointMass, RigidBody, Rod
+from shoal.engines.course import Clock, Course
+from shoal.engines.poses import InitialPose, normal
+from shoal.errors import InputError
+from shoal.scene import Function, PointMass, RigidBody, Rod
 from shoal.trajectory import Array
 
 Place = tuple[float, float]
@@ -35,28 +36,32 @@ class Energy(NamedTuple):
     moment: Array
 
 
-class Part(Protocol):
-    """One body of the scene. q, v: all coordinates and velocities of the system, (rows, unknowns)."""
+class Holder(Protocol):
+    """What has places: a body or the ground. q, v: all coordinates and velocities of the system, (rows, unknowns)."""
 
     def hold(self, system: System, place: Place) -> Any:
-        """A new marker at a place [m] in the body's frame, for joints."""
+        """A new marker at a place [m] in its frame, for joints."""
         ...
 
     def turn(self, system: System, place: Place, angle: float = 0.0) -> Any:
-        """A new marker that turns with the body there, `angle` [rad] ahead of it. Raises InputError."""
+        """A new marker that turns with it there, `angle` [rad] ahead. Raises InputError."""
         ...
 
     def motion(self, q: Array, v: Array, place: Place) -> Motion:
         """Motion of a place."""
         ...
 
+
+class Part(Holder, Protocol):
+    """One body of the scene."""
+
     def energy(self, q: Array, v: Array) -> Energy:
         """Energy of the whole body."""
         ...
 
     def damping(self, q: Array, v: Array) -> Array:
-        """Power lost in the material [W], (rows,)."""
-        ...
+        """Power lost in the material [W], (rows,); none unless a part says otherwise."""
+        return np.zeros(len(q))
 
 
 @dataclass
@@ -69,21 +74,33 @@ class System:
     clock: Clock
     unknowns: int = field(default=0)
 
-    def node(self, item: Any) -> tuple[Any, list[int]]:
-        """Enter a node; its number and the columns of its coordinates."""
-        columns = list(range(self.unknowns, self.unknowns + len(item.referenceCoordinates)))
+    def add(self, kind: str, **options: Any) -> Any:
+        """Enter an item of Exudyn's class `kind`; its number."""
+        family = next(family for family in ("Node", "Object", "Marker", "Load") if kind.startswith(family))
+        return getattr(self.mbs, f"Add{family}")(getattr(self.items, kind)(**options))
+
+    def node(self, kind: str, begin: list[Any], rates: list[Any]) -> tuple[Any, list[int]]:
+        """Enter a node with its coordinates at the start and their rates; its number and their columns."""
+        columns = list(range(self.unknowns, self.unknowns + len(begin)))
         self.unknowns += len(columns)
-        return self.mbs.AddNode(item), columns
+        return self.add(kind, referenceCoordinates=begin, initialVelocities=rates), columns
+
+    def course(self, f: Function, field: str, *, held: bool = False) -> Course:
+        """A function of time, as the clock has it. Raises InputError that names the field."""
+        try:
+            return self.clock.course(f, held=held)
+        except InputError as error:
+            raise InputError(f"{field}: {str(error).removeprefix('function: ')}") from None
 
     def marker(self, kind: str, body: Any, local: Place) -> Any:
         """Enter a marker of Exudyn's class `kind` at a local position [m] of one of its bodies."""
-        return self.mbs.AddMarker(getattr(self.items, kind)(bodyNumber=body, localPosition=[*local, 0.0]))
+        return self.add(kind, bodyNumber=body, localPosition=[*local, 0.0])
 
     def turned(self, body: Any, local: Place, angle: float) -> Any:
         """Enter a marker with a direction: that of a body at a local position [m], turned by `angle` [rad]."""
         c, s = np.cos(angle), np.sin(angle)
         frame = [[c, -s, 0.0, local[0]], [s, c, 0.0, local[1]], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
-        return self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=body, localHT=frame))
+        return self.add("MarkerBodyRigid", bodyNumber=body, localHT=frame)
 
     def weigh(self, body: Any) -> None:
         """Let gravity act on the distributed mass of an element."""
@@ -91,13 +108,12 @@ class System:
 
     def accelerate(self, body: Any, acceleration: Place, **options: Any) -> None:
         """Let an acceleration [m/s^2] act on the distributed mass of an element."""
-        marker = self.mbs.AddMarker(self.items.MarkerBodyMass(bodyNumber=body))
-        load = self.items.LoadMassProportional(markerNumber=marker, loadVector=[*acceleration, 0.0], **options)
-        self.mbs.AddLoad(load)
+        marker = self.add("MarkerBodyMass", bodyNumber=body)
+        self.add("LoadMassProportional", markerNumber=marker, loadVector=[*acceleration, 0.0], **options)
 
 
 @dataclass(frozen=True)
-class RigidPart:
+class RigidPart(Part):
     """ObjectRigidBody2D, its node at the origin of the body's frame: zero inertia about the centre of mass is legal.
 
     A point mass is a rigid body held at its centre of mass, where nothing turns it; its inertia is of no consequence.
@@ -113,25 +129,20 @@ class RigidPart:
     """Angle [rad] at the start, from which Exudyn counts."""
 
     @classmethod
-    def add(cls, system: System, given: Rod | RigidBody | PointMass, pose: Pose) -> RigidPart:
+    def add(cls, system: System, given: Rod | RigidBody | PointMass, pose: InitialPose) -> RigidPart:
         """Enter a rigid body at its initial pose."""
-        items, mbs = system.items, system.mbs
         if isinstance(given, PointMass):
             centre, about_centre = (0.0, 0.0), given.mass
         else:
             centre, about_centre = given.centre_of_mass, given.inertia
-        node, columns = system.node(
-            items.NodeRigidBody2D(
-                referenceCoordinates=[*pose.origin, pose.angle], initialVelocities=[*pose.velocity, pose.rate]
-            )
-        )
+        node, columns = system.node("NodeRigidBody2D", [*pose.origin, pose.angle], [*pose.velocity, pose.rate])
         inertia = about_centre + given.mass * (centre[0] ** 2 + centre[1] ** 2)
-        body = mbs.AddObject(
-            items.ObjectRigidBody2D(mass=given.mass, inertia=inertia, centerOfMass=[*centre], nodeNumber=node)
+        body = system.add(
+            "ObjectRigidBody2D", mass=given.mass, inertia=inertia, centerOfMass=[*centre], nodeNumber=node
         )
         marker = system.marker("MarkerBodyPosition", body, centre)
         weight = [given.mass * system.gravity[0], given.mass * system.gravity[1], 0.0]
-        mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVector=weight))
+        system.add("LoadForceVector", markerNumber=marker, loadVector=weight)
         return cls(body, node, columns, given.mass, about_centre, centre, pose.angle)
 
     def hold(self, system: System, place: Place) -> Any:
@@ -153,10 +164,6 @@ class RigidPart:
         centre = self.motion(q, v, self.centre)
         kinetic = self.mass * np.sum(centre.velocity**2, axis=1) / 2 + self.inertia * centre.rate**2 / 2
         return Energy(kinetic, np.zeros(len(q)), self.mass * centre.position)
-
-    def damping(self, q: Array, v: Array) -> Array:
-        """See Part."""
-        return np.zeros(len(q))
 
     def _arm(self, q: Array, place: Place) -> Array:
         axis = np.stack([np.cos(q[:, self.columns[2]]), np.sin(q[:, self.columns[2]])], axis=1)

@@ -11,11 +11,13 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from shoal.engines.casadi_fixed_step import runge_kutta
-from shoal.engines.casadi_model import CasadiModel, casadi_model
+from shoal.engines.capabilities import require
+from shoal.engines.casadi.engine import CasadiEngine
+from shoal.engines.casadi.fixed_step import runge_kutta
+from shoal.engines.casadi.model import CasadiModel, casadi_model
 from shoal.engines.contract import sampling_times
 from shoal.errors import InputError
-from shoal.scene import Scene, Spring, TorsionSpring
+from shoal.scene import Scene
 from shoal.trajectory import Array, Status
 
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -102,20 +104,32 @@ def identify_initial_angles(
     built = time.perf_counter()
     values = optimise(x0=first, lbx=low, ubx=high)["x"].full().ravel()
     wall = time.perf_counter() - built
-    stats = optimise.stats()
-    fitness = float(fitness_at(values))
-    forward = 1 + calls(stats, "nlp_f", "nlp_fg")
-    gradient = calls(stats, "nlp_grad_f", "nlp_jac_fg", "nlp_hess_l")
+    return result(values, float(fitness_at(values)), optimise.stats(), solver, 1, len(paths), wall, built - began)
+
+
+def result(
+    values: Array,
+    fitness: float,
+    stats: dict[str, Any],
+    solver: str,
+    more: int,
+    directions: int,
+    wall_s: float,
+    build_s: float,
+) -> ShootingResult:
+    """What an optimiser found, by its statistics. more: simulations beside its own; directions: of a derivative."""
+    forward = more + _calls(stats, "nlp_f", "nlp_fg", "nlp_g")
+    gradient = _calls(stats, "nlp_grad_f", "nlp_jac_fg", "nlp_jac_g", "nlp_hess_l")
     trusted = bool(stats["success"]) and np.isfinite(fitness)
     return ShootingResult(
         values=values,
         fitness=fitness,
-        evaluations=forward + (1 + len(paths)) * gradient,
+        evaluations=forward + (1 + directions) * gradient,
         forward_evaluations=forward,
         gradient_evaluations=gradient,
         iterations=int(stats["iter_count"]),
-        wall_s=wall,
-        build_s=built - began,
+        wall_s=wall_s,
+        build_s=build_s,
         status=Status.OK if trusted else Status.FAILED,
         message="" if trusted else f"{solver}: {stats['return_status']}",
     )
@@ -126,7 +140,7 @@ def left(limit: float | None, began: float) -> dict[str, Any]:
     return {} if limit is None else {"ipopt.max_wall_time": max(limit - (time.perf_counter() - began), _LEAST)}
 
 
-def calls(stats: dict[str, Any], *names: str) -> int:
+def _calls(stats: dict[str, Any], *names: str) -> int:
     """How often the optimiser called its functions of these names; IPOPT and SQP name theirs differently."""
     return sum(int(stats.get(f"n_call_{name}", 0)) for name in names)
 
@@ -157,6 +171,7 @@ def box(paths: Sequence[str], *sides: Sequence[float] | Array) -> tuple[Array, A
 
 def shot(scene: Scene, paths: Sequence[str], times: Array, marker: str, step: float, directions: int) -> Any:
     """Function parameters -> path of the marker [m] with its derivatives below, (2 + 2 directions, samples)."""
+    require(CasadiEngine(), scene)
     model = casadi_model(scene)
     p, size = ca.SX.sym("p", len(paths)), 2 * model.unknowns + 1
     initial = initial_state(model, scene, paths, p)
@@ -174,9 +189,8 @@ def shot(scene: Scene, paths: Sequence[str], times: Array, marker: str, step: fl
 def initial_state(model: CasadiModel, scene: Scene, paths: Sequence[str], p: Any) -> Any:
     """The state x at the start as an expression in the parameters p. Raises InputError."""
     for name, load in scene.loads.items():
-        if isinstance(load, Spring | TorsionSpring):
-            field = "length" if isinstance(load, Spring) else "angle"
-            if getattr(load, field) is None:
+        for field in ("length", "angle"):
+            if getattr(load, field, 0.0) is None:
                 raise InputError(f"loads.{name}.{field}: shooting moves the start, so say where the spring rests")
     angles: list[Any] = [scene.start(body).angle for body in model.bodies]
     rates: list[Any] = [scene.start(body).rate for body in model.bodies]

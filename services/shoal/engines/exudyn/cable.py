@@ -15,18 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.exudyn_bodies import Energy, Motion, Place, System
-from shoal.engines.exudyn_chain import Chain, cross, gauss
-from shoal.engines.poses import Pose, normal
+from shoal.engines.exudyn.bodies import Energy, Motion, Part, Place, System
+from shoal.engines.exudyn.chain import Chain, cross, gauss
+from shoal.engines.poses import InitialPose, normal
 from shoal.engines.sections import Sections
 from shoal.scene import Rod
 from shoal.trajectory import Array
 
 LOBATTO_3 = (np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3)
+RULES = {"full": (0, gauss(5), gauss(3)), "reduced": (2, LOBATTO_3, gauss(2))}
+"""Exudyn's number of a quadrature; its points and weights, axial then bending."""
 
 
 @dataclass(frozen=True)
-class CablePart(Chain):
+class CablePart(Chain, Part):
     """A chain of ObjectANCFCable2D; coordinates of a node: r and r'.
 
     rest: the nodal vectors of the unstrained elements, (elements, 4, 2).
@@ -35,25 +37,21 @@ class CablePart(Chain):
     rest: Array
 
     @classmethod
-    def add(cls, system: System, rod: Rod, pose: Pose) -> CablePart:
+    def add(cls, system: System, rod: Rod, pose: InitialPose) -> CablePart:
         """Enter an unstrained rod at its initial pose."""
-        items, sections = system.items, Sections.of(rod)
-        nodes, columns, vectors = [], [], []
+        sections = Sections.of(rod)
+        nodes, columns, vectors, elements = [], [], [], []
         for s in np.linspace(0.0, rod.length, rod.elements + 1):
             axis, lead = complex(rod.axis(s)), pose.angle + float(rod.turn(s))
             place, slope = (axis.real, axis.imag), np.array([np.cos(lead), np.sin(lead)])
-            node, places = system.node(
-                items.NodePoint2DSlope1(
-                    referenceCoordinates=[*pose.position(place), *slope],
-                    initialVelocities=[*pose.speed(place), *(pose.rate * normal(slope))],
-                )
-            )
+            begin, rates = [*pose.position(place), *slope], [*pose.speed(place), *(pose.rate * normal(slope))]
+            node, places = system.node("NodePoint2DSlope1", begin, rates)
             vectors.append([pose.position(place), slope])
             nodes.append(node)
             columns.append(places)
-        elements = []
         for k, pair in enumerate(pairwise(nodes)):
-            cable = items.ObjectANCFCable2D(
+            cable = system.add(
+                "ObjectANCFCable2D",
                 length=rod.length / rod.elements,
                 massPerLength=sections.mass[k],
                 bendingStiffness=sections.bending[k],
@@ -62,10 +60,10 @@ class CablePart(Chain):
                 axialDamping=rod.retardation * sections.axial[k],
                 nodeNumbers=list(pair),
                 strainIsRelativeToReference=float(bool(rod.curvature)),
-                useReducedOrderIntegration=0 if rod.quadrature == "full" else 2,
+                useReducedOrderIntegration=RULES[rod.quadrature][0],
             )
-            elements.append(system.mbs.AddObject(cable))
-            system.weigh(elements[-1])
+            elements.append(cable)
+            system.weigh(cable)
         rest = np.array([first + last for first, last in pairwise(vectors)])
         return cls(rod, sections, elements, np.array([first + last for first, last in pairwise(columns)]), rest)
 
@@ -109,7 +107,7 @@ class CablePart(Chain):
     @property
     def _rules(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         """Points and weights, axial then bending."""
-        return (gauss(5), gauss(3)) if self.rod.quadrature == "full" else (LOBATTO_3, gauss(2))
+        return RULES[self.rod.quadrature][1:]
 
     @cached_property
     def _rest(self) -> tuple[Array, Array]:

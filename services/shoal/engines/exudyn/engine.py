@@ -1,4 +1,4 @@
-"""Exudyn behind the engine contract: somebody else's elements, joints and integrator."""
+"""Exudyn behind the engine contract."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from shoal.engines.capabilities import CAPABILITIES, require
+from shoal.engines.capabilities import of_kind, require
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
-from shoal.engines.exudyn_build import Beam, Machine, build, library
-from shoal.engines.exudyn_checks import judge
-from shoal.engines.exudyn_record import Record, Steps, choose_steps
+from shoal.engines.exudyn.build import PARTS, Beam, Machine, build, library
+from shoal.engines.exudyn.checks import judge
+from shoal.engines.exudyn.joints import JOINTS
+from shoal.engines.exudyn.loads import LOADS
+from shoal.engines.exudyn.record import Record, Steps, choose_steps
 from shoal.errors import InputError
 from shoal.mechanics.halts import CROSSED
 from shoal.mechanics.start.start import facts
@@ -26,6 +28,22 @@ DENSE_LIMIT = 60
 """Unknowns beyond which the sparse linear solver is the faster one."""
 MOST = 1e5
 """Most steps that a run takes because of narrow parts of a force law."""
+NAMES: dict[Beam, str] = {"ancf-cable": "exudyn", "geometrically-exact": "exudyn-ge"}
+INTEGRATORS = {"trapezoidal": "TrapezoidalIndex2", "generalized-alpha": "GeneralizedAlpha"}
+"""What Exudyn calls them."""
+FEATURES = frozenset(
+    {
+        "point masses",
+        "free bodies",
+        "closed loops",
+        "moving ground points",
+        "functions of time",
+        "dry friction",
+        "nonlinear springs",
+        "tapered flexible rods",
+    }
+)
+CABLE_FEATURES = frozenset({"curved flexible rods", "damped flexible rods"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,18 +72,25 @@ class ExudynEngine:
     @property
     def name(self) -> str:
         """Name of the variant: `exudyn`, or `exudyn-ge` with geometrically exact beams."""
-        return "exudyn" if self.beam == "ancf-cable" else "exudyn-ge"
+        return NAMES[self.beam]
 
     @property
     def capabilities(self) -> Capabilities:
         """What Exudyn can simulate here."""
-        return CAPABILITIES[self.name]
+        return Capabilities(
+            elements=frozenset(PARTS[self.beam]),
+            joints=frozenset(JOINTS),
+            loads=frozenset(LOADS),
+            features=FEATURES | CABLE_FEATURES if self.beam == "ancf-cable" else FEATURES,
+            lanes=False,
+        )
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene; a run that failed or is not believed carries its status. Raises InputError."""
         started = time.perf_counter()
         wanted = sampling_times(scene, times)
-        require(self.name, scene)
+        require(self, scene)
+        damped = self._integrator(scene) == "generalized-alpha"
         exu = library()
         machine = build(exu, scene, self.beam, float(wanted[-1]))
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
@@ -78,7 +103,7 @@ class ExudynEngine:
                 return self.simulate(scene.with_values({"solver.step": float(shorter)}), wanted)
             failure = f"exudyn: a step leaps over a narrow part of an elastic law; solver.step needs {shorter:.3g} s"
         verdict = judge(machine, record, failure)
-        weak = self._damped(scene) and scene.solver.spectral_radius == 1.0 and verdict.message
+        weak = damped and scene.solver.spectral_radius == 1.0 and verdict.message
         return Trajectory(
             engine=self.name,
             times=wanted,
@@ -99,7 +124,7 @@ class ExudynEngine:
     ) -> Trajectory:
         """Run one scene per lane, one after the other; a lane that failed is not a number and has its status."""
         started = time.perf_counter()
-        require(self.name, scene)
+        require(self, scene)
         lanes = check_lanes(scene, values)
         wanted = sampling_times(scene, times)
         runs = []
@@ -156,18 +181,19 @@ class ExudynEngine:
         integration.verboseMode = 0
         integration.newton.useModifiedNewton = self.modified_newton
         integration.newton.absoluteTolerance = machine.scene.solver.newton_tolerance
-        solvers = exu.DynamicSolverType
-        damped = self._damped(machine.scene)
-        integration.solverType = solvers.GeneralizedAlpha if damped else solvers.TrapezoidalIndex2
+        integration.solverType = getattr(exu.DynamicSolverType, INTEGRATORS[self._integrator(machine.scene)])
         integration.generalizedAlpha.spectralRadius = machine.scene.solver.spectral_radius
         return settings
 
-    def _damped(self, scene: Scene) -> bool:
-        """Whether a scene is integrated by generalized-alpha."""
-        return (self.integrator or scene.solver.integrator) == "generalized-alpha"
+    def _integrator(self, scene: Scene) -> str:
+        """The integrator of a run. Raises InputError for one that Exudyn has not."""
+        stated = scene.solver.integrator
+        name = self.integrator or (stated if stated == "generalized-alpha" else "trapezoidal")
+        of_kind(INTEGRATORS, name, "integrator")
+        return name
 
     def _model(self, exu: Any, machine: Machine, steps: Steps) -> dict[str, Any]:
-        damped = self._damped(machine.scene)
+        integrator = self._integrator(machine.scene)
         rods = [body for body in machine.scene.bodies.values() if isinstance(body, Rod) and body.element != "rigid"]
         return {
             "exudyn": exu.__version__,
@@ -175,8 +201,8 @@ class ExudynEngine:
             "constraints": machine.constraints,
             "elements": sum(rod.elements for rod in rods),
             "beam": self.beam,
-            "integrator": "generalized-alpha" if damped else "trapezoidal",
-            "spectral_radius": machine.scene.solver.spectral_radius if damped else 1.0,
+            "integrator": integrator,
+            "spectral_radius": machine.scene.solver.spectral_radius if integrator == "generalized-alpha" else 1.0,
             "newton": "modified" if self.modified_newton else "full",
             "step": steps.size,
             "energy_check": "none: motion is prescribed" if machine.driven else "kinetic, elastic, springs, loads",

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.exudyn_bodies import Energy, Motion, Place, System
-from shoal.engines.exudyn_chain import Chain, cross, gauss
-from shoal.engines.poses import Pose
+from shoal.engines.exudyn.bodies import Energy, Motion, Part, Place, System
+from shoal.engines.exudyn.chain import Chain, cross, gauss
+from shoal.engines.poses import InitialPose
 from shoal.engines.sections import Sections
 from shoal.errors import InputError
 from shoal.scene import Rod
@@ -22,28 +22,24 @@ from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class BeamPart(Chain):
+class BeamPart(Chain, Part):
     """A chain of three-node ObjectBeamGeometricallyExact2D; coordinates of a node: r and the section's angle."""
 
     nodes: list[Any]
 
     @classmethod
-    def add(cls, system: System, rod: Rod, pose: Pose) -> BeamPart:
+    def add(cls, system: System, rod: Rod, pose: InitialPose) -> BeamPart:
         """Enter a straight rod at its initial pose."""
-        items, sections = system.items, Sections.of(rod)
-        nodes, columns = [], []
+        sections = Sections.of(rod)
+        nodes, columns, elements = [], [], []
         for s in np.linspace(0.0, rod.length, 2 * rod.elements + 1):
-            node, places = system.node(
-                items.NodeRigidBody2D(
-                    referenceCoordinates=[*pose.position((s, 0.0)), pose.angle],
-                    initialVelocities=[*pose.speed((s, 0.0)), pose.rate],
-                )
-            )
+            begin, rates = [*pose.position((s, 0.0)), pose.angle], [*pose.speed((s, 0.0)), pose.rate]
+            node, places = system.node("NodeRigidBody2D", begin, rates)
             nodes.append(node)
             columns.append(places)
-        elements = []
         for k in range(rod.elements):
-            beam = items.ObjectBeamGeometricallyExact2D(
+            beam = system.add(
+                "ObjectBeamGeometricallyExact2D",
                 nodeNumbers=nodes[2 * k : 2 * k + 3],
                 length=rod.length / rod.elements,
                 massPerLength=sections.mass[k],
@@ -53,8 +49,8 @@ class BeamPart(Chain):
                 shearStiffness=sections.shear[k],
                 includeReferenceRotations=True,
             )
-            elements.append(system.mbs.AddObject(beam))
-            system.weigh(elements[-1])
+            elements.append(beam)
+            system.weigh(beam)
         per_element = [columns[i] + columns[i + 1] + columns[i + 2] for i in range(0, 2 * rod.elements, 2)]
         return cls(rod, sections, elements, np.array(per_element), nodes)
 
@@ -72,7 +68,7 @@ class BeamPart(Chain):
             )
         if angle:
             raise InputError("joints: engine exudyn-ge keeps no angle of a flexible rod but 0; use exudyn")
-        return system.mbs.AddMarker(system.items.MarkerNodeRigid(nodeNumber=self.nodes[index]))
+        return system.add("MarkerNodeRigid", nodeNumber=self.nodes[index])
 
     def motion(self, q: Array, v: Array, place: Place) -> Motion:
         """See Part."""
@@ -100,10 +96,6 @@ class BeamPart(Chain):
         kinetic = self.total(weights, speed[..., 0] + speed[..., 1], self.sections.mass / 2)
         kinetic += self.total(weights, speed[..., 2], self.sections.inertia / 2)
         return Energy(kinetic, elastic, self.total(weights, self.values(shape, q)[..., :2], self.sections.mass))
-
-    def damping(self, q: Array, v: Array) -> Array:
-        """See Part."""
-        return np.zeros(len(q))
 
     def _shapes(self, xi: Array) -> tuple[Array, Array]:
         """Quadratic Lagrange polynomials and their derivative by s [1/m], (points, 3) each."""

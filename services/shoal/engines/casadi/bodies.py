@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import casadi as ca
-import numpy as np
 
-from shoal.engines.casadi_element import CableElement, cable_element
+from shoal.engines.casadi.element import CableElement, cable_element
 from shoal.engines.sections import Sections
 from shoal.scene import Rod
 from shoal.scene.record import Vector
 
 
 class Placed(Protocol):
-    """A body (or the ground) whose places are expressions in the coordinates q."""
+    """A body or the ground, whose places are expressions in the coordinates q."""
 
     def point(self, place: Vector) -> Any:
         """Position [m] of a place given in the body's frame, (2,)."""
@@ -25,19 +24,6 @@ class Placed(Protocol):
     def angle(self, place: Vector) -> Any:
         """Direction of the body, of a cable its tangent, at a place [rad]."""
         ...
-
-
-@dataclass(frozen=True)
-class PlacedGround:
-    """The fixed frame."""
-
-    def point(self, place: Vector) -> Any:
-        """The place itself [m], (2,)."""
-        return ca.SX(np.asarray(place))
-
-    def angle(self, place: Vector) -> Any:
-        """Zero everywhere."""
-        return ca.SX(0)
 
 
 @dataclass(frozen=True)

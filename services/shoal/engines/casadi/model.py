@@ -10,10 +10,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from shoal.engines.capabilities import require
-from shoal.engines.casadi_bodies import PlacedCable
-from shoal.engines.casadi_loads import applied, dissipation, stored, with_rest
-from shoal.engines.casadi_tree import Tree, build_tree
+from shoal.engines.casadi.bodies import PlacedCable
+from shoal.engines.casadi.loads import applied, dissipation, stored, with_rest
+from shoal.engines.casadi.tree import Tree, build_tree
 from shoal.scene import PointMass, Scene, Solver
 from shoal.trajectory import Array
 
@@ -46,8 +45,7 @@ class CasadiModel:
 
 
 def casadi_model(scene: Scene) -> CasadiModel:
-    """The model of a scene; scenes that differ only in initial state and solver share one. Raises InputError."""
-    require("casadi", scene)
+    """The model of a scene that the engine can do; scenes that differ only in initial state and solver share one."""
     scene = with_rest(scene)
     bare = scene.model_copy(update={"name": "any", "description": "", "initial": {}, "solver": Solver()})
     return _build(bare.model_dump_json())

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from shoal.engines.casadi_model import CasadiModel
+from shoal.engines.casadi.model import CasadiModel
 from shoal.trajectory import Array
 
 

@@ -7,20 +7,21 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from shoal.engines.capabilities import CAPABILITIES
-from shoal.engines.casadi_fixed_step import runge_kutta
-from shoal.engines.casadi_model import CasadiModel, casadi_model
+from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
+from shoal.errors import InputError
 from shoal.mechanics.reach import MARGIN, stretch
 from shoal.mechanics.start.start import started
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
+
+if TYPE_CHECKING:
+    from shoal.engines.casadi.model import CasadiModel
 
 _CHECK_INTERVAL = 0.01
 """Longest time [s] between two instants at which energy, reach and directions are looked at."""
@@ -45,8 +46,14 @@ class CasadiEngine:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can simulate."""
-        return CAPABILITIES[self.name]
+        """What the tables of `tree` and `loads` hold; reading it asks for no library."""
+        return Capabilities(
+            elements=frozenset({"rigid", "ancf-cable"}),
+            joints=frozenset({"revolute"}),
+            loads=frozenset({"spring", "torsion-spring", "force", "torque", "distributed-force"}),
+            features=frozenset({"point masses", "dry friction", "tapered flexible rods"}),
+            lanes=False,
+        )
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene; `times` [s] are the sampling instants, else the scene's own. Raises InputError."""
@@ -62,8 +69,12 @@ class CasadiEngine:
         return self._trajectory(scenes, sampling_times(scene, times))
 
     def _trajectory(self, scenes: list[Scene], times: Array) -> Trajectory:
+        from shoal.engines.casadi.model import casadi_model
+
         began = time.perf_counter()
-        runs = [self._run(scene, times) for scene in scenes]
+        for scene in scenes:
+            require(self, scene)
+        runs = [self._run(casadi_model(scene), scene, times) for scene in scenes]
         model = casadi_model(scenes[0])
         return Trajectory(
             engine=self.name,
@@ -86,8 +97,7 @@ class CasadiEngine:
             },
         )
 
-    def _run(self, scene: Scene, times: Array) -> _Run:
-        model = casadi_model(scene)
+    def _run(self, model: CasadiModel, scene: Scene, times: Array) -> _Run:
         scene = started(scene).scene
         starts = [scene.start(name) for name in model.bodies]
         x0 = model.start([start.angle for start in starts], [start.rate for start in starts])
@@ -105,6 +115,8 @@ class CasadiEngine:
         if self.integrator == "rk4":
             run, substeps, steps = _runge_kutta(model, grid.tobytes(), scene.solver.step)
             return run(x0, substeps).full(), steps
+        if self.integrator != "cvodes":
+            raise InputError(f"integrator: engine casadi has cvodes and rk4, found {self.integrator}")
         integrator = _cvodes(model, grid.tobytes(), self.tolerance, self.max_steps)
         states = integrator(x0=x0)["xf"].full()
         return states, int(integrator.stats()["nsteps"])
@@ -122,6 +134,8 @@ class _Run:
 
 @lru_cache(maxsize=64)
 def _cvodes(model: CasadiModel, grid: bytes, tolerance: float, max_steps: int) -> Any:
+    import casadi as ca
+
     symbol = ca.SX.sym("x", 2 * model.unknowns + 1)
     # Adams never asks for the Jacobian, and deriving it would cost more than all the rest.
     rate = ca.Function("rate", [symbol], [model.rate(symbol)], {"is_diff_in": [False], "is_diff_out": [False]})
@@ -139,6 +153,8 @@ def _cvodes(model: CasadiModel, grid: bytes, tolerance: float, max_steps: int) -
 
 @lru_cache(maxsize=64)
 def _runge_kutta(model: CasadiModel, grid: bytes, step: float) -> tuple[Any, Array, int]:
+    from shoal.engines.casadi.fixed_step import runge_kutta
+
     return runge_kutta(model, np.frombuffer(grid), step)
 
 

@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shoal.engines.exudyn_bodies import Place
+from shoal.engines.exudyn.bodies import Place
 from shoal.engines.sections import Sections
 from shoal.scene import Rod
 from shoal.trajectory import Array
 
-
-def gauss(points: int) -> tuple[Array, Array]:
-    """Gauss-Legendre points and weights on [-1, 1], (points,) each."""
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    return nodes, weights
+gauss = np.polynomial.legendre.leggauss
+"""Points and weights on [-1, 1]."""
 
 
 def cross(a: Array, b: Array) -> Array:

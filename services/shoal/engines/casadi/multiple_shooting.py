@@ -16,12 +16,12 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from shoal.engines.casadi_fixed_step import runge_kutta
-from shoal.engines.casadi_model import casadi_model
-from shoal.engines.casadi_shooting import OPTIONS, ShootingResult, box, calls, initial_state, left, record, shot
+from shoal.engines.casadi.fixed_step import runge_kutta
+from shoal.engines.casadi.model import casadi_model
+from shoal.engines.casadi.shooting import OPTIONS, ShootingResult, box, initial_state, left, record, result, shot
 from shoal.errors import InputError
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status
+from shoal.trajectory import Array
 
 LARGEST = 24
 """Components of a state, at most. A flexible double pendulum of six elements has 56, and takes minutes."""
@@ -60,24 +60,9 @@ def identify_by_segments(
     solution = optimise(x0=nlp.guess(first), lbx=np.append(low, -free), ubx=np.append(high, free), lbg=0.0, ubg=0.0)
     wall = time.perf_counter() - built
     values = np.clip(solution["x"].full().ravel()[: len(paths)], low, high)
-    stats = optimise.stats()
     fitness = float(np.sum((whole(values).full() - target.T) ** 2) / len(target))
     # The first guess runs all segments once for each of them but the first; the fitness is one more.
-    forward = nlp.segments + calls(stats, "nlp_f", "nlp_g")
-    gradient = calls(stats, "nlp_grad_f", "nlp_jac_g", "nlp_hess_l")
-    trusted = bool(stats["success"]) and np.isfinite(fitness)
-    return ShootingResult(
-        values=values,
-        fitness=fitness,
-        evaluations=forward + (1 + nlp.size) * gradient,
-        forward_evaluations=forward,
-        gradient_evaluations=gradient,
-        iterations=int(stats["iter_count"]),
-        wall_s=wall,
-        build_s=built - began,
-        status=Status.OK if trusted else Status.FAILED,
-        message="" if trusted else f"ipopt: {stats['return_status']}",
-    )
+    return result(values, fitness, optimise.stats(), "ipopt", nlp.segments, nlp.size, wall, built - began)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,24 +8,31 @@ from typing import Any, Literal
 
 import numpy as np
 
+from shoal.engines.capabilities import of_kind
 from shoal.engines.course import Clock
-from shoal.engines.exudyn_beam import BeamPart
-from shoal.engines.exudyn_bodies import Part, RigidPart, System
-from shoal.engines.exudyn_cable import CablePart
-from shoal.engines.exudyn_connectors import Exchange
-from shoal.engines.exudyn_ends import Ends
-from shoal.engines.exudyn_ground import GroundPart, add_moving_point
-from shoal.engines.exudyn_joints import Gap, add_friction, add_joint
-from shoal.engines.exudyn_loads import add_load
-from shoal.engines.exudyn_record import Indices
+from shoal.engines.exudyn.beam import BeamPart
+from shoal.engines.exudyn.bodies import Holder, Part, RigidPart, System
+from shoal.engines.exudyn.cable import CablePart
+from shoal.engines.exudyn.connectors import Exchange
+from shoal.engines.exudyn.ends import Ends
+from shoal.engines.exudyn.ground import GroundPart, add_moving_point
+from shoal.engines.exudyn.joints import Gap, add_friction, add_joint
+from shoal.engines.exudyn.loads import add_load
+from shoal.engines.exudyn.record import Indices
 from shoal.engines.poses import initial_poses
 from shoal.errors import InputError
+from shoal.mechanics.assembly.groups import moving
 from shoal.mechanics.reach import span
 from shoal.mechanics.start.start import complete
-from shoal.scene import GROUND, DrivenAngle, Rod, Scene
+from shoal.scene import GROUND, DrivenAngle, Scene
 from shoal.trajectory import Array
 
 Beam = Literal["ancf-cable", "geometrically-exact"]
+PARTS: dict[Beam, dict[str, Any]] = {
+    "ancf-cable": {"rigid": RigidPart, "ancf-cable": CablePart},
+    "geometrically-exact": {"rigid": RigidPart, "ancf-cable": BeamPart},
+}
+"""What stands for a body of each element."""
 
 
 def library() -> Any:
@@ -80,7 +87,8 @@ class Machine:
         shares = [part.energy(q[rows], v[rows]) for part in self.parts.values()]
         moving = np.sum([share.kinetic + share.elastic for share in shares], axis=0)
         # A torsion spring counts its turns along all times.
-        moving = moving + sum((exchange.stored(t, q, v)[rows] for exchange in self.exchanges), np.zeros(len(rows)))
+        stored = (exchange.stored(t, q, v)[rows] for exchange in self.exchanges if exchange.stored is not None)
+        moving = moving + sum(stored, np.zeros(len(rows)))
         height = np.sum([share.moment for share in shares], axis=0) @ np.array(self.scene.gravity)
         return moving - height, moving
 
@@ -109,16 +117,12 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None) -> Machi
     system = System(mbs, items, scene.gravity, clock)
     parts: dict[str, Part] = {}
     for name, body in scene.bodies.items():
-        if not isinstance(body, Rod) or body.element == "rigid":
-            parts[name] = RigidPart.add(system, body, poses[name])
-        elif beam == "ancf-cable":
-            parts[name] = CablePart.add(system, body, poses[name])
-        else:
-            parts[name] = BeamPart.add(system, body, poses[name])
+        part = of_kind(PARTS[beam], body.element, f"bodies.{name}.element")
+        parts[name] = part.add(system, body, poses[name])
     ground = GroundPart.add(system)
-    places: dict[str, Part] = {**parts, GROUND: ground}
+    places: dict[str, Holder] = {**parts, GROUND: ground}
     for point, path in scene.ground_points.items():
-        name = f"{GROUND}.{point}"
+        name = moving(point)
         places[name] = add_moving_point(system, ground, point, path, poses[name])
     ends = Ends(scene, system, places, poses)
     gaps = [add_joint(ends, name, joint) for name, joint in scene.joints.items()]

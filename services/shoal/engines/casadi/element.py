@@ -16,9 +16,12 @@ import numpy as np
 from shoal.scene.bodies import Quadrature
 from shoal.trajectory import Array
 
+_gauss = np.polynomial.legendre.leggauss
 # Gauss with 4 points integrates degree 7; products of cubics have degree 6.
-_MASS_RULE = np.polynomial.legendre.leggauss(4)
+_MASS_RULE = _gauss(4)
 _LOBATTO_3 = (np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3)
+_RULES = {"full": (_gauss(5), _gauss(3)), "reduced": (_LOBATTO_3, _gauss(2))}
+"""Points on [-1, 1] and weights, axial then bending."""
 
 
 class CableElement(NamedTuple):
@@ -45,7 +48,7 @@ def cable_element(quadrature: Quadrature) -> CableElement:
     curve = ca.jacobian(slope, s)
     axial = (ca.norm_2(slope) - 1) ** 2
     bending = ((slope[0] * curve[1] - slope[1] * curve[0]) / ca.sumsqr(slope)) ** 2
-    axial_rule, bending_rule = _rules(quadrature)
+    axial_rule, bending_rule = _RULES[quadrature]
 
     def integrate(expression: Any, rule: tuple[Array, Array]) -> Any:
         points, weights = rule
@@ -66,9 +69,3 @@ def _hermite_field(e: Any, s: Any, h: Any) -> Any:
     x = s / h
     shapes = (1 - 3 * x**2 + 2 * x**3, h * (x - 2 * x**2 + x**3), 3 * x**2 - 2 * x**3, h * (x**3 - x**2))
     return sum(shape * e[2 * i : 2 * i + 2] for i, shape in enumerate(shapes))
-
-
-def _rules(quadrature: Quadrature) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """Points on [-1, 1] and weights, axial then bending."""
-    gauss = np.polynomial.legendre.leggauss
-    return (gauss(5), gauss(3)) if quadrature == "full" else (_LOBATTO_3, gauss(2))

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shoal.engines.exudyn_chain import cross
-from shoal.engines.exudyn_ends import Ends
+from shoal.engines.exudyn.chain import cross
+from shoal.engines.exudyn.ends import Ends
 from shoal.mechanics.fitting import fit_law
 from shoal.mechanics.halts import marks
 from shoal.scene import Attachment, Function
@@ -19,12 +19,12 @@ from shoal.trajectory import Array
 class Exchange(NamedTuple):
     """What a force element does with energy, from times [s] (rows,), q and v (rows, unknowns).
 
-    stored: energy [J], (rows,); lost: power it takes out of the machine [W], negative where it feeds it, (rows,).
+    lost: power it takes out of the machine [W], negative where it feeds it, (rows,); stored: energy [J], (rows,).
     crossed: of the narrowest part of its law that each step crosses, how much at once, (rows - 1,); from q and v.
     """
 
-    stored: Callable[[Array, Array, Array], Array]
     lost: Callable[[Array, Array, Array], Array]
+    stored: Callable[[Array, Array, Array], Array] | None = None
     crossed: Callable[[Array, Array], Array] | None = None
 
 
@@ -79,16 +79,12 @@ def add_spring(ends: Ends, first: Attachment, second: Attachment, law: Law, leng
         distance = np.linalg.norm(apart, axis=1)
         return distance, np.sum(apart * (b.velocity - a.velocity), axis=1) / np.maximum(distance, 1e-300)
 
-    if length is None:
-        one, other = (ends.start(side) for side in (first, second))
-        length = float(np.linalg.norm(other - one))
-    rest = length
-    ends.system.mbs.AddObject(
-        ends.system.items.ObjectConnectorSpringDamper(
-            markerNumbers=[ends.hold(first), ends.hold(second)],
-            referenceLength=rest,
-            **law.options("springForceUserFunction"),
-        )
+    rest = ends.start_distance(first, second) if length is None else length
+    ends.system.add(
+        "ObjectConnectorSpringDamper",
+        markerNumbers=[ends.hold(first), ends.hold(second)],
+        referenceLength=rest,
+        **law.options("springForceUserFunction"),
     )
     return _exchange(law, lambda q, v: (measure(q, v)[0] - rest, measure(q, v)[1]))
 
@@ -97,17 +93,17 @@ def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, ang
     """Enter a law over the angle between two bodies; angle: where x is 0 [rad], else that of the start."""
     start = ends.start_turn(first, second)
     rest = start if angle is None else angle
-    items, mbs, options = ends.system.items, ends.system.mbs, law.options("springTorqueUserFunction")
+    system, options = ends.system, law.options("springTorqueUserFunction")
     if law.stiffness or law.cubic or law.elastic:
         # A data coordinate lets Exudyn count full turns.
         options |= {
             "markerNumbers": ends.level(first, second, start),
-            "nodeNumber": mbs.AddNode(items.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1)),
+            "nodeNumber": system.add("NodeGenericData", initialCoordinates=[0.0], numberOfDataCoordinates=1),
             "offset": rest - start,
         }
     else:
         options["markerNumbers"] = [ends.turn(first), ends.turn(second)]
-    mbs.AddObject(items.ObjectConnectorTorsionalSpringDamper(**options))
+    system.add("ObjectConnectorTorsionalSpringDamper", **options)
 
     def measure(q: Array, v: Array) -> tuple[Array, Array]:
         a, b = ends.motion(first, q, v), ends.motion(second, q, v)
@@ -119,12 +115,11 @@ def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, ang
 
 def add_rail(ends: Ends, first: Attachment, second: Attachment, direction: float, law: Law) -> Exchange:
     """Enter a law over the way along a line of the first body; direction: its angle [rad] in that body."""
-    ends.system.mbs.AddObject(
-        ends.system.items.ObjectConnectorLinearSpringDamper(
-            markerNumbers=[ends.turn(first), ends.turn(second)],
-            axisMarker0=[np.cos(direction), np.sin(direction), 0.0],
-            **law.options("springForceUserFunction"),
-        )
+    ends.system.add(
+        "ObjectConnectorLinearSpringDamper",
+        markerNumbers=[ends.turn(first), ends.turn(second)],
+        axisMarker0=[np.cos(direction), np.sin(direction), 0.0],
+        **law.options("springForceUserFunction"),
     )
 
     def measure(q: Array, v: Array) -> tuple[Array, Array]:
@@ -144,7 +139,7 @@ def _exchange(law: Law, measure: Callable[[Array, Array], tuple[Array, Array]]) 
 
     places = np.zeros(0) if law.elastic is None else marks(fit_law(law.elastic))
     crossed = (lambda q, v: _crossed(places, measure(q, v)[0])) if places.size > 1 else None
-    return Exchange(lambda t, q, v: law.stored(measure(q, v)[0]), lost, crossed)
+    return Exchange(lost, lambda t, q, v: law.stored(measure(q, v)[0]), crossed)
 
 
 def _crossed(places: Array, x: Array) -> Array:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from shoal.engines.exudyn_bodies import Motion, Part, Place, System
-from shoal.engines.exudyn_chain import Chain
-from shoal.engines.poses import Pose, lead, local, owner
+import numpy as np
+
+from shoal.engines.exudyn.bodies import Holder, Motion, Place, System
+from shoal.engines.exudyn.chain import Chain
+from shoal.engines.poses import InitialPose, owner, start_of
 from shoal.errors import InputError
+from shoal.mechanics.start.closure import lead
 from shoal.scene import Attachment, PointMass, Scene
 from shoal.trajectory import Array
 
@@ -19,10 +22,10 @@ class Ends:
 
     scene: Scene
     system: System
-    parts: dict[str, Part]
-    poses: dict[str, Pose]
+    parts: dict[str, Holder]
+    poses: dict[str, InitialPose]
 
-    def part(self, at: Attachment) -> tuple[Part, Place]:
+    def part(self, at: Attachment) -> tuple[Holder, Place]:
         """The part that an attachment is on, and its place there [m]."""
         return self.parts[owner(at)], self.scene.location(at)
 
@@ -47,14 +50,15 @@ class Ends:
         part, place = self.part(at)
         return part.motion(q, v, place)
 
-    def start(self, at: Attachment) -> Array:
-        """Where an attachment is at the start [m], (2,)."""
-        return self.poses[owner(at)].position(local(self.scene, at))
+    def start_distance(self, first: Attachment, second: Attachment) -> float:
+        """Distance of two attachments at the start [m]."""
+        one, other = (start_of(self.scene, self.poses, side) for side in (first, second))
+        return float(np.linalg.norm(other - one))
 
     def start_turn(self, first: Attachment, second: Attachment) -> float:
         """Angle from the first direction to the second at the start, over full turns [rad]."""
         one, other = (self.poses[owner(side)].angle + lead(self.scene, side) for side in (first, second))
-        return other - one
+        return float(other - one)
 
     def is_point(self, at: Attachment) -> bool:
         """Whether an attachment is on a point mass, which has no direction."""

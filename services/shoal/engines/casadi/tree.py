@@ -7,16 +7,18 @@ hangs on its parent its position is an expression in the parent's coordinates, s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from shoal.engines.casadi_bodies import Placed, PlacedCable, PlacedGround, PlacedRigid, cable_place, turned
-from shoal.engines.casadi_element import cable_element
-from shoal.scene import GROUND, Attachment, PointMass, Revolute, Rod, Scene
+from shoal.engines.capabilities import of_kind
+from shoal.engines.casadi.bodies import Placed, PlacedCable, PlacedRigid, cable_place, turned
+from shoal.engines.casadi.element import cable_element
+from shoal.errors import InputError
+from shoal.scene import GROUND, Attachment, PointMass, Revolute, RigidBody, Rod, Scene
 from shoal.scene.record import Vector
 
 
@@ -44,8 +46,8 @@ class Tree:
 
 def build_tree(scene: Scene) -> Tree:
     """Place every body of a scene of open chains, which `capabilities.require` has accepted."""
-    placed: dict[str, Placed] = {GROUND: PlacedGround()}
-    straight: dict[str, Placed] = {GROUND: PlacedGround()}
+    ground: Placed = PlacedRigid(ca.SX.zeros(2), ca.SX(0))
+    placed, straight = {GROUND: ground}, {GROUND: ground}
     entry: dict[str, Vector] = {}
     root: dict[str, Vector] = {}
     length: dict[str, float] = {}
@@ -57,17 +59,10 @@ def build_tree(scene: Scene) -> Tree:
         body, angle = scene.bodies[name], angles[name]
         straight[name] = rest = PlacedRigid(straight[parent.body].point(outer) - turned(angle, inner), angle)
         anchor = placed[parent.body].point(outer)
-        if isinstance(body, Rod) and body.element == "ancf-cable":
-            placed[name], free = _place_cable(name, body, inner, anchor)
-            start += _straight_cable(body, inner, rest)
-        elif isinstance(body, PointMass):
-            free = []
-            placed[name] = PlacedRigid(anchor, ca.SX(0))
-        else:
-            free = [ca.SX.sym(f"{name}_angle")]
-            placed[name] = PlacedRigid(anchor - turned(free[0], inner), free[0])
-            start.append(angle)
+        place = of_kind(ELEMENTS, body.element, f"bodies.{name}.element")
+        placed[name], free, straight_free = place(name, body, inner, anchor, rest)
         coordinates += free
+        start += straight_free
         entry[name] = inner
         on_ground = parent.body == GROUND
         root[name] = outer if on_ground else root[parent.body]
@@ -85,47 +80,56 @@ def build_tree(scene: Scene) -> Tree:
 
 def _links(scene: Scene) -> Iterator[tuple[Attachment, Attachment]]:
     """Joints from the ground outwards, each as (place on the parent, place on the child)."""
-    reached, waiting = {GROUND}, list(scene.joints.values())
+    reached, waiting = {GROUND}, dict(scene.joints)
     while waiting:
-        for joint in list(waiting):
-            assert isinstance(joint, Revolute)
+        for name, joint in list(waiting.items()):
+            if not isinstance(joint, Revolute):
+                raise InputError(f"joints.{name}: engine casadi cannot do {joint.kind}")
             known = [side.body in reached for side in (joint.first, joint.second)]
             if any(known):
                 parent, child = (joint.first, joint.second) if known[0] else (joint.second, joint.first)
-                waiting.remove(joint)
+                waiting.pop(name)
                 reached.add(child.body)
                 yield parent, child
 
 
-def _place_cable(name: str, rod: Rod, inner: Vector, anchor: Any) -> tuple[PlacedCable, list[Any]]:
-    """The cable whose place `inner` sits on the anchor [m], (2,), and its free coordinates.
+def _place_rigid(
+    name: str, body: Rod | RigidBody | PointMass, inner: Vector, anchor: Any, rest: PlacedRigid
+) -> tuple[Placed, list[Any], list[Any]]:
+    if isinstance(body, PointMass):
+        return PlacedRigid(anchor, ca.SX(0)), [], []
+    angle = ca.SX.sym(f"{name}_angle")
+    return PlacedRigid(anchor - turned(angle, inner), angle), [angle], [rest.turn]
 
-    The held node's position follows from the anchor, because the Hermite field is linear in it.
-    """
-    slopes = [ca.SX.sym(f"{name}_slope{k}", 2) for k in range(rod.elements + 1)]
-    positions = [ca.SX.sym(f"{name}_node{k}", 2) for k in range(rod.elements + 1)]
-    (index, s), held = cable_place(rod, inner), _held_node(rod, inner)
-    free = [part for k in range(rod.elements + 1) for part in ([] if k == held else [positions[k]]) + [slopes[k]]]
+
+def _place_cable(
+    name: str, rod: Rod, inner: Vector, anchor: Any, rest: PlacedRigid
+) -> tuple[Placed, list[Any], list[Any]]:
+    """The held node's position follows from the anchor, because the Hermite field is linear in it."""
+    h, knots = rod.length / rod.elements, range(rod.elements + 1)
+    index, s = cable_place(rod, inner)
+    held = index + int(s > h / 2)
+
+    def free(positions: list[Any], slopes: list[Any]) -> list[Any]:
+        return [part for k in knots for part in ([] if k == held else [positions[k]]) + [slopes[k]]]
+
+    slopes = [ca.SX.sym(f"{name}_slope{k}", 2) for k in knots]
+    positions = [ca.SX.sym(f"{name}_node{k}", 2) for k in knots]
+    unknowns = free(positions, slopes)
     positions[held] = ca.SX.zeros(2)
     others = PlacedCable(rod, _nodes(positions, slopes)).point(inner)
     unit = np.eye(8)[4 * (held - index)]
-    weight = float(cable_element(rod.quadrature).field(unit, s, rod.length / rod.elements)[0][0])
+    weight = float(cable_element(rod.quadrature).field(unit, s, h)[0][0])
     positions[held] = (anchor - others) / weight
-    return PlacedCable(rod, _nodes(positions, slopes)), free
+    straight = free([rest.point((k * h, 0.0)) for k in knots], [turned(rest.turn, (1.0, 0.0))] * len(knots))
+    return PlacedCable(rod, _nodes(positions, slopes)), unknowns, straight
 
 
-def _straight_cable(rod: Rod, inner: Vector, rest: PlacedRigid) -> list[Any]:
-    """The free coordinates of a straight cable, in the order of `_place_cable`."""
-    held = _held_node(rod, inner)
-    slope = turned(rest.turn, (1.0, 0.0))
-    positions = [rest.point((k * rod.length / rod.elements, 0.0)) for k in range(rod.elements + 1)]
-    return [part for k in range(rod.elements + 1) for part in ([] if k == held else [positions[k]]) + [slope]]
-
-
-def _held_node(rod: Rod, inner: Vector) -> int:
-    """The node nearest to the place `inner`."""
-    index, s = cable_place(rod, inner)
-    return index + int(s > rod.length / rod.elements / 2)
+ELEMENTS: dict[str, Callable[..., tuple[Placed, list[Any], list[Any]]]] = {
+    "rigid": _place_rigid,
+    "ancf-cable": _place_cable,
+}
+"""A body of each element on its anchor [m], its free coordinates, and where those are in the straight body."""
 
 
 def _nodes(positions: list[Any], slopes: list[Any]) -> tuple[Any, ...]:

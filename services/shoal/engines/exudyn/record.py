@@ -20,30 +20,25 @@ LARGEST_RECORD = 5_000_000
 class Steps:
     """`count` steps of `size` [s]; `kept` are the indices of those recorded, increasing, from 0 to count.
 
-    spans: where functions of time want steps to end, runs one after the other, each of so many equal steps up to its
-    end [s]; then `size` is the longest.
+    runs: one after the other, each of so many equal steps up to its end [s]; more than one where functions of time
+    want steps to end, and then `size` is the longest.
     """
 
     wanted: Array
     count: int
     size: float
     kept: Indices
-    spans: tuple[tuple[int, float], ...] = ()
-
-    @property
-    def runs(self) -> tuple[tuple[int, float], ...]:
-        """Number of steps and end [s] of each run."""
-        return self.spans or ((self.count, self.count * self.size),)
+    runs: tuple[tuple[int, float], ...]
 
     @property
     def instants(self) -> Array:
         """Where the steps begin and end [s], (count + 1,)."""
-        if not self.spans:
+        if len(self.runs) == 1:
             return np.multiply(np.arange(self.count + 1), self.size, dtype=float)
-        ends = [0.0, *(end for _, end in self.spans)]
+        ends = [0.0, *(end for _, end in self.runs)]
         parts = [
             begin + (end - begin) * np.arange(1, count + 1) / count
-            for (count, end), begin in zip(self.spans, ends, strict=False)
+            for (count, end), begin in zip(self.runs, ends, strict=False)
         ]
         return np.concatenate([[0.0], *parts])
 
@@ -70,7 +65,7 @@ def choose_steps(wanted: Array, step: float, unknowns: int, halts: Array | None 
     stride = max(1, math.ceil(count * unknowns / LARGEST_RECORD))
     before = np.floor(wanted / size + 1e-9).astype(np.int64)
     kept = np.unique(np.concatenate([np.arange(0, count, stride), before, before + 1, [count]]))
-    return Steps(wanted, count, size, kept[kept <= count])
+    return Steps(wanted, count, size, kept[kept <= count], ((count, count * size),))
 
 
 def _in_spans(wanted: Array, step: float, unknowns: int, ends: list[float]) -> Steps:

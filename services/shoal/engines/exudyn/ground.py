@@ -1,0 +1,76 @@
+"""The ground inside Exudyn, and points of it that move as functions of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shoal.engines.course import Course
+from shoal.engines.exudyn.bodies import Holder, Motion, Place, RigidPart, System
+from shoal.engines.poses import InitialPose
+from shoal.errors import InputError
+from shoal.scene import Function, MovingPoint, PointMass
+from shoal.trajectory import Array
+
+Coordinate = tuple[Any, int]
+"""A node and the number of one of its coordinates."""
+
+
+@dataclass(frozen=True)
+class GroundPart(Holder):
+    """ObjectGround, and a node whose coordinates are zero, against which coordinates are driven."""
+
+    body: Any
+    node: Any
+
+    @classmethod
+    def add(cls, system: System) -> GroundPart:
+        """Enter the ground."""
+        return cls(system.add("ObjectGround"), system.add("NodePointGround"))
+
+    def hold(self, system: System, place: Place) -> Any:
+        """See Holder."""
+        return system.marker("MarkerBodyPosition", self.body, place)
+
+    def turn(self, system: System, place: Place, angle: float = 0.0) -> Any:
+        """See Holder."""
+        return system.turned(self.body, place, angle)
+
+    def motion(self, q: Array, v: Array, place: Place) -> Motion:
+        """See Holder."""
+        still = np.zeros(len(q))
+        return Motion(np.tile(place, (len(q), 1)).astype(float), np.zeros((len(q), 2)), still, still)
+
+
+def add_moving_point(system: System, ground: GroundPart, name: str, path: MovingPoint, pose: InitialPose) -> RigidPart:
+    """Enter a point of the ground that moves: a body whose three coordinates are all driven, so its mass is idle."""
+    part = RigidPart.add(system, PointMass(mass=1.0), pose)
+    for axis, f in enumerate((path.x, path.y)):
+        drive(system, (ground.node, 0), (part.node, axis), driven(system, f, f"ground_points.{name}"))
+    drive(system, (ground.node, 0), (part.node, 2), system.clock.course(Function(number=0.0)))
+    return part
+
+
+def driven(system: System, f: Function, field: str) -> Course:
+    """A prescribed position. Raises InputError where its rate jumps: Exudyn knows no impact there."""
+    course = system.course(f, field, held=True)
+    if jumps := course.jumps():
+        raise InputError(f"{field}: engine exudyn cannot do a drive whose rate jumps, at t = {jumps[0]:.7g}; use gauss")
+    return course
+
+
+def drive(system: System, first: Coordinate, second: Coordinate, course: Course) -> None:
+    """Let second - first follow a function of time; Exudyn counts coordinates from the start."""
+    markers = [
+        system.add("MarkerNodeCoordinate", nodeNumber=node, coordinate=coordinate)
+        for node, coordinate in (first, second)
+    ]
+    begin = course.value(0.0)
+    system.add(
+        "ObjectConnectorCoordinate",
+        markerNumbers=markers,
+        offsetUserFunction=lambda mbs, t, item, given: course.value(t) - begin,
+        offsetUserFunction_t=lambda mbs, t, item, given: course.slope(t),
+    )
