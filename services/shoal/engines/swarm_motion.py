@@ -21,7 +21,7 @@ which at a singular position is in general not the acceleration of the motion (s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene, Solver
-from shoal.swarm import OPTIMIZERS, Afsa, EvaluationCounter, Iafsa, IafsaPrinted, minimize
+from shoal.swarm import OPTIMIZERS, EvaluationCounter, minimize
 from shoal.trajectory import Trajectory
 
 INTEGRATOR = "semi-implicit-euler"
@@ -158,24 +158,19 @@ def seek(
     if gauss.optimum.size == 0:
         return gauss.optimum
     upper = np.full(gauss.optimum.size, gauss.radius)
-    box: dict[str, Any] = {"lower": -upper, "upper": upper, "size": solver.swarm_size}
-    run: dict[str, Any] = {
-        "rng": np.random.default_rng([solver.swarm_seed, number]),
-        "iterations": solver.swarm_iterations,
-    }
-    if solver.acceleration == "afsa":
-        return minimize(Afsa(**box), function, **run).best
+    swarm = OPTIMIZERS[solver.acceleration]
     parts: dict[str, Any] = {
-        **box,
         "traditional": gauss.optimum if switches.seed_traditional else None,
         "previous": previous if switches.seed_previous else None,
         "use_mutation": switches.mutation,
         "use_velocity": switches.velocity,
     }
-    if solver.acceleration == "iafsa":
-        return minimize(Iafsa(**parts), function, **run).best
-    printed = minimize(IafsaPrinted(**parts), function, **run)
-    return printed.best if switches.keep_best else printed.group_best
+    own = {field.name for field in fields(swarm)}
+    fish = swarm(lower=-upper, upper=upper, size=solver.swarm_size, **{k: v for k, v in parts.items() if k in own})
+    rng = np.random.default_rng([solver.swarm_seed, number])
+    found = minimize(fish, function, rng=rng, iterations=solver.swarm_iterations)
+    best: Array = found.best if switches.keep_best else getattr(found, "group_best", found.best)
+    return best
 
 
 @dataclass
