@@ -70,7 +70,7 @@ def test_tutorial_finds_the_angle_that_it_recorded(tmp_path: Path, monkeypatch: 
 
 NEW = re.compile(r"`((?:mechanics|engines|swarm|identification)/\S+\.py)`:$", re.MULTILINE)
 CHANGED = re.compile(r"^\+\+\+ b/services/shoal/(\S+)$", re.MULTILINE)
-FILES = {"element": 3, "joint": 3, "integrator": 3, "optimiser": 2, "swarm": 2, "engine": 2}
+FILES = {"element": 3, "joint": 3, "load": 3, "integrator": 3, "optimiser": 2, "swarm": 2, "engine": 2}
 """How many files a new kind touches, by its page."""
 
 
@@ -127,8 +127,11 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What the pages leave behind that change the mechanics: on a copy of the package, with all their changes in it."""
     folder = tmp_path_factory.mktemp("copy")
     shutil.copytree(DOCS.parent / "services", folder / "services", ignore=shutil.ignore_patterns("__pycache__"))
-    uses = [extend(page, folder) for page in ("extend/element.md", "extend/joint.md", "extend/integrator.md")]
-    wanted = "gaps=gaps, gap=float(gap), balanced=balanced, order=float(order)"
+    uses = [
+        extend(page, folder)
+        for page in ("extend/element.md", "extend/joint.md", "extend/load.md", "extend/integrator.md")
+    ]
+    wanted = "misses=misses, gap=float(gap), balanced=balanced, ways=ways, order=float(order)"
     program = "\n".join([*uses, f"import json\nprint(json.dumps(dict({wanted})))"])
     place = {"PYTHONPATH": str(folder / "services"), "SHOAL_HOME": str(folder / "home"), "NUMBA_CACHE_DIR": ""}
     done = subprocess.run(
@@ -141,9 +144,10 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 @pytest.mark.slow  # Compiles the copy.
 def test_pages_of_the_mechanics_do_what_they_say(extended: dict[str, Any]) -> None:
-    first, second, third = extended["gaps"]
-    assert 3 < first / second < 5, "the element's mass is of second order"
-    assert 3 < second / third < 5
+    first, second = extended["misses"]
+    assert 3 < first / second < 5, "the rope is of second order"
+    assert second < 1e-2
     assert extended["gap"] < 1e-8, "the joint holds what a slider holds"
     assert extended["balanced"]
+    assert extended["ways"] == pytest.approx([0.0, 0.25 * 9.81 / 2], abs=1e-9)
     assert extended["order"] == pytest.approx(2.0, abs=0.1)

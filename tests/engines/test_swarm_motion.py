@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shoal.engines import get_engine, swarm_motion
 from shoal.engines.swarm_motion import INTEGRATOR, GaussFunction, Search, Switches, gauss_function
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
@@ -27,7 +28,7 @@ def _with(scene: Scene, **settings: Any) -> Scene:
 
 def _run(scene: Scene, solver: str, steps: int = 5, *, switches: Switches | None = None, **settings: Any) -> Trajectory:
     search = Search(switches=switches or Switches())
-    return simulate(_with(scene, acceleration=solver, **settings), _times(steps), search=search)
+    return swarm_motion.simulate(_with(scene, acceleration=solver, **settings), _times(steps), search)
 
 
 def _times(steps: int) -> Any:
@@ -144,8 +145,8 @@ def test_only_the_papers_time_step_goes_with_a_swarm(integrator: str) -> None:
 def test_many_lanes_are_refused() -> None:
     scene = _with(PENDULUM, acceleration="iafsa")
     with pytest.raises(InputError, match=r"^solver.acceleration: iafsa moves one lane at a time, found 3; use"):
-        simulate(scene, _times(1), {"initial.OA.angle": np.array([0.1, 0.2, 0.3])})
-    one = simulate(scene, _times(1), {"initial.OA.angle": np.array([0.1])})
+        get_engine("gauss").simulate_many(scene, {"initial.OA.angle": np.array([0.1, 0.2, 0.3])}, _times(1))
+    one = get_engine("gauss").simulate_many(scene, {"initial.OA.angle": np.array([0.1])}, _times(1))
     assert one.lanes == 1
     np.testing.assert_allclose(one.angle("A")[0], 0.1, atol=1e-12)
 
@@ -163,7 +164,9 @@ def test_at_a_singular_position_a_swarm_minimises_but_does_not_follow_the_motion
     exact = -9.81 * (0.5 + 1.5 + 2.0) / (1 / 3 + 1.0 + 2.0)
 
     def angular(solver: str) -> float:
-        run = simulate(_with(flat, acceleration=solver, integrator=INTEGRATOR, project=False), np.array([STEP]))
+        run = get_engine("gauss").simulate(
+            _with(flat, acceleration=solver, integrator=INTEGRATOR, project=False), np.array([STEP])
+        )
         return float((run.angle("A")[0] + STEP) / STEP**2)
 
     assert angular("projection") == pytest.approx(exact, rel=2e-3)
@@ -221,7 +224,7 @@ def test_progress_is_told_and_what_is_not_finite_has_diverged() -> None:
     seen: list[tuple[int, int]] = []
     search = Search(progress=lambda done, steps: seen.append((done, steps)))
     scene = _with(PENDULUM, acceleration="iafsa-printed", swarm_iterations=1)
-    simulate(scene, _times(3), search=search)
+    swarm_motion.simulate(scene, _times(3), search)
     assert seen == [(1, 3), (2, 3), (3, 3)]
-    run = simulate(scene.with_values({"initial.AB.rate": 1e200}), _times(3))
+    run = swarm_motion.simulate(scene.with_values({"initial.AB.rate": 1e200}), _times(3))
     assert run.status == (Status.DIVERGED,)

@@ -55,8 +55,10 @@ class GaussEngine:
         from shoal.mechanics.simulate import simulate
 
         _check_acceleration(scene)
-        swarm_motion.refuse_lanes(scene, check_lanes(scene, values))
-        return simulate(scene, sampling_times(scene, times), values, threads=self.threads)
+        lanes, wanted = check_lanes(scene, values), sampling_times(scene, times)
+        if swarm_motion.asked_for(scene):
+            return swarm_motion.simulate(swarm_motion.only_lane(scene, values, lanes), wanted)
+        return simulate(scene, wanted, values, threads=self.threads)
 
 
 def _check_acceleration(scene: Scene) -> None:

@@ -20,7 +20,7 @@ which at a singular position is in general not the acceleration of the motion (s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
@@ -91,12 +91,13 @@ def simulate(scene: Scene, times: Array, search: Search | None = None) -> Trajec
     return replace(run, model=run.model | told)
 
 
-def refuse_lanes(scene: Scene, lanes: int) -> None:
-    """Raises InputError where a swarm is to move many scenes side by side."""
-    if asked_for(scene):
+def only_lane(scene: Scene, values: Mapping[str, Array], lanes: int) -> Scene:
+    """The scene with the values of its only lane. Raises InputError if there are more."""
+    if lanes > 1:
         raise InputError(
             f"solver.acceleration: {scene.solver.acceleration} moves one lane at a time, found {lanes}; use projection"
         )
+    return scene.with_values({path: float(np.ravel(lane)[0]) for path, lane in values.items()})
 
 
 @dataclass(frozen=True, eq=False)
