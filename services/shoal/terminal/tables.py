@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from shoal.engines.sweep import Sweep
     from shoal.identification import Estimate
     from shoal.identification.design import Design
+    from shoal.mechanics.analysis.equilibrium import Equilibrium
     from shoal.mechanics.analysis.modes import Modes
     from shoal.mechanics.analysis.reactions import Reactions
-    from shoal.mechanics.analysis.statics import Equilibrium
     from shoal.scene import Scene
     from shoal.selection import Selection
     from shoal.trajectory import Trajectory

@@ -12,7 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipeinc, ellipk, ellipkinc
 from shoal.cli import main
-from shoal.mechanics.analysis.statics import Equilibrium, Held, statics
+from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
+from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene
 
 GROUND = {"body": "ground", "point": [0.0, 0.0]}

@@ -284,8 +284,7 @@ class Evaluator:
 
     def _strengths(self, arrays: Arrays, numbers: Index, t: float) -> Array:
         """Functions of time by number, -1 for the constant 1."""
-        found = [1.0 if k < 0 else functions.evaluate(arrays.functions, int(k), t, 0) for k in numbers]
-        return np.array(found)
+        return np.array([1.0 if k < 0 else functions.evaluate(arrays.functions, int(k), t, 0) for k in numbers])
 
     def _torques(self, arrays: Arrays, t: float) -> list[tuple[int, float]]:
         """(force element, applied torque [N m]) of motors."""

@@ -16,8 +16,9 @@ import scipy.linalg
 
 from shoal.errors import ComputationError
 from shoal.mechanics.analysis.balance import Balance, zero_level
+from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.evaluate import Evaluator, points
-from shoal.mechanics.analysis.statics import Equilibrium, statics
+from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span

@@ -8,8 +8,6 @@ drives stand still where they are at the stated time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -17,8 +15,9 @@ import scipy.linalg
 
 from shoal.mechanics import plane
 from shoal.mechanics.analysis.balance import Balance, Found, zero_level
+from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.evaluate import Evaluator, points
-from shoal.mechanics.analysis.reactions import Reactions, reactions_of
+from shoal.mechanics.analysis.reactions import reactions_of
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.assembly.groups import start_angle
@@ -26,7 +25,6 @@ from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Scene
-from shoal.trajectory import plain
 
 TURN = 0.8
 """Largest turn [rad] of any body or section in one load step."""
@@ -38,89 +36,6 @@ SMALLEST = 1.0 / 1024
 """Smallest load step."""
 GAPE = 1e-9
 """Joints that gape by more than this [m, relative to the machine's size] are not closed."""
-
-
-class Held(StrEnum):
-    """How the search for an equilibrium ended. Only `ok` may be believed."""
-
-    OK = "ok"
-    UNSTABLE = "unstable"
-    UNHELD = "nothing-holds"
-    FAILED = "failed"
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """A state of rest, and the evidence for it.
-
-    balanced: whether the forces balance, stably or not. q: coordinates; multipliers: lambda, Q = C_q' lambda.
-    markers: names; points [m], (markers, 2); angles [rad], counted over full turns from the start, (markers,).
-    energy: strain, gravity, applied [J]; strain_energy: of every flexible body [J]. residual: unbalanced force
-    relative to all forces; gap: worst violation of a joint; correction: the last one, relative to the machine's size.
-    eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
-    stable. steps: load steps. reactions: in the joints. turns: what angle forces have counted [rad].
-    """
-
-    scene: Scene
-    time: float
-    status: Held
-    message: str
-    balanced: bool
-    q: Array
-    multipliers: Array
-    markers: tuple[str, ...]
-    points: Array
-    angles: Array
-    energy: dict[str, float]
-    strain_energy: dict[str, float]
-    residual: float
-    gap: float
-    correction: float
-    eigenvalues: Array
-    iterations: int
-    steps: int
-    reactions: Reactions | None
-    turns: Array = field(repr=False)
-
-    @property
-    def ok(self) -> bool:
-        """Whether this is a stable equilibrium."""
-        return self.status is Held.OK
-
-    @property
-    def stable(self) -> bool:
-        """Whether every small displacement is pulled back."""
-        return bool(np.all(np.real(self.eigenvalues) > zero_level(self.eigenvalues)))
-
-    def marker(self, name: str) -> Array:
-        """Position of a marker [m], (2,)."""
-        return np.asarray(self.points[self.markers.index(name)])
-
-    def angle(self, name: str) -> float:
-        """Direction at a marker [rad]."""
-        return float(self.angles[self.markers.index(name)])
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data, which `shoal statics --json` prints."""
-        return {
-            "status": str(self.status),
-            "message": self.message,
-            "time": self.time,
-            "stable": self.stable,
-            "markers": {
-                name: {"x": plain(self.marker(name)[0]), "y": plain(self.marker(name)[1]), "angle": self.angle(name)}
-                for name in self.markers
-            },
-            "energy": self.energy,
-            "strain_energy": self.strain_energy,
-            "residual": self.residual,
-            "constraint_gap": self.gap,
-            "correction": plain(self.correction),
-            "eigenvalues": plain(np.real(self.eigenvalues)[:6]),
-            "iterations": self.iterations,
-            "load_steps": self.steps,
-            "reactions": self.reactions.to_json() if self.reactions else {},
-        }
 
 
 def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True) -> Equilibrium:

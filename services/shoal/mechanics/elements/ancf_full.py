@@ -20,7 +20,7 @@ from numba import njit
 
 from shoal.mechanics import plane
 from shoal.mechanics.elements import beam
-from shoal.mechanics.elements.ancf_full_tangent import COEFFICIENTS, ROWS, energy, gather, stiffness, strains
+from shoal.mechanics.elements.ancf_full_tangent import COEFFICIENTS, ROWS, columns, energy, gather, stiffness, strains
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import PLAN, Family, Kernel, Part, implement
 from shoal.mechanics.numerics.tile import Array, Number, Tile
@@ -167,16 +167,10 @@ def _force_points(tile: Tile, mean: bool, family: Family, number: int, w: Array)
         a, b, d, x = family.table[row], family.table[row + 1], family.table[row + 2], family.table[row + 3]
         section, axis = family.table[row + 4], family.table[row + 5]
         for lane in range(width):
-            mx, my = w[8 * width + lane], w[9 * width + lane]
-            ux = a * w[lane] + b * w[2 * width + lane] + d * w[4 * width + lane]
-            uy = a * w[width + lane] + b * w[3 * width + lane] + d * w[5 * width + lane]
-            vx, vy = w[6 * width + lane] + x * mx, w[7 * width + lane] + x * my
+            ux, uy, vx, vy, mx, my = columns(w, 0, a, b, d, x, width, lane)
             e, k, g, t, s, q = strains(ux, uy, vx, vy, mx, my)
             if mean:
-                lx, ly = w[after + 8 * width + lane], w[after + 9 * width + lane]
-                wx = a * w[after + lane] + b * w[after + 2 * width + lane] + d * w[after + 4 * width + lane]
-                wy = a * w[after + width + lane] + b * w[after + 3 * width + lane] + d * w[after + 5 * width + lane]
-                zx, zy = w[after + 6 * width + lane] + x * lx, w[after + 7 * width + lane] + x * ly
+                wx, wy, zx, zy, lx, ly = columns(w, after, a, b, d, x, width, lane)
                 e_, k_, g_, t_, s_, q_ = strains(wx, wy, zx, zy, lx, ly)
                 e, k, g = 0.5 * (e + e_), 0.5 * (k + k_), 0.5 * (g + g_)
                 t, s, q = 0.5 * (t + t_), 0.5 * (s + s_), 0.5 * (q + q_)

@@ -32,6 +32,15 @@ def gather(tile: Tile, family: Family, number: int, z: Array, w: Array, first: i
             w[to + 8 * width + lane] = z[y2 + lane] - z[y1 + lane]
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def columns(w, at, a, b, d, x, width, lane):  # type: ignore[no-untyped-def]
+    """u, v and m at a point of a configuration whose rows begin at `at`."""
+    mx, my = w[at + 8 * width + lane], w[at + 9 * width + lane]
+    ux = a * w[at + lane] + b * w[at + 2 * width + lane] + d * w[at + 4 * width + lane]
+    uy = a * w[at + width + lane] + b * w[at + 3 * width + lane] + d * w[at + 5 * width + lane]
+    return ux, uy, w[at + 6 * width + lane] + x * mx, w[at + 7 * width + lane] + x * my, mx, my
+
+
 @njit(cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz", "arcp"})
 def strains(ux, uy, vx, vy, mx, my):  # type: ignore[no-untyped-def]
     """e, k, g, t, s, q."""
@@ -58,10 +67,7 @@ def energy(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: i
             a, b, d, x = family.table[r], family.table[r + 1], family.table[r + 2], family.table[r + 3]
             section, axis = family.table[r + 4], family.table[r + 5]
             for lane in range(width):
-                mx, my = w[8 * width + lane], w[9 * width + lane]
-                ux = a * w[lane] + b * w[2 * width + lane] + d * w[4 * width + lane]
-                uy = a * w[width + lane] + b * w[3 * width + lane] + d * w[5 * width + lane]
-                vx, vy = w[6 * width + lane] + x * mx, w[7 * width + lane] + x * my
+                ux, uy, vx, vy, mx, my = columns(w, 0, a, b, d, x, width, lane)
                 e, k, g, t, s, q = strains(ux, uy, vx, vy, mx, my)
                 i2 = c[base + width + lane] / 12.0
                 i4 = i2 * i2 * 1.8
@@ -87,10 +93,7 @@ def _hessian(tile: Tile, family: Family, number: int, point: int, w: Array) -> N
     a, b, d, x = family.table[r], family.table[r + 1], family.table[r + 2], family.table[r + 3]
     section, axis = family.table[r + 4], family.table[r + 5]
     for lane in range(width):
-        mx, my = w[8 * width + lane], w[9 * width + lane]
-        ux = a * w[lane] + b * w[2 * width + lane] + d * w[4 * width + lane]
-        uy = a * w[width + lane] + b * w[3 * width + lane] + d * w[5 * width + lane]
-        vx, vy = w[6 * width + lane] + x * mx, w[7 * width + lane] + x * my
+        ux, uy, vx, vy, mx, my = columns(w, 0, a, b, d, x, width, lane)
         e, k, g, t, s, q = strains(ux, uy, vx, vy, mx, my)
         i2 = c[base + width + lane] / 12.0
         i4 = i2 * i2 * 1.8

@@ -37,6 +37,17 @@ def gather(tile: Tile, vectors: int, family: Family, number: int, z: Array, w: A
                         w[to + lane] = z[a + lane] / family.coefficients[base + lane]
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def curve(table, at, inner, w, first, width, lane):  # type: ignore[no-untyped-def]
+    """p = r' and c = L r'' at a point of the table, of the scaled vectors in rows of w from `first` on."""
+    px, py, cx, cy = 0.0, 0.0, 0.0, 0.0
+    for k in range(inner):
+        a, d = table[at + k], table[at + inner + k]
+        x, y = w[(first + 2 * k) * width + lane], w[(first + 2 * k + 1) * width + lane]
+        px, py, cx, cy = px + a * x, py + a * y, cx + d * x, cy + d * y
+    return px, py, cx, cy
+
+
 @njit(cache=True, error_model="numpy")
 def energy(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: int) -> None:
     """See `families.add_energy`."""
@@ -51,11 +62,7 @@ def energy(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: i
             at = 2 * vectors * (first + g)
             here = (rest + 2 * g) * width
             for lane in range(width):
-                px, py, cx, cy = 0.0, 0.0, 0.0, 0.0
-                for k in range(inner):
-                    a, d = family.table[at + k], family.table[at + inner + k]
-                    x, y = w[(_X + 2 * k) * width + lane], w[(_X + 2 * k + 1) * width + lane]
-                    px, py, cx, cy = px + a * x, py + a * y, cx + d * x, cy + d * y
+                px, py, cx, cy = curve(family.table, at, inner, w, _X, width, lane)
                 square = px * px + py * py
                 inverse = family.reference[here + lane]
                 strain = np.sqrt(square) * inverse - 1.0
@@ -157,11 +164,7 @@ def _hessian(tile: Tile, vectors: int, viscous: bool, family: Family, number: in
     rest = (family.plan[PLAN * number + 2] + 2 * g) * width
     h = _HESSIAN * width
     for lane in range(width):
-        px, py, cx, cy = 0.0, 0.0, 0.0, 0.0
-        for k in range(inner):
-            a, d = family.table[at + k], family.table[at + inner + k]
-            x, y = w[(_X + 2 * k) * width + lane], w[(_X + 2 * k + 1) * width + lane]
-            px, py, cx, cy = px + a * x, py + a * y, cx + d * x, cy + d * y
+        px, py, cx, cy = curve(family.table, at, inner, w, _X, width, lane)
         shrink = 1.0 / np.sqrt(px * px + py * py)
         flat = shrink * shrink
         tx, ty = px * shrink, py * shrink

@@ -10,7 +10,7 @@ from numba import njit
 
 from shoal.mechanics import plane
 from shoal.mechanics.elements import beam, beam_tangent
-from shoal.mechanics.elements.beam_tangent import gather
+from shoal.mechanics.elements.beam_tangent import curve, gather
 from shoal.mechanics.elements.families import PLAN, Family, Kernel, Part, implement
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
@@ -75,11 +75,7 @@ def _force_points(tile: Tile, damped: bool, family: Family, number: int, w: Arra
         axial_weight, bending_weight = family.table[at + 2 * inner], family.table[at + 2 * inner + 1]
         rest = (rule + 2 * g) * width
         for lane in range(width):
-            px, py, cx, cy = 0.0, 0.0, 0.0, 0.0
-            for k in range(inner):
-                a, d = family.table[at + k], family.table[at + inner + k]
-                x, y = w[(_X + 2 * k) * width + lane], w[(_X + 2 * k + 1) * width + lane]
-                px, py, cx, cy = px + a * x, py + a * y, cx + d * x, cy + d * y
+            px, py, cx, cy = curve(family.table, at, inner, w, _X, width, lane)
             shrink = 1.0 / np.sqrt(px * px + py * py)
             flat = shrink * shrink
             inverse = family.reference[rest + lane]
@@ -91,11 +87,7 @@ def _force_points(tile: Tile, damped: bool, family: Family, number: int, w: Arra
             angle = k_ - family.reference[rest + width + lane]
             if damped:
                 eta = family.coefficients[base + 3 * width + lane]
-                ux, uy, vx, vy = 0.0, 0.0, 0.0, 0.0
-                for k in range(inner):
-                    a, d = family.table[at + k], family.table[at + inner + k]
-                    x, y = w[(_RATE + 2 * k) * width + lane], w[(_RATE + 2 * k + 1) * width + lane]
-                    ux, uy, vx, vy = ux + a * x, uy + a * y, vx + d * x, vy + d * y
+                ux, uy, vx, vy = curve(family.table, at, inner, w, _RATE, width, lane)
                 stretch_rate = (px * ux + py * uy) * shrink
                 angle_rate = (ax * ux + ay * uy - py * vx + px * vy) * flat
                 strain += eta * inverse * stretch_rate * shrink

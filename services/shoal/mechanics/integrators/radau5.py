@@ -6,6 +6,8 @@ couple the three stages by the matrix A of the method. Instead of complex arithm
 factor T of its Crout decomposition: three real factorisations of M + g D + g^2 K, stage after stage (van der Houwen
 and de Swart, Triangularly implicit iteration methods for ODE-IVP solvers, 1997). The iteration converges for every
 frequency and decay rate, and at once in three steps for infinite ones.
+
+This file is long because all parts of the step share one room.
 """
 
 from __future__ import annotations

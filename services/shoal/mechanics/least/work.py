@@ -16,7 +16,10 @@ from shoal.mechanics.numerics.vector import clear, copy
 
 
 class LaneWork(NamedTuple):
-    """Work space for one lane at a time, as arrays; see `GaussWork`."""
+    """Room for one lane at a time.
+
+    rows: (constraints, unknowns); triangle, norms, order, wanted, weights: by constraint; y, row: (unknowns,).
+    """
 
     rows: Array
     triangle: Array
@@ -32,8 +35,7 @@ class GaussWork(NamedTuple):
     """Work space of one tile.
 
     jacobian, turning: C_q and dC_q/dt (entries, lanes). response: C_q' or H^-1 C_q' (constraints * unknowns, lanes).
-    gram: (constraints^2, lanes). multiplier, gap: (constraints, lanes). extra: (unknowns, lanes). For one lane at a
-    time: rows (constraints, unknowns), triangle, norms, order, wanted, weights (constraints), y, row (unknowns).
+    gram: (constraints^2, lanes). multiplier, gap: (constraints, lanes). extra: (unknowns, lanes).
     """
 
     jacobian: Array
@@ -43,39 +45,19 @@ class GaussWork(NamedTuple):
     multiplier: Array
     gap: Array
     extra: Array
-    rows: Array
-    triangle: Array
-    norms: Array
-    order: Array
-    wanted: Array
-    weights: Array
-    y: Array
-    row: Array
+    lane: LaneWork
     saddle: SaddleWork
 
 
 def work_space(width: int, m: Arrays) -> GaussWork:
     """Room for the constraints of a model."""
     count, n, entries = m.constraints.size, m.unknowns, len(m.constraints.column)
-    sizes = (entries, entries, count * n, count * count, count, count, n)
+    sizes = entries, entries, count * n, count * count, count, count, n
     jacobian, turning, response, gram, multiplier, gap, extra = (np.zeros(size * width) for size in sizes)
+    order = np.zeros(count, dtype=np.int64)
+    first = np.zeros((count, n)), np.zeros((count, count)), np.zeros(count), order, np.zeros(count), np.zeros(count)
     return GaussWork(
-        jacobian,
-        turning,
-        response,
-        gram,
-        multiplier,
-        gap,
-        extra,
-        np.zeros((count, n)),
-        np.zeros((count, count)),
-        np.zeros(count),
-        np.zeros(count, dtype=np.int64),
-        np.zeros(count),
-        np.zeros(count),
-        np.zeros(n),
-        np.zeros(n),
-        saddle.room(m.saddle.size, m.saddle.slots, width),
+        *wide, LaneWork(*first, np.zeros(n), np.zeros(n)), saddle.room(m.saddle.size, m.saddle.slots, width)
     )
 
 
@@ -84,14 +66,14 @@ def lane_work(m: Arrays, w: GaussWork) -> LaneWork:
     """The room for one lane as arrays."""
     count, n = m.constraints.size, m.unknowns
     return LaneWork(
-        carray(w.rows, (count, n)),
-        carray(w.triangle, (count, count)),
-        carray(w.norms, (count,)),
-        carray(w.order, (count,)),
-        carray(w.wanted, (count,)),
-        carray(w.weights, (count,)),
-        carray(w.y, (n,)),
-        carray(w.row, (n,)),
+        carray(w.lane.rows, (count, n)),
+        carray(w.lane.triangle, (count, count)),
+        carray(w.lane.norms, (count,)),
+        carray(w.lane.order, (count,)),
+        carray(w.lane.wanted, (count,)),
+        carray(w.lane.weights, (count,)),
+        carray(w.lane.y, (n,)),
+        carray(w.lane.row, (n,)),
     )
 
 

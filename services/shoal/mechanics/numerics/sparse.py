@@ -124,14 +124,8 @@ def factor(tile: Tile, pattern: Pattern, values: Array) -> None:
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def solve(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) -> None:
     """Replace the right-hand side in the rows of x from `first` on by the solution. Pointers."""
-    size = pattern.size
-    for i in range(size):
-        begin, end = pattern.across[i], pattern.across[i + 1]
-        subtract_dot(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
-    for k in range(size - 1, -1, -1):
-        scale(tile, x, first + k, factors, k)
-        begin, end = pattern.column[k], pattern.column[k + 1]
-        subtract_dot(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
+    _substitute(tile, pattern, factors, x, first)
+    backward(tile, pattern, factors, factors, x, first)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -150,19 +144,23 @@ def solve_alike(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: i
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def forward(tile: Tile, pattern: Pattern, factors: Array, root: Array, x: Array, first: int) -> None:
     """x <- D^-1/2 L^-1 x in the rows of x from `first` on; root: D^-1/2, (n, lanes). Pointers."""
-    size = pattern.size
-    for i in range(size):
-        begin, end = pattern.across[i], pattern.across[i + 1]
-        subtract_dot(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
-    for i in range(size):
+    _substitute(tile, pattern, factors, x, first)
+    for i in range(pattern.size):
         scale(tile, x, first + i, root, i)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=True)
+def _substitute(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) -> None:
+    """x <- L^-1 x."""
+    for i in range(pattern.size):
+        begin, end = pattern.across[i], pattern.across[i + 1]
+        subtract_dot(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=True)
 def backward(tile: Tile, pattern: Pattern, factors: Array, root: Array, x: Array, first: int) -> None:
-    """x <- L^-T D^-1/2 x in the rows of x from `first` on; root: D^-1/2, (n, lanes). Pointers."""
-    size = pattern.size
-    for k in range(size - 1, -1, -1):
+    """x <- L^-T D^-1/2 x in the rows of x from `first` on; root: D^-1/2, or D^-1 in its place, (n, lanes). Pointers."""
+    for k in range(pattern.size - 1, -1, -1):
         scale(tile, x, first + k, root, k)
         begin, end = pattern.column[k], pattern.column[k + 1]
         subtract_dot(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
