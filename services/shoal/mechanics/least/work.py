@@ -56,9 +56,9 @@ def work_space(width: int, m: Arrays) -> GaussWork:
     jacobian, turning, response, gram, multiplier, gap, extra = (np.zeros(size * width) for size in sizes)
     order = np.zeros(count, dtype=np.int64)
     first = np.zeros((count, n)), np.zeros((count, count)), np.zeros(count), order, np.zeros(count), np.zeros(count)
-    return GaussWork(
-        *wide, LaneWork(*first, np.zeros(n), np.zeros(n)), saddle.room(m.saddle.size, m.saddle.slots, width)
-    )
+    lane = LaneWork(*first, np.zeros(n), np.zeros(n))
+    room = saddle.room(m.saddle.size, m.saddle.slots, width)
+    return GaussWork(jacobian, turning, response, gram, multiplier, gap, extra, lane, room)
 
 
 @njit(cache=True, error_model="numpy")
