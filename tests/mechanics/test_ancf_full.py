@@ -52,7 +52,7 @@ def _family(
     found = families.Collected()
     for number in range(elements):
         numbers = ancf_full.coefficients(LAWS[law], length, height, width, young, POISSON, shear)
-        part = families.Part(ancf_full.quadrature(LAWS[law]), 0, False, numbers, [])
+        part = families.Entry(ancf_full.quadrature(LAWS[law]), 0, False, numbers, [])
         found.add("rod", [*range(6 * number, 6 * number + 12)], part)
     return packed(found.family(ancf_full.Solids), slice(0, lanes), (0,) * lanes)
 

@@ -66,7 +66,7 @@ def _family(
     for number, nodal in enumerate([_straight(vectors, length)] * elements if rest is None else rest):
         places = [np.array([v.real, v.imag]) for v in nodal]
         numbers = [1.0 / length, axial * length, bending / length, eta]
-        part = families.Part(table, variant, eta > 0, numbers, beam.reference(vectors, table, places, length))
+        part = families.Entry(table, variant, eta > 0, numbers, beam.reference(vectors, table, places, length))
         found.add("rod", [*range(vectors * number, vectors * (number + 2))], part)
     return packed(found.family(kind), slice(0, lanes), (0,) * lanes)
 

@@ -39,7 +39,7 @@ def _element(quadrature: str, lanes: int = 1) -> Any:
     numbers = [1 / LENGTH, EA * LENGTH, EI / LENGTH, 0.0]
     found = families.Collected()
     reference = beam.reference(beam.CUBIC, rule, straight, LENGTH)
-    found.add("rod", [*range(8)], families.Part(rule, variant, False, numbers, reference))
+    found.add("rod", [*range(8)], families.Entry(rule, variant, False, numbers, reference))
     return packed(found.family(cubic.Cubics), slice(0, lanes), (0,) * lanes)
 
 

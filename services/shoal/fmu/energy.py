@@ -10,9 +10,9 @@ from shoal.mechanics.analysis.motion_state import LANE
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import choose, facts, halting, pick
 from shoal.mechanics.march import march
+from shoal.mechanics.marched import sampled
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import SINGLE
-from shoal.mechanics.record import sampled
 from shoal.mechanics.simulate import at_start
 from shoal.scene import Scene
 from shoal.trajectory import Array

@@ -22,10 +22,10 @@ from shoal.mechanics.dynamics import Work, loaded, remember
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
 from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
 from shoal.mechanics.least import constraints
+from shoal.mechanics.marched import LoopRoom, Marched, rooms, sampled
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.record import Record, Room, rooms, sampled
 
 ASSEMBLY = 30
 """Iterations that may assemble a mechanism whose stated start is only roughly consistent."""
@@ -49,7 +49,7 @@ def march(
     marker_rows: Index,
     tolerance: float,
     halts: Halts,
-) -> Record:
+) -> Marched:
     """March from the state in `room` and sample the marker rows at `times` [s] (increasing).
 
     Schemes of fixed step take `steps` steps of `step` [s]; adaptive ones end at the last of the times and
@@ -114,7 +114,7 @@ def march(
 
 
 @njit(cache=True, error_model="numpy")
-def _begin(tile: Tile, m: Arrays, w: Work, k: Room, record: Record, marker_rows: Index, tolerance: float) -> None:
+def _begin(tile: Tile, m: Arrays, w: Work, k: LoopRoom, record: Marched, marker_rows: Index, tolerance: float) -> None:
     """Make the start consistent and keep it, find its acceleration, its energy and the sides of the directions."""
     end = m.unknowns * len(tile)
     gates.settle(tile, m, w, 0.0, tolerance, ASSEMBLY)
@@ -135,7 +135,7 @@ def _sample(
     scheme: Any,
     m: Arrays,
     w: Work,
-    k: Room,
+    k: LoopRoom,
     marker_rows: Index,
     ahead: float,
     taken: float,
@@ -172,7 +172,7 @@ def _sample(
 
 @njit(cache=True, error_model="numpy")
 def _leave_halt(
-    tile: Tile, scheme: Any, m: Arrays, w: Work, k: Room, now: float, tolerance: float, scale: Array
+    tile: Tile, scheme: Any, m: Arrays, w: Work, k: LoopRoom, now: float, tolerance: float, scale: Array
 ) -> None:
     """Go on from a time at which forces or driven rates jump: these are taken up at once, for what energy it takes."""
     restart(scheme)
@@ -191,7 +191,16 @@ def _leave_halt(
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _advance(
-    tile: Tile, scheme: Any, m: Arrays, w: Work, k: Room, halts: Halts, now: float, rest: float, snap: float, keep: bool
+    tile: Tile,
+    scheme: Any,
+    m: Arrays,
+    w: Work,
+    k: LoopRoom,
+    halts: Halts,
+    now: float,
+    rest: float,
+    snap: float,
+    keep: bool,
 ) -> float:
     """One step of at most `rest` [s], shorter where it would leap over a part of a force law; returns its length.
 
@@ -219,7 +228,7 @@ def _advance(
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _account(
-    tile: Tile, scheme: Any, m: Arrays, w: Work, k: Room, begin: float, taken: float, tolerance: float
+    tile: Tile, scheme: Any, m: Arrays, w: Work, k: LoopRoom, begin: float, taken: float, tolerance: float
 ) -> None:
     """Add what was dissipated less what was supplied in the step [J]: its mean power, or a quadrature over it."""
     width, free = len(tile), adaptive(scheme)
@@ -242,7 +251,7 @@ def _account(
 
 
 @njit(cache=True, error_model="numpy")
-def _look(tile: Tile, m: Arrays, w: Work, k: Room, now: float, record: Record) -> bool:
+def _look(tile: Tile, m: Arrays, w: Work, k: LoopRoom, now: float, record: Marched) -> bool:
     """Keep the largest errors of energy and constraints; false if no lane is a number anymore."""
     _energy(tile, m, w, k.energy, record.energy_scale)
     derive(tile, m.derived, w.z, m.unknowns, m.held_rows, False)
@@ -257,7 +266,7 @@ def _look(tile: Tile, m: Arrays, w: Work, k: Room, now: float, record: Record) -
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _count_turns(tile: Tile, m: Arrays, w: Work, k: Room, marker_rows: Index) -> None:
+def _count_turns(tile: Tile, m: Arrays, w: Work, k: LoopRoom, marker_rows: Index) -> None:
     """Add 2 pi to the turns where a marker's direction has passed the negative x axis."""
     width, d = len(tile), len(m.space)
     derive(tile, m.derived, w.z, m.held_rows, m.rows, False)

@@ -21,9 +21,9 @@ from shoal.mechanics.gates import Seek, Sought, ready
 from shoal.mechanics.integrators import Choice, choose, facts, halting, pick
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.march import march
+from shoal.mechanics.marched import Marched, sampled
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import Array, Tile, pack, tiles, unpack
-from shoal.mechanics.record import Record, sampled
 from shoal.mechanics.start import start
 from shoal.mechanics.start.redundancy import redundant_joints
 from shoal.scene import Scene, Solver
@@ -65,7 +65,7 @@ def simulate(
 
     workers = min(threads or os.cpu_count() or 1, len(parts))
     results = [run(part) for part in parts] if workers == 1 else list(_pool(workers).map(run, parts))
-    record = Record(*(np.concatenate(field, axis=1) for field in zip(*results, strict=True)))
+    record = Marched(*(np.concatenate(field, axis=1) for field in zip(*results, strict=True)))
     d = model.dimensions
     samples = record.samples.reshape(len(times), len(scene.markers), sampled(d), lanes)
     points = samples[:, :, :d]
@@ -105,12 +105,12 @@ def at_start(model: Model, tile: Tile, part: slice) -> tuple[Arrays, Work]:
 
 def _marched(
     solver: Solver, model: Model, choice: Choice, times: Array, tile: Tile, part: slice, arrays: Arrays, room: Work
-) -> Record:
+) -> Marched:
     step, end = solver.step, float(times[-1])
     steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(end / step - 1e-9))
     stops = halting(solver, model, choice.name, end)
     scheme = choose(solver, model, tile, part, choice.name)
-    record: Record = march(
+    record: Marched = march(
         tile, scheme, arrays, room, step, steps, times, model.marker_rows.ravel(), solver.rank_tolerance, stops
     )
     return record
@@ -196,7 +196,7 @@ def _angles(scene: Scene, model: Model, directions: Array) -> Array:
     return angle
 
 
-def _start(scene: Scene, model: Model, record: Record) -> dict[str, Any]:
+def _start(scene: Scene, model: Model, record: Marched) -> dict[str, Any]:
     """The start as it was used, what of it was stated otherwise, and joints whose forces are not unique."""
     q, v = np.split(record.begin[:, 0], 2)
     used = start.begun(model.frames, model.scene, q, v)
@@ -210,7 +210,7 @@ def _redundant(scene_json: str) -> tuple[str, ...]:
     return () if start.is_direct(scene) else redundant_joints(start.complete(scene).scene)
 
 
-def _facts(scene: Scene, model: Model, choice: Choice, record: Record, single: bool) -> dict[str, Any]:
+def _facts(scene: Scene, model: Model, choice: Choice, record: Marched, single: bool) -> dict[str, Any]:
     """What was computed, for the record; single: one scene without lanes."""
     return {
         "unknowns": model.unknowns,

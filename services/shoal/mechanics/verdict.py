@@ -6,9 +6,9 @@ import numpy as np
 
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.integrators import Choice, facts
+from shoal.mechanics.marched import Marched
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
-from shoal.mechanics.record import Record
 from shoal.scene import Scene
 from shoal.trajectory import Status
 
@@ -18,7 +18,7 @@ SINKING = 3000.0
 it is 14 times as fast as that. Twice as much is no error by the default tolerance of energies, a hundredth."""
 
 
-def energy_error(record: Record, scene: Scene, model: Model, end: float) -> Array:
+def energy_error(record: Marched, scene: Scene, model: Model, end: float) -> Array:
     """Energy error of a run up to `end` [s] over the largest kinetic + elastic energy, (lanes,).
 
     A machine that never moves has none: then its weight lifted by its span and the energy of stretching its
@@ -42,7 +42,7 @@ def of_the_size(drift: Array, scene: Scene) -> Array:
 def verdict(
     scene: Scene,
     model: Model,
-    record: Record,
+    record: Marched,
     choice: Choice,
     points: Array,
     energy_drift: Array,

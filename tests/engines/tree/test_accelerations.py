@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from shoal.engines.tree.articulated import accelerate
-from shoal.engines.tree.description import Placement, SpatialChain
+from shoal.engines.tree.description import JointFrame, SpatialChain
 from shoal.engines.tree.motion import energies
 from shoal.engines.tree.recursive import accelerations, equations
 from shoal.engines.tree.tree import build, room
@@ -197,7 +197,7 @@ def _mjcf(chain: SpatialChain) -> str:
     )
 
 
-def _rotation(placement: Placement) -> Rotation:
+def _rotation(placement: JointFrame) -> Rotation:
     return Rotation.from_rotvec(placement.rotation)
 
 

@@ -68,7 +68,7 @@ class SpatialBody(Record):
     centre_of_mass: Vector3 = (0.0, 0.0, 0.0)
 
 
-class Placement(Record):
+class JointFrame(Record):
     """Position [m] and orientation of a joint's frame in a body's frame.
 
     `rotation` is the axis times the angle [rad] that turns the body's axes into those of the joint.
@@ -93,8 +93,8 @@ class SpatialJoint(Record):
     parent: str = GROUND
     kind: Kind = "revolute"
     axis: Vector3 | None = None
-    on_parent: Placement = Placement()
-    on_body: Placement = Placement()
+    on_parent: JointFrame = JointFrame()
+    on_body: JointFrame = JointFrame()
     damping: NonNegative = 0.0
     load: Numbers | None = None
 

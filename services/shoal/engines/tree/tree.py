@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from shoal.engines.tree.description import FREEDOMS, Placement, SpatialBody, SpatialChain, SpatialJoint
+from shoal.engines.tree.description import FREEDOMS, JointFrame, SpatialBody, SpatialChain, SpatialJoint
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -83,7 +83,7 @@ class Room(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Model:
+class ChainModel:
     """A tree with its names and its state at time zero.
 
     q0: coordinates (spherical joints: unit quaternions, scalar first); v0: rates
@@ -112,7 +112,7 @@ class Model:
         return slice(int(self.tree.first_v[row]), int(self.tree.first_v[row]) + _rates(int(self.tree.kinds[row])))
 
 
-def build(chain: SpatialChain) -> Model:
+def build(chain: SpatialChain) -> ChainModel:
     """Number the bodies and move their frames into their joints."""
     order = chain.order
     joints = [chain.joints[name] for name in order]
@@ -166,7 +166,7 @@ def build(chain: SpatialChain) -> Model:
     )
     q0, v0 = _start(chain, order)
     points = chain.points.values()
-    return Model(
+    return ChainModel(
         tree,
         order,
         tuple(bodies),
@@ -197,7 +197,7 @@ def _rates(kind: int) -> int:
     return {FIXED: 0, REVOLUTE: 1, PRISMATIC: 1, SPHERICAL: 3}[kind]
 
 
-def _rotation(placement: Placement) -> Array:
+def _rotation(placement: JointFrame) -> Array:
     matrix: Array = Rotation.from_rotvec(placement.rotation).as_matrix()
     return matrix
 

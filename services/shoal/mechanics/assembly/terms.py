@@ -16,7 +16,7 @@ from shoal.scene.function import Composed
 
 
 @dataclass(frozen=True)
-class Held:
+class Term:
     """One constraint before it has rows: u' form w, plus a constant and a function of time.
 
     form: (d, d). lengths: the power of a length that it is measured in.
@@ -47,17 +47,17 @@ class Terms:
     """Collects constraints before their vectors have rows."""
 
     def __init__(self) -> None:
-        self.held: list[Held] = []
+        self.held: list[Term] = []
 
     def dot(
         self, name: str, u: Affine, w: Affine, lengths: int, constant: Number = 0.0, drive: Composed | None = None
     ) -> None:
         """u . w + constant + drive(t) = 0, measured in m to the power of `lengths`."""
-        self.held.append(Held(name, u, w, np.eye(len(u.constant)), constant, drive, lengths))
+        self.held.append(Term(name, u, w, np.eye(len(u.constant)), constant, drive, lengths))
 
     def cross(self, name: str, u: Affine, w: Affine, lengths: int, drive: Composed | None = None) -> None:
         """u x w + drive(t) = 0 of two vectors of the plane, measured in m to the power of `lengths`."""
-        self.held.append(Held(name, u, w, plane.CROSS, 0.0, drive, lengths))
+        self.held.append(Term(name, u, w, plane.CROSS, 0.0, drive, lengths))
 
     def vanish(self, name: str, vector: Affine, drives: tuple[Composed, ...] | None = None) -> None:
         """vector + drives(t) = 0, a linear constraint for each component [m]."""

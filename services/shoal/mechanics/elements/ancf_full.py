@@ -22,7 +22,7 @@ from shoal.mechanics import plane
 from shoal.mechanics.elements import beam
 from shoal.mechanics.elements.ancf_full_tangent import COEFFICIENTS, ROWS, columns, energy, gather, stiffness, strains
 from shoal.mechanics.elements.element import Element
-from shoal.mechanics.elements.families import PLAN, Family, Kernel, Part, implement
+from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 
@@ -235,10 +235,10 @@ def _direction_shape(x: Number, y: Number, length: Number) -> list[Number]:
     return [zero, zero, 1 - x + zero, zero, zero, x + zero]
 
 
-def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Part:
+def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
     law = LAWS[rod.law]
     numbers = coefficients(law, length, height, width, rod.youngs_modulus, rod.poisson_ratio)
-    return Part(quadrature(law), 0, False, numbers, [])
+    return Entry(quadrature(law), 0, False, numbers, [])
 
 
 ELEMENT = Element(

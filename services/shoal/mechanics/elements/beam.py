@@ -27,7 +27,7 @@ import numpy as np
 
 from shoal.mechanics import plane
 from shoal.mechanics.elements.element import Element
-from shoal.mechanics.elements.families import Part
+from shoal.mechanics.elements.families import Entry
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.scene import Rod
 
@@ -141,7 +141,7 @@ def element(
     vectors: int,
     family: type,
     nodal_vectors: Callable[[Rod, Number], list[Number]],
-    part: Callable[[Rod, Number, Number, Number, list[Number]], Part],
+    part: Callable[[Rod, Number, Number, Number, list[Number]], Entry],
 ) -> Element:
     """A beam element as `Element` states it."""
     return Element(
@@ -164,11 +164,11 @@ def part(
     width: Number,
     length: Number,
     nodal: list[Number],
-) -> Part:
+) -> Entry:
     """One element of a rod with this rule; nodal: its nodal vectors at rest, (2, ...)."""
     axial, bending = rod.youngs_modulus * height * width, rod.youngs_modulus * width * height**3 / 12
     numbers = [1.0 / length, axial * length, bending / length, rod.retardation + 0.0 * length]
-    return Part(rule, variant, bool(np.any(rod.retardation)), numbers, reference(vectors, rule, nodal, length))
+    return Entry(rule, variant, bool(np.any(rod.retardation)), numbers, reference(vectors, rule, nodal, length))
 
 
 def tangent(rod: Rod, s: Number) -> Number:

@@ -13,7 +13,7 @@ from numba import njit
 
 from shoal.errors import InputError
 from shoal.mechanics.elements import beam, beam_tangent
-from shoal.mechanics.elements.families import PLAN, Family, Kernel, Part, implement
+from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.mechanics.numerics.vector import add, copy
 from shoal.scene import Rod
@@ -157,7 +157,7 @@ implement(
 )
 
 
-def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Part:
+def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
     reduced, damped = rod.quadrature == "reduced", bool(np.any(rod.retardation))
     if reduced and (damped or rod.curvature):
         raise InputError("quadrature: a curved or damped ancf-cable has the full quadrature")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from shoal.mechanics.elements.families import Part
+from shoal.mechanics.elements.families import Entry
 from shoal.mechanics.numerics.tile import Number
 from shoal.scene import Rod
 
@@ -30,6 +30,6 @@ class Element:
     direction_shape: Shape
     mass: Callable[[Number, Number, Number, Number], list[list[Number]]]
     weight: Callable[[Number, Number, Number, Number], list[Number]]
-    part: Callable[[Rod, Number, Number, Number, list[Number]], Part]
+    part: Callable[[Rod, Number, Number, Number, list[Number]], Entry]
     clamped: int = 0
     normal: bool = False

@@ -48,7 +48,7 @@ class Kernel(NamedTuple):
     first_stiffness: int
 
 
-class Part(NamedTuple):
+class Entry(NamedTuple):
     """One element, as its family stores it. rule: rows of the table, (points, columns)."""
 
     rule: Array
@@ -74,7 +74,7 @@ class Collected:
         self._reference: list[Number] = []
         self._damped = False
 
-    def add(self, owner: str, rows: list[int], part: Part) -> None:
+    def add(self, owner: str, rows: list[int], part: Entry) -> None:
         """One element of a body."""
         key = part.rule.tobytes()
         if key not in self._rules:

@@ -11,7 +11,7 @@ from numba import njit
 from shoal.mechanics import plane
 from shoal.mechanics.elements import beam, beam_tangent
 from shoal.mechanics.elements.beam_tangent import curve, gather
-from shoal.mechanics.elements.families import PLAN, Family, Kernel, Part, implement
+from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 
@@ -138,7 +138,7 @@ def _nodal_vectors(rod: Rod, s: Number) -> list[Number]:
     return [tangent, curvature * plane.quarter(tangent)]
 
 
-def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Part:
+def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
     variant = DAMPED if np.any(rod.retardation) else ELASTIC
     return beam.part(beam.QUINTIC, recommended(rod.elements), variant, rod, height, width, length, nodal)
 

@@ -12,7 +12,7 @@ from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 
-class Record(NamedTuple):
+class Marched(NamedTuple):
     """What a march leaves behind. samples: (times * markers * sampled(d), lanes), see `sampled`; the rest: (lanes,).
 
     energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest kinetic + elastic energy [J];
@@ -31,7 +31,7 @@ class Record(NamedTuple):
     reached: Array
 
 
-class Room(NamedTuple):
+class LoopRoom(NamedTuple):
     """What the loop keeps between steps.
 
     past: coordinates, rates and accelerations at the beginning of the step, (3 * unknowns, lanes). q, v: the motion
@@ -65,12 +65,12 @@ def sampled(dimensions: int) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[Record, Room]:
+def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[Marched, LoopRoom]:
     """An empty record, and the room of the loop."""
     width, dimensions = len(tile), len(arrays.space)
     end, rows = arrays.unknowns * width, arrays.rows * width
     markers = marker_rows.size // (2 * dimensions)
-    record = Record(
+    record = Marched(
         np.full(times * sampled(dimensions) * markers * width, np.nan),
         np.zeros(width),
         np.zeros(width),
@@ -80,7 +80,7 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[R
         np.zeros(width),
         np.zeros(width),
     )
-    room = Room(
+    room = LoopRoom(
         np.empty(3 * end),
         np.zeros(rows),
         np.zeros(rows),
