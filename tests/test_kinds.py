@@ -17,9 +17,12 @@ from shoal.engines.exudyn.loads import add_load
 from shoal.engines.theory import left_out
 from shoal.errors import InputError
 from shoal.identification.methods import get_method
+from shoal.mechanics.assembly.build import build as build_model
+from shoal.mechanics.assembly.loads import LOADS
 from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.integrators import INTEGRATORS, facts
-from shoal.scene import Attachment, Scene, load_scene
+from shoal.mechanics.joints import CONDITIONS
+from shoal.scene import JOINT_KINDS, LOAD_KINDS, Attachment, Scene, load_scene
 from shoal.scene.bodies import Element
 from shoal.scene.joints import sides
 from shoal.scene.record import Record
@@ -68,6 +71,10 @@ def casadi_forces(scene: Scene) -> Any:
 
 
 PLACES: dict[str, Callable[[], Any]] = {
+    "joint, mechanics": lambda: build_model(JOINT),
+    "load, mechanics": lambda: build_model(LOAD),
+    "element, mechanics": lambda: build_model(ELEMENT),
+    "way to the acceleration, mechanics": lambda: build_model(SCENE.with_values({"solver.acceleration": NAME})),
     "joint, scene": lambda: Scene.parse(data(joints={"J": Joint().model_dump()})),
     **{f"joint, {name}": lambda name=name: require(get_engine(name), JOINT) for name in OTHERS},
     "joint, exudyn's table": lambda: add_joint(None, "J", Joint()),  # type: ignore[arg-type]
@@ -103,7 +110,7 @@ def test_an_invented_kind_is_refused_by_its_name(place: str) -> None:
     for package in ("exudyn", "casadi"):
         if package in place:
             pytest.importorskip(package)
-    with pytest.raises((InputError, KeyError), match=NAME) as refusal:
+    with pytest.raises((InputError, KeyError, NotImplementedError), match=NAME) as refusal:
         PLACES[place]()
     assert "\n" not in str(refusal.value)
 
@@ -126,6 +133,20 @@ def test_lists_of_the_scene_and_of_the_mechanics_name_the_same() -> None:
 @pytest.mark.parametrize("element", get_args(Element))
 def test_of_every_element_it_is_known_whether_it_shears(element: str) -> None:
     assert ROD.model_copy(update={"element": element}).shears == (element == "ancf-full")
+
+
+def test_the_mechanics_knows_every_joint_and_load_of_the_scene() -> None:
+    assert {kind.model_fields["kind"].default for kind in CONDITIONS} == set(JOINT_KINDS)
+    assert {kind.model_fields["kind"].default for kind in LOADS} == set(LOAD_KINDS)
+
+
+def test_a_condition_that_nobody_told_of_is_refused_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Invented:
+        first, second = Attachment(body="ground", point=(0.0, 0.0)), Attachment(body="OA")
+
+    monkeypatch.setitem(CONDITIONS, Joint, lambda joint: [Invented()])
+    with pytest.raises(NotImplementedError, match="Invented"):
+        build_model(JOINT)
 
 
 def test_what_casadi_says_is_what_its_tables_hold() -> None:

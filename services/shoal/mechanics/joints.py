@@ -125,6 +125,11 @@ def conditions(joint: Any) -> list[Condition]:
     return CONDITIONS[type(joint)](joint)
 
 
+def unknown(condition: Any) -> NotImplementedError:
+    """What is raised where somebody has not been told of a condition."""
+    return NotImplementedError(f"nobody says here what a condition {type(condition).__name__} does")
+
+
 def of_scene(scene: Scene) -> Iterator[tuple[str, Condition]]:
     """The conditions of all joints, in the order of the scene, with the name of the joint."""
     for name, joint in scene.joints.items():

@@ -7,8 +7,8 @@ energy of a run bounds its reach.
 
 from __future__ import annotations
 
-import math
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -27,18 +27,19 @@ A run that gained energy without bound would else have no reach.
 """
 
 
-def size(scene: Scene) -> Array:
-    """All undeformed bodies stretched out in a line [m], (lanes,) where their lengths differ between lanes."""
+def extents(scene: Scene) -> dict[str, Array]:
+    """Largest distance [m] between two places of each body that have a name, a joint or a marker; () or (lanes,)."""
     sides = [side for joint in scene.joints.values() for side in places(joint)]
     attached = [*sides, *scene.markers.values()]
-    total = np.zeros(())
-    for name, body in scene.bodies.items():
-        used = [*(scene.location(place) for place in attached if place.body == name), *body.points.values()]
-        longest = np.zeros(())
-        for (x, y), (other_x, other_y) in combinations(used, 2):
-            longest = np.maximum(longest, np.hypot(np.subtract(x, other_x), np.subtract(y, other_y)))
-        total = total + longest
-    return total
+    return {
+        name: _widest([*(scene.location(at) for at in attached if at.body == name), *body.points.values()])
+        for name, body in scene.bodies.items()
+    }
+
+
+def size(scene: Scene) -> Array:
+    """All undeformed bodies stretched out in a line [m], (lanes,) where their lengths differ between lanes."""
+    return np.asarray(sum(extents(scene).values()))
 
 
 def span(scene: Scene) -> float:
@@ -48,9 +49,17 @@ def span(scene: Scene) -> float:
     """
     joined = [side for joint in scene.joints.values() for side in places(joint)]
     loaded = [side for load in scene.loads.values() for side in load_sides(load).values()]
-    fixed = {scene.location(side) for side in (*joined, *loaded) if side.body == GROUND}
-    fixed |= {start.position for start in scene.initial.values() if start.position is not None}
-    return max(float(np.max(size(scene))), *(math.dist(a, b) for a, b in combinations(fixed, 2)), 0.0) or 1.0
+    fixed = [scene.location(side) for side in (*joined, *loaded) if side.body == GROUND]
+    fixed += [start.position for start in scene.initial.values() if start.position is not None]
+    return float(max(np.max(size(scene)), np.max(_widest(fixed)))) or 1.0
+
+
+def _widest(found: list[Any]) -> Array:
+    """The largest distance between two of these places, () or (lanes,)."""
+    longest = np.zeros(())
+    for (x, y), (other_x, other_y) in combinations(found, 2):
+        longest = np.maximum(longest, np.hypot(np.subtract(x, other_x), np.subtract(y, other_y)))
+    return longest
 
 
 def reach(scene: Scene, energy: Array) -> Array:

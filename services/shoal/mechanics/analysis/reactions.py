@@ -21,8 +21,9 @@ from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.motion_state import states
 from shoal.mechanics.assembly.affine import Affine
 from shoal.mechanics.assembly.frames import BeamFrame, RigidFrame
-from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, conditions
+from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, conditions, unknown
 from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Coupling, Revolute, Scene, Slider
 from shoal.scene.joints import places
 from shoal.trajectory import plain
@@ -117,7 +118,7 @@ def reactions_of(
     bodies.evaluator.turns = evaluator.turns[rubbing:]
     at, rate, change = bodies.state(q, v, a)
     free = bodies.evaluator
-    lever = _lever(bodies, at)
+    lever = span(bodies.scene)
     unknown = [part for name in bodies.scene.joints for part in _components(bodies, name, at)]
     known, rubbed = _friction(bodies, at, rate)
     force = free.at(at, rate, t).force
@@ -240,12 +241,13 @@ def _of_condition(bodies: FreeBodies, name: str, condition: Condition, at: Array
     if isinstance(condition, Along):
         e, _, across = _sliding(bodies, condition.first, condition.second, condition.direction, at)
         return [_Component(name, "normal", across, plane.quarter(e), False)]
+    if not isinstance(condition, Meet | Apart):
+        raise unknown(condition)
     gap = _gap(bodies, condition, at)
     if isinstance(condition, Apart):
         length = np.hypot(*gap.value)
         along = gap.value / length if length > 0 else np.eye(plane.DIMENSIONS)[0]
         return [_Component(name, "axial", along @ gap.slope, along, False)]
-    assert isinstance(condition, Meet)
     return [
         _Component(name, f"f{axis}", slope, unit, False)
         for axis, slope, unit in zip("xyz", gap.slope, np.eye(plane.DIMENSIONS), strict=False)
@@ -289,11 +291,3 @@ def _displacements(bodies: FreeBodies, at: Array, lever: float) -> Array:
         if isinstance(frame, RigidFrame):
             add(frame.directors[0], plane.quarter(frame.directors[0].at(at)) / lever)
     return np.array(rows)
-
-
-def _lever(bodies: FreeBodies, at: Array) -> float:
-    """The size of the machine [m]: its largest distance between joints, or 1."""
-    found = [_place(bodies, _second(joint), at).value for joint in bodies.scene.joints.values()]
-    for body in bodies.scene.bodies.values():
-        found += [np.array(point) for point in body.points.values()]
-    return float(max((np.hypot(*(a - b)) for a in found for b in found), default=0.0)) or 1.0

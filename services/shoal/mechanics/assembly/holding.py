@@ -45,8 +45,8 @@ def _keep(scene: Scene, name: str, condition: Meet | Along | Apart | Sum, result
             onto_first = np.outer(axes[0], term.factor * axes["xyz".index(term.axis)])
             total = total + result.point(scene, term.at).turned(onto_first)
         terms.dot(name, fixed(axes[0][:, None]), total, 1, drive=condition.value.through("neg"))
-    else:
-        assert isinstance(condition, Meet)  # shared, or a constraint where its loop closes
+    elif not isinstance(condition, Meet):  # which is shared, or a constraint where its loop closes
+        raise joints.unknown(condition)
 
 
 def _keep_turn(scene: Scene, name: str, condition: Turned, clamped: bool, result: Placement) -> None:

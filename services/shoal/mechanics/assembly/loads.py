@@ -64,9 +64,9 @@ class Loads:
             if isinstance(joint, Revolute | Slider) and (np.any(joint.friction) or np.any(joint.coulomb)):
                 self._friction(name, joint)
         for name, load in scene.loads.items():
-            if type(load) not in _ADD:
+            if type(load) not in LOADS:
                 raise NotImplementedError(f"the mechanics knows no load of kind {load.kind!r}")
-            _ADD[type(load)](self, name, load)
+            LOADS[type(load)](self, name, load)
 
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
         law = [0.0, 0.0, joint.friction, 0.0, joint.coulomb, joint.coulomb_speed, 0.0]
@@ -204,7 +204,7 @@ class Loads:
         )
 
 
-_ADD: dict[type, Callable[[Loads, str, Any], None]] = {
+LOADS: dict[type, Callable[[Loads, str, Any], None]] = {
     Spring: Loads._spring,
     TorsionSpring: Loads._torsion_spring,
     Force: Loads._force,

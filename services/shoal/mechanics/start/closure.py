@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, conditions
+from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, conditions, unknown
 from shoal.mechanics.numerics.tile import Array, Index, Number
 from shoal.mechanics.plane import as_complex, phasor
 from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
@@ -180,7 +180,8 @@ class Closure:
             wanted, rate = self._length(condition, length)
             slope = np.real(np.conj(along)[:, None] * apart.slope)
             return [(length - wanted, slope, np.real(np.conj(along) * apart.rate) - rate)]
-        assert isinstance(condition, Meet)
+        if not isinstance(condition, Meet):
+            raise unknown(condition)
         return [(f(apart.value), f(apart.slope), f(apart.rate)) for f in (np.real, np.imag)]
 
     def _length(self, condition: Apart, now: Array) -> tuple[Number, float]:

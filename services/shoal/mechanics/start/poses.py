@@ -14,10 +14,10 @@ import numpy as np
 
 from shoal.mechanics.joints import Apart, Turned, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
-from shoal.mechanics.start.closure import Closure, place_of
+from shoal.mechanics.reach import extents, span
+from shoal.mechanics.start.closure import Closure
 from shoal.mechanics.start.walk import Walk, guessed_angles
 from shoal.scene import Scene
-from shoal.scene.joints import places
 from shoal.scene.scene import Quantity
 
 CLOSED = 1e-11
@@ -82,11 +82,8 @@ class Assembly:
         self.angles, self.rates = guessed_angles(scene, lanes)
         self.closure = Closure(scene, np.zeros((lanes, 3 * len(scene.bodies))))
         self.guess = self._guess(0, np.ones(self.angles.shape, dtype=bool))
-        extents = _extents(scene)
-        ends = [self.closure.here(self.guess, at).value for j in scene.joints.values() for at in places(j)]
-        spread = max((float(np.max(np.abs(a - ends[0]))) for a in ends), default=0.0)
-        self.size = max(sum(extents.values()), spread) or 1.0
-        arms = np.array([max(extents[name], 1e-3 * self.size) for name in scene.bodies])
+        self.size = span(scene)
+        arms = np.array([max(float(np.max(arm)), 1e-3 * self.size) for arm in extents(scene).values()])
         self._yield = np.stack([np.ones_like(arms), np.ones_like(arms), arms**-2], 1).ravel()
         """Inverse of the metric in which displacements are measured, (3 bodies,)."""
         self.closure = Closure(scene, self.guess)
@@ -233,14 +230,3 @@ class Assembly:
         rank = DEPENDENT * np.max(basis.S, axis=1, initial=1e-300, keepdims=True) < basis.S
         told = np.einsum("lri,lr->li", basis.Vh**2, rank.astype(float))
         return np.asarray(1.0 - told[:, one.columns] > DEPENDENT)
-
-
-def _extents(scene: Scene) -> dict[str, float]:
-    """Largest distance [m] between two places of each body that have a name or are joined."""
-    ends = [at for joint in scene.joints.values() for at in places(joint)]
-    found = {}
-    for name, body in scene.bodies.items():
-        used = [place_of(scene, at) for at in ends if at.body == name]
-        used += [x + 1j * np.asarray(y) for x, y in body.points.values()]
-        found[name] = max(float(np.max(np.abs(a - b))) for a in used for b in used)
-    return found
