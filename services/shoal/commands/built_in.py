@@ -18,7 +18,7 @@ def scenes(name: str | None) -> None:
 
     if name is None:
         listing("scenes", {n: load_scene(n).description for n in scene_names()})
-        _list_problems()
+        _show_problems()
         return
     if (data := parametric(name)) is not None:
         import yaml
@@ -32,7 +32,7 @@ def scenes(name: str | None) -> None:
         return
     if name not in problem_names():
         raise InputError(unknown(name, "scene or problem", [*scene_names(), *problem_names()]) + "; see `shoal scenes`")
-    _print_problem(name)
+    _show_problems(name)
 
 
 @click.command()
@@ -42,22 +42,17 @@ def problems(name: str | None) -> None:
     from shoal.identification.problem import problem_names
     from shoal.scene.load import unknown
 
-    if name is None:
-        _list_problems()
-        return
-    if name not in problem_names():
+    if name is not None and name not in problem_names():
         raise InputError(unknown(name, "problem", problem_names()) + "; see `shoal problems`")
-    _print_problem(name)
+    _show_problems(name)
 
 
-def _list_problems() -> None:
-    from shoal.identification.problem import load_problem, problem_names
+def _show_problems(name: str | None = None) -> None:
+    """One as YAML, or the names of all."""
+    from shoal.identification.problem import load_problem, problem_library, problem_names
     from shoal.terminal.screen import listing
 
-    listing("problems", {n: load_problem(n).description for n in problem_names()})
-
-
-def _print_problem(name: str) -> None:
-    from shoal.identification.problem import problem_library
-
-    click.echo((problem_library() / f"{name}.yaml").read_text(encoding="utf-8"), nl=False)
+    if name is None:
+        listing("problems", {n: load_problem(n).description for n in problem_names()})
+    else:
+        click.echo((problem_library() / f"{name}.yaml").read_text(encoding="utf-8"), nl=False)

@@ -54,11 +54,10 @@ def identify(
 
     wanted, wishes = load_problem(problem), Wishes(profiles=profiles, bootstrap=bootstrap)
     with _interruptible(checkpoint), screen.working(f"{wanted.name}: preparing the data") as tell:
-
-        def note(iteration: int, best: float, mean: float, evaluations: int) -> None:
-            tell(f"{wanted.name}: best fitness {best:.3e}, {evaluations} evaluations")
-
-        estimate = identify(wanted, checkpoint=checkpoint, wishes=wishes, progress=note, **how)
+        how["progress"] = lambda _, best, __, count: tell(
+            f"{wanted.name}: best fitness {best:.3e}, {count} evaluations"
+        )
+        estimate = identify(wanted, checkpoint=checkpoint, wishes=wishes, **how)
     if out is not None:
         files.estimate(estimate, wanted, out)
     screen.show(estimate.to_json(), as_json, lambda: tables.estimate_table(estimate))

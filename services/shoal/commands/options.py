@@ -10,7 +10,6 @@ import click
 
 from shoal.errors import InputError
 
-Command = Callable[..., Any]
 Values = dict[str, Any]
 """Fields of a scene by path."""
 Times = list[float] | None
@@ -150,7 +149,7 @@ engine = click.option("--engine", cls=LateHelp, told=_engines, default="gauss", 
 method = click.option("--method", cls=LateHelp, told=_methods, metavar="NAME")
 
 
-def out(*endings: str, default: str | None = None, otherwise: str = "") -> Callable[[Command], Command]:
+def out(*endings: str, default: str | None = None, otherwise: str = "") -> Callable[[Any], Any]:
     """--out FILE, refused before anything is computed where it could not be written.
 
     endings: the forms there are; otherwise: what happens without the option

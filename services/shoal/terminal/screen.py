@@ -58,6 +58,7 @@ def listing(title: str, items: Mapping[str, str]) -> None:
     out.print()
 
 
-def say(text: str, style: str = "") -> None:
-    """A line of text, on a terminal folded at 80 columns, in a log file whole; what looks like markup is none."""
-    out.print(escape(text), style=style, width=min(80, out.width), soft_wrap=not out.is_terminal)
+def say(*texts: str, style: str = "") -> None:
+    """Lines of text, on a terminal folded at 80 columns, in a log file whole; what looks like markup is none."""
+    for text in texts:
+        out.print(escape(text), style=style, width=min(80, out.width), soft_wrap=not out.is_terminal)

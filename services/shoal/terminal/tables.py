@@ -49,11 +49,9 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
         f"{trajectory.energy_drift[0]:.1e}, constraints by {trajectory.constraint_drift[0]:.1e}"
     )
     screen.say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms")
-    for remark in remarks(trajectory.model):
-        screen.say(remark)
+    screen.say(*remarks(trajectory.model))
     if verification is not None:
-        for sentence in estimates(verification):
-            screen.say(sentence)
+        screen.say(*estimates(verification))
 
 
 def selection_table(selection: Selection) -> None:
@@ -66,8 +64,7 @@ def selection_table(selection: Selection) -> None:
     for row in rows(selection):
         table.add_row(*row)
     screen.out.print(table)
-    for rod, reason in selection.rigid.items():
-        screen.say(f"{rod} stays rigid: {reason}")
+    screen.say(*(f"{rod} stays rigid: {reason}" for rod, reason in selection.rigid.items()))
     verdict = "met" if selection.met else "not met"
     screen.say(f"{verdict}: {chosen.name}, estimated error {chosen.error:.1e} m; {selection.reason}")
     if selection.shear > selection.tolerance:
@@ -117,8 +114,7 @@ def comparison_table(comparison: Comparison) -> None:
             name, f"{x:.7f}", f"{y:.7f}", f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0])
         )
     screen.out.print(table)
-    for name, reason in comparison.refused.items():
-        screen.say(f"{name} refused: {reason}")
+    screen.say(*(f"{name} refused: {reason}" for name, reason in comparison.refused.items()))
     table = screen.table("distances over all samples", "engines", "marker", "largest [m]", "final [m]")
     for row in comparison.differences():
         distances = ("-" if row[key] is None else f"{row[key]:.2e}" for key in ("largest", "final"))
@@ -177,8 +173,7 @@ def modes_table(modes: Modes) -> None:
 def estimate_table(estimate: Estimate) -> None:
     """The verdict, then values with intervals, other minima, what the residuals say, and what to do next."""
     screen.say(f"verdict: {estimate.verdict}", style="bold")
-    for reason in filter(None, estimate.message.split("; ")):
-        screen.say(f"  {reason}")
+    screen.say(*(f"  {reason}" for reason in filter(None, estimate.message.split("; "))))
     table = screen.table(f"{estimate.problem}, {estimate.method}", "parameter", "value", "95 % interval", "known")
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
         known = "yes" if value.identifiable else "at bound" if value.at_bound else "no"
@@ -188,11 +183,9 @@ def estimate_table(estimate: Estimate) -> None:
         label = f"{name} [{value.unit}]" if value.unit else name
         table.add_row(escape(label), rounded(value.value, unit), interval, known)
     screen.out.print(table)
-    for sentence in estimate.combinations:
-        screen.say(sentence)
+    screen.say(*estimate.combinations)
     _minima(estimate)
-    for sentence in estimate.residual_tests.sentences():
-        screen.say(f"residual {sentence}")
+    screen.say(*(f"residual {sentence}" for sentence in estimate.residual_tests.sentences()))
     for name, found in estimate.profiles.items():
         sides = [side for side, is_open in (("below", found.lower_open), ("above", found.upper_open)) if is_open]
         screen.say(
@@ -204,8 +197,7 @@ def estimate_table(estimate: Estimate) -> None:
             low, high = estimate.bootstrap.interval(name)
             screen.say(f"bootstrap of {name}, {len(estimate.bootstrap.draws)} draws: {low:.6g} to {high:.6g}")
     _effort(estimate)
-    for step in estimate.advice:
-        screen.say(f"next: {step}")
+    screen.say(*(f"next: {step}" for step in estimate.advice))
 
 
 def _minima(estimate: Estimate) -> None:
@@ -221,8 +213,7 @@ def _minima(estimate: Estimate) -> None:
 def _effort(estimate: Estimate) -> None:
     """Where the data come from, what the search cost, and how the answer compares with a known truth."""
     screen.say(f"data: {estimate.data}")
-    for note in estimate.notes:
-        screen.say(f"note: {note}")
+    screen.say(*(f"note: {note}" for note in estimate.notes))
     screen.say(
         f"fitness {estimate.fitness:.4e} {fitness_unit(estimate)}, RMS {estimate.rms:.3e} {rms_unit(estimate)}; "
         f"{estimate.evaluations} evaluations in {estimate.wall_s:.2f} s"
