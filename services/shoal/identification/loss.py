@@ -23,8 +23,10 @@ def flatten(residuals: Array, loss: str, noise: Array) -> Array:
             rho = np.where(z <= 1.0, z, 2.0 * np.sqrt(z) - 1.0)
         case "soft-l1":
             rho = 2.0 * z / (1.0 + np.sqrt(1.0 + z))
-        case _:
+        case "cauchy":
             rho = np.log1p(z)
+        case _:
+            raise NotImplementedError(f"loss: {loss} has no residuals")
     flat: Array = np.sign(residuals) * scale * np.sqrt(rho)
     return flat
 
@@ -43,7 +45,9 @@ def steepness(flat: Array, loss: str, noise: Array) -> Array:
             found = np.sqrt(2.0 * beyond / (1.0 + beyond))
         case "soft-l1":
             found = np.sqrt((1.0 + rho / 2.0) / (1.0 + rho / 4.0))
-        case _:
+        case "cauchy":
             found = np.sqrt(np.maximum(rho, _SMALL) / -np.expm1(-np.maximum(rho, _SMALL)))
+        case _:
+            raise NotImplementedError(f"loss: {loss} has no steepness")
     steeper: Array = found
     return steeper

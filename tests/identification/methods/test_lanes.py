@@ -7,7 +7,7 @@ import pytest
 from shoal.engines import get_engine
 from shoal.identification import Measurement
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import descend_many, differentiate_many, distinct, history
+from shoal.identification.methods.lanes import descend_many, differentiate_many, history
 from shoal.identification.methods.least_squares import descend
 from shoal_validation.inverse_precision.cases import PLAIN, rigid_problem, textbook
 
@@ -79,7 +79,6 @@ def test_a_start_beside_another_leaves() -> None:
     first, second = descend_many(model, np.array([near, near + 1e-7]))
     assert first.converged != second.converged
     assert min(len(first.rows), len(second.rows)) == 1
-    assert len(distinct(model, [first, second], apart=0.5)) == 1
 
 
 def test_a_hopeless_rival_is_given_up() -> None:

@@ -41,7 +41,7 @@ def test_a_single_shot_over_the_same_record_fails() -> None:
     problem = rigid_problem()
     model = forward(problem, record(problem, CHAOTIC, 10.0))
     shot = least_squares(model, np.random.default_rng(0), silent)
-    assert np.max(np.abs(shot.point - list(model.measurement.truth.values()))) > 1e-2
+    assert shot.fitness > 0.1 * model.rows.signal**2
 
 
 def test_work_counts_the_simulated_time_of_every_run(watched: Callable[..., Any]) -> None:

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.starts import damped_steps
+from shoal.identification.methods.starts import damped_steps, poses_and_slopes
 from shoal.identification.recording.source import Channel
 from shoal.trajectory import Array
 
@@ -98,11 +98,9 @@ def _gauss_newton(
     model: ForwardModel, name: str, points: Array, targets: Array, angles: list[int], kinds: tuple[str, ...]
 ) -> Array:
     """The points with their angles moved towards the targets, (points, parameters)."""
-    h = 1e-6
-    shifted = np.concatenate([points, *(points + h * np.eye(points.shape[1])[k] for k in angles)])
-    seen = model.poses(shifted, name).reshape(1 + len(angles), len(points), -1)
-    error = _difference(seen[0], targets, kinds)
-    jacobian = np.moveaxis(_difference(seen[1:], seen[0], kinds) / h, 0, -1)
+    seen, jacobian = poses_and_slopes(model, name, points, angles)
+    error = _difference(seen, targets, kinds)
+    jacobian[:, [kind == "rate" for kind in kinds]] = 0.0
     # A little damping, so that a stretched pose (singular) does not send the angles far away.
     step = damped_steps(error, jacobian, np.full(len(points), 1e-6))
     moved = points.copy()

@@ -10,8 +10,6 @@ from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import starting_points
 from shoal.trajectory import Array
 
-__all__ = ["Descent", "descend", "differentiate", "from_starts", "least_squares"]
-
 PATIENCE = 100.0
 """A rival that after two steps is still worse by this factor than the best start is given up."""
 

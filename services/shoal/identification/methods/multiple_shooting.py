@@ -22,11 +22,11 @@ from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import progressive
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.problem import Parameter
-from shoal.identification.recording.measurement import Measurement, Recording
+from shoal.identification.recording.measurement import Recording
 from shoal.identification.recording.source import Channel
 from shoal.scene import Scene
 from shoal.scene.joints import Attachment, Revolute
-from shoal.scene.loads import DistributedForce, Force, Spring, Torque, TorsionSpring
+from shoal.scene.loads import DistributedForce, Force, Load, Spring, Torque, TorsionSpring
 from shoal.trajectory import Array
 
 SEGMENT = 0.5
@@ -196,7 +196,7 @@ class Segments:
         values = np.full((len(times), len(self.short.measurement.first.channels)), np.nan)
         values[:, : len(self.recording.channels)] = self.recording.values[mine]
         window = replace(self.short.measurement.first, times=times, values=values)
-        return replace(self.short, measurement=_like(self.short.measurement, window))
+        return replace(self.short, measurement=self.short.measurement.changed(lambda _: window))
 
     def _state_of(self, point: Array) -> Array:
         """The initial state at a point, (states,)."""
@@ -236,21 +236,12 @@ def cut(model: ForwardModel) -> Segments:
 def _short(model: ForwardModel, instants: Array, others: list[int]) -> ForwardModel:
     """The machine with a state and the others as parameters, and a record of zeros: its residuals are the motion."""
     scene, recording = model.scene, model.measurement.first
-    turn = np.pi + max(
-        (
-            float(np.nanmax(np.abs(v)))
-            for c, v in zip(recording.channels, recording.values.T, strict=True)
-            if c.quantity == "angle"
-        ),
-        default=0.0,
-    )
-    limits = {"angle": turn, "rate": _FASTEST}
-    parameters = {
-        f"{_PREFIX}{path.replace('.', '-')}": Parameter(
-            path=path, lower=-limits[path.split(".")[-1]], upper=limits[path.split(".")[-1]]
-        )
-        for path in _state_paths(scene)
-    }
+    angles = recording.values[:, [channel.quantity == "angle" for channel in recording.channels]]
+    limits = {"angle": np.pi + float(np.nanmax(np.abs(angles), initial=0.0)), "rate": _FASTEST}
+    parameters = {}
+    for path in _state_paths(scene):
+        limit = limits[path.rpartition(".")[2]]
+        parameters[f"{_PREFIX}{path.replace('.', '-')}"] = Parameter(path=path, lower=-limit, upper=limit)
     entries = list(model.parameters.entries.values())
     parameters |= {
         entries[k].key: entries[k].parameter.model_copy(update={"prior": None, "own": False}) for k in others
@@ -265,15 +256,10 @@ def _short(model: ForwardModel, instants: Array, others: list[int]) -> ForwardMo
         model,
         problem=model.problem.model_copy(update={"parameters": parameters, "loss": "squares"}),
         scene=scene.model_copy(update={"markers": {**scene.markers, **markers}}),
-        measurement=_like(model.measurement, still),
+        measurement=model.measurement.changed(lambda _: still),
         memory=None,
         whole=model,
     )
-
-
-def _like(measurement: Measurement, recording: Recording) -> Measurement:
-    """The measurement with another record in the place of its only one."""
-    return Measurement({next(iter(measurement.recordings)): recording})
 
 
 def _state_paths(scene: Scene) -> list[str]:
@@ -301,12 +287,17 @@ def _check(model: ForwardModel) -> None:
             raise InputError(f"method: multiple-shooting {reason}; {instead}")
 
 
-def _driven(load: object) -> bool:
+def _driven(load: Load) -> bool:
     """Whether a load depends on time."""
-    function = (
-        load.torque if isinstance(load, Torque) else load.scale if isinstance(load, Force | DistributedForce) else None
-    )
-    return function is not None and function.number is None
+    match load:
+        case Torque():
+            return load.torque.number is None
+        case Force() | DistributedForce():
+            return load.scale.number is None
+        case Spring() | TorsionSpring():
+            return False
+        case _:
+            raise NotImplementedError(f"multiple-shooting: a load of kind {load.kind} is not known")
 
 
 def _rests_at_start(load: object) -> bool:

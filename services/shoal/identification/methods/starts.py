@@ -155,14 +155,19 @@ def _pose_error(model: ForwardModel, name: str, points: Array, angles: list[int]
 
     Channels that are not known, or that are no pose (rates), do not count.
     """
+    seen, slope = poses_and_slopes(model, name, points, angles)
+    channels = model.measurement.recordings[name].channels
+    counted = np.isfinite(pose) & np.array([channel.quantity != "rate" for channel in channels])
+    error = np.where(counted, seen - np.where(counted, pose, 0.0), 0.0)
+    return error, np.where(counted[:, None] & np.isfinite(slope), slope, 0.0)
+
+
+def poses_and_slopes(model: ForwardModel, name: str, points: Array, angles: list[int]) -> tuple[Array, Array]:
+    """Channels at time zero, (points, channels), and their derivatives in the angles, (points, channels, angles)."""
     h = 1e-6
     shifted = np.concatenate([points, *(points + h * np.eye(points.shape[1])[k] for k in angles)])
     seen = model.poses(shifted, name).reshape(1 + len(angles), len(points), -1)
-    channels = model.measurement.recordings[name].channels
-    counted = np.isfinite(pose) & np.array([channel.quantity != "rate" for channel in channels])
-    error = np.where(counted, seen[0] - np.where(counted, pose, 0.0), 0.0)
-    slope = np.moveaxis((seen[1:] - seen[0]) / h, 0, -1)
-    return error, np.where(counted[:, None] & np.isfinite(slope), slope, 0.0)
+    return seen[0], np.moveaxis((seen[1:] - seen[0]) / h, 0, -1)
 
 
 def _with_rates(

@@ -40,7 +40,9 @@ def observe(trajectory: Trajectory, channels: tuple[Channel, ...], seen_by: Came
             if trajectory.rates is None:
                 raise InputError(f"channels: engine {trajectory.engine} tells no rates; use gauss, or no rate")
             columns.append(trajectory.rates[:, index])
-        else:
+        elif channel.is_position:
             x, y = trajectory.points[:, index, 0] - seen_by.x, trajectory.points[:, index, 1] - seen_by.y
             columns.append((c * x + s * y if channel.quantity == "x" else c * y - s * x) / seen_by.scale)
+        else:
+            raise NotImplementedError(f"channels: {channel.quantity} is not observed")
     return np.moveaxis(np.stack(columns, axis=1), -1, 0)

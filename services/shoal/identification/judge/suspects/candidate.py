@@ -47,19 +47,21 @@ class Candidate:
     def single(
         cls,
         name: str,
+        path: str,
         stated: float,
-        parameter: Parameter,
+        bounds: tuple[float, float],
         probe: float,
         kind: str = "machine",
         *,
+        law: Literal["linear", "log"] = "linear",
         scene: Scene | None = None,
         alone: bool = False,
         factor: bool = False,
     ) -> Candidate:
-        """One number, whose effect is measured at one other value."""
-        law: Literal["linear", "log"] = "log" if parameter.logarithmic else "linear"
+        """One number between bounds, whose effect is measured at one other value."""
+        free = Parameter(path=path, lower=bounds[0], upper=bounds[1], scale=law)
         probes, bases = np.array([[[probe]]]), np.array([[stated]])
-        return cls(name, kind, (parameter,), (stated,), probes, bases, law, scene, alone, factor)
+        return cls(name, kind, (free,), (stated,), probes, bases, law, scene, alone, factor)
 
     @property
     def keys(self) -> tuple[str, ...]:

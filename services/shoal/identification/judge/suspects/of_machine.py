@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.size import Size, size_of
-from shoal.identification.problem import Parameter
 from shoal.mechanics.start.start import is_direct
 from shoal.scene import PointMass, RigidBody, Rod, Scene
 from shoal.scene.joints import GROUND, Attachment, Revolute, Slider, places
@@ -49,9 +49,9 @@ def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
         }
         for field, upper in most.items():
             stated = float(getattr(joint, field))
-            free = Parameter(path=f"joints.{name}.{field}", lower=0.0, upper=max(upper, 4 * stated), scale="linear")
             words = "friction" if field == "friction" else "dry friction"
-            yield Candidate.single(f"{words} of {name}", stated, free, stated + _STEP * upper)
+            path, bounds = f"joints.{name}.{field}", (0.0, max(upper, 4 * stated))
+            yield Candidate.single(f"{words} of {name}", path, stated, bounds, stated + _STEP * upper)
 
 
 def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
@@ -67,9 +67,8 @@ def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
     with suppress(InputError):
         with_masses = Scene.parse(loaded)
         for name in seen:
-            path = f"bodies.further-{name}.mass"
-            free = Parameter(path=path, lower=_NOTHING * size.mass, upper=size.mass, scale="linear")
-            yield Candidate.single(f"mass at {name}", 0.0, free, _STEP * size.mass, scene=with_masses)
+            path, bounds = f"bodies.further-{name}.mass", (_NOTHING * size.mass, size.mass)
+            yield Candidate.single(f"mass at {name}", path, 0.0, bounds, _STEP * size.mass, scene=with_masses)
     for name, body in scene.bodies.items() if len(scene.bodies) > 1 else ():
         field = "density" if isinstance(body, Rod) else "mass"
         yield _ratio(f"mass of {name}", f"bodies.{name}.{field}", float(getattr(body, field)))
@@ -97,8 +96,8 @@ def _lengths(scene: Scene) -> Iterator[Candidate]:
 def _ratio(name: str, path: str, stated: float) -> Candidate:
     """A number known to within a factor."""
     lower, upper = sorted((stated / _FACTORS, stated * _FACTORS))
-    free = Parameter(path=path, lower=lower, upper=upper, scale="log" if stated > 0 else "linear")
-    return Candidate.single(name, stated, free, stated * (1 + _STEP), factor=True)
+    law: Literal["log", "linear"] = "log" if stated > 0 else "linear"
+    return Candidate.single(name, path, stated, (lower, upper), stated * (1 + _STEP), law=law, factor=True)
 
 
 def _pivots(scene: Scene, size: Size) -> Iterator[Candidate]:
@@ -112,9 +111,8 @@ def _pivots(scene: Scene, size: Size) -> Iterator[Candidate]:
     }
     for (name, field), place in places.items() if len(places) > 1 else ():
         for axis, stated in enumerate(place):
-            path, width = f"joints.{name}.{field}.point.{axis}", _SHIFT * size.length
-            free = Parameter(path=path, lower=stated - width, upper=stated + width, scale="linear")
-            yield Candidate.single(f"{'xy'[axis]} of the pivot {name}", stated, free, stated + _STEP * width)
+            words, path = f"{'xy'[axis]} of the pivot {name}", f"joints.{name}.{field}.point.{axis}"
+            yield _near(words, path, stated, _SHIFT * size.length)
     yield from _joints_on_bodies(scene)
 
 
@@ -133,10 +131,14 @@ def _joints_on_bodies(scene: Scene) -> Iterator[Candidate]:
     with suppress(InputError):
         stated = Scene.parse(explicit)
         for name, field, along, length in found:
-            path, width = f"joints.{name}.{field}.point.0", _SHIFT * length
-            free = Parameter(path=path, lower=along - width, upper=along + width, scale="linear")
             words = f"place of {name} on {getattr(scene.joints[name], field).body}"
-            yield Candidate.single(words, along, free, along + _STEP * width, scene=stated)
+            yield _near(words, f"joints.{name}.{field}.point.0", along, _SHIFT * length, stated)
+
+
+def _near(name: str, path: str, stated: float, width: float, scene: Scene | None = None) -> Candidate:
+    """A number known to within a width."""
+    bounds = (stated - width, stated + width)
+    return Candidate.single(name, path, stated, bounds, stated + _STEP * width, scene=scene)
 
 
 def _rates(scene: Scene, size: Size) -> Iterator[Candidate]:
@@ -148,6 +150,5 @@ def _rates(scene: Scene, size: Size) -> Iterator[Candidate]:
         if isinstance(body, PointMass) or not (direct or name in grounded):
             continue
         rate, most = scene.start(name).rate, 10.0 * size.rate
-        free = Parameter(path=f"initial.{name}.rate", lower=rate - most, upper=rate + most, scale="linear")
-        words = f"rate of {name} at the start"
-        yield Candidate.single(words, rate, free, rate + _STEP * size.rate, alone=not direct)
+        words, path, bounds = f"rate of {name} at the start", f"initial.{name}.rate", (rate - most, rate + most)
+        yield Candidate.single(words, path, rate, bounds, rate + _STEP * size.rate, alone=not direct)

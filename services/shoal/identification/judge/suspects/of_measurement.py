@@ -8,7 +8,7 @@ import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.candidate import Candidate
-from shoal.identification.problem import RESERVED, Parameter
+from shoal.identification.problem import RESERVED
 
 _FACTORS = 2.0
 """Clock, scale and gravity are looked for within this factor."""
@@ -27,18 +27,18 @@ def of_measurement(model: ForwardModel) -> Iterator[Candidate]:
     end = model.measurement.end
     for name in ("clock", "scale") if positions else ("clock",):
         stated = float(getattr(first.stated, name))
-        free = Parameter(path=f"{RESERVED}.{name}", lower=stated / _FACTORS, upper=stated * _FACTORS, scale="log")
-        yield Candidate.single(name, stated, free, stated * (1 + _STEP), "measurement", factor=True)
+        bounds, probe = (stated / _FACTORS, stated * _FACTORS), stated * (1 + _STEP)
+        yield Candidate.single(name, f"{RESERVED}.{name}", stated, bounds, probe, "measurement", law="log", factor=True)
     shifts = {"tilt": np.pi / 2} | ({"x": reach, "y": reach} if positions else {})
     for name, width in shifts.items():
         stated = float(getattr(first.stated, name))
-        free = Parameter(path=f"{RESERVED}.{name}", lower=stated - width, upper=stated + width, scale="linear")
-        yield Candidate.single(name, stated, free, stated + _STEP * width, "measurement")
+        bounds, probe = (stated - width, stated + width), stated + _STEP * width
+        yield Candidate.single(name, f"{RESERVED}.{name}", stated, bounds, probe, "measurement")
     stated = first.stated.delay
-    free = Parameter(path=f"{RESERVED}.delay", lower=stated - _EARLY * end, upper=stated + _LATE * end, scale="linear")
-    yield Candidate.single("delay", stated, free, stated + _STEP * end, "measurement")
+    bounds = (stated - _EARLY * end, stated + _LATE * end)
+    yield Candidate.single("delay", f"{RESERVED}.delay", stated, bounds, stated + _STEP * end, "measurement")
     size = model.scene.gravity[1]
     if size != 0.0 and model.scene.gravity[0] == 0.0:
         lower, upper = sorted((size / _FACTORS, size * _FACTORS))
-        free = Parameter(path="gravity.1", lower=lower, upper=upper, scale="linear")
-        yield Candidate.single("gravity", size, free, size * (1 + _STEP), "measurement", factor=True)
+        probe = size * (1 + _STEP)
+        yield Candidate.single("gravity", "gravity.1", size, (lower, upper), probe, "measurement", factor=True)

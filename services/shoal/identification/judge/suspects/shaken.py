@@ -62,12 +62,7 @@ def _on_a_block(scene: Scene, joint: str, side: str, axis: int, size: Size) -> S
     data["bodies"][_BLOCK] = {"kind": "point-mass", "mass": mass}
     data["joints"][joint][side] = {"body": _BLOCK}
     ground, block = {"body": GROUND, "point": place}, {"body": _BLOCK}
-    data["joints"][_BLOCK] = {
-        "kind": "slider",
-        "first": ground,
-        "second": block,
-        "direction": axis * np.pi / 2,
-    }
+    data["joints"][_BLOCK] = {"kind": "slider", "first": ground, "second": block, "direction": axis * np.pi / 2}
     data["loads"][_BLOCK] = {
         "kind": "spring",
         "first": {"body": GROUND, "point": held},
@@ -96,16 +91,9 @@ def _candidate(joint: str, axis: int, place: tuple[float, float], scene: Scene, 
     step = _STEP * size.length
     ways = zip(stiffness, rates, strict=True)
     probes = np.array([[[stated + step, 0.0, k], [stated, step * rate, k]] for k, rate in ways])
-    return Candidate(
-        f"motion of the pivot {joint} along {'xy'[axis]}",
-        "machine",
-        parameters,
-        (stated, 0.0, float(stiffness[0])),
-        probes,
-        bases,
-        scene=scene,
-        tell=partial(_told, stated, mass),
-    )
+    name, values = f"motion of the pivot {joint} along {'xy'[axis]}", (stated, 0.0, float(stiffness[0]))
+    tell = partial(_told, stated, mass)
+    return Candidate(name, "machine", parameters, values, probes, bases, scene=scene, tell=tell)
 
 
 def _told(stated: float, mass: float, values: Array) -> tuple[float, str]:
