@@ -97,9 +97,9 @@ def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
     """On a copy of the engines that goes before those of the package, whose kernels are compiled."""
     shutil.copytree(DOCS.parent / "services/shoal/engines", tmp_path / "services/shoal/engines")
     use = extend("extend/engine.md", tmp_path)
-    first = f"import shoal\nshoal.__path__.insert(0, {str(tmp_path / 'services/shoal')!r})\n"
-    last = "\nimport json\nprint(json.dumps([largest, estimated, refusal]))"
-    done = subprocess.run([sys.executable, "-c", first + use + last], capture_output=True, text=True, check=False)
+    first = f"import json, shoal\nshoal.__path__.insert(0, {str(tmp_path / 'services/shoal')!r})\n"
+    program = f"{first}{use}\nprint(json.dumps([largest, estimated, refusal]))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     largest, estimated, refusal = json.loads(done.stdout)
     assert max(largest, estimated) < 1e-8
