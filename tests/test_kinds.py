@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 import pytest
@@ -17,9 +17,13 @@ from shoal.engines.exudyn.loads import add_load
 from shoal.engines.theory import left_out
 from shoal.errors import InputError
 from shoal.identification.methods import get_method
-from shoal.mechanics.integrators import facts
+from shoal.mechanics.elements import ELEMENTS
+from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.scene import Attachment, Scene, load_scene
+from shoal.scene.bodies import Element
+from shoal.scene.joints import sides
 from shoal.scene.record import Record
+from shoal.scene.solver import IntegratorName
 
 NAME = "invented"
 SCENE = load_scene("single-pendulum")
@@ -87,6 +91,12 @@ PLACES: dict[str, Callable[[], Any]] = {
     "integrator, casadi": lambda: CasadiEngine(integrator=NAME).simulate(SCENE, [0.1]),  # type: ignore[arg-type]
     "beam": lambda: ExudynEngine(beam=NAME).simulate(SCENE, [0.1]),  # type: ignore[arg-type]
     "method": lambda: get_method(NAME),
+    **{
+        f"swarm, {name}": lambda name=name: get_engine(name).simulate(
+            SCENE.with_values({"solver.acceleration": NAME}), [0.1]
+        )
+        for name in OTHERS
+    },
     "swarm, one run": lambda: get_engine("gauss").simulate(SCENE.with_values({"solver.acceleration": NAME})),
     "swarm, lanes": lambda: get_engine("gauss").simulate_many(
         SCENE.with_values({"solver.acceleration": NAME}), {"initial.OA.angle": np.zeros(2)}
@@ -107,6 +117,21 @@ def test_an_invented_kind_is_refused_by_its_name(place: str) -> None:
 @pytest.mark.parametrize("scene", [JOINT, LOAD, ELEMENT], ids=["joint", "load", "element"])
 def test_a_scene_needs_the_kind(scene: Scene) -> None:
     assert NAME in {need for _, need in needs(scene)}
+
+
+def test_the_places_of_a_newcomer_are_found_among_its_fields() -> None:
+    assert list(sides(Joint())) == ["first", "second"]
+    assert list(sides(Load())) == ["at"]
+
+
+def test_lists_of_the_scene_and_of_the_mechanics_name_the_same() -> None:
+    assert set(get_args(IntegratorName)) == {"auto", *INTEGRATORS}
+    assert set(get_args(Element)) == {"rigid", *ELEMENTS}
+
+
+@pytest.mark.parametrize("element", get_args(Element))
+def test_of_every_element_it_is_known_whether_it_shears(element: str) -> None:
+    assert ROD.model_copy(update={"element": element}).shears == (element == "ancf-full")
 
 
 def test_what_casadi_says_is_what_its_tables_hold() -> None:

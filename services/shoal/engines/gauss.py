@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import get_args
 
-from shoal.engines.capabilities import FEATURES
+from shoal.engines.capabilities import FEATURES, check_acceleration
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
-from shoal.errors import InputError
 from shoal.scene import JOINT_KINDS, LOAD_KINDS, Scene
 from shoal.scene.bodies import Element
 from shoal.trajectory import Array, Trajectory
@@ -40,7 +39,7 @@ class GaussEngine:
         """Run one scene, under `auto` by the first integrator that can; see `Engine`."""
         from shoal.mechanics.persist import persist
 
-        _check_acceleration(scene)
+        check_acceleration(scene)
         return persist(scene, sampling_times(scene, times), self.threads)
 
     def simulate_many(
@@ -49,16 +48,6 @@ class GaussEngine:
         """Run one scene per lane, all in compiled tiles; see `Engine`."""
         from shoal.mechanics.simulate import simulate
 
-        _check_acceleration(scene)
+        check_acceleration(scene)
         check_lanes(scene, values)
         return simulate(scene, sampling_times(scene, times), values, threads=self.threads)
-
-
-def _check_acceleration(scene: Scene) -> None:
-    """Raises InputError for a way to the acceleration that neither the mechanics nor the swarms have."""
-    from shoal.mechanics.least.gauss import METHODS
-    from shoal.swarm import OPTIMIZERS
-
-    known = (*METHODS, *OPTIMIZERS)
-    if (name := scene.solver.acceleration) not in known:
-        raise InputError(f"solver.acceleration: no way {name!r}; there are {', '.join(known)}")
