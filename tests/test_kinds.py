@@ -98,6 +98,12 @@ PLACES: dict[str, Callable[[], Any]] = {
     "integrator, casadi": lambda: CasadiEngine(integrator=NAME).simulate(SCENE, [0.1]),  # type: ignore[arg-type]
     "beam": lambda: ExudynEngine(beam=NAME).simulate(SCENE, [0.1]),  # type: ignore[arg-type]
     "method": lambda: get_method(NAME),
+    **{
+        f"swarm, {name}": lambda name=name: get_engine(name).simulate(
+            SCENE.with_values({"solver.acceleration": NAME}), [0.1]
+        )
+        for name in OTHERS
+    },
     "swarm, one run": lambda: get_engine("gauss").simulate(SCENE.with_values({"solver.acceleration": NAME})),
     "swarm, lanes": lambda: get_engine("gauss").simulate_many(
         SCENE.with_values({"solver.acceleration": NAME}), {"initial.OA.angle": np.zeros(2)}

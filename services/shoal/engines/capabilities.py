@@ -77,6 +77,7 @@ def loops(scene: Scene) -> Iterator[str]:
 
 def require(engine: Engine, scene: Scene) -> None:
     """Raises InputError, one line, where a scene needs more than the engine can do."""
+    check_acceleration(scene)
     able = engine.capabilities.all
     for field, need in needs(scene):
         if need not in able:
@@ -84,6 +85,16 @@ def require(engine: Engine, scene: Scene) -> None:
             others = [name for name, make in ENGINES.items() if wanted <= make().capabilities.all]
             use = f"; use {' or '.join(others)}" if others else ""
             raise InputError(f"{field}: engine {engine.name} cannot do {need}{use}")
+
+
+def check_acceleration(scene: Scene) -> None:
+    """Raises InputError for a way to the acceleration that neither the mechanics nor the swarms have."""
+    from shoal.mechanics.least.principle import METHODS
+    from shoal.swarm import OPTIMIZERS
+
+    known = (*METHODS, *OPTIMIZERS)
+    if (name := scene.solver.acceleration) not in known:
+        raise InputError(f"solver.acceleration: no way {name!r}; there are {', '.join(known)}")
 
 
 def of_kind(table: Mapping[str, T], kind: str, where: str) -> T:

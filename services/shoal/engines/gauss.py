@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import get_args
 
-from shoal.engines.capabilities import FEATURES
+from shoal.engines.capabilities import FEATURES, check_acceleration
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
-from shoal.errors import InputError
 from shoal.scene import JOINT_KINDS, LOAD_KINDS, Scene
 from shoal.scene.bodies import Element
 from shoal.trajectory import Array, Trajectory
@@ -41,7 +40,7 @@ class GaussEngine:
         from shoal.engines import swarm_motion
         from shoal.mechanics.persist import persist
 
-        _check_acceleration(scene)
+        check_acceleration(scene)
         wanted = sampling_times(scene, times)
         if swarm_motion.asked_for(scene):
             return swarm_motion.simulate(scene, wanted)
@@ -54,18 +53,8 @@ class GaussEngine:
         from shoal.engines import swarm_motion
         from shoal.mechanics.simulate import simulate
 
-        _check_acceleration(scene)
+        check_acceleration(scene)
         lanes, wanted = check_lanes(scene, values), sampling_times(scene, times)
         if swarm_motion.asked_for(scene):
             return swarm_motion.simulate(swarm_motion.only_lane(scene, values, lanes), wanted)
         return simulate(scene, wanted, values, threads=self.threads)
-
-
-def _check_acceleration(scene: Scene) -> None:
-    """Raises InputError for a way to the acceleration that neither the mechanics nor the swarms have."""
-    from shoal.mechanics.least.principle import METHODS
-    from shoal.swarm import OPTIMIZERS
-
-    known = (*METHODS, *OPTIMIZERS)
-    if (name := scene.solver.acceleration) not in known:
-        raise InputError(f"solver.acceleration: no way {name!r}; there are {', '.join(known)}")

@@ -9,7 +9,7 @@ from pydantic import Field
 from shoal.scene.record import Positive, Record
 
 Acceleration = Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
-"""A name that the native engine knows: among them are the swarms, of which a scene need not know the list."""
+"""A name that the engines look up: among them are the swarms, whose list a scene does not know."""
 IntegratorName = Literal[
     "auto",
     "leapfrog",
