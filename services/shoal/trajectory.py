@@ -38,7 +38,7 @@ class Trajectory:
 
     times: sampling instants [s], (samples,)
     markers: names, in the order of the scene
-    points: marker positions [m], (samples, markers, 2, lanes)
+    points: marker positions [m], (samples, markers, d, lanes), d the dimensions of the scene, named by `axes`
     angles: direction of the body (of a cable: of its tangent) at each marker [rad],
         continuous in time, (samples, markers, lanes)
     status: one per lane; message: why the first lane that is not ok is not
@@ -47,7 +47,7 @@ class Trajectory:
     constraint_drift: largest violation of a position constraint, relative to the machine's size, (lanes,)
     steps: time steps taken by each lane; wall_s: wall-clock time of the whole call [s]
     model: what was computed, for the record (unknowns, elements, integrator, step, ...)
-    velocities: of the markers [m/s], (samples, markers, 2, lanes); rates: of the angles [rad/s],
+    velocities: of the markers [m/s], (samples, markers, d, lanes); rates: of the angles [rad/s],
         (samples, markers, lanes); None where the engine does not tell them
     """
 
@@ -67,6 +67,11 @@ class Trajectory:
     rates: Array | None = None
 
     @property
+    def axes(self) -> str:
+        """Names of the components of a position, one letter each."""
+        return "xyz"[: self.points.shape[2]]
+
+    @property
     def lanes(self) -> int:
         """Number of scenes simulated side by side."""
         return len(self.status)
@@ -81,7 +86,7 @@ class Trajectory:
         return f"Trajectory({', '.join(self.markers)}; {len(self.times)} samples, {self.engine}, {what})"
 
     def marker(self, name: str, lane: int = 0) -> Array:
-        """Path of one marker [m], (samples, 2)."""
+        """Path of one marker [m], (samples, d)."""
         return self.points[:, self.markers.index(name), :, lane]
 
     def angle(self, name: str, lane: int = 0) -> Array:
@@ -98,8 +103,8 @@ class Trajectory:
 
         columns: dict[str, Array] = {}
         for name in self.markers:
-            x, y = self.marker(name, lane).T
-            columns |= {f"{name}.x": x, f"{name}.y": y, f"{name}.angle": self.angle(name, lane)}
+            columns |= {f"{name}.{axis}": x for axis, x in zip(self.axes, self.marker(name, lane).T, strict=True)}
+            columns[f"{name}.angle"] = self.angle(name, lane)
         return pd.DataFrame(columns, index=pd.Index(self.times, name="t"))
 
     def to_xarray(self) -> xr.Dataset:
@@ -109,7 +114,8 @@ class Trajectory:
         except ModuleNotFoundError:
             raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
         dims = ("time", "marker", "lane")
-        columns = {"x": (self.points[:, :, 0], "m"), "y": (self.points[:, :, 1], "m"), "angle": (self.angles, "rad")}
+        columns = {axis: (self.points[:, :, k], "m") for k, axis in enumerate(self.axes)}
+        columns["angle"] = self.angles, "rad"
         status = ("lane", [str(status) for status in self.status])
         time = ("time", self.times, {"units": "s"})
         coordinates = {"time": time, "marker": list(self.markers), "status": status}
@@ -125,8 +131,7 @@ class Trajectory:
             "markers": {
                 name: {
                     "t": times,
-                    "x": plain(self.marker(name, lane)[:, 0]),
-                    "y": plain(self.marker(name, lane)[:, 1]),
+                    **{axis: plain(x) for axis, x in zip(self.axes, self.marker(name, lane).T, strict=True)},
                     "angle": plain(self.angle(name, lane)),
                 }
                 for name in self.markers
