@@ -6,6 +6,7 @@ import asyncio
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from shoal.api.jobs import Jobs
 from shoal.api.refusal import Refusal
 from shoal.api.schemas import IdentifyRequest
@@ -60,6 +61,5 @@ def test_too_many_jobs_are_refused() -> None:
 
 
 def test_every_engine_can_be_served() -> None:
-    choice = next(one for one in main.commands["serve"].params if one.name == "engine")
-    assert set(choice.type.choices) == set(ENGINES)  # type: ignore[attr-defined]
+    assert f"{{{'|'.join(ENGINES)}}}" in CliRunner().invoke(main, ["serve", "--help"]).stdout
     assert PORTS == {"gauss": 8001, "exudyn": 8002, "casadi": 8003}

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 from numba import njit
-from shoal.mechanics import gates
-from shoal.mechanics.least import constraints, drift
+from shoal.mechanics import constraints, gates
+from shoal.mechanics.least import drift
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.pointers import pointer, raw
 

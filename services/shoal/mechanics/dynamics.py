@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import literal_unroll, njit
 
-from shoal.mechanics import applied, forces
+from shoal.mechanics import applied, constraints, forces
 from shoal.mechanics.derived import derive, fold
 from shoal.mechanics.elements import families
-from shoal.mechanics.least import constraints, principle
+from shoal.mechanics.least import principle
 from shoal.mechanics.least import work as least
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import gate, sparse

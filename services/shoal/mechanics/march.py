@@ -16,12 +16,11 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import gates
+from shoal.mechanics import constraints, gates
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, loaded, remember
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
 from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
-from shoal.mechanics.least import constraints
 from shoal.mechanics.marched import LoopRoom, Marched, rooms, sampled
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.pointers import raw

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics.least import constraints
+from shoal.mechanics import constraints
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 

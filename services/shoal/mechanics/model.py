@@ -15,17 +15,17 @@ import numpy as np
 from numba import njit
 
 from shoal.errors import InputError
+from shoal.mechanics import saddle
 from shoal.mechanics.applied import Applied
-from shoal.mechanics.assembly.frames import Frame
+from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.derived import Derived
 from shoal.mechanics.forces import Forces
+from shoal.mechanics.frames import Frame
 from shoal.mechanics.functions import Functions, Piecewise
-from shoal.mechanics.least import saddle
-from shoal.mechanics.least.constraints import Constraints
-from shoal.mechanics.least.saddle import Saddle
 from shoal.mechanics.numerics import gate, sparse
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import Array, Flags, Index, Tile, pack, packed, varies
+from shoal.mechanics.saddle import Saddle
 from shoal.scene import Scene
 
 

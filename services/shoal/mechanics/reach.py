@@ -15,8 +15,7 @@ import numpy as np
 from shoal.mechanics.joints import Meet, of_scene
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import GROUND, Rod, Scene
-from shoal.scene.joints import places
-from shoal.scene.loads import sides as load_sides
+from shoal.scene.joints import places, sides
 
 MARGIN = 1.1
 """A run is rejected beyond so many times the reach, which bending and the samples of the energy round off."""
@@ -48,7 +47,7 @@ def span(scene: Scene) -> float:
     All bodies stretched out in a line, or the distance between places on the ground and stated positions if it is more.
     """
     joined = [side for joint in scene.joints.values() for side in places(joint)]
-    loaded = [side for load in scene.loads.values() for side in load_sides(load).values()]
+    loaded = [side for load in scene.loads.values() for side in sides(load).values()]
     fixed = [scene.location(side) for side in (*joined, *loaded) if side.body == GROUND]
     fixed += [start.position for start in scene.initial.values() if start.position is not None]
     return float(max(np.max(size(scene)), np.max(_widest(fixed)))) or 1.0

@@ -8,7 +8,6 @@ from pydantic import Field
 
 from shoal.scene.function import Function
 from shoal.scene.joints import Attachment
-from shoal.scene.joints import sides as sides
 from shoal.scene.record import NonNegative, Record, Vector, kinds
 
 

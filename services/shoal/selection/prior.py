@@ -26,8 +26,7 @@ from shoal.scene import (
     TorsionSpring,
     Weld,
 )
-from shoal.scene.joints import places
-from shoal.scene.loads import sides
+from shoal.scene.joints import places, sides
 from shoal.selection.levels import RIGID, apply
 from shoal.trajectory import Array, Trajectory
 

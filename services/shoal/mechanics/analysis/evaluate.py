@@ -14,14 +14,13 @@ import numpy as np
 import scipy.sparse
 from numba import njit
 
-from shoal.mechanics import forces, functions, gates, plane
-from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics import constraints, forces, functions, gates, plane
+from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, derived_rows, remember, work_space
 from shoal.mechanics.elements.families import KERNELS
 from shoal.mechanics.gates import ready
-from shoal.mechanics.least import constraints
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.pointers import pointer, raw

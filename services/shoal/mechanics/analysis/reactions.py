@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shoal.mechanics import plane
+from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.motion_state import states
-from shoal.mechanics.assembly.affine import Affine
-from shoal.mechanics.assembly.frames import BeamFrame, RigidFrame
+from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, conditions, unknown
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span

@@ -16,12 +16,11 @@ from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
-from shoal.mechanics.assembly.frames import BeamFrame
 from shoal.mechanics.elements import ELEMENTS
+from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, DistributedForce, Rod, Scene
-from shoal.scene.joints import places
-from shoal.scene.loads import sides
+from shoal.scene.joints import places, sides
 
 
 class Sections(NamedTuple):

@@ -19,9 +19,9 @@ from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.reactions import reactions_of
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.assembly.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Scene

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shoal.mechanics import plane
-from shoal.mechanics.assembly.affine import Affine, fixed
-from shoal.mechanics.assembly.frames import Frame
+from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.groups import JointPoint, place_of
 from shoal.mechanics.assembly.pose import Pose
 from shoal.mechanics.assembly.terms import Terms
+from shoal.mechanics.frames import Frame
 from shoal.mechanics.joints import Along, Apart
 from shoal.mechanics.numerics.tile import Array, Flags, Number
 from shoal.scene import GROUND, Attachment, Scene

@@ -8,8 +8,8 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import joints, plane
-from shoal.mechanics.assembly.affine import Affine, combined, fixed
-from shoal.mechanics.assembly.frames import Place
+from shoal.mechanics.affine import Affine, combined, fixed
+from shoal.mechanics.frames import Place
 from shoal.mechanics.joints import Along, Meet, Turned
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.scene import GROUND, Attachment, Rod, Scene

@@ -6,10 +6,10 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import joints, plane
-from shoal.mechanics.assembly.affine import fixed
+from shoal.mechanics.affine import fixed
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.assembly.frames import BeamFrame
 from shoal.mechanics.assembly.groups import is_stiff, kept_rotation
+from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.joints import Along, Apart, Meet, Sum, Turned
 from shoal.scene import GROUND, Function, Scene
 

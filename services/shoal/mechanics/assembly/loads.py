@@ -10,15 +10,15 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import fitting, plane
+from shoal.mechanics.affine import Affine
 from shoal.mechanics.applied import Applied
-from shoal.mechanics.assembly.affine import Affine
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.assembly.frames import BeamFrame, RigidFrame
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
+from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.numerics.tile import Number, index, stacked
 from shoal.scene import (

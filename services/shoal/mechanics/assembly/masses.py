@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from shoal.mechanics import plane
-from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.assembly.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.elements import ELEMENTS, FAMILIES
 from shoal.mechanics.elements.families import Collected
+from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Number
 from shoal.scene import PointMass, RigidBody, Rod, Scene
 

@@ -14,9 +14,8 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import joints, plane
-from shoal.mechanics.assembly.affine import combined, fixed
+from shoal.mechanics.affine import combined, fixed
 from shoal.mechanics.assembly.coordinates import Placement
-from shoal.mechanics.assembly.frames import Place, PointFrame, RigidFrame
 from shoal.mechanics.assembly.groups import (
     JointPoint,
     Orientations,
@@ -29,6 +28,7 @@ from shoal.mechanics.assembly.groups import (
 from shoal.mechanics.assembly.holding import hold
 from shoal.mechanics.assembly.pose import Pose, arm
 from shoal.mechanics.assembly.rods import place_rod
+from shoal.mechanics.frames import Place, PointFrame, RigidFrame
 from shoal.mechanics.joints import Along
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.start.start import started

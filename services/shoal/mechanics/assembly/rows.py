@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shoal.mechanics.assembly.affine import Affine
+from shoal.mechanics.affine import Affine
 from shoal.mechanics.derived import Derived
 from shoal.mechanics.numerics.tile import Number, index, stacked
 

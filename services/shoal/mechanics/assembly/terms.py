@@ -1,4 +1,4 @@
-"""Constraints before their vectors have rows, and how they become the lists of `least.constraints`."""
+"""Constraints before their vectors have rows, and how they become the lists of `constraints`."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.mechanics import plane
-from shoal.mechanics.assembly.affine import Affine, fixed
+from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.rows import Rows
-from shoal.mechanics.least.constraints import Constraints
+from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.numerics.tile import Array, Number, index, stacked
 from shoal.scene.function import Composed
 

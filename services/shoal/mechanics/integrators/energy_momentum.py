@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics, gates
+from shoal.mechanics import constraints, dynamics, gates
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.functions import evaluate
@@ -20,7 +20,6 @@ from shoal.mechanics.integrators import newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
-from shoal.mechanics.least import constraints
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.pointers import raw

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import dynamics, gates
+from shoal.mechanics import constraints, dynamics, gates
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.scheme import Facts, implement
-from shoal.mechanics.least import constraints
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from numba import njit
 
+from shoal.mechanics import constraints, saddle
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import constraints, many, projection, saddle
+from shoal.mechanics.least import many, projection
 from shoal.mechanics.least.work import GaussWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse

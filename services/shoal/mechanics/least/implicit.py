@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.mechanics import constraints
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import constraints
 from shoal.mechanics.least.work import GaussWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import functions
-from shoal.mechanics.least import constraints, saddle
+from shoal.mechanics import constraints, functions, saddle
 from shoal.mechanics.least.work import GaussWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse

@@ -9,9 +9,9 @@ from __future__ import annotations
 from numba import njit
 
 from shoal.errors import InputError
-from shoal.mechanics import functions
+from shoal.mechanics import constraints, functions
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import alternatives, constraints, many, projection
+from shoal.mechanics.least import alternatives, many, projection
 from shoal.mechanics.least.work import GaussWork, LaneWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import carray, njit
 
-from shoal.mechanics.least import saddle
-from shoal.mechanics.least.saddle import SaddleWork
+from shoal.mechanics import saddle
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 from shoal.mechanics.numerics.vector import clear, copy
+from shoal.mechanics.saddle import SaddleWork
 
 
 class LaneWork(NamedTuple):

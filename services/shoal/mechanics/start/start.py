@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from shoal.errors import InputError
 from shoal.mechanics import plane
-from shoal.mechanics.assembly.frames import Frame
+from shoal.mechanics.frames import Frame
 from shoal.mechanics.joints import Apart, Meet, Turned, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.start.poses import Assembly, Statement

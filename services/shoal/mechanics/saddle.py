@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics.least.constraints import Constraints
+from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 from shoal.mechanics.numerics.vector import copy, scale

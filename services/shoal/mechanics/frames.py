@@ -9,7 +9,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import plane
-from shoal.mechanics.assembly.affine import Affine, combined, fixed
+from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.numerics.tile import Number
 
