@@ -91,11 +91,7 @@ def sweep(
 
 
 def compare(
-    scene: Scene | str,
-    engines: Sequence[str] = COMPARED,
-    times: Times | None = None,
-    *,
-    values: Values | None = None,
+    scene: Scene | str, engines: Sequence[str] = COMPARED, times: Times | None = None, *, values: Values | None = None
 ) -> Comparison:
     """Run a scene on several engines; `differences()` tells how far apart they come out. Raises InputError."""
     from shoal.engines.compare import compare

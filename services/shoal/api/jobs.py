@@ -102,11 +102,7 @@ class Jobs:
     async def _run(self, job: Job, request: IdentifyRequest) -> None:
         try:
             job.result = await self._pool.run(
-                "identify",
-                request,
-                self._settings.job_seconds,
-                job.note,
-                lambda: job.become("running"),
+                "identify", request, self._settings.job_seconds, job.note, lambda: job.become("running")
             )
         except Refusal as refusal:
             job.refusal = refusal

@@ -30,10 +30,7 @@ def export(scene: Scene, paths: Sequence[str] = (), out: Path | None = None) -> 
     if asked_for(scene):
         raise InputError(f"solver.acceleration: {scene.solver.acceleration!r} is for studies; a unit needs a solver")
     chosen = list(dict.fromkeys(paths)) or ["gravity.0", "gravity.1", *(f"initial.{b}.angle" for b in scene.bodies)]
-    content = {
-        "scene": scene.model_dump(mode="json"),
-        "parameters": {path: number(scene, path) for path in chosen},
-    }
+    content = {"scene": scene.model_dump(mode="json"), "parameters": {path: number(scene, path) for path in chosen}}
     target = out or Path(f"{identifier(scene)}.fmu")
     with tempfile.TemporaryDirectory() as folder, _paths_as_they_were(), whole(target) as unit:
         script, data = Path(folder) / "machine.py", Path(folder) / CONTENT

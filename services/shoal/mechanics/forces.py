@@ -232,14 +232,7 @@ def add_energy(
 
 @njit(cache=True, error_model="numpy")
 def tangent(
-    tile: Tile,
-    forces: Forces,
-    functions: Functions,
-    z: Array,
-    memory: Array,
-    w: Array,
-    out: Array,
-    first: int,
+    tile: Tile, forces: Forces, functions: Functions, z: Array, memory: Array, w: Array, out: Array, first: int
 ) -> None:
     """Stiffness d2U/dz2 of every element; rows of out from `first` on: (elements * side^2, lanes), square blocks.
 

@@ -82,10 +82,7 @@ def _rung_json(rung: Rung, chosen: bool) -> dict[str, Any]:
 
 
 def select(
-    scene: Scene,
-    tolerance: float,
-    times: Sequence[float] | Array | None = None,
-    progress: Progress = lambda _: None,
+    scene: Scene, tolerance: float, times: Sequence[float] | Array | None = None, progress: Progress = lambda _: None
 ) -> Selection:
     """The cheapest model of a scene whose estimated error at the markers is within `tolerance` [m].
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -50,3 +51,31 @@ def reflect(unit: Array, velocity: Array) -> tuple[Array, Array]:
     """Fold points back into [0, 1]^d at its walls; a component that hits a wall loses its velocity."""
     folded = 1.0 - np.abs(1.0 - np.mod(unit, 2.0))
     return folded, np.where((unit < 0.0) | (unit > 1.0), 0.0, velocity)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Seeded:
+    """A swarm of `size` fish in a box, of which the last two may be given.
+
+    traditional, previous: optimum of a traditional method and of the previous time step, (d,), each optional so that an
+    ablation can leave it out. Raises ValueError.
+    """
+
+    lower: Array
+    upper: Array
+    size: int = 40
+    traditional: Array | None = None
+    previous: Array | None = None
+
+    def __post_init__(self) -> None:
+        box = self.box
+        if self.size < 2:
+            raise ValueError(f"needs 2 fish or more, found {self.size}")
+        for name in ("traditional", "previous"):
+            if (seed := getattr(self, name)) is not None:
+                box.point(name, seed)
+
+    @cached_property
+    def box(self) -> Box:
+        """The box that is searched."""
+        return Box(self.lower, self.upper)

@@ -24,11 +24,7 @@ class EvaluationCounter:
     """
 
     def __init__(
-        self,
-        function: BatchFunction,
-        *,
-        cost: Callable[[Array], Array] | None = None,
-        budget: int | None = None,
+        self, function: BatchFunction, *, cost: Callable[[Array], Array] | None = None, budget: int | None = None
     ) -> None:
         """Wrap `function`, which maps points (n, d) to values (n,).
 

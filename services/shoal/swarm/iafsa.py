@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.swarm.best import better_of, without_failures
-from shoal.swarm.box import Box, reflect
+from shoal.swarm.box import Seeded, reflect
 from shoal.swarm.iafsa_printed import ATTRACTION, CONSTRICTION
 from shoal.swarm.protocol import Array
 
@@ -42,20 +42,15 @@ class IafsaState:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Iafsa:
+class Iafsa(Seeded):
     """IAFSA as repaired; one batch of `size` evaluations per iteration.
 
-    traditional, previous: optimum of a traditional method and of the previous time step, (d,), each optional; they
-    replace the last and the last but one fish. mutation: probability with which a fish mutates. tolerance: the search
-    is finished when all memories lie within this fraction of the box; 0 for when they coincide.
+    traditional, previous: they replace the last and the last but one fish. mutation: probability with which a fish
+    mutates. tolerance: the search is finished when all memories lie within this fraction of the box; 0 for when they
+    coincide.
     use_velocity: the term w v of eq. 17; use_mutation: the mutation.
     """
 
-    lower: Array
-    upper: Array
-    size: int = 40
-    traditional: Array | None = None
-    previous: Array | None = None
     w: float = CONSTRICTION
     c1: float = ATTRACTION
     c2: float = ATTRACTION
@@ -65,19 +60,9 @@ class Iafsa:
     use_mutation: bool = True
 
     def __post_init__(self) -> None:
-        box = Box(self.lower, self.upper)
-        if self.size < 2:
-            raise ValueError(f"needs 2 fish or more, found {self.size}")
+        super().__post_init__()
         if not 0.0 <= self.mutation <= 1.0:
             raise ValueError(f"mutation is a probability, found {self.mutation}")
-        for name in ("traditional", "previous"):
-            if (seed := getattr(self, name)) is not None:
-                box.point(name, seed)
-
-    @property
-    def box(self) -> Box:
-        """The box that is searched."""
-        return Box(self.lower, self.upper)
 
     def init(self, rng: np.random.Generator) -> IafsaState:
         """Steps 3-1 and 3-2: fish in the box, velocities zero, the last two fish are the seeds."""

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.swarm.best import better_of, without_failures
-from shoal.swarm.box import Box
+from shoal.swarm.box import Seeded
 from shoal.swarm.protocol import Array
 
 CONSTRICTION = 0.7298
@@ -53,19 +53,14 @@ class IafsaPrintedState:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class IafsaPrinted:
+class IafsaPrinted(Seeded):
     """IAFSA as printed; `tell` follows the numbered steps.
 
     traditional: x0, the optimum that a traditional method found; previous: the optimum of the previous time step
-    (q_{tau-1}), in the first time step None; both (d,) and both optional so that an ablation can leave them out.
+    (q_{tau-1}), in the first time step None.
     epsilon: threshold of step 3-7, 0 for never. use_velocity: the term w v of eq. 17; use_mutation: the term in rho.
     """
 
-    lower: Array
-    upper: Array
-    size: int = 40
-    traditional: Array | None = None
-    previous: Array | None = None
     w: float = CONSTRICTION
     c1: float = ATTRACTION
     c2: float = ATTRACTION
@@ -74,19 +69,10 @@ class IafsaPrinted:
     use_velocity: bool = True
     use_mutation: bool = True
 
-    def __post_init__(self) -> None:
-        box = Box(self.lower, self.upper)
-        if self.size < 2:
-            raise ValueError(f"needs 2 fish or more, found {self.size}")
-        for name in ("traditional", "previous"):
-            if (seed := getattr(self, name)) is not None:
-                box.point(name, seed)
-
     def init(self, rng: np.random.Generator) -> IafsaPrintedState:
         """Steps 3-1 and 3-2: fish in the box, velocities zero, the last two fish are the seeds."""
         rng = copy.deepcopy(rng)
-        box = Box(self.lower, self.upper)
-        fish = box.from_unit(rng.random((self.size, box.dimension)))
+        fish = self.box.from_unit(rng.random((self.size, self.box.dimension)))
         if self.traditional is not None:
             fish[-2:] = self.traditional
         if self.previous is not None:

@@ -89,14 +89,7 @@ class _Segments:
 
     @classmethod
     def of(
-        cls,
-        scene: Scene,
-        paths: Sequence[str],
-        times: Array,
-        marker: str,
-        target: Array,
-        step: float,
-        segments: int,
+        cls, scene: Scene, paths: Sequence[str], times: Array, marker: str, target: Array, step: float, segments: int
     ) -> _Segments:
         model = casadi_model(scene)
         p, size = ca.SX.sym("p", len(paths)), 2 * model.unknowns

@@ -119,7 +119,8 @@ def reactions_of(
     at, rate, change = bodies.state(q, v, a)
     free = bodies.evaluator
     lever = span(bodies.scene)
-    unknown = [part for name in bodies.scene.joints for part in _components(bodies, name, at)]
+    told = [(name, one) for name, joint in bodies.scene.joints.items() for one in conditions(joint)]
+    unknown = [part for name, one in told for part in _of_condition(bodies, name, one, at)]
     known, rubbed = _friction(bodies, at, rate)
     force = free.at(at, rate, t).force
     inertia = bodies.mass @ change
@@ -223,12 +224,8 @@ def _sliding(bodies: FreeBodies, first: Attachment, second: Attachment, turn: fl
     return e, along, across
 
 
-def _components(bodies: FreeBodies, name: str, at: Array) -> list[_Component]:
-    """The unknowns of a joint."""
-    return [part for one in conditions(bodies.scene.joints[name]) for part in _of_condition(bodies, name, one, at)]
-
-
 def _of_condition(bodies: FreeBodies, name: str, condition: Condition, at: Array) -> list[_Component]:
+    """The unknowns of a condition of a joint."""
     if isinstance(condition, Sum):
         axes = ["xyz".index(term.axis) for term in condition.terms]
         rows = [_place(bodies, term.at, at).slope[axis] for term, axis in zip(condition.terms, axes, strict=True)]

@@ -89,13 +89,7 @@ def quadrature(law: Law) -> Array:
 
 
 def coefficients(
-    law: Law,
-    length: Number,
-    height: Number,
-    width: Number,
-    young: Number,
-    poisson: Number,
-    shear: Number = 1.0,
+    law: Law, length: Number, height: Number, width: Number, young: Number, poisson: Number, shear: Number = 1.0
 ) -> list[Number]:
     """The ten numbers of an element [1/m, 1, J ...]; `shear` scales the shear stiffness (1: none, 5/6 ...)."""
     scale = young * width * height * length

@@ -9,17 +9,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
-from shoal.mechanics.numerics.choice import body, is_of
+from shoal.mechanics.numerics.choice import choose
 from shoal.mechanics.numerics.tile import Array, Index, Number, Tile, index, stacked
 
 PLAN = 4
 """Numbers of an element in the plan: its first row of the table, how many rows, its first row of the reference, and the
 variant of the kernel (which only the family itself knows)."""
-
-
-OPTIONS = {"error_model": "numpy"}
 
 
 class Family(NamedTuple):
@@ -140,33 +136,9 @@ def implement(
     viscosity: of a family that may be damped. mean: of one that is exact.
     """
     KERNELS[kind] = kernel
-
-    @overload(add_force, jit_options=OPTIONS)
-    def choose_force(tile, family, z, zdot, f, w, power, moving):  # type: ignore[no-untyped-def]
-        return body(force) if is_of(family, kind) else None
-
-    @overload(add_energy, jit_options=OPTIONS)
-    def choose_energy(tile, family, z, w, energy, row):  # type: ignore[no-untyped-def]
-        return body(potential) if is_of(family, kind) else None
-
-    @overload(tangent, jit_options=OPTIONS)
-    def choose_tangent(tile, family, z, w, out, first):  # type: ignore[no-untyped-def]
-        return body(stiffness) if is_of(family, kind) else None
-
-    @overload(damping, jit_options=OPTIONS)
-    def choose_damping(tile, family, z, w, out, first):  # type: ignore[no-untyped-def]
-        if not is_of(family, kind):
-            return None
-        return (lambda tile, family, z, w, out, first: None) if viscosity is None else body(viscosity)
-
-    @overload(add_mean_force, jit_options=OPTIONS)
-    def choose_mean_force(tile, family, before, after, f, w):  # type: ignore[no-untyped-def]
-        if not is_of(family, kind):
-            return None
-        return (lambda tile, family, before, after, f, w: None) if mean is None else body(mean)
-
-    @overload(is_exact)
-    def choose_exact(family):  # type: ignore[no-untyped-def]
-        if not is_of(family, kind):
-            return None
-        return (lambda family: False) if mean is None else (lambda family: True)
+    choose(add_force, kind, force)
+    choose(add_energy, kind, potential)
+    choose(tangent, kind, stiffness)
+    choose(damping, kind, viscosity or (lambda tile, family, z, w, out, first: None))
+    choose(add_mean_force, kind, mean or (lambda tile, family, before, after, f, w: None))
+    choose(is_exact, kind, (lambda family: True) if mean else (lambda family: False))

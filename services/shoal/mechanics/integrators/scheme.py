@@ -12,12 +12,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import dense
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics.choice import body, is_of
+from shoal.mechanics.numerics.choice import choose
 from shoal.mechanics.numerics.tile import Array, Tile
 
 
@@ -80,29 +79,8 @@ def implement(settings: type, step: Any, facts: Facts, inside: Any = dense.quint
     anew: forgets what a scheme remembers from step to step, if anything. The parameters of the kernels are named as
     those of `advance`, `interpolate` and `restart`.
     """
-
-    @overload(advance, jit_options={"error_model": "numpy", "forceinline": True})
-    def choose_step(tile, scheme, m, w, t, h):  # type: ignore[no-untyped-def]
-        return body(step) if is_of(scheme, settings) else None
-
-    @overload(interpolate, jit_options={"error_model": "numpy"})
-    def choose_inside(tile, scheme, m, w, past, x, h, q, v):  # type: ignore[no-untyped-def]
-        return body(inside) if is_of(scheme, settings) else None
-
-    @overload(restart, jit_options={"error_model": "numpy"})
-    def choose_restart(scheme):  # type: ignore[no-untyped-def]
-        if not is_of(scheme, settings):
-            return None
-        return (lambda scheme: None) if anew is None else body(anew)
-
-    @overload(adaptive)
-    def choose_adaptive(scheme):  # type: ignore[no-untyped-def]
-        if not is_of(scheme, settings):
-            return None
-        return (lambda scheme: True) if facts.adaptive else (lambda scheme: False)
-
-    @overload(averages)
-    def choose_averages(scheme):  # type: ignore[no-untyped-def]
-        if not is_of(scheme, settings):
-            return None
-        return (lambda scheme: True) if facts.mean_power else (lambda scheme: False)
+    choose(advance, settings, step, forceinline=True)
+    choose(interpolate, settings, inside)
+    choose(restart, settings, anew or (lambda scheme: None))
+    choose(adaptive, settings, (lambda scheme: True) if facts.adaptive else (lambda scheme: False))
+    choose(averages, settings, (lambda scheme: True) if facts.mean_power else (lambda scheme: False))

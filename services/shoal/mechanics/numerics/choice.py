@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import inspect
 from types import FunctionType
 from typing import Any
 
-from numba import types
+from numba.extending import overload
 
 
-def is_of(structure: Any, kind: type) -> bool:
-    """Whether the compiler's type of an argument is that of a NamedTuple class, with arrays or with pointers."""
-    return isinstance(structure, types.BaseNamedTuple) and structure.instance_class is kind
+def choose(generic: Any, kind: type, kernel: Any, **options: bool) -> None:
+    """Let compiled calls of `generic` with a structure of this kind run a kernel, whose parameters have the same names.
 
-
-def body(kernel: Any) -> Any:
-    """The Python function of a kernel without its annotations, which differ from kind to kind.
-
-    Compiled in place of the call: a call of the compiled kernel would be one more layer to optimise.
+    kind: a NamedTuple class, with arrays or with pointers. The kernel is compiled in place of the call (a call of the
+    compiled kernel would be one more layer to optimise), without its annotations, which differ from kind to kind.
     """
-    function = kernel.py_func
-    return FunctionType(function.__code__, function.__globals__, function.__name__)
+    function = getattr(kernel, "py_func", kernel)
+    bare = FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
+
+    def chosen(*arguments: Any) -> Any:
+        return bare if any(getattr(argument, "instance_class", None) is kind for argument in arguments) else None
+
+    chosen.__signature__ = inspect.signature(bare)  # type: ignore[attr-defined]
+    overload(generic, jit_options={"error_model": "numpy", **options})(chosen)

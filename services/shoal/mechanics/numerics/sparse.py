@@ -15,14 +15,7 @@ import scipy.sparse
 from numba import njit
 
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import (
-    add_product,
-    copy,
-    scale,
-    scale_alike,
-    subtract_dot,
-    subtract_dot_alike,
-)
+from shoal.mechanics.numerics.vector import add_product, copy, scale, scale_alike, subtract_dot, subtract_dot_alike
 
 
 class Pattern(NamedTuple):

@@ -175,17 +175,14 @@ def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputErro
                 )
         return InputError("initial: the joints allow no motion with these rates in this position")
     last = broken[0]
-    guilty = [one for one in velocities.statements if one is not last and one.firm and _frees(velocities, one, last)]
+    others = [one for one in velocities.statements if one is not last and one.firm]
+    guilty = [one for one in others if last not in velocities.run(without=one).broken]
     names = dict.fromkeys((*velocities.walk.closing, *velocities.rows.names))
     joint = next((name for name in names if last not in velocities.run(joint=name).broken), "")
     told = velocities.run(without=last).rates[0, last.columns]
     told = np.where(np.abs(told) > ROUND_OFF * velocities.speed, told, 0.0)
     wants = f"joint {joint} asks for {_written(told)} {_UNITS[last.quantity]}" if joint else "they cannot both hold"
     return _contradiction([*guilty, last], wants)
-
-
-def _frees(velocities: Velocities, one: Statement, last: Statement) -> bool:
-    return last not in velocities.run(without=one).broken
 
 
 def _contradiction(guilty: list[Statement], why: str) -> InputError:
