@@ -20,7 +20,10 @@ from shoal.errors import ShoalError
 from shoal.home import compiled, home, kernel_cache
 from shoal.ports import PORTS
 
-_PACKAGES = {"pipeline": ("prefect", "mlflow"), "services": ("fastapi", "uvicorn", "orjson")}
+_PACKAGES = {
+    "pipeline": ("prefect", "mlflow"),
+    "services": ("fastapi", "uvicorn", "orjson"),
+}
 """What the extras bring that has no check of its own."""
 _PORTS = {"MLflow": 5000, "Prefect": 4200, **PORTS}
 """Where `make up`, `shoal ui` and `shoal serve` listen unless told otherwise."""

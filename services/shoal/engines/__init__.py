@@ -35,7 +35,12 @@ def _casadi() -> Engine:
     return CasadiEngine()
 
 
-ENGINES |= {"gauss": _gauss, "exudyn": _exudyn, "exudyn-ge": _exudyn_ge, "casadi": _casadi}
+ENGINES |= {
+    "gauss": _gauss,
+    "exudyn": _exudyn,
+    "exudyn-ge": _exudyn_ge,
+    "casadi": _casadi,
+}
 COMPARED = ("gauss", "exudyn", "casadi")
 """Compared unless somebody names others: three derivations of the same equations."""
 

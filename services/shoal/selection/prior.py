@@ -14,7 +14,18 @@ import numpy as np
 
 from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
-from shoal.scene import Attachment, DistributedForce, Force, Function, Rod, Scene, Spring, Torque, TorsionSpring, Weld
+from shoal.scene import (
+    Attachment,
+    DistributedForce,
+    Force,
+    Function,
+    Rod,
+    Scene,
+    Spring,
+    Torque,
+    TorsionSpring,
+    Weld,
+)
 from shoal.scene.joints import places, sides
 from shoal.selection.levels import RIGID, apply
 from shoal.trajectory import Array, Trajectory

@@ -9,7 +9,11 @@ from shoal.swarm.iafsa_printed import IafsaPrinted
 from shoal.swarm.minimize import minimize
 from shoal.swarm.protocol import Array, Optimizer, State
 
-OPTIMIZERS: dict[str, type[Any]] = {"afsa": Afsa, "iafsa": Iafsa, "iafsa-printed": IafsaPrinted}
+OPTIMIZERS: dict[str, type[Any]] = {
+    "afsa": Afsa,
+    "iafsa": Iafsa,
+    "iafsa-printed": IafsaPrinted,
+}
 """All take `lower`, `upper` and `size`; `traditional` and `previous` are fish of the first swarm, where it has them."""
 
 __all__ = [
