@@ -13,12 +13,14 @@ from shoal.mechanics.elements import families
 from shoal.mechanics.least import principle
 from shoal.mechanics.least import work as least
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics import gate, sparse
+from shoal.mechanics.numerics import alike, gate, simd, sparse
 from shoal.mechanics.numerics.pointers import raw, shift
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import clear, copy
+from shoal.mechanics.numerics.vector import clear
 
 ELEMENT_ROWS = 64
+ELEMENT_ROOM = 256
+"""Numbers of room at least: eight elements of a single lane are computed at once."""
 ALL, ELASTIC, SIMPLE, ACCELERATION = 0, 1, 2, 3
 """Parts of the force: everything, the elastic part, the elastic part but for elements that know their mean force; or
 the acceleration that follows from everything."""
@@ -28,7 +30,7 @@ class Work(NamedTuple):
     """The state of one tile and the room to compute its change.
 
     z, zdot, a: coordinates, rates and accelerations, (rows, lanes). before: z, zdot and a at the
-    beginning of the step. stage: room of four states for integrators. element: 64 rows. memory: the
+    beginning of the step. stage: room of four states for integrators. element: room of 64 rows or more. memory: the
     continuous angle of every force element, (forces, lanes). power: dissipated minus supplied power
     [W], (lanes,). energy: kinetic, elastic, potential [J], (3, lanes). until: the last instant [s] before
     functions of time may jump, (1,); what is asked for later, is asked for then.
@@ -52,7 +54,17 @@ def work_space(tile: Tile, m: Arrays) -> Work:
     """Room for the motion of one tile."""
     width = len(tile)
     rows = m.rows * width
-    sizes = (rows, rows, rows, 3 * rows, 4 * rows, ELEMENT_ROWS * width, m.forces.size * width, width, 3 * width)
+    sizes = (
+        rows,
+        rows,
+        rows,
+        3 * rows,
+        4 * rows,
+        max(ELEMENT_ROWS * width, ELEMENT_ROOM),
+        m.forces.size * width,
+        width,
+        3 * width,
+    )
     z, zdot, a, before, stage, element, memory, power, energy = (np.zeros(size) for size in sizes)
     return Work(
         gate.home(),
@@ -97,12 +109,11 @@ def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Ar
     Fills the derived rows of z and zdot that forces act on, and the dissipated minus supplied power.
     """
     derive(tile, m.derived, z, m.unknowns, m.force_rows, False)
-    for row in range(m.force_rows):
-        clear(tile, f, row)
     moving = part in (ALL, ACCELERATION)
     if moving:
-        for row in range(m.unknowns):
-            copy(tile, f, row, m.weight, row)
+        simd.assign(f, m.weight, m.unknowns * len(tile))
+    for row in range(m.unknowns if moving else 0, m.force_rows):
+        clear(tile, f, row)
     if loaded(m):
         for lane in range(len(tile)):
             w.power[lane] = 0.0
@@ -131,8 +142,8 @@ def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
         gate.ask(m.gates.sought, t, a)
     elif m.constraints.size > 0:
         principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
-    elif m.alike:
-        sparse.solve_alike(tile, m.pattern, m.alike_factor, a, 0)
+    elif m.alike.components > 0:
+        alike.solve(tile, m.space, m.alike, w.element, a)
     else:
         sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
     if m.driven:
@@ -151,7 +162,10 @@ def remember(tile: Tile, m: Arrays, w: Work) -> None:
 def energies(tile: Tile, m: Arrays, w: Work) -> None:
     """Kinetic, elastic and gravitational energy [J] of the state, into w.energy; uses w.stage."""
     width = len(tile)
-    sparse.multiply(tile, m.pattern, m.mass, w.zdot, w.stage)
+    if m.alike.components > 0:
+        alike.multiply(tile, m.space, m.alike, w.zdot, w.stage)
+    else:
+        sparse.multiply(tile, m.pattern, m.mass, w.zdot, w.stage)
     for kind in range(3):
         clear(tile, w.energy, kind)
     for i in range(m.unknowns):

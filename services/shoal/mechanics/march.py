@@ -268,9 +268,12 @@ def _look(tile: Tile, m: Arrays, w: Work, k: LoopRoom, now: float, record: March
 def _count_turns(tile: Tile, m: Arrays, w: Work, k: LoopRoom, marker_rows: Index) -> None:
     """Add 2 pi to the turns where a marker's direction has passed the negative x axis."""
     width, d = len(tile), len(m.space)
-    derive(tile, m.derived, w.z, m.held_rows, m.rows, False)
     for marker in range(marker_rows.size // (2 * d)):
-        x, y = marker_rows[2 * d * marker + d] * width, marker_rows[2 * d * marker + d + 1] * width
+        rows = marker_rows[2 * d * marker + d], marker_rows[2 * d * marker + d + 1]
+        for row in rows:
+            if row >= m.held_rows:
+                derive(tile, m.derived, w.z, row, row + 1, False)
+        x, y = rows[0] * width, rows[1] * width
         for lane in range(width):
             at = marker * width + lane
             now = 1.0 if w.z[y + lane] >= 0.0 else 0.0

@@ -22,9 +22,10 @@ from shoal.mechanics.derived import Derived
 from shoal.mechanics.forces import Forces
 from shoal.mechanics.frames import Frame
 from shoal.mechanics.functions import Functions, Piecewise
-from shoal.mechanics.numerics import gate, sparse
+from shoal.mechanics.numerics import alike, gate, sparse
+from shoal.mechanics.numerics.alike import Alike
 from shoal.mechanics.numerics.pointers import pointer, raw
-from shoal.mechanics.numerics.tile import Array, Flags, Index, Tile, pack, packed, varies
+from shoal.mechanics.numerics.tile import SINGLE, Array, Flags, Index, Tile, pack, packed, varies
 from shoal.mechanics.saddle import Saddle
 from shoal.scene import Scene
 
@@ -42,8 +43,8 @@ class Gates(NamedTuple):
 class Arrays(NamedTuple):
     """All a kernel needs of one tile of lanes. space: a tuple as long as vectors are.
 
-    method, baumgarte: how accelerations are found. elements: one structure a family. alike: whether all lanes have one
-    mass matrix, whose factor is then alike_factor, (slots,).
+    method, baumgarte: how accelerations are found. elements: one structure a family. alike: the mass matrix where all
+    lanes have the same one.
     """
 
     home: Array
@@ -63,8 +64,7 @@ class Arrays(NamedTuple):
     mass: Array
     mass_factor: Array
     mass_root: Array
-    alike: bool
-    alike_factor: Array
+    alike: Alike
     weight: Array
     elements: tuple[Any, ...]
     forces: Forces
@@ -172,6 +172,20 @@ class Model:
         base = scatter(pattern, slots, self.mass_entries)
         return Saddle(len(place), pattern.slots, pattern, place, base, entries, multiplier)
 
+    @cached_property
+    def _alike(self) -> Alike:
+        """What solves for the accelerations of all lanes, where they have the same mass matrix."""
+        if self.mass_values.shape[1] > 1:
+            return Alike(0, _EMPTY, np.zeros(0), np.zeros(0), np.zeros(0))
+        components, entries = alike.analyse(self.unknowns, self.dimensions, self.mass_entries)
+        size = self.unknowns // components
+        pattern, slots = sparse.analyse(size, entries)
+        matrix = scatter(pattern, slots, entries)[:, 0]
+        factor = matrix.copy()
+        _factor_mass(SINGLE, pattern, factor)
+        dense = sparse.matrix(pattern, matrix).toarray() if size <= alike.FEW else np.zeros((0, 0))
+        return Alike(components, pattern, matrix, factor, alike.spread_inverse(dense, components))
+
     def tile(self, tile: Tile, lanes: slice) -> Arrays:
         """The arrays of one tile of lanes. Raises InputError if a mass matrix is singular."""
         if self.varies:
@@ -207,8 +221,7 @@ class Model:
             mass,
             factor,
             np.sqrt(inverse),
-            self.mass_values.shape[1] == 1,
-            np.ascontiguousarray(factor[:: len(tile)]),
+            self._alike,
             pack(self.weight, lanes, tile),
             *packed(forces, lanes, tile),
         )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import gates
+from shoal.mechanics import forces, gates
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.model import Arrays, Model, scatter
@@ -87,9 +87,9 @@ def _contributions(model: Model) -> tuple[list[tuple[tuple[int, int], int, Array
     """((row, column), position in the stored blocks, coefficient) for the lower triangle, and the blocks' length."""
     found = []
     position = 0
-    for family in (*model.elements, model.forces):
-        size = len(family.rows) // family.size if family.size else 0
-        for rows in family.rows.reshape(family.size, size).tolist():
+    counts = [(family, family.side) for family in model.elements]
+    for family, size in (*counts, (model.forces, forces.side(model.forces))):
+        for rows in family.rows[: family.size * size].reshape(family.size, size).tolist():
             for a in range(size):
                 for b in range(size):
                     for i, ci in _expand(model, rows[a]):

@@ -1,8 +1,13 @@
 """The force of the cubic beam element: the one kernel in which most runs spend their time.
 
-The theory is that of `beam`; here its sums are written out for two nodes with position and slope. With r(s) the Hermite
-curve, d = (r2 - r1)/L, p = r1', q = r2', the derivatives r' and L r'' have coefficients in (d, p, q) that do not depend
-on the element: the tables below, which are constants of the compiled code, so that the loops over their points unroll.
+The theory is that of `beam`; here its sums are written out for two nodes with position and slope. On xi in [-1, 1]
+
+    r' = c0 + c1 xi + c2 xi^2,    L r'' = 2 (c1 + 2 c2 xi),
+
+so that |r'|^2 and k |r'|^2 = r' x L r'' are polynomials of xi with scalar coefficients. Points come in pairs +-xi that
+share their even and odd parts. What a strain contributes to dU/dc_i is sums over the points of its density times powers
+of xi: N_j of the derivative by |r'|^2/2, K_j of that by r' x L r''. Straight or curved, elastic or damped, the same
+formula serves; its vectors are lanes or elements (`batch`).
 Berzeri and Shabana 2000; Gerstmayr and Shabana 2006; with the reduced rule, Gerstmayr and Irschik 2008.
 """
 
@@ -13,9 +18,11 @@ from numba import njit
 
 from shoal.errors import InputError
 from shoal.mechanics.elements import beam, beam_tangent
+from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, rest, together
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
+from shoal.mechanics.numerics.pointers import shift
+from shoal.mechanics.numerics.simd import EIGHT, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
-from shoal.mechanics.numerics.vector import add, copy
 from shoal.scene import Rod
 
 ROWS = 2 * beam.CUBIC
@@ -29,22 +36,89 @@ class Cubics(Family):
 
 FULL_RULE = beam.quadrature(beam.CUBIC, 5, 3)
 REDUCED_RULE = beam.lobatto(beam.CUBIC, 2)
-# Columns: coefficients of r' in (d, p, q), those of L r'', weights of the axial and of the bending strain.
-_FULL_AXIAL, _FULL_BENDING = FULL_RULE[:5], FULL_RULE[5:]
-_REDUCED_AXIAL, _REDUCED_BENDING = REDUCED_RULE[:3], REDUCED_RULE[3:]
-_AXIAL, _BENDING = 6, 7
-
-# Rows of the work space: coordinates of the element, force on them, rates.
-_FORCE, _RATE = ROWS, 2 * ROWS
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _mixed(a, b, c, d, p, q):  # type: ignore[no-untyped-def]
-    """a d + b p + c q; where a is the constant zero, nothing is done for it."""
-    return b * p + c * q if a == 0.0 else a * d + b * p + c * q
+def _pairs(points: Array, weights: Array) -> Array:
+    """The pairs +-xi of a rule on [-1, 1], xi = 0 in the middle where it has one: (xi, weight, number of -xi, of +xi).
+
+    Weights are those of the unit interval. The last row is the middle, of weight zero in a rule without one.
+    """
+    last = len(points) - 1
+    pairs = [(points[last - k], weights[last - k] / 2, k, last - k) for k in range(len(points) // 2)]
+    return np.array([*pairs, (0.0, weights[last // 2] / 2 if last % 2 == 0 else 0.0, last // 2, last // 2)])
 
 
-@njit(cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz", "arcp"})
+_GAUSS = np.polynomial.legendre.leggauss
+_LOBATTO = np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3
+_FULL_AXIAL, _FULL_BENDING = _pairs(*_GAUSS(5)), _pairs(*_GAUSS(3))
+_REDUCED_AXIAL, _REDUCED_BENDING = _pairs(*_LOBATTO), _pairs(*_GAUSS(2))
+_POINTS, _BENDING_POINTS, _REDUCED_POINTS, _REDUCED_BENDING_POINTS = (
+    np.column_stack([points, weights / 2]) for points, weights in (_GAUSS(5), _GAUSS(3), _LOBATTO, _GAUSS(2))
+)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _curve(tile, family, number, lane, inverse, z):  # type: ignore[no-untyped-def]
+    """c0, c1, c2 of elements in the state z."""
+    x1, y1 = coordinate(tile, family, number, lane, ROWS, 0, z), coordinate(tile, family, number, lane, ROWS, 1, z)
+    px, py = coordinate(tile, family, number, lane, ROWS, 2, z), coordinate(tile, family, number, lane, ROWS, 3, z)
+    x2, y2 = coordinate(tile, family, number, lane, ROWS, 4, z), coordinate(tile, family, number, lane, ROWS, 5, z)
+    qx, qy = coordinate(tile, family, number, lane, ROWS, 6, z), coordinate(tile, family, number, lane, ROWS, 7, z)
+    dx, dy, sx, sy = 1.5 * (x2 - x1) * inverse, 1.5 * (y2 - y1) * inverse, px + qx, py + qy
+    return dx - 0.25 * sx, dy - 0.25 * sy, 0.5 * (qx - px), 0.5 * (qy - py), 0.75 * sx - dx, 0.75 * sy - dy
+
+
+@njit(error_model="numpy", forceinline=True)
+def _dot(ax, ay, bx, by, cx, cy, dx, dy, ex, ey, fx, fy):  # type: ignore[no-untyped-def]
+    """Coefficients of (a + b xi + c xi^2) . (d + e xi + f xi^2)."""
+    return (
+        ax * dx + ay * dy,
+        ax * ex + ay * ey + (bx * dx + by * dy),
+        ax * fx + ay * fy + (cx * dx + cy * dy) + (bx * ex + by * ey),
+        bx * fx + by * fy + (cx * ex + cy * ey),
+        cx * fx + cy * fy,
+    )
+
+
+@njit(error_model="numpy", forceinline=True)
+def _at_both(x, a0, a1, a2, a3, a4):  # type: ignore[no-untyped-def]
+    """A polynomial of xi at +xi and at -xi."""
+    square = x * x
+    even, odd = a0 + square * a2 + (square * square) * a4, x * (a1 + square * a3)
+    return even + odd, even - odd
+
+
+@njit(error_model="numpy", forceinline=True)
+def _reference(tile, curved, family, number, lane, k, usual):  # type: ignore[no-untyped-def]
+    """Entry k of the reference of curved elements, and what it is for straight ones."""
+    return rest(tile, family, number, lane, k) if curved else spread(EIGHT, usual)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _stretch(damped, shrink, rate, relaxed, stiffness, eta):  # type: ignore[no-untyped-def]
+    """The tension over |r'| at a point, EA (1/|r0'| - 1/|r'|), and the power lost; shrink: 1/|r'|, rate: r' . u."""
+    strain, lost = relaxed - shrink, 0.0 * shrink
+    if damped:
+        stretching = relaxed * rate * shrink
+        strain = strain + eta * stretching * shrink
+        lost = eta * stiffness * stretching * (rate * shrink)
+    return stiffness * strain, lost
+
+
+@njit(error_model="numpy", forceinline=True)
+def _bend(damped, flat, k, rate, change, inverse, angle, stiffness, eta):  # type: ignore[no-untyped-def]
+    """The moment over |r'|^2 at a point, its turn, and the power lost; flat: 1/|r'|^2, k: r' x L r''."""
+    stiffness = stiffness * inverse
+    turn = k * flat
+    bent, lost = turn - angle, 0.0 * flat
+    if damped:
+        turning = (change - 2.0 * turn * rate) * flat
+        bent = bent + eta * turning
+        lost = eta * stiffness * turning * turning
+    return stiffness * bent * flat, turn, lost
+
+
+@njit(error_model="numpy", forceinline=True)
 def _force(
     tile: Tile,
     curved: bool,
@@ -53,105 +127,151 @@ def _force(
     bending: Array,
     family: Family,
     number: int,
+    count: int,
+    lane: int,
+    z: Array,
+    zdot: Array,
+    f: Array,
     w: Array,
     power: Array,
 ) -> None:
-    """Force of the coordinates in w, into its next rows; curved, damped and the tables are constants of the call."""
-    width = len(tile)
-    base = beam.COEFFICIENTS * number * width
-    rest = family.plan[PLAN * number + 2] * width
-    out, rate = _FORCE * width, _RATE * width
-    coefficient, reference = family.coefficients, family.reference
-    for lane in range(width):
-        inverse = coefficient[base + lane]
-        ea = coefficient[base + width + lane]
-        ei = coefficient[base + 2 * width + lane]
-        dx = (w[4 * width + lane] - w[lane]) * inverse
-        dy = (w[5 * width + lane] - w[width + lane]) * inverse
-        px, py = w[2 * width + lane], w[3 * width + lane]
-        qx, qy = w[6 * width + lane], w[7 * width + lane]
-        if damped:
-            eta = coefficient[base + 3 * width + lane]
-            rdx = (w[rate + 4 * width + lane] - w[rate + lane]) * inverse
-            rdy = (w[rate + 5 * width + lane] - w[rate + width + lane]) * inverse
-            rpx, rpy = w[rate + 2 * width + lane], w[rate + 3 * width + lane]
-            rqx, rqy = w[rate + 6 * width + lane], w[rate + 7 * width + lane]
-            lost = 0.0
-        fdx, fdy, fpx, fpy, fqx, fqy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for g in range(axial.shape[0]):
-            a, b, c = axial[g, 0], axial[g, 1], axial[g, 2]
-            tx, ty = _mixed(a, b, c, dx, px, qx), _mixed(a, b, c, dy, py, qy)
-            shrink = 1.0 / np.sqrt(tx * tx + ty * ty)
-            relaxed = reference[rest + 2 * g * width + lane] if curved else 1.0
-            strain = relaxed - shrink  # eps/|r'|
-            stiffness = ea * axial[g, _AXIAL]
-            if damped:
-                ux, uy = _mixed(a, b, c, rdx, rpx, rqx), _mixed(a, b, c, rdy, rpy, rqy)
-                stretching = (tx * ux + ty * uy) * shrink
-                strain += eta * relaxed * stretching * shrink
-                lost += eta * stiffness * relaxed * stretching * stretching
-            n = stiffness * strain
-            tx, ty = n * tx, n * ty
-            if a != 0.0:
-                fdx, fdy = fdx + a * tx, fdy + a * ty
-            fpx, fqx = fpx + b * tx, fqx + c * tx
-            fpy, fqy = fpy + b * ty, fqy + c * ty
-        for g in range(bending.shape[0]):
-            a, b, c = bending[g, 0], bending[g, 1], bending[g, 2]
-            d, e, h = bending[g, 3], bending[g, 4], bending[g, 5]
-            tx, ty = _mixed(a, b, c, dx, px, qx), _mixed(a, b, c, dy, py, qy)
-            cx, cy = _mixed(d, e, h, dx, px, qx), _mixed(d, e, h, dy, py, qy)
-            flat = 1.0 / (tx * tx + ty * ty)
-            turn = (tx * cy - ty * cx) * flat
-            ax, ay = cy - 2.0 * turn * tx, -cx - 2.0 * turn * ty
-            stiffness, angle = ei * bending[g, _BENDING], turn
-            if curved:
-                at = rest + 2 * (axial.shape[0] + g) * width + lane
-                stiffness, angle = stiffness * reference[at], turn - reference[at + width]
-            if damped:
-                ux, uy = _mixed(a, b, c, rdx, rpx, rqx), _mixed(a, b, c, rdy, rpy, rqy)
-                vx, vy = _mixed(d, e, h, rdx, rpx, rqx), _mixed(d, e, h, rdy, rpy, rqy)
-                turning = (ax * ux + ay * uy - ty * vx + tx * vy) * flat
-                angle += eta * turning
-                lost += eta * stiffness * turning * turning
-            m = stiffness * angle * flat
-            gx, gy, hx, hy = m * ax, m * ay, -m * ty, m * tx
-            fdx, fpx, fqx = fdx + a * gx + d * hx, fpx + b * gx + e * hx, fqx + c * gx + h * hx
-            fdy, fpy, fqy = fdy + a * gy + d * hy, fpy + b * gy + e * hy, fqy + c * gy + h * hy
-        w[out + lane], w[out + width + lane] = fdx * inverse, fdy * inverse
-        w[out + 2 * width + lane], w[out + 3 * width + lane] = -fpx, -fpy
-        w[out + 4 * width + lane], w[out + 5 * width + lane] = -fdx * inverse, -fdy * inverse
-        w[out + 6 * width + lane], w[out + 7 * width + lane] = -fqx, -fqy
-        if damped:
-            power[lane] += lost
+    """Add the force of `count` elements to f; curved, damped and the rules are constants of the call."""
+    inverse = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 0)
+    ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
+    ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
+    none, eta = spread(EIGHT, 0.0), spread(EIGHT, 0.0)
+    ax, ay, bx, by, cx, cy = _curve(tile, family, number, lane, inverse, z)
+    s0, s1, s2, s3, s4 = _dot(ax, ay, bx, by, cx, cy, ax, ay, bx, by, cx, cy)
+    k0, k1, k2 = 2.0 * (ax * by - ay * bx), 4.0 * (ax * cy - ay * cx), 2.0 * (bx * cy - by * cx)
+    p0, p1, p2, p3, p4, l0, l1, l2 = none, none, none, none, none, none, none, none
+    if damped:
+        eta = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 3)
+        dx, dy, ex, ey, fx, fy = _curve(tile, family, number, lane, inverse, zdot)
+        p0, p1, p2, p3, p4 = _dot(ax, ay, bx, by, cx, cy, dx, dy, ex, ey, fx, fy)
+        l0 = 2.0 * (dx * by - dy * bx + ax * ey - ay * ex)
+        l1 = 4.0 * (dx * cy - dy * cx + ax * fy - ay * fx)
+        l2 = 2.0 * (ex * cy - ey * cx + bx * fy - by * fx)
+    points, pairs = 2 * axial.shape[0] - 1, axial.shape[0] - 1
+    # In the middle both strains share the root.
+    shrink = 1.0 / root(s0)
+    relaxed = _reference(tile, curved, family, number, lane, 2 * int(axial[pairs, 2]), 1.0)
+    n0, lost = _stretch(damped, shrink, p0, relaxed, ea * axial[pairs, 1], eta)
+    n1, n2, n3, n4, m0, m1, m2 = none, none, none, none, none, none, none
+    for g in range(pairs):
+        x, square = axial[g, 0], axial[g, 0] * axial[g, 0]
+        here, there = _at_both(x, s0, s1, s2, s3, s4)
+        rate, other = _at_both(x, p0, p1, p2, p3, p4)
+        relaxed = _reference(tile, curved, family, number, lane, 2 * int(axial[g, 3]), 1.0)
+        first, power_first = _stretch(damped, 1.0 / root(here), rate, relaxed, ea * axial[g, 1], eta)
+        relaxed = _reference(tile, curved, family, number, lane, 2 * int(axial[g, 2]), 1.0)
+        second, power_second = _stretch(damped, 1.0 / root(there), other, relaxed, ea * axial[g, 1], eta)
+        lost = lost + (power_first + power_second)
+        even, odd = first + second, x * (first - second)
+        n0, n1, n2 = n0 + even, n1 + odd, n2 + square * even
+        n3, n4 = n3 + square * odd, n4 + (square * square) * even
+    last = bending.shape[0] - 1
+    if bending[last, 1] != 0.0:
+        at = 2 * (points + int(bending[last, 2]))
+        straight = _reference(tile, curved, family, number, lane, at, 1.0)
+        angle = _reference(tile, curved, family, number, lane, at + 1, 0.0)
+        m0, turn, more = _bend(damped, shrink * shrink, k0, p0, l0, straight, angle, ei * bending[last, 1], eta)
+        n0, lost = n0 - 2.0 * m0 * turn, lost + more
+    for g in range(last):
+        x, square = bending[g, 0], bending[g, 0] * bending[g, 0]
+        here, there = _at_both(x, s0, s1, s2, s3, s4)
+        rate, other = _at_both(x, p0, p1, p2, p3, p4)
+        k, k_there = _at_both(x, k0, k1, k2, none, none)
+        turning, twisting = _at_both(x, l0, l1, l2, none, none)
+        at = 2 * (points + int(bending[g, 3]))
+        straight = _reference(tile, curved, family, number, lane, at, 1.0)
+        angle = _reference(tile, curved, family, number, lane, at + 1, 0.0)
+        moment, turn, more = _bend(damped, 1.0 / here, k, rate, turning, straight, angle, ei * bending[g, 1], eta)
+        at = 2 * (points + int(bending[g, 2]))
+        straight = _reference(tile, curved, family, number, lane, at, 1.0)
+        angle = _reference(tile, curved, family, number, lane, at + 1, 0.0)
+        second, twist, most = _bend(
+            damped, 1.0 / there, k_there, other, twisting, straight, angle, ei * bending[g, 1], eta
+        )
+        lost = lost + (more + most)
+        even, odd = -2.0 * (moment * turn + second * twist), (-2.0 * x) * (moment * turn - second * twist)
+        n0, n1, n2 = n0 + even, n1 + odd, n2 + square * even
+        n3, n4 = n3 + square * odd, n4 + (square * square) * even
+        even = moment + second
+        m0, m1, m2 = m0 + even, m1 + x * (moment - second), m2 + square * even
+    m0, m1, m2 = 2.0 * m0, 4.0 * m1, 2.0 * m2
+    gx, gy = n0 * ax + n1 * bx + n2 * cx + m0 * by + m1 * cy, n0 * ay + n1 * by + n2 * cy - m0 * bx - m1 * cx
+    hx, hy = n1 * ax + n2 * bx + n3 * cx - m0 * ay + m2 * cy, n1 * ay + n2 * by + n3 * cy + m0 * ax - m2 * cx
+    ix, iy = n2 * ax + n3 * bx + n4 * cx - m1 * ay - m2 * by, n2 * ay + n3 * by + n4 * cy + m1 * ax + m2 * bx
+    dx, dy, hx, hy = 1.5 * (gx - ix) * inverse, 1.5 * (gy - iy) * inverse, 0.5 * hx, 0.5 * hy
+    ex, ey = 0.25 * gx - 0.75 * ix, 0.25 * gy - 0.75 * iy
+    add_rows(tile, family, number, lane, count, w, f, (dx, dy, ex + hx, ey + hy, -dx, -dy, ex - hx, ey - hy))
+    if damped:
+        add_sum(tile, lane, count, w, power, lost)
 
 
 @njit(cache=True, error_model="numpy")
 def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array, power: Array, moving: bool) -> None:
     """See `families.add_force`."""
-    for number in range(family.size):
-        for k in range(ROWS):
-            copy(tile, w, k, z, family.rows[ROWS * number + k])
-        variant = family.plan[PLAN * number + 3]
-        if variant == FULL:
-            _force(tile, False, False, _FULL_AXIAL, _FULL_BENDING, family, number, w, power)
-        elif variant == REDUCED:
-            _force(tile, False, False, _REDUCED_AXIAL, _REDUCED_BENDING, family, number, w, power)
-        elif variant == DAMPED and moving:
-            for k in range(ROWS):
-                copy(tile, w, _RATE + k, zdot, family.rows[ROWS * number + k])
-            _force(tile, True, True, _FULL_AXIAL, _FULL_BENDING, family, number, w, power)
-        else:
-            _force(tile, True, False, _FULL_AXIAL, _FULL_BENDING, family, number, w, power)
-        for k in range(ROWS):
-            add(tile, f, family.rows[ROWS * number + k], w, _FORCE + k)
+    number = 0
+    while number < family.size:
+        count, variant = together(tile, family, number), family.plan[PLAN * number + VARIANT]
+        for lane in range(0, len(tile), len(EIGHT)):
+            at = family, number, count, lane, z, zdot, f, w, power
+            if variant == FULL:
+                _force(tile, False, False, _FULL_AXIAL, _FULL_BENDING, *at)
+            elif variant == REDUCED:
+                _force(tile, False, False, _REDUCED_AXIAL, _REDUCED_BENDING, *at)
+            elif variant == DAMPED and moving:
+                _force(tile, True, True, _FULL_AXIAL, _FULL_BENDING, *at)
+            else:
+                _force(tile, True, False, _FULL_AXIAL, _FULL_BENDING, *at)
+        number += count
+
+
+@njit(error_model="numpy", forceinline=True)
+def _add_energy(tile, axial, bending, family, number, count, lane, z, w, energy):  # type: ignore[no-untyped-def]
+    """Add the strain energy of `count` elements; the rules, rows (xi, weight), are constants of the call."""
+    inverse = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 0)
+    ax, ay, bx, by, cx, cy = _curve(tile, family, number, lane, inverse, z)
+    s0, s1, s2, s3, s4 = _dot(ax, ay, bx, by, cx, cy, ax, ay, bx, by, cx, cy)
+    k0, k1, k2 = 2.0 * (ax * by - ay * bx), 4.0 * (ax * cy - ay * cx), 2.0 * (bx * cy - by * cx)
+    stretched, bent = 0.0 * inverse, 0.0 * inverse
+    for g in range(axial.shape[0]):
+        x, weight = axial[g, 0], axial[g, 1]
+        relaxed = rest(tile, family, number, lane, 2 * g)
+        strain = root(s0 + x * (s1 + x * (s2 + x * (s3 + x * s4)))) * relaxed - 1.0
+        stretched = stretched + weight * strain * strain / relaxed
+    for g in range(bending.shape[0]):
+        x, weight = bending[g, 0], bending[g, 1]
+        at = 2 * (axial.shape[0] + g)
+        square = s0 + x * (s1 + x * (s2 + x * (s3 + x * s4)))
+        angle = (k0 + x * (k1 + x * k2)) / square - rest(tile, family, number, lane, at + 1)
+        bent = bent + weight * angle * angle * rest(tile, family, number, lane, at)
+    ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
+    ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
+    add_sum(tile, lane, count, w, energy, 0.5 * (ea * stretched + ei * bent))
+
+
+@njit(cache=True, error_model="numpy")
+def potential(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: int) -> None:
+    """See `families.add_energy`."""
+    number, total = 0, shift(energy, row * len(tile))
+    while number < family.size:
+        count, variant = together(tile, family, number), family.plan[PLAN * number + VARIANT]
+        for lane in range(0, len(tile), len(EIGHT)):
+            at = family, number, count, lane, z, w, total
+            if variant == REDUCED:
+                _add_energy(tile, _REDUCED_POINTS, _REDUCED_BENDING_POINTS, *at)
+            else:
+                _add_energy(tile, _POINTS, _BENDING_POINTS, *at)
+        number += count
 
 
 implement(
     Cubics,
     Kernel(ROWS, beam.COEFFICIENTS, 1),
     force=force,
-    potential=beam_tangent.energy,
+    potential=potential,
     stiffness=beam_tangent.stiffness,
     viscosity=beam_tangent.viscosity,
 )

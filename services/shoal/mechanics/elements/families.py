@@ -11,15 +11,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shoal.mechanics.numerics.choice import choose
+from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Index, Number, Tile, index, stacked
 
-PLAN = 4
-"""Numbers of an element in the plan: its first row of the table, how many rows, its first row of the reference, and the
-variant of the kernel (which only the family itself knows)."""
+PLAN = 5
+"""Numbers of an element in the plan: its first row of the table, how many rows, its first row of the reference, the
+variant of the kernel (which only the family itself knows), and how many from here on are of that variant, at most 8."""
 
 
 class Family(NamedTuple):
     """Elements of one family, any number of them, also none; each family is a subclass.
+
+    The arrays repeat the last element, so that a batch that begins with it reads nothing that is not there.
 
     side: rows of one element. damped: whether any loses energy in itself, otherwise rates are not looked at. table:
     quadrature rules back to back. plan: PLAN numbers an element. rows: `side` an element. coefficients: (numbers *
@@ -76,7 +79,12 @@ class Collected:
         if key not in self._rules:
             self._rules[key] = self._points, part.rule
             self._points += len(part.rule)
-        self._plan += [self._rules[key][0], len(part.rule), len(self._reference), part.variant]
+        self._plan += [self._rules[key][0], len(part.rule), len(self._reference), part.variant, 1]
+        last = len(self._plan) - PLAN
+        for first in range(last - PLAN, max(last - PLAN * len(EIGHT), -1), -PLAN):
+            if self._plan[first + PLAN - 2] != part.variant:
+                break
+            self._plan[first + PLAN - 1] += 1
         self.owners.append(owner)
         self._rows += rows
         self._numbers += part.numbers
@@ -84,7 +92,11 @@ class Collected:
         self._damped = self._damped or part.damped
 
     def family(self, kind: Any) -> Any:
-        """All of them as arrays."""
+        """All of them as arrays, and the last one again where a batch would read beyond it."""
+        for _ in range(len(EIGHT) - 1 if self.owners else 0):
+            self._plan += self._plan[-PLAN:]
+            self._rows += self._rows[-KERNELS[kind].side :]
+            self._numbers += self._numbers[-KERNELS[kind].coefficients :]
         table = np.concatenate([np.zeros(0), *(rule.ravel() for _, rule in self._rules.values())])
         side = KERNELS[kind].side
         plan, rows = index(self._plan), index(self._rows)

@@ -15,6 +15,7 @@ from shoal.mechanics import dynamics, gates
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.numerics.simd import add_scaled, assign
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
@@ -46,21 +47,18 @@ def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, t: float, h: float) -
     """One step of h [s] from the time t."""
     end = m.unknowns * len(tile)
     scheme.evaluations[0] += 1
-    for i in range(end):
-        w.zdot[i] += 0.5 * h * w.a[i]
-        w.z[i] += h * w.zdot[i]
+    add_scaled(w.zdot, 0.5 * h, w.a, end)
+    add_scaled(w.z, h, w.zdot, end)
     if m.constraints.size > 0 or dynamics.loaded(m):
-        for i in range(end):
-            w.stage[i] = w.zdot[i]
-            w.zdot[i] += 0.5 * h * w.a[i]
+        assign(w.stage, w.zdot, end)
+        add_scaled(w.zdot, 0.5 * h, w.a, end)
         gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
-        for i in range(end):
-            w.zdot[i] = w.stage[i] + 0.5 * h * w.a[i]
+        assign(w.zdot, w.stage, end)
+        add_scaled(w.zdot, 0.5 * h, w.a, end)
         gates.settle(tile, m, w, t + h, scheme.rank_tolerance)
     else:
         gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
-        for i in range(end):
-            w.zdot[i] += 0.5 * h * w.a[i]
+        add_scaled(w.zdot, 0.5 * h, w.a, end)
     return h
 
 

@@ -1,0 +1,115 @@
+"""Elements as vectors: one element of a tile of simulations, or up to eight elements of a single simulation.
+
+A force is written once for values of `simd`. In a tile their lanes are the simulations, in a single run neighbours of
+one variant; the last batch of these repeats an element, whose force is not counted twice.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+from numba.extending import overload
+
+from shoal.mechanics.elements.families import PLAN, Family
+from shoal.mechanics.numerics import simd
+from shoal.mechanics.numerics.pointers import shift
+from shoal.mechanics.numerics.simd import EIGHT
+from shoal.mechanics.numerics.tile import Array, Tile
+
+REST, VARIANT, TOGETHER = 2, 3, 4
+"""Columns of the plan: see `families.PLAN`."""
+
+
+@njit(error_model="numpy", forceinline=True)
+def together(tile: Tile, family: Family, number: int) -> int:
+    """How many elements from this one on are computed at once."""
+    return family.plan[PLAN * number + TOGETHER] if len(tile) == 1 else 1
+
+
+def coordinate(tile: Tile, family: Family, number: int, lane: int, side: int, k: int, z: Array) -> Any:
+    """Row k of `side` of the elements from this number on, of the state z."""
+    raise NotImplementedError
+
+
+def coefficient(tile: Tile, family: Family, number: int, lane: int, count: int, k: int) -> Any:
+    """Their coefficient k of `count`."""
+    raise NotImplementedError
+
+
+def rest(tile: Tile, family: Family, number: int, lane: int, k: int) -> Any:
+    """Entry k of their reference."""
+    raise NotImplementedError
+
+
+def add_rows(tile: Tile, family: Family, number: int, lane: int, count: int, w: Array, f: Array, values: Any) -> None:
+    """Add a tuple of vectors, one a row, to the rows of `count` elements in f; w: room for 8 of each."""
+    raise NotImplementedError
+
+
+def add_sum(tile: Tile, lane: int, count: int, w: Array, total: Array, value: Any) -> None:
+    """Add a vector to total, (lanes,), in a single run the sum over `count` elements; w: room for 8."""
+    raise NotImplementedError
+
+
+@overload(coordinate)
+def _coordinate(tile, family, number, lane, side, k, z):  # type: ignore[no-untyped-def]
+    if tile.count == 1:
+        return lambda tile, family, number, lane, side, k, z: simd.pick(EIGHT, z, family.rows, side * number + k, side)
+    return lambda tile, family, number, lane, side, k, z: simd.load(
+        EIGHT, z, family.rows[side * number + k] * len(tile) + lane
+    )
+
+
+@overload(coefficient)
+def _coefficient(tile, family, number, lane, count, k):  # type: ignore[no-untyped-def]
+    if tile.count == 1:
+        return lambda tile, family, number, lane, count, k: simd.gather(
+            EIGHT, family.coefficients, count * number + k, count
+        )
+    return lambda tile, family, number, lane, count, k: simd.load(
+        EIGHT, family.coefficients, (count * number + k) * len(tile) + lane
+    )
+
+
+@overload(rest)
+def _rest(tile, family, number, lane, k):  # type: ignore[no-untyped-def]
+    if tile.count == 1:
+        return lambda tile, family, number, lane, k: simd.pick(
+            EIGHT, shift(family.reference, k), family.plan, PLAN * number + REST, PLAN
+        )
+    return lambda tile, family, number, lane, k: simd.load(
+        EIGHT, family.reference, (family.plan[PLAN * number + REST] + k) * len(tile) + lane
+    )
+
+
+@overload(add_rows)
+def _add_rows(tile, family, number, lane, count, w, f, values):  # type: ignore[no-untyped-def]
+    side = values.count
+
+    def single(tile, family, number, lane, count, w, f, values):  # type: ignore[no-untyped-def]
+        for k in range(side):
+            simd.store(w, len(EIGHT) * k, values[k])
+        for other in range(count):
+            first = side * (number + other)
+            for k in range(side):
+                f[family.rows[first + k]] += w[len(EIGHT) * k + other]
+
+    def wide(tile, family, number, lane, count, w, f, values):  # type: ignore[no-untyped-def]
+        for k in range(side):
+            simd.add_to(f, family.rows[side * number + k] * len(tile) + lane, values[k])
+
+    return single if tile.count == 1 else wide
+
+
+@overload(add_sum)
+def _add_sum(tile, lane, count, w, total, value):  # type: ignore[no-untyped-def]
+    def single(tile, lane, count, w, total, value):  # type: ignore[no-untyped-def]
+        simd.store(w, 0, value)
+        for other in range(count):
+            total[0] += w[other]
+
+    def wide(tile, lane, count, w, total, value):  # type: ignore[no-untyped-def]
+        simd.add_to(total, lane, value)
+
+    return single if tile.count == 1 else wide

@@ -1,0 +1,226 @@
+"""A vector of doubles as a value in compiled code: `+ - * /`, `sqrt`, and how it comes from memory and goes back.
+
+The compiler makes vector code of a loop over lanes only if it can prove that rows do not overlap, and not through long
+formulas. Here a formula is written once for a number; given vectors, it is computed for as many lanes as they have: the
+simulations of a tile, or elements of a single one. The length is that of a tuple, as of a tile. LLVM splits vectors
+that are longer than the processor's; results do not depend on it but for the rounding of fused products.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.extending import intrinsic, overload, register_model
+
+from shoal.mechanics.numerics.tile import Array, Tile
+
+EIGHT: Tile = (0,) * 8
+"""The lanes of the longest vectors of today's processors."""
+_FLAGS = ("contract", "nsz")
+
+
+class Vector(types.Type):
+    """The compiler's type of a vector of `count` doubles."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        super().__init__(f"Vector({count})")
+
+
+@register_model(Vector)
+class _Model(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Vector) -> None:
+        super().__init__(manager, kind, _vector(kind.count))
+
+
+def _vector(count: int) -> Any:
+    return ir.VectorType(ir.DoubleType(), count)
+
+
+def _place(builder: Any, base: Any, at: Any, count: int) -> Any:
+    return builder.bitcast(builder.gep(base, [at]), _vector(count).as_pointer())
+
+
+def _spread(builder: Any, value: Any, count: int) -> Any:
+    kind = ir.VectorType(value.type, count)
+    undefined = ir.Constant(kind, ir.Undefined)
+    first = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(ir.IntType(32), count), [0] * count))
+
+
+@intrinsic
+def load(typing_context, tile, base, at):  # type: ignore[no-untyped-def]
+    """As many neighbours as the tile has lanes, from entry `at` of a pointer on."""
+    count = tile.count
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.load(_place(builder, arguments[1], arguments[2], count), align=8)
+
+    return Vector(count)(tile, base, at), generate
+
+
+@intrinsic
+def store(typing_context, base, at, value):  # type: ignore[no-untyped-def]
+    """Write a vector to the entries from `at` on."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        builder.store(arguments[2], _place(builder, arguments[0], arguments[1], value.count), align=8)
+        return context.get_dummy_value()
+
+    return types.void(base, at, value), generate
+
+
+@intrinsic
+def add_to(typing_context, base, at, value):  # type: ignore[no-untyped-def]
+    """Add a vector to the entries from `at` on."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        place = _place(builder, arguments[0], arguments[1], value.count)
+        builder.store(builder.fadd(builder.load(place, align=8), arguments[2], flags=_FLAGS), place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(base, at, value), generate
+
+
+@intrinsic
+def gather(typing_context, tile, base, first, step):  # type: ignore[no-untyped-def]
+    """The entries first, first + step, ... of a pointer."""
+    count = tile.count
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        _, base, at, step = arguments
+        return _collected(builder, [builder.add(at, builder.mul(step, at.type(k))) for k in range(count)], base)
+
+    return Vector(count)(tile, base, first, step), generate
+
+
+@intrinsic
+def pick(typing_context, tile, base, rows, first, step):  # type: ignore[no-untyped-def]
+    """The entries of a pointer whose numbers stand in rows[first], rows[first + step], ..."""
+    count = tile.count
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        _, base, rows, at, step = arguments
+        places = [builder.gep(rows, [builder.add(at, builder.mul(step, at.type(k)))]) for k in range(count)]
+        return _collected(builder, [builder.load(place) for place in places], base)
+
+    return Vector(count)(tile, base, rows, first, step), generate
+
+
+def _collected(builder: Any, numbers: list[Any], base: Any) -> Any:
+    value = ir.Constant(_vector(len(numbers)), ir.Undefined)
+    for k, number in enumerate(numbers):
+        value = builder.insert_element(value, builder.load(builder.gep(base, [number])), ir.IntType(32)(k))
+    return value
+
+
+@intrinsic
+def spread(typing_context, tile, number):  # type: ignore[no-untyped-def]
+    """One number in all lanes."""
+    count = tile.count
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return _spread(builder, arguments[1], count)
+
+    return Vector(count)(tile, number), generate
+
+
+@intrinsic
+def repeat(typing_context, tile, group, base, at):  # type: ignore[no-untyped-def]
+    """The entries of a pointer from `at` on, as many as the group has members, again and again."""
+    count, members = tile.count, group.count
+    if count % members:
+        raise TypeError(f"repeat: {count} lanes are no multiple of {members}")
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        part = builder.load(_place(builder, arguments[2], arguments[3], members), align=8)
+        numbers = ir.Constant(ir.VectorType(ir.IntType(32), count), [k % members for k in range(count)])
+        return builder.shuffle_vector(part, ir.Constant(part.type, ir.Undefined), numbers)
+
+    return Vector(count)(tile, group, base, at), generate
+
+
+@intrinsic
+def root(typing_context, x):  # type: ignore[no-untyped-def]
+    """The square root of a vector."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        kind = arguments[0].type
+        function = ir.FunctionType(kind, [kind])
+        return builder.call(
+            cgutils.get_or_insert_function(builder.module, function, f"llvm.sqrt.v{x.count}f64"), arguments
+        )
+
+    return x(x), generate
+
+
+@intrinsic
+def _negative(typing_context, x):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.fneg(arguments[0])
+
+    return x(x), generate
+
+
+def _binary(instruction: str) -> Any:
+    @intrinsic
+    def combined(typing_context, x, y):  # type: ignore[no-untyped-def]
+        count = (x if isinstance(x, Vector) else y).count
+
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            kinds = zip(signature.args, arguments, strict=True)
+            both = [value if isinstance(kind, Vector) else _spread(builder, value, count) for kind, value in kinds]
+            return getattr(builder, instruction)(*both, flags=_FLAGS)
+
+        return Vector(count)(x, y), generate
+
+    return combined
+
+
+def _define(operation: Any, instruction: str) -> None:
+    combined = _binary(instruction)
+
+    @overload(operation)
+    def chosen(x, y):  # type: ignore[no-untyped-def]
+        if {type(x), type(y)} <= {Vector, types.Float} and Vector in (type(x), type(y)):
+            return lambda x, y: combined(x, y)
+        return None
+
+
+for _operation, _instruction in (
+    (operator.add, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.mul, "fmul"),
+    (operator.truediv, "fdiv"),
+):
+    _define(_operation, _instruction)
+
+
+@overload(operator.neg)
+def _negated(x):  # type: ignore[no-untyped-def]
+    return (lambda x: _negative(x)) if isinstance(x, Vector) else None
+
+
+@njit(error_model="numpy", forceinline=True)
+def assign(y: Array, x: Array, count: int) -> None:
+    """y = x, so many numbers that do not overlap. Pointers."""
+    whole = count - count % len(EIGHT)
+    for i in range(0, whole, len(EIGHT)):
+        store(y, i, load(EIGHT, x, i))
+    for i in range(whole, count):
+        y[i] = x[i]
+
+
+@njit(error_model="numpy", forceinline=True)
+def add_scaled(y: Array, factor: float, x: Array, count: int) -> None:
+    """y += factor x, so many numbers that do not overlap. Pointers."""
+    whole = count - count % len(EIGHT)
+    for i in range(0, whole, len(EIGHT)):
+        add_to(y, i, factor * load(EIGHT, x, i))
+    for i in range(whole, count):
+        y[i] += factor * x[i]
