@@ -41,7 +41,7 @@ def kernel_cache(package: Path = _PACKAGE) -> Path:
 
 
 def compiled() -> bool:
-    """Whether there are compiled kernels; without, the first run takes minutes."""
+    """Whether there are compiled kernels; without, the first run takes a minute."""
     return any(Path(os.environ.get("NUMBA_CACHE_DIR") or kernel_cache()).rglob("*.nbi"))
 
 

@@ -36,6 +36,7 @@ def simulate(
 ) -> None:
     """Say where the markers of SCENE go, and how far to trust it."""
     from shoal.engines import get_engine
+    from shoal.engines.theory import rigid_runs
     from shoal.engines.verification import verified
     from shoal.pictures import files
     from shoal.scene import load_scene
@@ -54,6 +55,7 @@ def simulate(
     else:
         chosen = get_engine(engine)
         with screen.working(f"simulating {wanted.name} with {engine}"):
+            screen.compile_for(engine, [1], wanted, *(rigid_runs(wanted) if verify else ()))
             trajectory = verified(chosen, wanted, times) if verify else chosen.simulate(wanted, times)
     if out is not None:
         files.trajectory(trajectory, wanted, out, selection)
@@ -84,6 +86,7 @@ def sweep(
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"sweeping {wanted.name}"):
+        screen.compile_for(engine, [1, 2], wanted)
         result = sweep(wanted, vary, get_engine(engine), time)
         result = spot_checked(result, get_engine(engine)) if verify else result
     if out is not None:
@@ -108,6 +111,8 @@ def compare(scene: str, engines: str, values: Values, times: Times, as_json: boo
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"running {wanted.name} on {engines}"):
+        for name in engines.split(","):
+            screen.compile_for(name.strip(), [1], wanted)
         comparison = compare(wanted, [name.strip() for name in engines.split(",")], times)
     if out is not None:
         files.comparison(comparison, out)

@@ -57,6 +57,7 @@ def identify(
         how["progress"] = lambda _, best, __, count: tell(
             f"{wanted.name}: best fitness {best:.3e}, {count} evaluations"
         )
+        screen.compile_for(how["engine"], [1, 2], wanted.load_scene(how["values"]))
         estimate = identify(wanted, checkpoint=checkpoint, wishes=wishes, **how)
     if out is not None:
         files.estimate(estimate, wanted, out)

@@ -22,29 +22,41 @@ def left_out(trajectory: Trajectory, scene: Scene, native: Engine) -> float | No
     r radius of gyration of the section, kappa by Cowper 1966); this share of the effect that bending has at all, the
     distance from the run with rigid rods, is an order of magnitude.
     """
-    rods = {name: body for name, body in scene.bodies.items() if isinstance(body, Rod)}
-    shearing = trajectory.engine in WITH_SHEAR
-    full = [name for name, rod in rods.items() if rod.shears or (shearing and rod.element != "rigid")]
-    slender = {name: rod for name, rod in rods.items() if name not in full and not rod.rotary_inertia}
-    flexible = [rod for rod in rods.values() if rod.element != "rigid"]
-    # A place on a curved rod is told by its arc length where it is flexible, by its coordinates where it is rigid.
-    if not slender or any(rod.curvature for rod in flexible):
-        return None
-    values: dict[str, object] = {f"bodies.{name}.element": "rigid" for name in rods}
-    values |= {f"bodies.{name}.rotary_inertia": name not in slender for name in rods}
-    stout = values | {f"bodies.{name}.rotary_inertia": True for name in slender}
+    _, slender = _rods(scene, trajectory.engine in WITH_SHEAR)
     try:
-        runs = [
-            native.simulate(scene.with_values({**one, "solver.integrator": "auto"}), trajectory.times)
-            for one in (values, stout)
-        ]
+        runs = [native.simulate(one, trajectory.times) for one in rigid_runs(scene, trajectory.engine)]
     except InputError:
         return None
-    if not all(run.ok for run in runs):
+    if not runs or not all(run.ok for run in runs):
         return None
     rotary = runs[0].distance(runs[1])
     share = max((slender_share(rod) for rod in slender.values() if rod.element != "rigid"), default=0.0)
     return rotary + (share * runs[0].distance(trajectory) if share else 0.0)
+
+
+def rigid_runs(scene: Scene, engine: str = "gauss") -> list[Scene]:
+    """The scene with rigid rods, without and with the rotary inertia of their section; none if it cannot be told."""
+    rods, slender = _rods(scene, engine in WITH_SHEAR)
+    # A place on a curved rod is told by its arc length where it is flexible, by its coordinates where it is rigid.
+    if not slender or any(rod.curvature for rod in rods.values() if rod.element != "rigid"):
+        return []
+    values: dict[str, object] = {f"bodies.{name}.element": "rigid" for name in rods}
+    values["solver.integrator"] = "auto"
+    inertias = (
+        {f"bodies.{name}.rotary_inertia": stout or name not in slender for name in rods} for stout in (False, True)
+    )
+    try:
+        return [scene.with_values(values | inertia) for inertia in inertias]
+    except InputError:
+        return []
+
+
+def _rods(scene: Scene, shearing: bool) -> tuple[dict[str, Rod], dict[str, Rod]]:
+    """All rods, and those whose motion leaves shear and rotary inertia out; shearing: every flexible rod has both."""
+    rods = {name: body for name, body in scene.bodies.items() if isinstance(body, Rod)}
+    full = [name for name, rod in rods.items() if rod.shears or (shearing and rod.element != "rigid")]
+    slender = {name: rod for name, rod in rods.items() if name not in full and not rod.rotary_inertia}
+    return rods, slender
 
 
 def slender_share(rod: Rod) -> float:

@@ -8,13 +8,13 @@ import numpy as np
 from numba import literal_unroll, njit
 
 from shoal.mechanics import applied, constraints, forces
-from shoal.mechanics.derived import derive, fold
+from shoal.mechanics.derived import Derived, derive, fold
 from shoal.mechanics.elements import families
 from shoal.mechanics.least import principle
 from shoal.mechanics.least import work as least
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import alike, gate, simd, sparse
-from shoal.mechanics.numerics.pointers import raw, shift
+from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.mechanics.numerics.vector import clear
 
@@ -88,12 +88,15 @@ def instant(w: Work, t: float) -> float:
     return min(t, w.until[0])  # type: ignore[no-any-return]
 
 
-@njit(cache=True, error_model="numpy")
 def derived_rows(tile: Tile, arrays: Arrays, room: Work) -> None:
     """Fill all derived rows of the state in `room`. Arrays, not pointers."""
-    m, w = raw(arrays), raw(room)
-    derive(tile, m.derived, w.z, m.unknowns, m.rows, False)
-    derive(tile, m.derived, w.zdot, m.unknowns, m.rows, True)
+    _derived_rows(tile, arrays.derived, room.z, arrays.unknowns, arrays.rows, False)
+    _derived_rows(tile, arrays.derived, room.zdot, arrays.unknowns, arrays.rows, True)
+
+
+@njit(cache=True, error_model="numpy")
+def _derived_rows(tile: Tile, derived: Derived, z: Array, begin: int, end: int, moving: bool) -> None:
+    derive(tile, raw(derived), pointer(z), begin, end, moving)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -121,9 +124,11 @@ def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Ar
             derive(tile, m.derived, zdot, m.unknowns, m.force_rows, True)
             applied.add_force(tile, m.applied, m.functions, t, z, zdot, f, w.power)
         forces.add_force(tile, m.forces, m.functions, t, z, zdot, w.memory, f, w.element, w.power, moving)
+    kind = -1
     for family in literal_unroll(m.elements):
-        if not (part == SIMPLE and families.is_exact(family)):
-            families.add_force(tile, family, z, zdot, f, w.element, w.power, moving)
+        kind += 1
+        if family.size > 0 and not (part == SIMPLE and families.is_exact(family)):
+            gate.call(m.gates.force[kind], (tile, family, z, zdot, f, w.element, w.power, moving))
     fold(tile, m.derived, f, m.force_rows)
 
 
@@ -137,15 +142,23 @@ def add_mean_force(tile: Tile, m: Arrays, w: Work, before: Array, after: Array, 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """Turn all of the force in `a` into the acceleration by Gauss's principle, valid on the unknowns."""
-    if m.method == principle.SOUGHT:
-        principle.state(tile, m, w.gauss, t, z, zdot)
-        gate.ask(m.gates.sought, t, a)
-    elif m.constraints.size > 0:
-        principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
+    if m.constraints.size > 0 or m.gates.sought != 0:
+        arguments = (gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, tolerance, a)
+        gate.call(m.gates.constrain, (tile, *arguments))
     elif m.alike.components > 0:
         alike.solve(tile, m.space, m.alike, w.element, a)
     else:
         sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
+    """`accelerate` where there are constraints, or somebody else who seeks the acceleration."""
+    if m.gates.sought != 0:
+        principle.state(tile, m, w.gauss, t, z, zdot)
+        gate.ask(m.gates.sought, t, a)
+    else:
+        principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
     if m.driven:
         constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)
 
@@ -173,37 +186,9 @@ def energies(tile: Tile, m: Arrays, w: Work) -> None:
             w.energy[lane] += 0.5 * w.zdot[i * width + lane] * w.stage[i * width + lane]
             w.energy[2 * width + lane] -= m.weight[i * width + lane] * w.z[i * width + lane]
     derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
+    kind = -1
     for family in literal_unroll(m.elements):
-        families.add_energy(tile, family, w.z, w.element, w.energy, 1)
+        kind += 1
+        if family.size > 0:
+            gate.call(m.gates.energy[kind], (tile, family, w.z, w.element, w.energy, 1))
     forces.add_energy(tile, m.forces, m.functions, w.z, w.memory, w.element, w.energy, 1)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def tangents(tile: Tile, m: Arrays, w: Work, z: Array, damping_factor: float, block: Array, size: int) -> None:
-    """K + damping_factor D of all elements, family by family, then of the forces, into `size` rows of block.
-
-    Another `size` rows are work space. The derived rows of z, and those of w.zdot where anything is damped, are filled.
-    """
-    first = 0
-    for family in literal_unroll(m.elements):
-        families.tangent(tile, family, z, w.element, block, first)
-        first += family.side * family.side * family.size
-    forces.tangent(tile, m.forces, m.functions, z, w.memory, w.element, block, first)
-    if damping_factor != 0.0 and (m.forces.size > 0 or m.damped):
-        end = size * len(tile)
-        other = shift(block, end)
-        _dampings(tile, m, w, z, other, end)
-        for i in range(end):
-            block[i] += damping_factor * other[i]
-
-
-@njit(cache=True, error_model="numpy")
-def _dampings(tile: Tile, m: Arrays, w: Work, z: Array, block: Array, end: int) -> None:
-    for i in range(end):
-        block[i] = 0.0
-    first = 0
-    for family in literal_unroll(m.elements):
-        if family.damped:
-            families.damping(tile, family, z, w.element, block, first)
-        first += family.side * family.side * family.size
-    forces.damping(tile, m.forces, z, w.zdot, w.element, block, first)

@@ -1,7 +1,8 @@
 """The gates between the integrators and the mechanics: kernels that are compiled once and called by their addresses.
 
 Each function here does what the one of the same name does that its gate calls, a few lines below; `numerics.gate` says
-why. `ready` compiles the gates of one width, or takes them from the cache.
+why. `ready` compiles what a model calls, or takes it from the cache: constraints where there are some, and the families
+of elements that it has.
 """
 
 from __future__ import annotations
@@ -13,15 +14,17 @@ from typing import Any
 import numpy as np
 from numba import njit, typeof, types
 
-from shoal.mechanics import dynamics
+from shoal.mechanics import compilation, dynamics
 from shoal.mechanics.dynamics import ACCELERATION, ALL, ELASTIC, SIMPLE, Work, instant
+from shoal.mechanics.elements import families
 from shoal.mechanics.least import drift
-from shoal.mechanics.least.principle import SOUGHT
 from shoal.mechanics.model import Arrays, Gates
 from shoal.mechanics.numerics import gate
 from shoal.mechanics.numerics.pointers import raw_type
-from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile, index
 
+Kernel = tuple[Any, tuple[Any, ...]]
+"""A function that is compiled, and the types of its arguments."""
 Seek = Callable[[float, Array], None]
 """Seeks the acceleration of a single lane in place of the kernels: (time [s], the forces Q (unknowns,), which it
 replaces by the acceleration). The state, C_q and eta are in the work space, where it leaves the multipliers."""
@@ -97,37 +100,97 @@ def _energies(tile, pm, pw):  # type: ignore[no-untyped-def]
     dynamics.energies(tile, gate.load(pm), gate.load(pw))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def tangents(tile: Tile, m: Arrays, w: Work, z: Array, damping_factor: float, block: Array, size: int) -> None:
-    """`dynamics.tangents`."""
-    arguments = (gate.typed(m.home, m), gate.typed(w.home, w), z, damping_factor, block, size)
-    gate.call(m.gates.tangents, (tile, *arguments))
+@njit(cache=True, error_model="numpy")
+def _constrain(tile, pm, pw, t, z, zdot, tolerance, a):  # type: ignore[no-untyped-def]
+    dynamics.constrain(tile, gate.load(pm), gate.load(pw), t, z, zdot, tolerance, a)
 
 
 @njit(cache=True, error_model="numpy")
-def _tangents(tile, pm, pw, z, damping_factor, block, size):  # type: ignore[no-untyped-def]
-    dynamics.tangents(tile, gate.load(pm), gate.load(pw), z, damping_factor, block, size)
+def _force(tile, family, z, zdot, f, w, power, moving):  # type: ignore[no-untyped-def]
+    families.add_force(tile, family, z, zdot, f, w, power, moving)
 
 
-_NUMBER, _COUNT, _ROWS = types.float64, types.int64, types.CPointer(types.float64)
-_GATES: dict[str, tuple[Any, tuple[Any, ...]]] = {
+@njit(cache=True, error_model="numpy")
+def _energy(tile, family, z, w, energy, row):  # type: ignore[no-untyped-def]
+    families.add_energy(tile, family, z, w, energy, row)
+
+
+@njit(cache=True, error_model="numpy")
+def _stiffness(tile, family, z, w, out, first):  # type: ignore[no-untyped-def]
+    families.tangent(tile, family, z, w, out, first)
+
+
+@njit(cache=True, error_model="numpy")
+def _damping(tile, family, z, w, out, first):  # type: ignore[no-untyped-def]
+    families.damping(tile, family, z, w, out, first)
+
+
+_NUMBER, _COUNT, _FLAG, _ROWS = types.float64, types.int64, types.boolean, types.CPointer(types.float64)
+_STATE_GATES: dict[str, Kernel] = {
     "motion": (_motion, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS, _COUNT)),
-    "settle": (_settle, (_NUMBER, _NUMBER, _COUNT)),
     "energies": (_energies, ()),
-    "tangents": (_tangents, (_ROWS, _NUMBER, _ROWS, _COUNT)),
+    "constrain": (_constrain, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
+    "settle": (_settle, (_NUMBER, _NUMBER, _COUNT)),
 }
-"""Every gate, and the types of its arguments after the tile and the two structures."""
+"""Gates of a whole state, and the types of their arguments after the tile and the two structures."""
+_FAMILY_GATES: dict[str, Kernel] = {
+    "force": (_force, (_ROWS, _ROWS, _ROWS, _ROWS, _ROWS, _FLAG)),
+    "energy": (_energy, (_ROWS, _ROWS, _ROWS, _COUNT)),
+    "stiffness": (_stiffness, (_ROWS, _ROWS, _ROWS, _COUNT)),
+    "damping": (_damping, (_ROWS, _ROWS, _ROWS, _COUNT)),
+}
+"""Gates of one family of elements, and the types of their arguments after the tile and the family."""
 
-_READY: dict[int, Gates] = {}
+compilation.watch()
+_FOUND: dict[tuple[str, int, type], int] = {}
+_READY: dict[tuple[int, bool, tuple[bool, ...]], Gates] = {}
 
 
 def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
-    """The same arrays with a home of their own and the gates for this width."""
-    if len(tile) not in _READY:
-        shared = (typeof(tile), *(types.CPointer(raw_type(typeof(part))) for part in (arrays, room)))
-        addresses = {name: gate.address(kernel, (*shared, *own)) for name, (kernel, own) in _GATES.items()}
-        _READY[len(tile)] = Gates(**addresses)
-    return arrays._replace(home=gate.home(), gates=_READY[len(tile)])
+    """The same arrays with a home of their own and the gates that they have a use for."""
+    key = len(tile), arrays.constraints.size > 0, tuple(family.size > 0 for family in arrays.elements)
+    if key not in _READY:
+        wanted = _wanted(arrays)
+        motion, energies, constrain, settle = (
+            _address(name, tile, arrays, room) if name in wanted else 0 for name in _STATE_GATES
+        )
+        force, energy = (family_gates(name, tile, arrays.elements) for name in ("force", "energy"))
+        _READY[key] = Gates(motion, energies, constrain, settle, force, energy)
+    return arrays._replace(home=gate.home(), gates=_READY[key])
+
+
+def family_gates(name: str, tile: Tile, elements: tuple[Any, ...]) -> Index:
+    """Addresses of "force", "energy", "stiffness" or "damping" by family; 0 for a family that has none of it."""
+    wanted = [family.size > 0 and (family.damped or name != "damping") for family in elements]
+    return index([_address(name, tile, one) if want else 0 for one, want in zip(elements, wanted, strict=True)])
+
+
+def kernels(tile: Tile, arrays: Arrays, room: Work, *, every: bool = False) -> list[Kernel]:
+    """What `ready` compiles, and the stiffness, for stability limits and implicit steps; every: for any model."""
+    found = [_kernel(name, tile, arrays, room) for name in (_STATE_GATES if every else _wanted(arrays))]
+    elements = [family for family in arrays.elements if every or family.size > 0]
+    return found + [_kernel(name, tile, one) for name in ("force", "energy", "stiffness") for one in elements]
+
+
+def _wanted(arrays: Arrays) -> tuple[str, ...]:
+    return tuple(_STATE_GATES) if arrays.constraints.size > 0 else ("motion", "energies")
+
+
+def _kernel(name: str, tile: Tile, *parts: Any) -> Kernel:
+    """A gate for these structures: those of a state, or a family."""
+    raws = [raw_type(typeof(part)) for part in parts]
+    if name in _FAMILY_GATES:
+        kernel, own = _FAMILY_GATES[name]
+        return kernel, (typeof(tile), *raws, *own)
+    kernel, own = _STATE_GATES[name]
+    return kernel, (typeof(tile), *(types.CPointer(kind) for kind in raws), *own)
+
+
+def _address(name: str, tile: Tile, *parts: Any) -> int:
+    key = name, len(tile), type(parts[0])
+    if key not in _FOUND:
+        _FOUND[key] = gate.address(*_kernel(name, tile, *parts))
+    return _FOUND[key]
 
 
 class Sought:
@@ -138,10 +201,11 @@ class Sought:
         self._called = _CALLED(self._call)
         self.error: Exception | None = None
 
-    def joined(self, arrays: Arrays) -> Arrays:
-        """The arrays with accelerations that are sought."""
+    def joined(self, arrays: Arrays, room: Work) -> Arrays:
+        """The arrays of a single lane with accelerations that are sought."""
         where = ctypes.cast(self._called, ctypes.c_void_p).value or 0
-        return arrays._replace(method=SOUGHT, gates=arrays.gates._replace(sought=where))
+        gates = arrays.gates._replace(constrain=_address("constrain", SINGLE, arrays, room), sought=where)
+        return arrays._replace(gates=gates)
 
     def _call(self, t: float, place: Any) -> None:
         a = np.ctypeslib.as_array(place, (self._unknowns,))

@@ -31,12 +31,17 @@ from shoal.scene import Scene
 
 
 class Gates(NamedTuple):
-    """Addresses of the kernels of `gates` for one width, and of what seeks accelerations instead (0: nobody)."""
+    """Addresses of the kernels of `gates` for one width; 0 for what the model has no use for and so never calls.
+
+    force, energy: by family of elements. sought: what seeks accelerations in place of `constrain`'s own ways.
+    """
 
     motion: int
-    settle: int
     energies: int
-    tangents: int
+    constrain: int
+    settle: int
+    force: Index
+    energy: Index
     sought: int = 0
 
 
@@ -203,9 +208,10 @@ class Model:
         if not np.all((inverse > 0) & np.isfinite(inverse)):
             raise InputError(f"{self.scene.name}: the mass matrix is singular; some coordinate moves no mass")
         forces = self.elements, self.forces, self.applied, self.functions, self.constraints, self._saddle
+        nobody = np.zeros(len(self.elements), dtype=np.int64)
         return Arrays(
             gate.home(),
-            Gates(0, 0, 0, 0),
+            Gates(0, 0, 0, 0, nobody, nobody),
             (0,) * self.dimensions,
             self.unknowns,
             self.force_rows,

@@ -57,7 +57,7 @@ def simulate(
     def run(part: slice) -> tuple[Array, ...]:
         arrays, room = at_start(model, tile, part)
         sought = None if seek is None else Sought(seek(arrays, room), model.unknowns)
-        arrays = arrays if sought is None else sought.joined(arrays)
+        arrays = arrays if sought is None else sought.joined(arrays, room)
         record = _marched(scene.solver, model, choice, times, tile, part, arrays, room)
         if sought is not None and sought.error is not None:
             raise sought.error

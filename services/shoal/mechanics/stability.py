@@ -11,13 +11,12 @@ import scipy.linalg
 import scipy.sparse.linalg
 
 from shoal.mechanics.dynamics import work_space
-from shoal.mechanics.gates import ready
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.sparse import Pattern
 from shoal.mechanics.numerics.tile import Array, pack, tiles, unpack
-from shoal.mechanics.tangent import stiffness_at, tangent_tile
+from shoal.mechanics.tangent import damping_at, stiffness_at, tangent_tile
 
 _DENSE = 60
 """Up to so many unknowns the dense eigenproblem is the faster one."""
@@ -59,11 +58,8 @@ def _largest_eigenvalue(model: Model, damping: bool) -> float:
         tangent = tangent_tile(model, tile, part)
         arrays = model.tile(tile, part)
         room = work_space(tile, arrays)
-        arrays = ready(tile, arrays, room)
         room.z[: model.unknowns * len(tile)] = pack(model.q0, part, tile)
-        values = stiffness_at(tile, arrays, tangent, room, 0.0)
-        if damping:
-            values = stiffness_at(tile, arrays, tangent, room, 1.0) - values
+        values = (damping_at if damping else stiffness_at)(tile, arrays, tangent, room)
         matrix, mass = unpack(values, part, tile), unpack(tangent.mass, part, tile)
         for lane in _different(matrix, mass):
             largest = max(largest, _top(tangent.pattern, matrix[:, lane], mass[:, lane]))

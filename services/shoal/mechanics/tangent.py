@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import literal_unroll, njit
 
 from shoal.mechanics import forces, gates
-from shoal.mechanics.derived import derive
-from shoal.mechanics.dynamics import Work
+from shoal.mechanics.dynamics import Work, derived_rows
 from shoal.mechanics.model import Arrays, Model, scatter
-from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics import gate, sparse
+from shoal.mechanics.numerics.pointers import pointer, raw, shift
 from shoal.mechanics.numerics.tile import Array, Index, Tile, index, pack, stacked
 from shoal.mechanics.numerics.vector import add_product
 
@@ -22,7 +21,7 @@ class Tangent(NamedTuple):
 
     Contribution k adds coefficient[k] * block[source[k]] to slot[k]; `block` holds the square tangents of all
     elements, family by family, then those of the force elements: `blocks` rows. Curvature k adds
-    bend[k] * multiplier[owner[k]] to curvature[k].
+    bend[k] * multiplier[owner[k]] to curvature[k]. stiffness, damping: addresses of the kernels of each family.
     """
 
     pattern: sparse.Pattern
@@ -36,6 +35,8 @@ class Tangent(NamedTuple):
     curvature: Index
     owner: Index
     bend: Array
+    stiffness: Index
+    damping: Index
 
 
 def tangent_tile(model: Model, tile: Tile, lanes: slice) -> Tangent:
@@ -57,6 +58,8 @@ def tangent_tile(model: Model, tile: Tile, lanes: slice) -> Tangent:
         index([slot[key] for key, *_ in curved]),
         index([owner for _, owner, _ in curved]),
         pack(stacked([c for *_, c in curved]), lanes, tile),
+        gates.family_gates("stiffness", tile, model.elements),
+        gates.family_gates("damping", tile, model.elements),
     )
 
 
@@ -119,8 +122,14 @@ def assemble(
     multiplier: one lambda per constraint, (constraints, lanes); block: work space of 2 t.blocks rows.
     The derived rows of z, and those of w.zdot where anything is damped, must be filled. Pointers.
     """
-    gates.tangents(tile, m, w, z, damping_factor, block, t.blocks)
     width = len(tile)
+    _fill(tile, m, t, w, z, block)
+    if damping_factor != 0.0 and (m.forces.size > 0 or m.damped):
+        end = t.blocks * width
+        other = shift(block, end)
+        _fill_damping(tile, m, t, w, z, other)
+        for i in range(end):
+            block[i] += damping_factor * other[i]
     for i in range(slots * width):
         values[i] = mass_factor * t.mass[i]
     for k in range(t.contributions):
@@ -130,28 +139,79 @@ def assemble(
 
 
 @njit(cache=True, error_model="numpy")
-def stiffness_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work, damping_factor: float) -> Array:
-    """K + damping_factor D at the state in `room`, without constraints; (slots, lanes)."""
-    width = len(tile)
-    m, t, w = raw(arrays), raw(tangent), raw(room)
-    gates.enter(m, w)
-    derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
-    derive(tile, m.derived, w.zdot, m.unknowns, m.force_rows, True)
-    block = np.empty(2 * tangent.blocks * width + 1)
-    values = np.empty(tangent.mass.size)
-    multiplier = np.zeros(m.constraints.size * width + 1)
-    assemble(
-        tile,
-        m,
-        t,
-        w,
-        w.z,
-        pointer(multiplier),
-        0.0,
-        damping_factor,
-        pointer(block),
-        pointer(values),
-        tangent.mass.size // width,
-    )
-    # The work arrays are used once more so that they live as long as their pointers.
-    return values + 0.0 * (block.size + multiplier.size)
+def _fill(tile: Tile, m: Arrays, t: Tangent, w: Work, z: Array, block: Array) -> None:
+    """The stiffness of all elements, family by family, then of the forces."""
+    first, kind = 0, -1
+    for family in literal_unroll(m.elements):
+        kind += 1
+        if family.size > 0:
+            gate.call(t.stiffness[kind], (tile, family, z, w.element, block, first))
+        first += family.side * family.side * family.size
+    forces.tangent(tile, m.forces, m.functions, z, w.memory, w.element, block, first)
+
+
+@njit(cache=True, error_model="numpy")
+def _fill_damping(tile: Tile, m: Arrays, t: Tangent, w: Work, z: Array, block: Array) -> None:
+    """The same of the damping."""
+    for i in range(t.blocks * len(tile)):
+        block[i] = 0.0
+    first, kind = 0, -1
+    for family in literal_unroll(m.elements):
+        kind += 1
+        if family.size > 0 and family.damped:
+            gate.call(t.damping[kind], (tile, family, z, w.element, block, first))
+        first += family.side * family.side * family.size
+    forces.damping(tile, m.forces, z, w.zdot, w.element, block, first)
+
+
+def stiffness_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work) -> Array:
+    """K at the state in `room`, without constraints; (slots, lanes)."""
+    derived_rows(tile, arrays, room)
+    block, first = np.zeros(tangent.blocks * len(tile)), 0
+    for family, address in zip(arrays.elements, tangent.stiffness.tolist(), strict=True):
+        if family.size > 0:
+            _of_family(tile, address, family, room.z, room.element, block, first)
+        first += family.side * family.side * family.size
+    if arrays.forces.size > 0:
+        _of_forces(tile, arrays.forces, arrays.functions, room.z, room.memory, room.element, block, first)
+    return _assembled(tile, tangent, block)
+
+
+def damping_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work) -> Array:
+    """D at the state in `room`, (slots, lanes)."""
+    derived_rows(tile, arrays, room)
+    block, first = np.zeros(tangent.blocks * len(tile)), 0
+    for family, address in zip(arrays.elements, tangent.damping.tolist(), strict=True):
+        if family.size > 0 and family.damped:
+            _of_family(tile, address, family, room.z, room.element, block, first)
+        first += family.side * family.side * family.size
+    if arrays.forces.size > 0:
+        _of_dampers(tile, arrays.forces, room.z, room.zdot, room.element, block, first)
+    return _assembled(tile, tangent, block)
+
+
+def _assembled(tile: Tile, t: Tangent, block: Array) -> Array:
+    values, parts = np.zeros((t.mass.size // len(tile), len(tile))), block.reshape(-1, len(tile))
+    np.add.at(values, t.slot, t.coefficient.reshape(-1, len(tile)) * parts[t.source])
+    return values.ravel()
+
+
+# These take the structures that they need and no others: a kernel takes seconds to compile that is handed them all.
+
+
+@njit(cache=True, error_model="numpy")
+def _of_family(tile: Tile, address: int, family: Any, z: Array, w: Array, block: Array, first: int) -> None:
+    """What the kernel at an address, for the stiffness or the damping, finds of a family."""
+    gate.call(address, (tile, raw(family), pointer(z), pointer(w), pointer(block), first))
+
+
+@njit(cache=True, error_model="numpy")
+def _of_forces(
+    tile: Tile, springs: Any, functions: Any, z: Array, memory: Array, w: Array, block: Array, first: int
+) -> None:
+    forces.tangent(tile, raw(springs), raw(functions), pointer(z), pointer(memory), pointer(w), pointer(block), first)
+
+
+@njit(cache=True, error_model="numpy")
+def _of_dampers(tile: Tile, springs: Any, z: Array, zdot: Array, w: Array, block: Array, first: int) -> None:
+    forces.damping(tile, raw(springs), pointer(z), pointer(zdot), pointer(w), pointer(block), first)

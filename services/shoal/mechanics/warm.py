@@ -2,46 +2,162 @@
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable
+import zlib
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import config, typeof
 
-from shoal.mechanics.integrators import INTEGRATORS
+from shoal.errors import ShoalError
+from shoal.mechanics import gates
+from shoal.mechanics.assembly.build import build
+from shoal.mechanics.compilation import SECONDS, described
+from shoal.mechanics.dynamics import work_space
+from shoal.mechanics.integrators import INTEGRATORS, choose, halting
+from shoal.mechanics.march import march
+from shoal.mechanics.notes import Note, telling
+from shoal.mechanics.numerics.tile import tiles
 from shoal.mechanics.simulate import simulate
-from shoal.scene import load_scene
+from shoal.scene import Scene, load_scene
 
 WIDE = ("leapfrog", "rk4", "dop853", "generalized-alpha")
 """Integrators of which tiles of lanes are compiled ahead; the others compile theirs when they are first asked to."""
 
 
-def warm(integrators: Iterable[str] = tuple(INTEGRATORS), note: Callable[[str], None] = lambda _: None) -> float:
-    """Compile what is not yet in the cache, on all cores; returns the seconds it took.
+class Kernel(NamedTuple):
+    """A kernel by its name, and the types of its arguments."""
 
-    The first integrator comes before the others: its single run and its lanes share nothing that takes long, the
-    others use again what they brought. `note` is told what has been done.
+    name: str
+    kinds: tuple[Any, ...]
+
+    @property
+    def seconds(self) -> float:
+        """About how long it takes to compile."""
+        return SECONDS.get(self.name, 1.0)
+
+    @property
+    def cached(self) -> bool:
+        """Whether the cache has it."""
+        function = _function(self.name)
+        found = function._cache
+        return found._index_key(self.kinds, function.targetctx.codegen()) in found._cache_file._load_index()
+
+
+def warm(integrators: Iterable[str] = tuple(INTEGRATORS), note: Note = lambda _: None, *, every: bool = True) -> float:
+    """Compile what is not yet in the cache, on all cores, and load it; returns the seconds it took.
+
+    every: for any scene, with constraints and all families of elements; else for cables that hang together. The first
+    integrator comes with the gates, which the others use again. `note` is told what is being done.
     """
     begin = time.perf_counter()
-    first, *others = ([(name, 1), (name, 2)] if name in WIDE else [(name, 1)] for name in integrators)
-    with ProcessPoolExecutor(os.cpu_count() or 1, multiprocessing.get_context("spawn")) as pool:
-        for jobs in (first, [job for pair in others for job in pair]):
-            for done in as_completed([pool.submit(_compile, *job) for job in jobs]):
-                note(done.result())
+    first, *others = integrators
+    for names in ([first], others):
+        scenes = [(_pendulum(name), lanes) for name in names for lanes in _lanes(name)]
+        ahead([kernel for scene, lanes in scenes for kernel in kernels(scene, lanes, every=every)], note)
+    with telling(note):  # what is small
+        for name in (first, *others):
+            for lanes in _lanes(name):
+                angles = {"initial.OA.angle": np.linspace(0.7, 0.8, lanes)} if lanes > 1 else None
+                simulate(_pendulum(name), np.array([4e-4]), angles)
     return time.perf_counter() - begin
 
 
-def _compile(integrator: str, lanes: int) -> str:
-    """Two steps of the flexible double pendulum; returns what was done and how long it took."""
+def warm_for(scenes: Iterable[Scene], lanes: Iterable[int], note: Note) -> None:
+    """Compile what runs of scenes will need and the cache lacks: one by itself (1), many side by side (2).
+
+    A mark in the cache says that it has been done for the like, so that later runs spend no time on it. Nothing is done
+    for a scene that cannot be modelled: its run will say so.
+    """
+    wanted: dict[Path, list[Kernel]] = {}
+    for scene, count in itertools.product(scenes, lanes):
+        mark = Path(config.CACHE_DIR) / f"ahead-{_likeness(scene, count)}"
+        if not mark.exists():
+            with suppress(ShoalError):
+                wanted[mark] = kernels(scene, count)
+    ahead(itertools.chain(*wanted.values()), note)
+    for mark in wanted:
+        mark.touch()
+
+
+def _likeness(scene: Scene, lanes: int) -> str:
+    """Scenes of the same need the same kernels, or nearly: what is missing is compiled when it is called."""
+    bodies = {
+        (type(body).__name__, body.element, str(getattr(body, "rotary_inertia", ""))) for body in scene.bodies.values()
+    }
+    features = scene.solver.integrator, sorted(bodies), sorted({joint.kind for joint in scene.joints.values()}), lanes
+    return f"{zlib.crc32(repr(features).encode()):08x}"
+
+
+def ahead(wanted: Iterable[Kernel], note: Note) -> None:
+    """Compile what is missing in the cache, longest first, in as many processes as there are cores.
+
+    Where there can be no processes, nothing is done but to say so.
+    """
     begin = time.perf_counter()
-    solver = {"solver.integrator": integrator, "solver.step": 2e-4}
-    angles = {"initial.OA.angle": np.linspace(0.7, 0.8, lanes)} if lanes > 1 else None
-    simulate(load_scene("flexible-double-pendulum").with_values(solver), np.array([4e-4]), angles)
-    return f"{integrator}, {'single' if lanes == 1 else 'lanes'}: {time.perf_counter() - begin:.1f} s"
+    missing = sorted((one for one in dict.fromkeys(wanted) if not one.cached), key=lambda one: -one.seconds)
+    if not missing:
+        return
+    workers = min(os.cpu_count() or 1, len(missing))
+    wait = max(missing[0].seconds, sum(one.seconds for one in missing) / workers)
+    cores = f"{workers} cores" if workers > 1 else "one core"
+    note(f"compiling {len(missing)} kernels for this machine, once: about {wait:.0f} s on {cores}")
+    try:
+        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+            for number, done in enumerate(as_completed([pool.submit(_compile, one) for one in missing]), 1):
+                note(f"  {done.result()} ({number} of {len(missing)}, {time.perf_counter() - begin:.0f} s so far)")
+    except (OSError, NotImplementedError, BrokenProcessPool) as error:
+        note(f"  no further processes ({error}): the run compiles what it calls, one after the other")
+
+
+def kernels(scene: Scene, lanes: int, *, every: bool = False) -> list[Kernel]:
+    """The large kernels of a run of so many lanes; every: also for constraints and families that the scene lacks.
+
+    Under `auto` those of its usual choice. Raises InputError if the scene cannot be modelled.
+    """
+    model, (tile, _) = build(scene), tiles(lanes)
+    name = scene.solver.integrator
+    if name == "auto":
+        name = "leapfrog" if model.flexible else "dop853"
+    lane = slice(0, 1)
+    arrays = model.tile(tile, lane)
+    room, scheme = work_space(tile, arrays), choose(scene.solver, model, tile, lane, name)
+    stops = halting(scene.solver, model, name, scene.solver.duration)
+    arguments = tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops
+    shared = [Kernel(kernel.__name__, kinds) for kernel, kinds in gates.kernels(tile, arrays, room, every=every)]
+    if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
+        shared = [kernel for kernel in shared if kernel.name != "_stiffness"]
+    return [Kernel(march.__name__, tuple(typeof(argument) for argument in arguments)), *shared]
+
+
+def _function(name: str) -> Any:
+    return march if name == march.__name__ else getattr(gates, name)
+
+
+def _compile(kernel: Kernel) -> str:
+    begin = time.perf_counter()
+    _function(kernel.name).compile(kernel.kinds)
+    return f"{described(*kernel)}: {time.perf_counter() - begin:.1f} s"
+
+
+def _lanes(name: str) -> tuple[int, ...]:
+    return (1, 2) if name in WIDE else (1,)
+
+
+def _pendulum(integrator: str) -> Scene:
+    return load_scene("flexible-double-pendulum").with_values({"solver.integrator": integrator, "solver.step": 2e-4})
 
 
 if __name__ == "__main__":
-    warm(note=lambda line: print(f"  kernels {line}", file=sys.stderr))  # noqa: T201 - a command
+    from shoal.mechanics import warm as itself  # the processes know its kernels by this name, not as __main__
+
+    itself.warm(note=lambda line: print(line, file=sys.stderr, flush=True))  # noqa: T201 - a command

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,7 +12,8 @@ from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from shoal.home import compiled
+from shoal.mechanics.notes import telling
+from shoal.scene import Scene
 from shoal.trajectory import json_text
 
 out = Console(highlight=False)
@@ -29,13 +30,24 @@ def show(data: Mapping[str, Any], as_json: bool, draw: Callable[[], None]) -> No
 
 @contextmanager
 def working(what: str) -> Iterator[Callable[[str], None]]:
-    """A spinner beside `what`, or beside what it is told later; only on a terminal, nothing in a log file."""
-    if not compiled():
-        err.print("compiling the solver for this machine; this takes a few minutes, once", soft_wrap=True)
+    """A spinner beside `what`, or what it is told later, on a terminal; a line for every kernel that is compiled."""
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress, telling(line):
         task = progress.add_task(what, total=None)
         yield lambda now: progress.update(task, description=now)
+
+
+def line(text: str) -> None:
+    """A line of progress, which log files get too."""
+    err.print(escape(text), soft_wrap=True)
+
+
+def compile_for(engine: str, lanes: Iterable[int], *scenes: Scene) -> None:
+    """On all cores, what runs of our own solver will need: one by itself (1), many side by side (2)."""
+    if engine == "gauss":
+        from shoal.mechanics.warm import warm_for
+
+        warm_for(scenes, lanes, line)
 
 
 def table(title: str, *headings: str) -> Table:

@@ -25,7 +25,7 @@ from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile
-from shoal.mechanics.tangent import stiffness_at, tangent_tile
+from shoal.mechanics.tangent import damping_at, stiffness_at, tangent_tile
 from shoal.scene import Scene
 
 Sparse = scipy.sparse.csr_array
@@ -192,7 +192,7 @@ class Evaluator:
         """
         self._enter(q, None)
         arrays = self._loaded(load)
-        values = stiffness_at(SINGLE, arrays, self._tangent, self._room, 0.0)
+        values = stiffness_at(SINGLE, arrays, self._tangent, self._room)
         if multipliers is not None:
             tangent = self._tangent
             np.add.at(values, tangent.curvature, tangent.bend * multipliers[tangent.owner])
@@ -206,10 +206,7 @@ class Evaluator:
             law = arrays.forces.law.copy()
             law[forces.COULOMB :: forces.LAW] = 0.0
             arrays = arrays._replace(forces=arrays.forces._replace(law=law))
-        both = stiffness_at(SINGLE, arrays, self._tangent, self._room, 1.0)
-        values = both - stiffness_at(SINGLE, arrays, self._tangent, self._room, 0.0)
-        damped = arrays.forces.size > 0 or any(family.damped for family in arrays.elements)
-        return sparse.matrix(self._tangent.pattern, values if damped else 0.0 * values)
+        return sparse.matrix(self._tangent.pattern, damping_at(SINGLE, arrays, self._tangent, self._room))
 
     def strain_energies(self, q: Array) -> dict[str, float]:
         """Strain energy [J] of every flexible body."""

@@ -17,7 +17,7 @@ from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Tile
 
-PROJECTION, BAUMGARTE, SOUGHT = 0, 4, 5
+PROJECTION, BAUMGARTE = 0, 4
 METHODS = {
     "projection": PROJECTION,
     "kkt": alternatives.KKT,
@@ -25,7 +25,7 @@ METHODS = {
     "proximal": alternatives.PROXIMAL,
     "baumgarte": BAUMGARTE,
 }
-"""Ways to the acceleration. With SOUGHT somebody else seeks it; see `gates.Seek`."""
+"""Ways to the acceleration, unless somebody else seeks it; see `gates.Seek`."""
 
 
 def method(name: str) -> int:

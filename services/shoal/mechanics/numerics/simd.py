@@ -24,7 +24,7 @@ EIGHT: Tile = (0,) * 8
 _FLAGS = ("contract", "nsz")
 
 
-class Vector(types.Type):
+class Vector(types.Type):  # type: ignore[misc]
     """The compiler's type of a vector of `count` doubles."""
 
     def __init__(self, count: int) -> None:
@@ -33,7 +33,7 @@ class Vector(types.Type):
 
 
 @register_model(Vector)
-class _Model(models.PrimitiveModel):
+class _Model(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, kind: Vector) -> None:
         super().__init__(manager, kind, _vector(kind.count))
 

@@ -1,0 +1,130 @@
+"""Compilation as those who wait for it want it: each kernel once, many at a time, and told about.
+
+Numba keeps what it compiled in a folder, without a lock: processes that start together compile the same, and two that
+write the same index at once can lose or mix up its entries. Here each compilation has a lock, so that whoever comes
+second waits and then loads.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba.core import caching, config, dispatcher, event
+from numba.core.compiler_lock import global_compiler_lock
+
+from shoal.mechanics.notes import tell
+
+if sys.platform != "win32":
+    import fcntl
+
+SECONDS = {
+    "march": 10.0,
+    "_constrain": 8.0,
+    "_force": 5.0,
+    "_motion": 3.0,
+    "_stiffness": 3.0,
+    "_settle": 3.0,
+    "_energies": 1.5,
+}
+"""What large kernels take on a usual core: for the order, and to say how long it will take."""
+_WORTH_A_LINE = 1.0
+"""Seconds."""
+
+
+def described(name: str, kinds: tuple[Any, ...]) -> str:
+    """What a person may know a kernel by: its name, for how many lanes, and the structure that it is made for."""
+    lanes = getattr(kinds[0], "count", 0) if kinds else 0
+    width = {0: "", 1: ", single"}.get(lanes, ", lanes")
+    made_for = getattr(getattr(kinds[1], "instance_class", None), "__name__", "") if len(kinds) > 1 else ""
+    return f"{name.lstrip('_')}{' of ' + made_for if made_for else ''}{width}"
+
+
+class _Listener(event.Listener):  # type: ignore[misc]
+    """Tells of the outermost kernels; those that they call are a part of them."""
+
+    def __init__(self) -> None:
+        self._depth, self._begin, self._told = 0, 0.0, False
+
+    def on_start(self, event: Any) -> None:
+        """A kernel begins."""
+        self._depth += 1
+        if self._depth > 1:
+            return
+        self._begin = time.perf_counter()
+        if not self._told and event.data["dispatcher"].__name__ in SECONDS:
+            self._told = True
+            tell("compiling what the solver lacks for this machine, once")
+
+    def on_end(self, event: Any) -> None:
+        """A kernel is done, or could not be compiled."""
+        self._depth -= 1
+        took = time.perf_counter() - self._begin
+        if self._depth == 0 and took >= _WORTH_A_LINE:
+            tell(f"  {described(event.data['dispatcher'].__name__, event.data['args'])}: {took:.1f} s")
+
+
+@cache
+def _lock_file() -> int | None:
+    """One file for all locks of this process: POSIX gives them up when any descriptor of the file is closed."""
+    if sys.platform == "win32":  # kernels may be compiled twice there
+        return None
+    folder = Path(config.CACHE_DIR)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    except OSError:
+        return None
+
+
+@contextmanager
+def _alone(what: str) -> Iterator[None]:
+    """No other process is at the same; a lock of one byte, at a place that the name decides.
+
+    Numba's own lock comes first, so that one thread of a process at a time waits for others.
+    """
+    file = _lock_file() if config.CACHE_DIR else None
+    place = zlib.crc32(what.encode())
+    with global_compiler_lock:
+        if file is not None:
+            with suppress(OSError):  # a file system without locks
+                fcntl.lockf(file, fcntl.LOCK_EX, 1, place)
+        try:
+            yield
+        finally:
+            if file is not None:
+                with suppress(OSError):
+                    fcntl.lockf(file, fcntl.LOCK_UN, 1, place)
+
+
+_numbas_compile = dispatcher.Dispatcher.compile
+_numbas_save = caching.Cache.save_overload
+
+
+def _compile(self: Any, sig: Any) -> Any:
+    """`Dispatcher.compile`: looks into the cache, compiles, saves. Kernels wait for those they call: in no circle."""
+    if isinstance(self._cache, caching.NullCache):
+        return _numbas_compile(self, sig)
+    with _alone(f"{self.py_func.__module__}.{self.py_func.__qualname__} {sig}"):
+        return _numbas_compile(self, sig)
+
+
+def _save(self: Any, sig: Any, data: Any) -> None:
+    """`Cache.save_overload`: reads the index of all types of arguments, adds to it, writes it."""
+    with _alone(f"index of {self.cache_path}/{self._impl.filename_base}"):
+        _numbas_save(self, sig, data)
+
+
+@cache
+def watch() -> None:
+    """From now on compile under locks, and tell of it (`notes`)."""
+    dispatcher.Dispatcher.compile = _compile  # type: ignore[method-assign]
+    caching.Cache.save_overload = _save
+    event.register("numba:compile", _Listener())
