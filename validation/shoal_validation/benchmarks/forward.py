@@ -17,7 +17,7 @@ from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import choose, halting
 from shoal.mechanics.march import march
 from shoal.mechanics.numerics.tile import tiles
-from shoal.mechanics.simulate import at_start
+from shoal.mechanics.workspace import at_start
 from shoal.scene import Scene, load_scene
 
 from shoal_validation.benchmarks.timing import median_time
