@@ -109,7 +109,7 @@ class _Asked:
     scene: Scene = field(compare=False)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _prepared(asked: _Asked) -> Prepared:
     return Prepared(asked.scene, asked.key[-1])
 

@@ -32,7 +32,7 @@ from shoal.trajectory import Trajectory, plain
 
 INSTANTS = 4
 """The workspaces of so many lists of sampling times are kept."""
-LARGEST = 2**17
+LARGEST = 2**16
 """No workspace of more numbers is kept: beside its march the time to make it does not count."""
 
 

@@ -96,9 +96,9 @@ class March:
         self.frame = frame
         self._home = gate.home()
         _enter(self._home, frame)
-        kinds = len(frame.tile), len(frame.arrays.space), type(frame.scheme), *map(type, frame.arrays.elements)
+        kinds = loop_of(frame)
         if kinds not in _LOOPS:
-            _LOOPS[kinds] = gate.address(_march, (types.CPointer(raw_type(typeof(frame))),))
+            _LOOPS[kinds] = gate.address(_march, (types.CPointer(frame_type(frame)),))
         self._loop = _LOOPS[kinds]
 
     def __call__(self) -> None:
@@ -107,7 +107,17 @@ class March:
 
 
 _LOOPS: dict[tuple[Any, ...], int] = {}
-"""Addresses of the compiled loops by what their types depend on."""
+"""Addresses of the compiled loops."""
+
+
+def loop_of(frame: Frame) -> tuple[Any, ...]:
+    """What the type of a frame depends on: frames that agree in it share a compiled loop."""
+    return len(frame.tile), len(frame.arrays.space), type(frame.scheme), *map(type, frame.arrays.elements)
+
+
+def frame_type(frame: Frame) -> Any:
+    """The compiler's type of a frame, which takes a millisecond to find."""
+    return raw_type(typeof(frame))
 
 
 def march(*arguments: Any) -> Marched:

@@ -97,7 +97,7 @@ def _limit(scene_json: str, horizon: float, integrator: Facts) -> float:
     return step_limit(_model(scene_json, horizon), integrator)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _machine(scene_json: str, horizon: float, moving: bool) -> Machine:
     """The stability limit is that of the scene's own start; where nothing moves, no step is limited."""
     scene = Scene.model_validate_json(scene_json)
