@@ -43,6 +43,9 @@ class Prepared:
         self._machines: dict[tuple[float, bool], Machine] = {}
         self._set: dict[str, Prepared] = {}
 
+    def __repr__(self) -> str:
+        return f"Prepared({self.scene.name})"
+
     def __call__(
         self, values: Mapping[str, Any] | None = None, times: Sequence[float] | Array | None = None
     ) -> Trajectory:
