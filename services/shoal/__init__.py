@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from shoal.identification import Estimate, Measurement, Problem, Recording, load_problem, problem_names
-    from shoal.notebook import compare, identify, plot, select, simulate, sweep
+    from shoal.notebook import compare, identify, plot, prepare, select, simulate, sweep
     from shoal.scene import Scene, load_scene, scene_names
     from shoal.trajectory import Trajectory
 
@@ -25,6 +25,7 @@ __all__ = [
     "load_problem",
     "load_scene",
     "plot",
+    "prepare",
     "problem_names",
     "scene_names",
     "select",

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.errors import InputError
-from shoal.mechanics import march, simulate
+from shoal.mechanics import simulate
 from shoal.mechanics.integrators import INTEGRATORS
+from shoal.mechanics.marched import sampled
 from shoal.mechanics.simulate import stable_step
+from shoal.mechanics.workspace import Workspace
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Status
 
@@ -83,14 +85,15 @@ def test_the_verdict_on_a_record(spoil: dict[str, float], expected: Status, monk
     """One number of the record is spoilt after the march."""
 
     def spoilt(*arguments: Any) -> Any:
-        record = march.march(*arguments)
+        record = march(*arguments)
         for field, value in spoil.items():
             getattr(record, field)[-1] = value
             if field == "samples":
                 record.samples[:] = value
         return record
 
-    monkeypatch.setattr(simulate, "march", spoilt)
+    march = Workspace.run
+    monkeypatch.setattr(Workspace, "run", spoilt)
     run = simulate.simulate(RIGID, np.array([0.1, 0.2]))
     assert run.status == (expected,)
     assert bool(run.message) == (expected is not Status.OK)
@@ -98,11 +101,12 @@ def test_the_verdict_on_a_record(spoil: dict[str, float], expected: Status, monk
 
 def test_one_sample_that_is_not_finite_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     def spoilt(*arguments: Any) -> Any:
-        record = march.march(*arguments)
-        record.samples[march.sampled(2)] = np.nan
+        record = march(*arguments)
+        record.samples[sampled(2)] = np.nan
         return record
 
-    monkeypatch.setattr(simulate, "march", spoilt)
+    march = Workspace.run
+    monkeypatch.setattr(Workspace, "run", spoilt)
     run = simulate.simulate(RIGID, np.linspace(0, 0.2, 11))
     assert run.status == (Status.DIVERGED,)
 

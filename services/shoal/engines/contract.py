@@ -70,12 +70,22 @@ def sampling_times(scene: Scene, times: Sequence[float] | Array | None) -> Array
     return wanted
 
 
-def check_lanes(scene: Scene, values: Mapping[str, Array]) -> int:
-    """Number of lanes in `values`, after the scene accepted the extremes of each. Raises InputError."""
+def check_lanes(
+    scene: Scene, values: Mapping[str, Array], accepted: dict[str, tuple[float, float]] | None = None
+) -> int:
+    """Number of lanes in `values`, after the scene accepted the extremes of each. Raises InputError.
+
+    accepted: the extremes of earlier calls, by path, which these widen; what lies between them is accepted too.
+    """
     sizes = {path: np.asarray(lanes).size for path, lanes in values.items()}
     if len(set(sizes.values())) != 1:
         raise InputError(f"values: every path needs the same number of lanes, found {sizes}")
+    known = {} if accepted is None else accepted
     for path, lanes in values.items():
-        for extreme in (float(np.min(lanes)), float(np.max(lanes))):
-            scene.with_values({path: extreme})
+        low, high = float(np.min(lanes)), float(np.max(lanes))
+        least, most = known.get(path, (np.inf, -np.inf))
+        if not (least <= low and high <= most):
+            for extreme in (low, high):
+                scene.with_values({path: extreme})
+            known[path] = min(low, least), max(high, most)
     return next(iter(sizes.values()))

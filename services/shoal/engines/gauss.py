@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import get_args
 
-from shoal.engines.capabilities import FEATURES, check_acceleration
-from shoal.engines.contract import Capabilities, check_lanes, sampling_times
+import numpy as np
+
+from shoal.engines.capabilities import FEATURES
+from shoal.engines.contract import Capabilities
 from shoal.scene import JOINT_KINDS, LOAD_KINDS, Scene
 from shoal.scene.bodies import Element
 from shoal.trajectory import Array, Trajectory
@@ -37,24 +39,15 @@ class GaussEngine:
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene, under `auto` by the first integrator that can; see `Engine`."""
-        from shoal.engines import swarm_motion
-        from shoal.mechanics.persist import persist
+        from shoal.engines.prepared import prepared
 
-        check_acceleration(scene)
-        wanted = sampling_times(scene, times)
-        if swarm_motion.asked_for(scene):
-            return swarm_motion.simulate(scene, wanted)
-        return persist(scene, wanted, self.threads)
+        return prepared(scene, self.threads)(times=times)
 
     def simulate_many(
         self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
     ) -> Trajectory:
         """Run one scene per lane, all in compiled tiles; see `Engine`."""
-        from shoal.engines import swarm_motion
-        from shoal.mechanics.simulate import simulate
+        from shoal.engines.prepared import prepared
 
-        check_acceleration(scene)
-        lanes, wanted = check_lanes(scene, values), sampling_times(scene, times)
-        if swarm_motion.asked_for(scene):
-            return swarm_motion.simulate(swarm_motion.only_lane(scene, values, lanes), wanted)
-        return simulate(scene, wanted, values, threads=self.threads)
+        lanes = {path: np.ravel(np.asarray(numbers, dtype=float)) for path, numbers in values.items()}
+        return prepared(scene, self.threads)(lanes, times)

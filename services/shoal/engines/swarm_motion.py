@@ -25,7 +25,6 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 
 from shoal.errors import InputError
 from shoal.mechanics import simulate as mechanics
@@ -134,6 +133,8 @@ def gauss_function(lower: Array, load: Array, rows: Array, eta: Array, tolerance
 
     tolerance: singular values below it, of rows of unit length in the mass metric, count as zero.
     """
+    from scipy.linalg import solve_triangular
+
     free = solve_triangular(lower, load, lower=True)
     scaled = solve_triangular(lower, rows.T, lower=True).T
     length = np.linalg.norm(scaled, axis=1)
@@ -217,6 +218,8 @@ class Seeker:
 
     def begin(self, arrays: Arrays, room: Work) -> Callable[[float, Array], None]:
         """The function that turns forces Q (unknowns,) into the acceleration, for the state in `room`."""
+        from scipy.linalg import cholesky
+
         self._arrays, self._room = arrays, room
         self._lower = cholesky(sparse.matrix(arrays.pattern, arrays.mass).toarray(), lower=True)
         self._found: Array | None = None
@@ -224,6 +227,8 @@ class Seeker:
 
     def _seek(self, t: float, a: Array) -> None:
         """Steps 2 and 3 of the paper's loop."""
+        from scipy.linalg import solve_triangular
+
         number = self.tally.accelerations
         gauss = _gauss_function(self._arrays, self._room, self._lower, a, self.solver.rank_tolerance)
         if gauss is None:

@@ -13,7 +13,7 @@ from shoal.mechanics.march import march
 from shoal.mechanics.marched import sampled
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import SINGLE
-from shoal.mechanics.simulate import at_start
+from shoal.mechanics.workspace import at_start
 from shoal.scene import Scene
 from shoal.trajectory import Array
 

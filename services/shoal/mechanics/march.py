@@ -11,10 +11,10 @@ short where functions of time are not smooth (`halts`).
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import carray, njit, typeof, types
 
 from shoal.mechanics import constraints, gates
 from shoal.mechanics.derived import derive
@@ -23,7 +23,8 @@ from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
 from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
 from shoal.mechanics.marched import LoopRoom, Marched, rooms, sampled
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics.pointers import raw
+from shoal.mechanics.numerics import gate
+from shoal.mechanics.numerics.pointers import pointer, raw, raw_type
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 ASSEMBLY = 30
@@ -36,8 +37,34 @@ LOBATTO = 0.5 - 0.5 / np.sqrt(5.0)
 """Inner node of the four-point Lobatto rule on the unit interval, of order 6; its weights are 1/12 and 5/12."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def march(
+class Frame(NamedTuple):
+    """All that the march of one tile works on.
+
+    step: [s], of schemes of fixed step, which take `steps` of them; adaptive ones end at the last of the times and take
+    at most so many. times: at which the marker rows are sampled [s], increasing, `samples` of them; directed: number of
+    marker rows; halts: where steps end, `stops` times and `marks` marks; there forces may jump, and driven constraints
+    their rates. tolerance: from which rows count as dependent. What is not reached stays nan in the record.
+    """
+
+    tile: Tile
+    scheme: Any
+    arrays: Arrays
+    room: Work
+    own: LoopRoom
+    record: Marched
+    step: float
+    steps: int
+    times: Array
+    samples: int
+    marker_rows: Index
+    directed: int
+    halts: Halts
+    stops: int
+    marks: int
+    tolerance: float
+
+
+def framed(
     tile: Tile,
     scheme: Any,
     arrays: Arrays,
@@ -48,17 +75,77 @@ def march(
     marker_rows: Index,
     tolerance: float,
     halts: Halts,
-) -> Marched:
-    """March from the state in `room` and sample the marker rows at `times` [s] (increasing).
-
-    Schemes of fixed step take `steps` steps of `step` [s]; adaptive ones end at the last of the times and
-    take at most `steps`. Steps are cut short to end at the halts; there forces may jump, and driven constraints their
-    rates. What was not reached stays nan.
-    """
-    m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
+) -> Frame:
+    """The frame of a march from the state in `room`, with an empty record."""
     record, own = rooms(tile, arrays, len(times), marker_rows)
-    k = raw(own)
+    sizes = len(times), marker_rows.size, halts.times.size, halts.marks.size
+    samples, directed, stops, marks = sizes
+    return Frame(
+        tile, scheme, arrays, room, own, record, step, steps, times, samples,
+        marker_rows, directed, halts, stops, marks, tolerance,
+    )  # fmt: skip
+
+
+class March:
+    """A march that is ready to run from the state in its frame's room, as often as that is put there.
+
+    The compiled loop gets nothing but an address: numba takes 40 us to look at the arrays of a machine.
+    """
+
+    def __init__(self, frame: Frame) -> None:
+        self.frame = frame
+        self._home = gate.home()
+        _enter(self._home, frame)
+        kinds = loop_of(frame)
+        if kinds not in _LOOPS:
+            _LOOPS[kinds] = gate.address(_march, (types.CPointer(frame_type(frame)),))
+        self._loop = _LOOPS[kinds]
+
+    def __call__(self) -> None:
+        """Run; the record is in the frame, the state at the end in its room. Holds no lock of the interpreter."""
+        _call(self._loop, self._home)
+
+
+_LOOPS: dict[tuple[Any, ...], int] = {}
+"""Addresses of the compiled loops."""
+
+
+def loop_of(frame: Frame) -> tuple[Any, ...]:
+    """What the type of a frame depends on: frames that agree in it share a compiled loop."""
+    return len(frame.tile), len(frame.arrays.space), type(frame.scheme), *map(type, frame.arrays.elements)
+
+
+def frame_type(frame: Frame) -> Any:
+    """The compiler's type of a frame, which takes a millisecond to find."""
+    return raw_type(typeof(frame))
+
+
+def march(*arguments: Any) -> Marched:
+    """March once, with the arguments of `framed`."""
+    ready = March(framed(*arguments))
+    ready()
+    return ready.frame.record
+
+
+@njit(cache=True)
+def _enter(home: Array, frame: Frame) -> None:
+    gates.enter(raw(frame.arrays), raw(frame.room))
+    gate.store(pointer(home), raw(frame))
+
+
+@njit(cache=True, nogil=True)
+def _call(address: int, home: Array) -> None:
+    gate.call(address, (pointer(home),))
+
+
+@njit(cache=True, error_model="numpy")
+def _march(place):  # type: ignore[no-untyped-def]
+    frame = gate.load(place)
+    tile, scheme, m, w, k, record = frame.tile, frame.scheme, frame.arrays, frame.room, frame.own, frame.record
+    step, steps, tolerance = frame.step, frame.steps, frame.tolerance
+    times, marker_rows = carray(frame.times, frame.samples), carray(frame.marker_rows, frame.directed)
+    stops, marks = carray(frame.halts.times, frame.stops), carray(frame.halts.marks, frame.marks)
+    halts = Halts(stops, frame.halts.start, marks)
     free, last = adaptive(scheme), halts.times.size - 1
     w.until[0] = np.nextafter(halts.times[0], 0.0) if last >= 0 else np.inf
     _begin(tile, m, w, k, record, marker_rows, tolerance)
@@ -107,9 +194,6 @@ def march(
         record.steps[lane] = number + cuts
         record.evaluations[lane] = scheme.evaluations[0]
         record.reached[lane] = now
-    # The room is looked at once more so that it lives as long as its pointers.
-    record.reached[0] += 0.0 * own.gap.size
-    return record  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,6 +11,8 @@ from shoal.mechanics import constraints
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
+TURN = 2.0 * np.pi
+
 
 class Marched(NamedTuple):
     """What a march leaves behind. samples: (times * markers * sampled(d), lanes), see `sampled`; the rest: (lanes,).
@@ -64,7 +66,6 @@ def sampled(dimensions: int) -> int:
     return 3 * dimensions + 2
 
 
-@njit(cache=True, error_model="numpy")
 def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[Marched, LoopRoom]:
     """An empty record, and the room of the loop."""
     width, dimensions = len(tile), len(arrays.space)
@@ -95,3 +96,66 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
         np.zeros(arrays.forces.size * width),
     )
     return record, room
+
+
+FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE, STEPS, EVALUATIONS, REACHED = range(7)
+"""Rows of the numbers that a run is judged by: the largest distance of a marker from its nearest anchor [m]; the energy
+error over the largest kinetic + elastic energy; the largest violation of a constraint, relative to the machine's size;
+and as `Marched` has them."""
+NUMBERS = 7
+
+
+@njit(cache=True, error_model="numpy")
+def told(
+    record: Marched,
+    width: int,
+    first: int,
+    turns: Array,
+    anchors: Array,
+    floor: float,
+    span: float,
+    motion: Array,
+    numbers: Array,
+) -> None:
+    """What the record of a tile of some width says of its lanes, the first of which is lane `first` of all.
+
+    turns: of the stated directions of the markers [rad], (markers, lanes) or (markers, 1). anchors: on the ground,
+    (anchors, d, lanes) or (anchors, d, 1). floor: no energy error is compared with less [J]; span: the machine's size
+    [m]. motion, of all lanes: points, continuous angles [rad], velocities and rates of the markers, (times, markers,
+    2 d + 2, lanes); numbers: (NUMBERS, lanes).
+    """
+    times, markers, rows, lanes = motion.shape
+    d = rows // 2 - 1
+    for lane in range(first, min(first + width, lanes)):
+        own, turn, at = lane - first, lane % turns.shape[1], lane % anchors.shape[2]
+        farthest = 0.0
+        for k in range(times * markers):
+            time, marker = k // markers, k % markers
+            row = k * sampled(d) * width + own
+            x, y = record.samples[row], record.samples[row + width]
+            near = np.inf
+            for anchor in range(len(anchors)):
+                distance = np.hypot(x - anchors[anchor, 0, at], y - anchors[anchor, 1, at])
+                near = near if distance > near else distance
+            farthest = _larger(farthest, near)
+            for i in range(d):
+                motion[time, marker, i, lane] = record.samples[row + i * width]
+                motion[time, marker, d + 1 + i, lane] = record.samples[row + (2 * d + 1 + i) * width]
+            angle = np.arctan2(record.samples[row + (d + 1) * width], record.samples[row + d * width])
+            angle += TURN * np.rint((record.samples[row + 2 * d * width] - angle) / TURN)
+            motion[time, marker, d, lane] = angle + turns[marker, turn]
+            motion[time, marker, 2 * d + 1, lane] = record.samples[row + (3 * d + 1) * width]
+        drift, size = 0.0, 1.0
+        for power in range(constraints.POWERS):
+            drift = _larger(drift, record.drift[power * width + own] / size)
+            size *= span
+        numbers[FARTHEST, lane], numbers[CONSTRAINT_DRIFT, lane] = farthest, drift
+        numbers[ENERGY_DRIFT, lane] = record.energy_error[own] / _larger(record.energy_scale[own], floor)
+        numbers[ENERGY_SCALE, lane], numbers[STEPS, lane] = record.energy_scale[own], record.steps[own]
+        numbers[EVALUATIONS, lane], numbers[REACHED, lane] = record.evaluations[own], record.reached[own]
+
+
+@njit(cache=True, error_model="numpy")
+def _larger(a: float, b: float) -> float:
+    """The larger of two numbers, or what of them is none."""
+    return b if b > a or b != b else a

@@ -13,7 +13,7 @@ from typing import Any
 from shoal.mechanics import expense
 from shoal.mechanics.simulate import STEP_MARGIN, simulate, stable_step
 from shoal.scene import Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Status, Trajectory
 
 PATIENCE = 20.0
 """No other choice is tried that would take longer than so many seconds."""
@@ -22,17 +22,13 @@ DAMPED = 0.9
 TOLERANCE = 1e-8
 
 
-def persist(scene: Scene, times: Array, threads: int | None = None) -> Trajectory:
-    """The motion of one scene; under `auto` by the first integrator whose run can be believed, if there is one.
-
-    Raises InputError if the scene cannot be modelled.
-    """
-    first = simulate(scene, times, threads=threads)
+def persist(scene: Scene, first: Trajectory, threads: int | None = None) -> Trajectory:
+    """The motion of one scene after its first run; under `auto` the first run that can be believed, if there is one."""
     if first.ok or scene.solver.integrator != "auto" or scene.solver.acceleration != "projection":
         return first
     for settings in _others(scene, first):
         other = scene.with_values({f"solver.{name}": value for name, value in settings.items()})
-        run = simulate(other, times, threads=threads)
+        run = simulate(other, first.times, threads=threads)
         if run.ok:
             reason = f"auto: {first.model['integrator']} ended with {first.status[0]}"
             wall_s = first.wall_s + run.wall_s

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.mechanics import plane
 from shoal.mechanics.joints import Meet, of_scene
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import GROUND, Rod, Scene
@@ -103,12 +104,19 @@ def _tethers(scene: Scene) -> list[Meet]:
     return [condition for _, condition in of_scene(scene) if isinstance(condition, Meet)]
 
 
+def anchors(scene: Scene) -> Array:
+    """Places on the ground that joints hold, or its origin if there are none [m], (anchors, d, lanes or 1)."""
+    sides = (side for tether in _tethers(scene) for side in (tether.first, tether.second))
+    found = [plane.vector(*scene.location(side)) for side in sides if side.body == GROUND]
+    found = found or [plane.vector(*(0.0,) * plane.DIMENSIONS)]
+    lanes = max(place.shape[1] for place in found)
+    return np.stack([np.broadcast_to(place, (plane.DIMENSIONS, lanes)) for place in found])
+
+
 def distance_to_ground(scene: Scene, points: Array) -> Array:
     """Distance of every marker to the nearest anchor on the ground [m], (samples, markers, lanes).
 
     points: (samples, markers, 2, lanes).
     """
-    sides = (side for tether in _tethers(scene) for side in (tether.first, tether.second))
-    anchors = [scene.location(side) for side in sides if side.body == GROUND]
-    distances = [np.hypot(points[:, :, 0] - x, points[:, :, 1] - y) for x, y in anchors or [(0.0, 0.0)]]
+    distances = [np.hypot(points[:, :, 0] - x, points[:, :, 1] - y) for x, y in anchors(scene)]
     return np.asarray(np.min(distances, axis=0))

@@ -6,9 +6,9 @@ import numpy as np
 
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.integrators import Choice, facts
-from shoal.mechanics.marched import Marched
+from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENERGY_SCALE, FARTHEST, REACHED, STEPS
 from shoal.mechanics.model import Model
-from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.scene import Scene
 from shoal.trajectory import Status
 
@@ -17,70 +17,75 @@ SINKING = 3000.0
 """A weight that nothing holds yet falls for as long as the error of its rate is below the absolute tolerance; by then
 it is 14 times as fast as that. Twice as much is no error by the default tolerance of energies, a hundredth."""
 
+_JUDGED = slice(FARTHEST, CONSTRAINT_DRIFT + 1)
+"""What has a largest value."""
 
-def energy_error(record: Marched, scene: Scene, model: Model, end: float) -> Array:
-    """Energy error of a run up to `end` [s] over the largest kinetic + elastic energy, (lanes,).
 
-    A machine that never moves has none: then its weight lifted by its span and the energy of stretching its
-    rods set the scale, as far as round-off goes. Nor is it an error if the weight sinks at a rate that the tolerance of
-    rates allows: between two bars in one line, which hold it to the second order only, it does until they feel it.
+class Limits:
+    """What the runs of a scene must keep to, as far as the scene tells it; worked out once for all of them.
+
+    numbers, here and below: what `marched.told` says of every lane, (NUMBERS, lanes).
     """
-    stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
-    weight = float(np.max(np.abs(model.weight), initial=0.0))
-    sunk = SINKING * scene.solver.absolute_tolerance * end
-    floor = weight * (1e-9 * reaches.span(scene) + sunk) + 1e-12 * float(stiff)
-    relative: Array = record.energy_error[0] / np.maximum(record.energy_scale[0], floor + 1e-300)
-    return relative
 
+    def __init__(self, scene: Scene, model: Model) -> None:
+        self._solver, self._model = scene.solver, model
+        self.span = reaches.span(scene)
+        """The machine's size [m]."""
+        self.anchors = reaches.anchors(model.scene)
+        """Where the ground holds the machine [m], (anchors, d, lanes) or (anchors, d, 1)."""
+        self._weight = float(np.max(np.abs(model.weight), initial=0.0))
+        stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
+        self._still = self._weight * 1e-9 * self.span + 1e-12 * float(stiff)
+        # So far away a marker may be whatever the energy of the run.
+        near = np.minimum(reaches.MARGIN * reaches.reach(model.scene, np.zeros(1)), np.finfo(float).max)
+        tolerances = np.array([[scene.solver.energy_tolerance], [DRIFT_TOLERANCE]])
+        self._fine = np.concatenate([near[None], np.broadcast_to(tolerances, (2, len(near)))])
 
-def of_the_size(drift: Array, scene: Scene) -> Array:
-    """The largest of the violations of constraints (POWERS, lanes), relative to the machine's size; (lanes,)."""
-    relative: Array = np.max(drift / reaches.span(scene) ** np.arange(len(drift))[:, None], axis=0)
-    return relative
+    def energy_floor(self, end: float) -> float:
+        """The energy [J] that the energy error of a run up to `end` [s] is compared with at least.
 
+        That error is relative to the largest kinetic + elastic energy. A machine that never moves has none: then its
+        weight lifted by its span and the energy of stretching its rods set the scale, as far as round-off goes. Nor is
+        it an error if the weight sinks at a rate that the tolerance of rates allows: between two bars in one line,
+        which hold it to the second order only, it does until they feel it.
+        """
+        return self._still + self._weight * SINKING * self._solver.absolute_tolerance * end + 1e-300
 
-def verdict(
-    scene: Scene,
-    model: Model,
-    record: Marched,
-    choice: Choice,
-    points: Array,
-    energy_drift: Array,
-    constraint_drift: Array,
-) -> tuple[tuple[Status, ...], str]:
-    """Status of every lane, and the reason for the first that is not ok."""
-    # Lanes may be machines of different lengths.
-    reach = reaches.MARGIN * reaches.reach(model.scene, record.energy_scale[0])
-    farthest = np.max(reaches.distance_to_ground(model.scene, points), axis=(0, 1))
-    adaptive = facts(choice.name).adaptive
-    steps, reached = record.steps[0], record.reached[0]
-    statuses, message = [], ""
-    failed = np.broadcast_to(model.failed, model.lanes)
-    for lane in range(model.lanes):
-        finite = np.isfinite(farthest[lane]) and np.isfinite(energy_drift[lane])
-        if failed[lane]:
-            status, reason = Status.FAILED, "no start agrees with the joints and with what is stated"
-        elif not finite and np.isfinite(energy_drift[lane]) and adaptive and steps[lane] >= scene.solver.max_steps:
-            status = Status.FAILED
-            reason = (
-                f"{steps[lane]:.0f} steps of {choice.name} led to {reached[lane]:.4g} s only; "
+    def verdict(self, numbers: Array, choice: Choice, failed: Flags) -> tuple[tuple[Status, ...], str]:
+        """Status of every lane, and the reason for the first that is not ok; failed: lanes that have no start."""
+        lanes = numbers.shape[1]
+        fine = numbers[_JUDGED] <= self._fine
+        if fine.all() and not failed.any():
+            return (Status.OK,) * lanes, ""
+        # Lanes may be machines of different lengths.
+        reach = reaches.MARGIN * reaches.reach(self._model.scene, numbers[ENERGY_SCALE])
+        reach, failed = np.broadcast_to(reach, lanes), np.broadcast_to(failed, lanes)
+        statuses, message = [Status.OK] * lanes, ""
+        for lane in np.flatnonzero(~fine.all(axis=0) | failed):
+            statuses[lane], reason = self._judged(choice, numbers[:, lane], float(reach[lane]), bool(failed[lane]))
+            message = message or reason
+        return tuple(statuses), message
+
+    def _judged(self, choice: Choice, numbers: Array, reach: float, failed: bool) -> tuple[Status, str]:
+        """Status of one lane, whose numbers are (NUMBERS,), and the reason if it is not ok."""
+        farthest, energy_drift, constraint_drift = numbers[_JUDGED]
+        steps = numbers[STEPS]
+        adaptive, allowed = facts(choice.name).adaptive, self._solver.energy_tolerance
+        finite = np.isfinite(farthest) and np.isfinite(energy_drift)
+        if failed:
+            return Status.FAILED, "no start agrees with the joints and with what is stated"
+        if not finite and np.isfinite(energy_drift) and adaptive and steps >= self._solver.max_steps:
+            return Status.FAILED, (
+                f"{steps:.0f} steps of {choice.name} led to {numbers[REACHED]:.4g} s only; "
                 "raise solver.max_steps or solver.relative_tolerance"
             )
-        elif not finite:
-            status = Status.DIVERGED
+        if not finite:
             advice = "no step is short enough for it" if adaptive else "use a smaller step"
-            reason = f"the motion is not finite; {advice}"
-        elif farthest[lane] > reach[lane]:
-            status = Status.OUT_OF_REACH
-            reason = f"a marker is {farthest[lane]:.3g} m away, the reach is {reach[lane]:.3g} m"
-        elif energy_drift[lane] > scene.solver.energy_tolerance:
-            status = Status.ENERGY
-            reason = f"energy is off by {energy_drift[lane]:.2g}, allowed {scene.solver.energy_tolerance:g} (relative)"
-        elif not constraint_drift[lane] <= DRIFT_TOLERANCE:
-            status = Status.DRIFTED
-            reason = f"constraints are violated by {constraint_drift[lane]:.2g} of the machine's size"
-        else:
-            status, reason = Status.OK, ""
-        statuses.append(status)
-        message = message or reason
-    return tuple(statuses), message
+            return Status.DIVERGED, f"the motion is not finite; {advice}"
+        if farthest > reach:
+            return Status.OUT_OF_REACH, f"a marker is {farthest:.3g} m away, the reach is {reach:.3g} m"
+        if energy_drift > allowed:
+            return Status.ENERGY, f"energy is off by {energy_drift:.2g}, allowed {allowed:g} (relative)"
+        if not constraint_drift <= DRIFT_TOLERANCE:
+            return Status.DRIFTED, f"constraints are violated by {constraint_drift:.2g} of the machine's size"
+        return Status.OK, ""

@@ -11,7 +11,6 @@ from shoal.pictures.choice import rows
 from shoal.pictures.estimates import estimates
 from shoal.pictures.numbers import rounded
 from shoal.pictures.start import remarks
-from shoal.pictures.units import fitness_unit, rms_unit
 from shoal.terminal import screen
 
 if TYPE_CHECKING:
@@ -202,6 +201,8 @@ def estimate_table(estimate: Estimate) -> None:
 
 def _minima(estimate: Estimate) -> None:
     """At most five other minima, the best first."""
+    from shoal.pictures.units import fitness_unit
+
     others = sorted(estimate.minima, key=lambda minimum: minimum["fitness"])
     for other in others[:5]:
         values = ", ".join(f"{name} {value:.4g}" for name, value in other.items() if name != "fitness")
@@ -212,6 +213,8 @@ def _minima(estimate: Estimate) -> None:
 
 def _effort(estimate: Estimate) -> None:
     """Where the data come from, what the search cost, and how the answer compares with a known truth."""
+    from shoal.pictures.units import fitness_unit, rms_unit
+
     screen.say(f"data: {estimate.data}")
     screen.say(*(f"note: {note}" for note in estimate.notes))
     screen.say(

@@ -14,10 +14,9 @@ from shoal.engines.exudyn.build import build as build_exudyn
 from shoal.engines.exudyn.build import library
 from shoal.engines.exudyn.record import choose_steps
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.integrators import choose, halting
-from shoal.mechanics.march import march
+from shoal.mechanics.integrators import Choice, halting
 from shoal.mechanics.numerics.tile import tiles
-from shoal.mechanics.simulate import at_start
+from shoal.mechanics.workspace import Workspace
 from shoal.scene import Scene, load_scene
 
 from shoal_validation.benchmarks.timing import median_time
@@ -80,14 +79,12 @@ def prepare(what: Scene, lanes: int) -> Any:
     model = build(what.with_lanes(values), lanes)
     tile, parts = tiles(lanes)
     times = np.linspace(0.0, what.solver.duration, 51)[1:]
-    work = [(*at_start(model, tile, part), choose(what.solver, model, tile, part)) for part in parts]
-    kept = [(room.z.copy(), room.zdot.copy()) for _, room, _ in work]
-    stops = halting(what.solver, model, what.solver.integrator, what.solver.duration)
-    rows, tolerance = model.marker_rows.ravel(), what.solver.rank_tolerance
+    choice = Choice(what.solver.integrator, "", np.inf)
+    stops = halting(what.solver, model, choice.name, what.solver.duration)
+    work = [(Workspace(what.solver, model, choice, tile, part, times, stops), part) for part in parts]
 
     def run() -> None:
-        for (arrays, room, scheme), (z, zdot) in zip(work, kept, strict=True):
-            room.z[:], room.zdot[:] = z, zdot
-            march(tile, scheme, arrays, room, what.solver.step, STEPS, times, rows, tolerance, stops)
+        for space, part in work:
+            space.run(model, part)
 
     return run

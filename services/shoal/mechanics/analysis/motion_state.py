@@ -12,9 +12,10 @@ from shoal.mechanics import stability
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import choose, facts, halting, pick
+from shoal.mechanics.machine import check_step
 from shoal.mechanics.march import march
 from shoal.mechanics.numerics.tile import SINGLE, Array
-from shoal.mechanics.simulate import at_start, check_step
+from shoal.mechanics.workspace import at_start
 from shoal.scene import Scene
 
 LANE = slice(0, 1)

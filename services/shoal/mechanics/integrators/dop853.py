@@ -1,7 +1,7 @@
 """The explicit Runge-Kutta method of Dormand and Prince of order 8 with step control and its own dense output.
 
-Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.10; the coefficients are those that
-scipy publishes. After each step the drift from the constraints is projected away.
+Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.10; the coefficients stand in
+`dop853_tableau`. After each step the drift from the constraints is projected away.
 """
 
 from __future__ import annotations
@@ -10,35 +10,19 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.integrate import DOP853
 
 from shoal.mechanics import gates
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators import control
 from shoal.mechanics.integrators.control import RESOLUTION, Control, control_room
+from shoal.mechanics.integrators.dop853_tableau import DENSE, ERROR_3, ERROR_5, INSTANTS, STAGES, WEIGHTS
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
-STAGES = 12
-"""Stage 12 is the end of the step, stages 13 to 15 serve the dense output alone."""
 ORDER_OF_ERROR = 8
-
-
-def _tableau() -> tuple[Array, Array]:
-    """Weights (16, 16) and instants (16,) of all stages."""
-    weights, instants = np.zeros((16, 16)), np.zeros(16)
-    weights[:STAGES, :STAGES], instants[:STAGES] = DOP853.A, DOP853.C
-    weights[STAGES, :STAGES], instants[STAGES] = DOP853.B, 1.0
-    weights[STAGES + 1 :], instants[STAGES + 1 :] = DOP853.A_EXTRA, DOP853.C_EXTRA
-    return weights, instants
-
-
-WEIGHTS, INSTANTS = _tableau()
-ERROR_3, ERROR_5 = np.array(DOP853.E3), np.array(DOP853.E5)
-DENSE = np.array(DOP853.D)
 
 
 class Dop853(NamedTuple):

@@ -22,7 +22,7 @@ from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.least import drift
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
@@ -62,7 +62,7 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
     mass_factor = (1 - alpha_m) / (h * h * beta * (1 - alpha_f))
     damping_factor = gamma / (h * beta)
 
-    auxiliary = pointer(scheme.auxiliary)
+    auxiliary = raw(scheme).auxiliary
     if scheme.started[0] == 0.0:
         scheme.started[0] = 1.0
         for i in range(end):

@@ -28,7 +28,7 @@ from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.least import implicit
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.mechanics.numerics.vector import clear
 from shoal.mechanics.tangent import Tangent, tangent_tile
@@ -362,7 +362,7 @@ def step(tile: Tile, scheme: Radau5, m: Arrays, w: Work, t: float, h: float) -> 
 def inside(tile: Tile, scheme: Radau5, m: Arrays, w: Work, past: Array, x: float, h: float, q: Array, v: Array) -> None:
     """The collocation polynomial of the rates at the fraction x of the last step, and its integral."""
     end = m.unknowns * len(tile)
-    p = pointer(scheme.polynomial)
+    p = raw(scheme).polynomial
     for i in range(end):
         p0, p1, p2, p3 = p[i], p[end + i], p[2 * end + i], p[3 * end + i]
         v[i] = p0 + x * (p1 + x * (p2 + x * p3))

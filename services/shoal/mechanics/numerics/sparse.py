@@ -8,14 +8,16 @@ elements for chains.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import scipy.sparse
 from numba import njit
 
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 from shoal.mechanics.numerics.vector import add_product, copy, scale, scale_alike, subtract_dot, subtract_dot_alike
+
+if TYPE_CHECKING:
+    import scipy.sparse
 
 
 class Pattern(NamedTuple):
@@ -91,6 +93,8 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
 
 def matrix(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
     """The symmetric matrix of one lane whose lower triangle lies in the slots of a pattern."""
+    import scipy.sparse
+
     n = pattern.size
     lower = scipy.sparse.csc_array((values[n:], pattern.row, pattern.column), shape=(n, n))
     return scipy.sparse.csc_array(lower + lower.T + scipy.sparse.diags_array(values[:n]))

@@ -1,0 +1,127 @@
+"""A scene that is prepared once and simulated many times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from shoal.engines import swarm_motion
+from shoal.engines.capabilities import check_acceleration
+from shoal.engines.contract import check_lanes, sampling_times
+from shoal.mechanics.machine import Machine
+from shoal.mechanics.persist import persist
+from shoal.mechanics.simulate import machine, simulate
+from shoal.scene import Scene
+from shoal.trajectory import Array, Trajectory
+
+KEPT = 16
+"""So many scenes with values, and lists of sampling times, are remembered."""
+
+
+class Prepared:
+    """A scene that the native solver simulates again and again: call it.
+
+    What the scene alone tells is worked out once: its model, its integrator and the stability limit of that, how far it
+    reaches, how it starts. A run that is repeated computes nothing of this again, and marches in memory that is there
+    already. Threads may call it at the same time: each call takes a work space for itself.
+
+    Attributes:
+        scene: the scene
+    """
+
+    def __init__(self, scene: Scene, threads: int | None = None) -> None:
+        check_acceleration(scene)
+        self.scene = scene
+        self._threads = threads
+        self._instants = sampling_times(scene, None)
+        self._checked: dict[tuple[tuple[int, ...], bytes], None] = {}
+        self._accepted: dict[str, tuple[float, float]] = {}
+        self._machines: dict[tuple[float, bool], Machine] = {}
+        self._set: dict[str, Prepared] = {}
+
+    def __repr__(self) -> str:
+        return f"Prepared({self.scene.name})"
+
+    def __call__(
+        self, values: Mapping[str, Any] | None = None, times: Sequence[float] | Array | None = None
+    ) -> Trajectory:
+        """The motion, as `shoal.simulate` without its second runs gives it, to the last bit.
+
+        values: fields of the scene to set, by dotted path; one-dimensional numpy arrays have one number per lane, and
+        what is the same in all lanes may be a number. times: sampling instants [s], else the scene's own. New values
+        make a new model, but for lanes that only start differently: they share the scene's model and its integrator.
+        Raises InputError.
+        """
+        lanes = {path: value for path, value in values.items() if _of_lanes(value)} if values else {}
+        if values and len(lanes) < len(values):
+            return self._with({path: value for path, value in values.items() if path not in lanes})(lanes, times)
+        wanted = self._wanted(times)
+        if lanes:
+            count = check_lanes(self.scene, lanes, self._accepted)
+            if swarm_motion.asked_for(self.scene):
+                return swarm_motion.simulate(swarm_motion.only_lane(self.scene, lanes, count), wanted)
+            return simulate(self.scene, wanted, lanes, threads=self._threads, machine=self._machine)
+        if swarm_motion.asked_for(self.scene):
+            return swarm_motion.simulate(self.scene, wanted)
+        first = simulate(self.scene, wanted, threads=self._threads, machine=self._machine)
+        return persist(self.scene, first, self._threads)
+
+    def _with(self, values: dict[str, Any]) -> Prepared:
+        """The scene with some of its fields set."""
+        key = repr(values)
+        found = self._set.get(key)
+        if found is None:
+            found = self._set[key] = Prepared(self.scene.with_values(values), self._threads)
+            _forget(self._set)
+        return found
+
+    def _wanted(self, times: Sequence[float] | Array | None) -> Array:
+        if times is None:
+            return self._instants.copy()
+        wanted = np.asarray(times, dtype=float)
+        key = wanted.shape, wanted.tobytes()
+        if key not in self._checked:
+            sampling_times(self.scene, wanted)
+            self._checked[key] = None
+            _forget(self._checked)
+        return wanted
+
+    def _machine(self, scene: Scene, end: float) -> Machine:
+        key = max(end, scene.solver.duration), end > 0
+        found = self._machines.get(key)
+        if found is None:
+            found = self._machines[key] = machine(scene, end)
+            _forget(self._machines)
+        return found
+
+
+def prepared(scene: Scene, threads: int | None = None) -> Prepared:
+    """A scene, prepared now or by an earlier call."""
+    # Whether the kind of an element was said decides what other values do to a scene.
+    said = tuple("element" in body.model_fields_set for body in scene.bodies.values())
+    return _prepared(_Asked((scene.model_dump_json(), said, threads), scene))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    key: tuple[str, tuple[bool, ...], int | None]
+    scene: Scene = field(compare=False)
+
+
+@lru_cache(maxsize=32)
+def _prepared(asked: _Asked) -> Prepared:
+    return Prepared(asked.scene, asked.key[-1])
+
+
+def _of_lanes(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.ndim == 1
+
+
+def _forget(kept: dict[Any, Any]) -> None:
+    """Leave out the oldest entries beyond so many."""
+    for old in list(kept)[:-KEPT]:
+        kept.pop(old, None)

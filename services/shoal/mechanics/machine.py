@@ -1,0 +1,184 @@
+"""A machine that is kept from run to run: what its scene alone tells is worked out once, its memory is used again."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics import plane
+from shoal.mechanics import reach as reaches
+from shoal.mechanics.assembly.groups import start_angle
+from shoal.mechanics.dynamics import Work
+from shoal.mechanics.gates import Seek
+from shoal.mechanics.halts import Halts
+from shoal.mechanics.integrators import Choice, halting
+from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENERGY_DRIFT, EVALUATIONS, NUMBERS, STEPS, TURN, told
+from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.numerics.tile import Array, Tile, stacked, tiles
+from shoal.mechanics.start import start
+from shoal.mechanics.start.redundancy import redundant_joints
+from shoal.mechanics.verdict import Limits
+from shoal.mechanics.workspace import Workspace
+from shoal.scene import Scene
+from shoal.trajectory import Trajectory, plain
+
+INSTANTS = 4
+"""The workspaces of so many lists of sampling times are kept."""
+LARGEST = 2**16
+"""No workspace of more numbers is kept: beside its march the time to make it does not count."""
+
+
+class Machine:
+    """A scene as the solver moves it, from its own start or from others.
+
+    Its methods may be called from several threads at once: each march takes a workspace that is idle, or makes one.
+    """
+
+    def __init__(self, scene: Scene, model: Model, choice: Choice, *, alone: bool = True) -> None:
+        """alone: whether the model is that of the scene as it is, with no lanes."""
+        self.scene, self.model, self.choice = scene, model, choice
+        self._alone = alone
+        self._limits = Limits(scene, model)
+        self._turns = _turns(scene, model)
+        self._idle: dict[tuple[bytes, int], tuple[Halts, list[Workspace]]] = {}
+        self._told: dict[bool, bytes] = {}
+        self._alike = not model.varies
+
+    def run(
+        self,
+        times: Array,
+        model: Model | None = None,
+        *,
+        threads: int | None = None,
+        seek: Callable[[Arrays, Work], Seek] | None = None,
+        begin: float | None = None,
+    ) -> Trajectory:
+        """The motion at `times` [s]; model: one that starts differently; begin: when the clock of the run was started.
+
+        For threads and seek see `simulate`. Raises InputError if the step is beyond the stability limit.
+        """
+        begin = time.perf_counter() if begin is None else begin
+        end = float(times[-1])
+        if end > 0:
+            check_step(self.scene, self.choice)
+        single = self._alone and model is None
+        turns = self._turns if model is None else _turns(self.scene, model)
+        moved = self.model if model is None else model
+        tile, parts = tiles(moved.lanes)
+        halts, idle = self._workspaces(times, tile)
+        d = moved.dimensions
+        motion = np.empty((len(times), len(self.scene.markers), 2 * d + 2, moved.lanes))
+        numbers = np.empty((NUMBERS, moved.lanes))
+        limits, floor = self._limits, self._limits.energy_floor(end)
+
+        def march(part: slice) -> None:
+            space = None if seek is not None or not idle else _taken(idle)
+            if space is None:
+                space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek)
+            record = space.run(moved, part)
+            told(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
+            if single not in self._told:
+                self._told[single] = pickle.dumps(self._facts(record.begin if single else None))
+            if seek is None and self._alike and space.size <= LARGEST:
+                idle.append(space)
+
+        workers = min(threads or os.cpu_count() or 1, len(parts)) if len(parts) > 1 else 1
+        if workers == 1:
+            for part in parts:
+                march(part)
+        else:
+            list(_pool(workers).map(march, parts))
+        status, message = limits.verdict(numbers, self.choice, moved.failed)
+        most = np.maximum.reduce(numbers, axis=1)
+        facts = pickle.loads(self._told[single])
+        facts["evaluations"] = int(most[EVALUATIONS])
+        return Trajectory(
+            engine="gauss",
+            times=times,
+            markers=tuple(self.scene.markers),
+            points=motion[:, :, :d],
+            angles=motion[:, :, d],
+            velocities=motion[:, :, d + 1 : 2 * d + 1],
+            rates=motion[:, :, 2 * d + 1],
+            status=status,
+            energy_drift=numbers[ENERGY_DRIFT],
+            constraint_drift=numbers[CONSTRAINT_DRIFT],
+            steps=int(most[STEPS]),
+            wall_s=time.perf_counter() - begin,
+            message=message,
+            model=facts,
+        )
+
+    def _workspaces(self, times: Array, tile: Tile) -> tuple[Halts, list[Workspace]]:
+        """Where the steps of a run end, and the workspaces for it that are idle."""
+        key = times.tobytes(), len(tile)
+        found = self._idle.get(key)
+        if found is None:
+            halts = halting(self.scene.solver, self.model, self.choice.name, float(times[-1]))
+            found = self._idle.setdefault(key, (halts, []))
+            for old in list(self._idle)[:-INSTANTS]:
+                self._idle.pop(old, None)
+        return found
+
+    def _facts(self, begun: Array | None) -> dict[str, Any]:
+        """What is computed, for the record; begun: coordinates and rates at the start, of a scene without lanes."""
+        scene, model, choice = self.scene, self.model, self.choice
+        return {
+            "unknowns": model.unknowns,
+            "elements": model.flexible,
+            "constraints": len(model.constraint_names),
+            "integrator": choice.name,
+            "integrator_reason": choice.reason,
+            "step": scene.solver.step,
+            "stability_limit": choice.limit if np.isfinite(choice.limit) else None,
+            "evaluations": 0,
+            **({} if begun is None else self._started(begun)),
+            "bodies": {
+                name: {"element": body.element, **({"elements": body.elements} if body.element != "rigid" else {})}
+                for name, body in scene.bodies.items()
+            },
+        }
+
+    def _started(self, begun: Array) -> dict[str, Any]:
+        """The start as it is used, what of it was stated otherwise, and joints whose forces are not unique."""
+        scene, model = self.scene, self.model
+        used = start.begun(model.frames, model.scene, *np.split(begun, 2))
+        redundant = () if start.is_direct(scene) else redundant_joints(start.complete(scene).scene)
+        told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
+        return dict(plain(told))
+
+
+def check_step(scene: Scene, choice: Choice) -> None:
+    """Raises InputError if the step is beyond the stability limit."""
+    if scene.solver.step > choice.limit:
+        raise InputError(
+            f"solver.step: {scene.solver.step:g} s is beyond the stability limit {choice.limit:.3e} s of "
+            f"{choice.name} for this scene; use a smaller step or solver.integrator=generalized-alpha"
+        )
+
+
+@cache
+def _pool(workers: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(workers, thread_name_prefix="shoal-tiles")
+
+
+def _taken(idle: list[Workspace]) -> Workspace | None:
+    """One of the idle workspaces, if another thread has not taken the last."""
+    try:
+        return idle.pop()
+    except IndexError:
+        return None
+
+
+def _turns(scene: Scene, model: Model) -> Array:
+    """Whole turns in the stated directions of the markers [rad], (markers, lanes) or (markers, 1)."""
+    begins = stacked([start_angle(model.scene, marker) for marker in scene.markers.values()])
+    return np.asarray(TURN * np.rint((begins - plane.angle(plane.unit(begins))) / TURN))

@@ -1,0 +1,119 @@
+"""The memory of one tile's march, which is put back to its start by one copy and marched in again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
+
+import numpy as np
+
+from shoal.mechanics import forces
+from shoal.mechanics.dynamics import Work, derived_rows, work_space
+from shoal.mechanics.gates import Seek, Sought, ready
+from shoal.mechanics.halts import Halts
+from shoal.mechanics.integrators import Choice, choose, facts
+from shoal.mechanics.march import March, framed
+from shoal.mechanics.marched import Marched
+from shoal.mechanics.model import Arrays, Model
+from shoal.mechanics.numerics.tile import Array, Tile, pack
+from shoal.scene import Solver
+
+T = TypeVar("T")
+_LINE = 8
+"""Numbers in a line of the processor's cache."""
+
+
+def at_start(model: Model, tile: Tile, part: slice) -> tuple[Arrays, Work]:
+    """The arrays and the work space of one tile of lanes that stands at its start, as a march takes them."""
+    arrays = model.tile(tile, part)
+    room = work_space(tile, arrays)
+    arrays = ready(tile, arrays, room)
+    put_at_start(model, tile, part, arrays, room)
+    return arrays, room
+
+
+def put_at_start(model: Model, tile: Tile, part: slice, arrays: Arrays, room: Work) -> None:
+    """Put the coordinates, the rates and the turns of a model's start into a work space."""
+    room.z[: model.unknowns * len(tile)] = pack(model.q0, part, tile)
+    room.zdot[: model.unknowns * len(tile)] = pack(model.v0, part, tile)
+    if model.forces.size:
+        derived_rows(tile, arrays, room)
+        room.memory[:] = forces.initial_memory(tile, arrays.forces, room.z, pack(model.start_angles, part, tile))
+
+
+class Workspace:
+    """Room for the march of one tile of a model at given times [s], for one march at a time.
+
+    seek: who seeks the accelerations, see `simulate`.
+    """
+
+    def __init__(
+        self,
+        solver: Solver,
+        model: Model,
+        choice: Choice,
+        tile: Tile,
+        part: slice,
+        times: Array,
+        halts: Halts,
+        seek: Callable[[Arrays, Work], Seek] | None = None,
+    ) -> None:
+        self._model, self._part, self._tile = model, part, tile
+        arrays, room = at_start(model, tile, part)
+        scheme = choose(solver, model, tile, part, choice.name)
+        steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
+        rows = model.marker_rows.ravel()
+        frame = framed(tile, scheme, arrays, room, solver.step, steps, times.copy(), rows, solver.rank_tolerance, halts)
+        own = frame.room, frame.scheme, frame.own, frame.record
+        self._block, (room, scheme, loop, record) = gathered(own)
+        frame = frame._replace(room=room, scheme=scheme, own=loop, record=record)
+        self._sought = None if seek is None else Sought(seek(arrays, room), model.unknowns)
+        if self._sought is not None:
+            frame = frame._replace(arrays=self._sought.joined(arrays, room))
+        self.march = March(frame)
+        self._start = self._block.copy()
+
+    @property
+    def size(self) -> int:
+        """Numbers that it holds."""
+        return self._block.size
+
+    def run(self, model: Model, part: slice) -> Marched:
+        """The record of a march from the start of a model that differs in its start only; good until the next one."""
+        np.copyto(self._block, self._start)
+        if model is not self._model or part != self._part:
+            frame = self.march.frame
+            put_at_start(model, self._tile, part, frame.arrays, frame.room)
+        self.march()
+        if self._sought is not None and self._sought.error is not None:
+            raise self._sought.error
+        return self.march.frame.record
+
+
+def gathered(structure: T) -> tuple[Array, T]:
+    """One block of memory, and the structure with its arrays of real numbers copied into it, on lines of the cache."""
+    arrays = {id(array): array for array in _reals(structure)}
+    sizes = [-(-array.size // _LINE) * _LINE for array in arrays.values()]
+    room = np.zeros(sum(sizes) + _LINE)
+    first = -(room.ctypes.data // room.itemsize) % _LINE
+    block, views, end = room[first : first + sum(sizes)], {}, 0
+    for (key, array), size in zip(arrays.items(), sizes, strict=True):
+        views[key] = block[end : end + array.size].reshape(array.shape)
+        views[key][...] = array
+        end += size
+    return block, _replaced(structure, views)
+
+
+def _reals(structure: Any) -> Iterator[Array]:
+    if isinstance(structure, np.ndarray) and structure.dtype == float:
+        yield structure
+    elif isinstance(structure, tuple):
+        for part in structure:
+            yield from _reals(part)
+
+
+def _replaced(structure: Any, views: dict[int, Array]) -> Any:
+    if isinstance(structure, tuple):
+        parts = [_replaced(part, views) for part in structure]
+        return structure._make(parts) if hasattr(structure, "_make") else tuple(parts)
+    return views.get(id(structure), structure)

@@ -1,0 +1,64 @@
+"""The way into the compiled time loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.mechanics.integrators import INTEGRATORS, Choice, halting
+from shoal.mechanics.march import frame_type, framed, loop_of
+from shoal.mechanics.model import Model
+from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
+from shoal.mechanics.simulate import machine
+from shoal.mechanics.workspace import Workspace, at_start, gathered
+from shoal.scene import load_scene
+
+SCENES = (
+    "flexible-double-pendulum",
+    "rigid-double-pendulum",
+    "andrews-squeezer",
+    "n-four-bar-40",
+    "ibm-double-pendulum",
+)
+
+
+def _frame(model: Model, integrator: str, tile: Tile) -> Any:
+    solver, times = model.scene.solver, np.array([1e-3])
+    scheme = INTEGRATORS[integrator].settings(solver, model, tile, slice(0, 1))
+    halts = halting(solver, model, integrator, 1e-3)
+    arrays, room = at_start(model, tile, slice(0, 1))
+    return framed(tile, scheme, arrays, room, 1e-4, 10, times, model.marker_rows.ravel(), 1e-5, halts)
+
+
+@pytest.mark.parametrize("tile", [pytest.param(SINGLE, id="single"), pytest.param(WIDE, id="wide")])
+def test_frames_of_one_loop_are_of_one_type(tile: Tile) -> None:
+    found: dict[Any, Any] = {}
+    for name in SCENES:
+        model = machine(load_scene(name), 1e-3).model
+        for integrator in INTEGRATORS:
+            frame = _frame(model, integrator, tile)
+            assert found.setdefault(loop_of(frame), frame_type(frame)) == frame_type(frame), (name, integrator)
+    assert len(found) == len(INTEGRATORS)
+
+
+def test_a_block_holds_every_number_once() -> None:
+    shared = np.arange(3.0)
+    block, (one, (two, rest, count)) = gathered((shared, (shared, np.ones((2, 2)), 5)))
+    assert one is two
+    assert count == 5
+    assert block.ctypes.data % 64 == 0
+    one[:] = 7.0
+    assert block[:3].tolist() == [7.0] * 3
+    np.testing.assert_array_equal(rest, np.ones((2, 2)))
+
+
+def test_a_workspace_forgets_its_last_run() -> None:
+    kept = machine(load_scene("andrews-squeezer"), 0.01)
+    solver, lane = kept.scene.solver, slice(0, 1)
+    halts = halting(solver, kept.model, "radau5", 0.01)
+    space = Workspace(solver, kept.model, Choice("radau5", "", np.inf), SINGLE, lane, np.array([0.01]), halts)
+    first = [np.array(part) for part in space.run(kept.model, lane)]
+    second = space.run(kept.model, lane)
+    for one, other in zip(first, second, strict=True):
+        np.testing.assert_array_equal(one, other)

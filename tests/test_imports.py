@@ -1,0 +1,31 @@
+"""What a simulation does not need is not imported by it: counted in modules, in an interpreter of its own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+FOREIGN = ("scipy", "pandas", "matplotlib", "prefect", "mlflow", "xarray", "casadi", "exudyn", "fastapi", "cma")
+RUN = """
+import sys
+import numba.np.arraymath  # Numba itself looks for the BLAS of scipy.
+before = set(sys.modules)
+import numpy as np
+import shoal
+import shoal.scene
+import shoal.mechanics.simulate
+run = shoal.simulate("single-pendulum", [1e-3], verify=False)
+assert run.ok, run.message
+from click.testing import CliRunner
+from shoal.cli import main
+told = CliRunner().invoke(main, ["simulate", "single-pendulum", "--at", "1e-3"])
+assert "status ok" in told.stdout, told
+print(sorted(name for name in set(sys.modules) - before if name.partition(".")[0] in {foreign!r}))
+"""
+
+
+def test_a_simulation_imports_nothing_that_it_does_not_need() -> None:
+    program = RUN.format(foreign=FOREIGN)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert done.stdout == "[]\n"
