@@ -36,7 +36,7 @@ QUINTIC = 6
 
 # Hermite polynomials on the unit interval, coefficients of 1, x, x^2, ...; the nodal vectors of the first
 # node in increasing order of differentiation, then those of the second.
-_HERMITE = {
+HERMITE = {
     CUBIC: np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=float),
     QUINTIC: np.array(
         [
@@ -89,12 +89,22 @@ def _table(vectors: int, points: Array, axial: Array, bending: Array) -> Array:
 def shape(vectors: int, x: Number, length: Number, derivative: int) -> list[Number]:
     """Shape functions of the derivative of r in S, at the fraction x."""
     shapes = []
-    for number, polynomial in enumerate(_HERMITE[vectors]):
+    for number, polynomial in enumerate(HERMITE[vectors]):
         value: Number = 0.0
         for coefficient in np.polynomial.polynomial.polyder(polynomial, derivative)[::-1]:
             value = value * x + coefficient
         shapes.append(value * length ** float(number % (vectors // 2) - derivative) + 0.0 * x)
     return shapes
+
+
+def pairs(points: Array, weights: Array) -> Array:
+    """The pairs +-xi of a rule on [-1, 1], xi = 0 in the middle where it has one: (xi, weight, number of -xi, of +xi).
+
+    Weights are those of the unit interval. The last row is the middle, of weight zero in a rule without one.
+    """
+    last = len(points) - 1
+    pairs = [(points[last - k], weights[last - k] / 2, k, last - k) for k in range(len(points) // 2)]
+    return np.array([*pairs, (0.0, weights[last // 2] / 2 if last % 2 == 0 else 0.0, last // 2, last // 2)])
 
 
 def _unit_masses(vectors: int) -> Array:
@@ -105,7 +115,7 @@ def _unit_masses(vectors: int) -> Array:
     return np.asarray((masses + masses.T) / 2)
 
 
-_UNIT_MASS = {vectors: _unit_masses(vectors) for vectors in _HERMITE}
+_UNIT_MASS = {vectors: _unit_masses(vectors) for vectors in HERMITE}
 
 
 def mass_matrix(vectors: int, mass_per_length: Number, length: Number) -> list[list[Number]]:

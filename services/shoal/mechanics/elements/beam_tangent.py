@@ -1,4 +1,4 @@
-"""Energy, stiffness and damping of beam elements of any order, with the quadrature as a table; see `beam`."""
+"""Stiffness and damping of beam elements of any order, with the quadrature as a table; see `beam`."""
 
 from __future__ import annotations
 
@@ -46,30 +46,6 @@ def curve(table, at, inner, w, first, width, lane):  # type: ignore[no-untyped-d
         x, y = w[(first + 2 * k) * width + lane], w[(first + 2 * k + 1) * width + lane]
         px, py, cx, cy = px + a * x, py + a * y, cx + d * x, cy + d * y
     return px, py, cx, cy
-
-
-@njit(cache=True, error_model="numpy")
-def energy(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: int) -> None:
-    """See `families.add_energy`."""
-    width = len(tile)
-    vectors = family.side // 2
-    inner = vectors - 1
-    for number in range(family.size):
-        gather(tile, vectors, family, number, z, w, _X)
-        base = beam.COEFFICIENTS * number * width
-        first, points, rest = family.plan[PLAN * number], family.plan[PLAN * number + 1], family.plan[PLAN * number + 2]
-        for g in range(points):
-            at = 2 * vectors * (first + g)
-            here = (rest + 2 * g) * width
-            for lane in range(width):
-                px, py, cx, cy = curve(family.table, at, inner, w, _X, width, lane)
-                square = px * px + py * py
-                inverse = family.reference[here + lane]
-                strain = np.sqrt(square) * inverse - 1.0
-                angle = (px * cy - py * cx) / square - family.reference[here + width + lane]
-                axial = family.table[at + 2 * inner] * family.coefficients[base + width + lane] / inverse
-                bending = family.table[at + 2 * inner + 1] * family.coefficients[base + 2 * width + lane] * inverse
-                energy[row * width + lane] += 0.5 * (axial * strain * strain + bending * angle * angle)
 
 
 @njit(cache=True, error_model="numpy")

@@ -20,6 +20,7 @@ from shoal.errors import InputError
 from shoal.mechanics.elements import beam, beam_tangent
 from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, rest, together
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
+from shoal.mechanics.elements.strain import bend, reference, stretch
 from shoal.mechanics.numerics.pointers import shift
 from shoal.mechanics.numerics.simd import EIGHT, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
@@ -38,20 +39,10 @@ FULL_RULE = beam.quadrature(beam.CUBIC, 5, 3)
 REDUCED_RULE = beam.lobatto(beam.CUBIC, 2)
 
 
-def _pairs(points: Array, weights: Array) -> Array:
-    """The pairs +-xi of a rule on [-1, 1], xi = 0 in the middle where it has one: (xi, weight, number of -xi, of +xi).
-
-    Weights are those of the unit interval. The last row is the middle, of weight zero in a rule without one.
-    """
-    last = len(points) - 1
-    pairs = [(points[last - k], weights[last - k] / 2, k, last - k) for k in range(len(points) // 2)]
-    return np.array([*pairs, (0.0, weights[last // 2] / 2 if last % 2 == 0 else 0.0, last // 2, last // 2)])
-
-
 _GAUSS = np.polynomial.legendre.leggauss
 _LOBATTO = np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3
-_FULL_AXIAL, _FULL_BENDING = _pairs(*_GAUSS(5)), _pairs(*_GAUSS(3))
-_REDUCED_AXIAL, _REDUCED_BENDING = _pairs(*_LOBATTO), _pairs(*_GAUSS(2))
+_FULL_AXIAL, _FULL_BENDING = beam.pairs(*_GAUSS(5)), beam.pairs(*_GAUSS(3))
+_REDUCED_AXIAL, _REDUCED_BENDING = beam.pairs(*_LOBATTO), beam.pairs(*_GAUSS(2))
 _POINTS, _BENDING_POINTS, _REDUCED_POINTS, _REDUCED_BENDING_POINTS = (
     np.column_stack([points, weights / 2]) for points, weights in (_GAUSS(5), _GAUSS(3), _LOBATTO, _GAUSS(2))
 )
@@ -86,36 +77,6 @@ def _at_both(x, a0, a1, a2, a3, a4):  # type: ignore[no-untyped-def]
     square = x * x
     even, odd = a0 + square * a2 + (square * square) * a4, x * (a1 + square * a3)
     return even + odd, even - odd
-
-
-@njit(error_model="numpy", forceinline=True)
-def _reference(tile, curved, family, number, lane, k, usual):  # type: ignore[no-untyped-def]
-    """Entry k of the reference of curved elements, and what it is for straight ones."""
-    return rest(tile, family, number, lane, k) if curved else spread(EIGHT, usual)
-
-
-@njit(error_model="numpy", forceinline=True)
-def _stretch(damped, shrink, rate, relaxed, stiffness, eta):  # type: ignore[no-untyped-def]
-    """The tension over |r'| at a point, EA (1/|r0'| - 1/|r'|), and the power lost; shrink: 1/|r'|, rate: r' . u."""
-    strain, lost = relaxed - shrink, 0.0 * shrink
-    if damped:
-        stretching = relaxed * rate * shrink
-        strain = strain + eta * stretching * shrink
-        lost = eta * stiffness * stretching * (rate * shrink)
-    return stiffness * strain, lost
-
-
-@njit(error_model="numpy", forceinline=True)
-def _bend(damped, flat, k, rate, change, inverse, angle, stiffness, eta):  # type: ignore[no-untyped-def]
-    """The moment over |r'|^2 at a point, its turn, and the power lost; flat: 1/|r'|^2, k: r' x L r''."""
-    stiffness = stiffness * inverse
-    turn = k * flat
-    bent, lost = turn - angle, 0.0 * flat
-    if damped:
-        turning = (change - 2.0 * turn * rate) * flat
-        bent = bent + eta * turning
-        lost = eta * stiffness * turning * turning
-    return stiffness * bent * flat, turn, lost
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -154,17 +115,17 @@ def _force(
     points, pairs = 2 * axial.shape[0] - 1, axial.shape[0] - 1
     # In the middle both strains share the root.
     shrink = 1.0 / root(s0)
-    relaxed = _reference(tile, curved, family, number, lane, 2 * int(axial[pairs, 2]), 1.0)
-    n0, lost = _stretch(damped, shrink, p0, relaxed, ea * axial[pairs, 1], eta)
+    relaxed = reference(tile, curved, family, number, lane, 2 * int(axial[pairs, 2]), 1.0)
+    n0, lost = stretch(damped, shrink, p0, relaxed, ea * axial[pairs, 1], eta)
     n1, n2, n3, n4, m0, m1, m2 = none, none, none, none, none, none, none
     for g in range(pairs):
         x, square = axial[g, 0], axial[g, 0] * axial[g, 0]
         here, there = _at_both(x, s0, s1, s2, s3, s4)
         rate, other = _at_both(x, p0, p1, p2, p3, p4)
-        relaxed = _reference(tile, curved, family, number, lane, 2 * int(axial[g, 3]), 1.0)
-        first, power_first = _stretch(damped, 1.0 / root(here), rate, relaxed, ea * axial[g, 1], eta)
-        relaxed = _reference(tile, curved, family, number, lane, 2 * int(axial[g, 2]), 1.0)
-        second, power_second = _stretch(damped, 1.0 / root(there), other, relaxed, ea * axial[g, 1], eta)
+        relaxed = reference(tile, curved, family, number, lane, 2 * int(axial[g, 3]), 1.0)
+        first, power_first = stretch(damped, 1.0 / root(here), rate, relaxed, ea * axial[g, 1], eta)
+        relaxed = reference(tile, curved, family, number, lane, 2 * int(axial[g, 2]), 1.0)
+        second, power_second = stretch(damped, 1.0 / root(there), other, relaxed, ea * axial[g, 1], eta)
         lost = lost + (power_first + power_second)
         even, odd = first + second, x * (first - second)
         n0, n1, n2 = n0 + even, n1 + odd, n2 + square * even
@@ -172,9 +133,9 @@ def _force(
     last = bending.shape[0] - 1
     if bending[last, 1] != 0.0:
         at = 2 * (points + int(bending[last, 2]))
-        straight = _reference(tile, curved, family, number, lane, at, 1.0)
-        angle = _reference(tile, curved, family, number, lane, at + 1, 0.0)
-        m0, turn, more = _bend(damped, shrink * shrink, k0, p0, l0, straight, angle, ei * bending[last, 1], eta)
+        straight = reference(tile, curved, family, number, lane, at, 1.0)
+        angle = reference(tile, curved, family, number, lane, at + 1, 0.0)
+        m0, turn, more = bend(damped, shrink * shrink, k0, p0, l0, straight, angle, ei * bending[last, 1], eta)
         n0, lost = n0 - 2.0 * m0 * turn, lost + more
     for g in range(last):
         x, square = bending[g, 0], bending[g, 0] * bending[g, 0]
@@ -183,13 +144,13 @@ def _force(
         k, k_there = _at_both(x, k0, k1, k2, none, none)
         turning, twisting = _at_both(x, l0, l1, l2, none, none)
         at = 2 * (points + int(bending[g, 3]))
-        straight = _reference(tile, curved, family, number, lane, at, 1.0)
-        angle = _reference(tile, curved, family, number, lane, at + 1, 0.0)
-        moment, turn, more = _bend(damped, 1.0 / here, k, rate, turning, straight, angle, ei * bending[g, 1], eta)
+        straight = reference(tile, curved, family, number, lane, at, 1.0)
+        angle = reference(tile, curved, family, number, lane, at + 1, 0.0)
+        moment, turn, more = bend(damped, 1.0 / here, k, rate, turning, straight, angle, ei * bending[g, 1], eta)
         at = 2 * (points + int(bending[g, 2]))
-        straight = _reference(tile, curved, family, number, lane, at, 1.0)
-        angle = _reference(tile, curved, family, number, lane, at + 1, 0.0)
-        second, twist, most = _bend(
+        straight = reference(tile, curved, family, number, lane, at, 1.0)
+        angle = reference(tile, curved, family, number, lane, at + 1, 0.0)
+        second, twist, most = bend(
             damped, 1.0 / there, k_there, other, twisting, straight, angle, ei * bending[g, 1], eta
         )
         lost = lost + (more + most)

@@ -1,6 +1,8 @@
 """The quintic beam element: nodes with position, slope and second derivative; theory in `beam`.
 
-A quarter of the elements of the cubic one serve the same accuracy; its force keeps sums in the work space, row by row.
+A quarter of the elements of the cubic one serve the same accuracy. r' is a polynomial of fourth degree in xi, from -1
+to 1; points come in pairs +-xi that share its even and odd parts, and forces are sums over the points of what the
+energy changes with r' and L r'', times powers of xi.
 """
 
 from __future__ import annotations
@@ -10,17 +12,17 @@ from numba import njit
 
 from shoal.mechanics import plane
 from shoal.mechanics.elements import beam, beam_tangent
-from shoal.mechanics.elements.beam_tangent import curve, gather
+from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, rest, together
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
+from shoal.mechanics.elements.strain import bend, reference, stretch
+from shoal.mechanics.numerics.pointers import shift
+from shoal.mechanics.numerics.simd import EIGHT, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 
 ROWS = 2 * beam.QUINTIC
-ELASTIC, DAMPED = range(2)
-"""Variants."""
-
-# Rows of the work space: scaled vectors, their rates, forces on them.
-_X, _RATE, _FORCE = 0, 10, 20
+FOUR, FOUR_CURVED, FOUR_DAMPED, FIVE, FIVE_CURVED, FIVE_DAMPED = range(6)
+"""Variants: the points of the rule; straight and elastic, curved, curved or not and damped."""
 
 
 class Quintics(Family):
@@ -37,96 +39,216 @@ def recommended(elements: int) -> Array:
     return beam.quadrature(beam.QUINTIC, points, points)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _scatter(tile: Tile, family: Family, number: int, w: Array, f: Array) -> None:
-    """Subtract dU/dX, in the force rows of w, from the rows of f."""
-    width = len(tile)
-    order = beam.QUINTIC // 2
-    base = beam.COEFFICIENTS * number * width
-    for component in range(2):
-        at = 2 * beam.QUINTIC * number + component
-        a, b = family.rows[at] * width, family.rows[at + beam.QUINTIC] * width
-        source = (_FORCE + component) * width
-        for lane in range(width):
-            value = w[source + lane] * family.coefficients[base + lane]
-            f[a + lane] += value
-            f[b + lane] -= value
-        for node in range(2):
-            for j in range(1, order):
-                a = family.rows[at + 2 * (node * order + j)] * width
-                source = (_FORCE + 2 * (node * (order - 1) + j) + component) * width
-                if j == 1:
-                    for lane in range(width):
-                        f[a + lane] -= w[source + lane]
-                else:
-                    for lane in range(width):
-                        f[a + lane] -= w[source + lane] / family.coefficients[base + lane]
+def _slope() -> Array:
+    """r' = c0 + c1 xi + ... + c4 xi^4 of the scaled vectors: (5, vectors (d, r1', L r1'', r2', L r2''))."""
+    xi = np.polynomial.Polynomial([0.5, 0.5])
+    shapes = [np.polynomial.Polynomial(one).deriv()(xi).coef for one in beam.HERMITE[beam.QUINTIC][[3, 1, 2, 4, 5]]]
+    return np.array([np.pad(one, (0, 5 - len(one))) for one in shapes]).T
 
 
-@njit(cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz", "arcp"})
-def _force_points(tile: Tile, damped: bool, family: Family, number: int, w: Array, power: Array) -> None:
-    """Add dU/dX and the damping forces to the force rows of w; damped is a constant of the call."""
-    width = len(tile)
-    inner = beam.QUINTIC - 1
-    first, rule = family.plan[PLAN * number], family.plan[PLAN * number + 2]
-    base = beam.COEFFICIENTS * number * width
-    for g in range(family.plan[PLAN * number + 1]):
-        at = 2 * beam.QUINTIC * (first + g)
-        axial_weight, bending_weight = family.table[at + 2 * inner], family.table[at + 2 * inner + 1]
-        rest = (rule + 2 * g) * width
-        for lane in range(width):
-            px, py, cx, cy = curve(family.table, at, inner, w, _X, width, lane)
-            shrink = 1.0 / np.sqrt(px * px + py * py)
-            flat = shrink * shrink
-            inverse = family.reference[rest + lane]
-            k_ = (px * cy - py * cx) * flat
-            ax, ay = cy - 2.0 * k_ * px, -cx - 2.0 * k_ * py  # |p|^2 dk/dp; |p|^2 dk/dc = (-py, px)
-            axial = axial_weight * family.coefficients[base + width + lane]
-            bending = bending_weight * family.coefficients[base + 2 * width + lane] * inverse
-            strain = inverse - shrink  # eps/|p|
-            angle = k_ - family.reference[rest + width + lane]
-            if damped:
-                eta = family.coefficients[base + 3 * width + lane]
-                ux, uy, vx, vy = curve(family.table, at, inner, w, _RATE, width, lane)
-                stretch_rate = (px * ux + py * uy) * shrink
-                angle_rate = (ax * ux + ay * uy - py * vx + px * vy) * flat
-                strain += eta * inverse * stretch_rate * shrink
-                angle += eta * angle_rate
-                power[lane] += eta * (axial * inverse * stretch_rate**2 + bending * angle_rate**2)
-            tension, moment = axial * strain, bending * angle * flat
-            gx, gy = tension * px + moment * ax, tension * py + moment * ay
-            hx, hy = -moment * py, moment * px
-            for k in range(inner):
-                a, d = family.table[at + k], family.table[at + inner + k]
-                w[(_FORCE + 2 * k) * width + lane] += a * gx + d * hx
-                w[(_FORCE + 2 * k + 1) * width + lane] += a * gy + d * hy
+# What is even in xi depends on d, r1' + r2' and L (r1'' - r2''), what is odd on r2' - r1' and L (r1'' + r2'').
+_EVEN, _ODD = _slope()[[0, 2, 4], :3], _slope()[[1, 3], 3:]
+_GAUSS = np.polynomial.legendre.leggauss
+_FOUR_PAIRS, _FIVE_PAIRS = beam.pairs(*_GAUSS(4)), beam.pairs(*_GAUSS(5))
+_FOUR_POINTS, _FIVE_POINTS = (np.column_stack([x, weights / 2]) for x, weights in (_GAUSS(4), _GAUSS(5)))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _add(tile: Tile, damped: bool, family: Family, number: int, f: Array, w: Array, power: Array) -> None:
-    for i in range(_FORCE * len(tile), (_FORCE + 2 * beam.QUINTIC - 2) * len(tile)):
-        w[i] = 0.0
-    _force_points(tile, damped, family, number, w, power)
-    _scatter(tile, family, number, w, f)
+@njit(error_model="numpy", forceinline=True)
+def _component(tile, family, number, lane, inverse, length, k, z):  # type: ignore[no-untyped-def]
+    """c0 to c4 in one direction, 0 or 1."""
+    r1 = coordinate(tile, family, number, lane, ROWS, k, z)
+    p1 = coordinate(tile, family, number, lane, ROWS, 2 + k, z)
+    k1 = coordinate(tile, family, number, lane, ROWS, 4 + k, z)
+    r2 = coordinate(tile, family, number, lane, ROWS, 6 + k, z)
+    p2 = coordinate(tile, family, number, lane, ROWS, 8 + k, z)
+    k2 = coordinate(tile, family, number, lane, ROWS, 10 + k, z)
+    d, k1, k2 = (r2 - r1) * inverse, k1 * length, k2 * length
+    s, a, u, b = p1 + p2, k1 - k2, p2 - p1, k1 + k2
+    return (
+        _EVEN[0, 0] * d + _EVEN[0, 1] * s + _EVEN[0, 2] * a,
+        _ODD[0, 0] * u + _ODD[0, 1] * b,
+        _EVEN[1, 0] * d + _EVEN[1, 1] * s + _EVEN[1, 2] * a,
+        _ODD[1, 0] * u + _ODD[1, 1] * b,
+        _EVEN[2, 0] * d + _EVEN[2, 1] * s + _EVEN[2, 2] * a,
+    )
+
+
+@njit(error_model="numpy", forceinline=True)
+def _at_both(x, c):  # type: ignore[no-untyped-def]
+    """r' and L r'' at +xi and at -xi, in one direction."""
+    c0, c1, c2, c3, c4 = c
+    x2 = x * x
+    even, odd = c0 + x2 * (c2 + x2 * c4), x * (c1 + x2 * c3)
+    up, down = 2.0 * c1 + (6.0 * x2) * c3, x * (4.0 * c2 + (8.0 * x2) * c4)
+    return even + odd, even - odd, up + down, up - down
+
+
+@njit(error_model="numpy", forceinline=True)
+def _point(damped, px, py, cx, cy, ux, uy, vx, vy, inverse, angle, axial, bending, eta):  # type: ignore[no-untyped-def]
+    """Derivatives of the energy by r' and by L r'' at a point, and the power lost; u, v: rates of r' and L r''."""
+    shrink = 1.0 / root(px * px + py * py)
+    rate, change = ux * px + uy * py, ux * cy - uy * cx + px * vy - py * vx
+    n, lost = stretch(damped, shrink, rate, inverse, axial, eta)
+    m, turn, more = bend(damped, shrink * shrink, px * cy - py * cx, rate, change, inverse, angle, bending, eta)
+    n = n - 2.0 * m * turn
+    return n * px + m * cy, n * py - m * cx, -m * py, m * px, lost + more
+
+
+@njit(error_model="numpy", forceinline=True)
+def _collect(x, g, other, h, beyond, sums):  # type: ignore[no-untyped-def]
+    """Add the derivatives by c0 to c4 of a pair of points in one direction: g by r', h by L r'' at +xi and at -xi."""
+    s0, s1, s2, s3, s4 = sums
+    even, odd, up, down = g + other, x * (g - other), h + beyond, x * (h - beyond)
+    x2 = x * x
+    return (
+        s0 + even,
+        s1 + odd + 2.0 * up,
+        s2 + x2 * even + 4.0 * down,
+        s3 + x2 * odd + (6.0 * x2) * up,
+        s4 + (x2 * x2) * even + (8.0 * x2) * down,
+    )
+
+
+@njit(error_model="numpy", forceinline=True)
+def _nodal(inverse, length, sums):  # type: ignore[no-untyped-def]
+    """The force in one direction on r1, r1', r1'', r2, r2', r2''."""
+    s0, s1, s2, s3, s4 = sums
+    d = (_EVEN[0, 0] * s0 + _EVEN[1, 0] * s2 + _EVEN[2, 0] * s4) * inverse
+    s = _EVEN[0, 1] * s0 + _EVEN[1, 1] * s2 + _EVEN[2, 1] * s4
+    a = (_EVEN[0, 2] * s0 + _EVEN[1, 2] * s2 + _EVEN[2, 2] * s4) * length
+    u, b = _ODD[0, 0] * s1 + _ODD[1, 0] * s3, (_ODD[0, 1] * s1 + _ODD[1, 1] * s3) * length
+    return d, u - s, -(a + b), -d, -(s + u), a - b
+
+
+@njit(error_model="numpy", forceinline=True)
+def _force(
+    tile: Tile,
+    curved: bool,
+    damped: bool,
+    pairs: Array,
+    family: Family,
+    number: int,
+    count: int,
+    lane: int,
+    z: Array,
+    zdot: Array,
+    f: Array,
+    w: Array,
+    power: Array,
+) -> None:
+    """Add the force of `count` elements to f; curved, damped and the rule are constants of the call."""
+    inverse = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 0)
+    ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
+    ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
+    length, none = 1.0 / inverse, spread(EIGHT, 0.0)
+    eta, lost, still = none, none, (none, none, none, none, none)
+    x = _component(tile, family, number, lane, inverse, length, 0, z)
+    y = _component(tile, family, number, lane, inverse, length, 1, z)
+    dx, dy, sx, sy = still, still, still, still
+    if damped:
+        eta = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 3)
+        dx = _component(tile, family, number, lane, inverse, length, 0, zdot)
+        dy = _component(tile, family, number, lane, inverse, length, 1, zdot)
+    last = pairs.shape[0] - 1
+    for g in range(last):
+        xi, weight = pairs[g, 0], pairs[g, 1]
+        px, qx, cx, ex = _at_both(xi, x)
+        py, qy, cy, ey = _at_both(xi, y)
+        ux, tx, vx, wx = _at_both(xi, dx)
+        uy, ty, vy, wy = _at_both(xi, dy)
+        straight = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 3]), 1.0)
+        angle = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 3]) + 1, 0.0)
+        gx, gy, hx, hy, one = _point(
+            damped, px, py, cx, cy, ux, uy, vx, vy, straight, angle, ea * weight, ei * weight, eta
+        )
+        straight = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 2]), 1.0)
+        angle = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 2]) + 1, 0.0)
+        ix, iy, jx, jy, two = _point(
+            damped, qx, qy, ex, ey, tx, ty, wx, wy, straight, angle, ea * weight, ei * weight, eta
+        )
+        sx, sy = _collect(xi, gx, ix, hx, jx, sx), _collect(xi, gy, iy, hy, jy, sy)
+        lost = lost + (one + two)
+    if pairs[last, 1] != 0.0:
+        weight = pairs[last, 1]
+        straight = reference(tile, curved, family, number, lane, 2 * int(pairs[last, 2]), 1.0)
+        angle = reference(tile, curved, family, number, lane, 2 * int(pairs[last, 2]) + 1, 0.0)
+        px, py, cx, cy = x[0], y[0], 2.0 * x[1], 2.0 * y[1]
+        ux, uy, vx, vy = dx[0], dy[0], 2.0 * dx[1], 2.0 * dy[1]
+        gx, gy, hx, hy, one = _point(
+            damped, px, py, cx, cy, ux, uy, vx, vy, straight, angle, ea * weight, ei * weight, eta
+        )
+        sx = (sx[0] + gx, sx[1] + 2.0 * hx, sx[2], sx[3], sx[4])
+        sy = (sy[0] + gy, sy[1] + 2.0 * hy, sy[2], sy[3], sy[4])
+        lost = lost + one
+    a, b, c, d, e, h = _nodal(inverse, length, sx)
+    i, j, k, m, n, o = _nodal(inverse, length, sy)
+    add_rows(tile, family, number, lane, count, w, f, (a, i, b, j, c, k, d, m, e, n, h, o))
+    if damped:
+        add_sum(tile, lane, count, w, power, lost)
 
 
 @njit(cache=True, error_model="numpy")
 def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array, power: Array, moving: bool) -> None:
     """See `families.add_force`."""
-    for number in range(family.size):
-        gather(tile, beam.QUINTIC, family, number, z, w, _X)
-        if moving and family.plan[PLAN * number + 3] == DAMPED:
-            gather(tile, beam.QUINTIC, family, number, zdot, w, _RATE)
-            _add(tile, True, family, number, f, w, power)
-        else:
-            _add(tile, False, family, number, f, w, power)
+    number = 0
+    while number < family.size:
+        count, variant = together(tile, family, number), family.plan[PLAN * number + VARIANT]
+        for lane in range(0, len(tile), len(EIGHT)):
+            at = family, number, count, lane, z, zdot, f, w, power
+            if variant == FOUR:
+                _force(tile, False, False, _FOUR_PAIRS, *at)
+            elif variant == FIVE:
+                _force(tile, False, False, _FIVE_PAIRS, *at)
+            elif variant == FOUR_DAMPED and moving:
+                _force(tile, True, True, _FOUR_PAIRS, *at)
+            elif variant == FIVE_DAMPED and moving:
+                _force(tile, True, True, _FIVE_PAIRS, *at)
+            elif variant in (FOUR_CURVED, FOUR_DAMPED):
+                _force(tile, True, False, _FOUR_PAIRS, *at)
+            else:
+                _force(tile, True, False, _FIVE_PAIRS, *at)
+        number += count
+
+
+@njit(error_model="numpy", forceinline=True)
+def _add_energy(tile, points, family, number, count, lane, z, w, energy):  # type: ignore[no-untyped-def]
+    """Add the strain energy of `count` elements; the rule, rows (xi, weight), is a constant of the call."""
+    inverse = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 0)
+    ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
+    ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
+    length, total = 1.0 / inverse, spread(EIGHT, 0.0)
+    x = _component(tile, family, number, lane, inverse, length, 0, z)
+    y = _component(tile, family, number, lane, inverse, length, 1, z)
+    for g in range(points.shape[0]):
+        px, _, cx, _ = _at_both(points[g, 0], x)
+        py, _, cy, _ = _at_both(points[g, 0], y)
+        square, relaxed = px * px + py * py, rest(tile, family, number, lane, 2 * g)
+        strain = root(square) * relaxed - 1.0
+        angle = (px * cy - py * cx) / square - rest(tile, family, number, lane, 2 * g + 1)
+        total = total + (0.5 * points[g, 1]) * (ea * strain * strain / relaxed + ei * angle * angle * relaxed)
+    add_sum(tile, lane, count, w, energy, total)
+
+
+@njit(cache=True, error_model="numpy")
+def potential(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: int) -> None:
+    """See `families.add_energy`."""
+    number, total = 0, shift(energy, row * len(tile))
+    while number < family.size:
+        count, variant = together(tile, family, number), family.plan[PLAN * number + VARIANT]
+        for lane in range(0, len(tile), len(EIGHT)):
+            at = family, number, count, lane, z, w, total
+            if variant in (FOUR, FOUR_CURVED, FOUR_DAMPED):
+                _add_energy(tile, _FOUR_POINTS, *at)
+            else:
+                _add_energy(tile, _FIVE_POINTS, *at)
+        number += count
 
 
 implement(
     Quintics,
     Kernel(ROWS, beam.COEFFICIENTS, 1),
     force=force,
-    potential=beam_tangent.energy,
+    potential=potential,
     stiffness=beam_tangent.stiffness,
     viscosity=beam_tangent.viscosity,
 )
@@ -139,8 +261,10 @@ def _nodal_vectors(rod: Rod, s: Number) -> list[Number]:
 
 
 def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
-    variant = DAMPED if np.any(rod.retardation) else ELASTIC
-    return beam.part(beam.QUINTIC, recommended(rod.elements), variant, rod, height, width, length, nodal)
+    rule = recommended(rod.elements)
+    kind = 2 if np.any(rod.retardation) else 1 if rod.curvature else 0
+    variant = (FOUR if len(rule) == 4 else FIVE) + kind
+    return beam.part(beam.QUINTIC, rule, variant, rod, height, width, length, nodal)
 
 
 ELEMENT = beam.element(beam.QUINTIC, Quintics, _nodal_vectors, _part)
