@@ -26,15 +26,15 @@ if sys.platform != "win32":
     import fcntl
 
 SECONDS = {
-    "march": 10.0,
-    "_constrain": 8.0,
-    "_force": 5.0,
-    "_motion": 3.0,
+    "march": 16.0,
+    "_constrain": 15.0,
+    "_force": 6.0,
+    "_motion": 5.0,
+    "_settle": 4.0,
     "_stiffness": 3.0,
-    "_settle": 3.0,
     "_energies": 1.5,
 }
-"""What large kernels take on a usual core: for the order, and to say how long it will take."""
+"""What large kernels take on one core of a server: for the order, and to say how long it will take."""
 _WORTH_A_LINE = 1.0
 """Seconds."""
 
