@@ -17,6 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from numba import types
 from numba.core import caching, config, dispatcher, event
 from numba.core.compiler_lock import global_compiler_lock
 
@@ -26,11 +27,12 @@ if sys.platform != "win32":
     import fcntl
 
 SECONDS = {
-    "march": 16.0,
+    "loop": 16.0,
     "_constrain": 15.0,
     "_force": 6.0,
     "_motion": 5.0,
     "_settle": 4.0,
+    "store_frame": 3.5,
     "_stiffness": 3.0,
     "_energies": 1.5,
 }
@@ -41,6 +43,8 @@ _WORTH_A_LINE = 1.0
 
 def described(name: str, kinds: tuple[Any, ...]) -> str:
     """What a person may know a kernel by: its name, for how many lanes, and the structure that it is made for."""
+    if len(kinds) == 1 and isinstance(kinds[0], types.CPointer):  # a frame's place
+        kinds = tuple(kinds[0].dtype)
     lanes = getattr(kinds[0], "count", 0) if kinds else 0
     width = {0: "", 1: ", single"}.get(lanes, ", lanes")
     made_for = getattr(getattr(kinds[1], "instance_class", None), "__name__", "") if len(kinds) > 1 else ""

@@ -95,10 +95,10 @@ class March:
     def __init__(self, frame: Frame) -> None:
         self.frame = frame
         self._home = gate.home()
-        _enter(self._home, frame)
+        store_frame(self._home, frame)
         kinds = loop_of(frame)
         if kinds not in _LOOPS:
-            _LOOPS[kinds] = gate.address(_march, (types.CPointer(frame_type(frame)),))
+            _LOOPS[kinds] = gate.address(loop, (frame_type(frame),))
         self._loop = _LOOPS[kinds]
 
     def __call__(self) -> None:
@@ -116,8 +116,8 @@ def loop_of(frame: Frame) -> tuple[Any, ...]:
 
 
 def frame_type(frame: Frame) -> Any:
-    """The compiler's type of a frame, which takes a millisecond to find."""
-    return raw_type(typeof(frame))
+    """The compiler's type of a frame's place in memory, which takes a millisecond to find."""
+    return types.CPointer(raw_type(typeof(frame)))
 
 
 def march(*arguments: Any) -> Marched:
@@ -128,7 +128,8 @@ def march(*arguments: Any) -> Marched:
 
 
 @njit(cache=True)
-def _enter(home: Array, frame: Frame) -> None:
+def store_frame(home: Array, frame: Frame) -> None:
+    """Put a frame with pointers for its arrays into its home, and its structures where the gates find them."""
     gates.enter(raw(frame.arrays), raw(frame.room))
     gate.store(pointer(home), raw(frame))
 
@@ -139,7 +140,8 @@ def _call(address: int, home: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _march(place):  # type: ignore[no-untyped-def]
+def loop(place):  # type: ignore[no-untyped-def]
+    """The march of the frame at a place."""
     frame = gate.load(place)
     tile, scheme, m, w, k, record = frame.tile, frame.scheme, frame.arrays, frame.room, frame.own, frame.record
     step, steps, tolerance = frame.step, frame.steps, frame.tolerance

@@ -24,8 +24,9 @@ from shoal.mechanics.assembly.build import build
 from shoal.mechanics.compilation import SECONDS, described
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import INTEGRATORS, choose, halting
-from shoal.mechanics.march import march
+from shoal.mechanics.march import frame_type, framed, loop, store_frame
 from shoal.mechanics.notes import Note, telling
+from shoal.mechanics.numerics import gate
 from shoal.mechanics.numerics.tile import tiles
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
@@ -132,15 +133,20 @@ def kernels(scene: Scene, lanes: int, *, every: bool = False) -> list[Kernel]:
     arrays = model.tile(tile, lane)
     room, scheme = work_space(tile, arrays), choose(scene.solver, model, tile, lane, name)
     stops = halting(scene.solver, model, name, scene.solver.duration)
-    arguments = tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops
+    frame = framed(tile, scheme, arrays, room, 0.0, 0, np.zeros(1), model.marker_rows.ravel(), 0.0, stops)
     shared = [Kernel(kernel.__name__, kinds) for kernel, kinds in gates.kernels(tile, arrays, room, every=every)]
     if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
         shared = [kernel for kernel in shared if kernel.name != "_stiffness"]
-    return [Kernel(march.__name__, tuple(typeof(argument) for argument in arguments)), *shared]
+    own = [
+        Kernel(loop.__name__, (frame_type(frame),)),
+        Kernel(store_frame.__name__, (typeof(gate.home()), typeof(frame))),
+    ]
+    return own + shared
 
 
 def _function(name: str) -> Any:
-    return march if name == march.__name__ else getattr(gates, name)
+    own = {kernel.__name__: kernel for kernel in (loop, store_frame)}
+    return own.get(name) or getattr(gates, name)
 
 
 def _compile(kernel: Kernel) -> str:
