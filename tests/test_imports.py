@@ -14,8 +14,9 @@ import numpy as np
 import shoal
 import shoal.scene
 import shoal.mechanics.simulate
-run = shoal.simulate("single-pendulum", [1e-3], verify=False)
-assert run.ok, run.message
+for scene in ("single-pendulum", "flexible-double-pendulum"):
+    run = shoal.simulate(scene, [1e-3], verify=False)
+    assert run.ok, run.message
 from click.testing import CliRunner
 from shoal.cli import main
 told = CliRunner().invoke(main, ["simulate", "single-pendulum", "--at", "1e-3"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from typing import Any
@@ -107,6 +109,13 @@ def test_threads_share_a_prepared_scene() -> None:
         runs = list(pool.map(lambda times: prepared(times=times), asked))
     for run, times in zip(runs, asked, strict=True):
         assert_same(run, Prepared(RIGID)(times=times))
+
+
+def test_a_copy_starts_with_the_scene_alone() -> None:
+    prepared = Prepared(RIGID)
+    run = prepared(times=[0.01])
+    for other in (pickle.loads(pickle.dumps(prepared)), copy.deepcopy(prepared)):
+        assert_same(other(times=[0.01]), run)
 
 
 def test_a_run_that_fails_does_so_each_time() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.mechanics.integrators import INTEGRATORS, Choice, halting
-from shoal.mechanics.march import frame_type, framed, loop_of
+from shoal.mechanics.marched import frame_type, framed, loop_of
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
 from shoal.mechanics.simulate import machine

@@ -43,6 +43,10 @@ class Prepared:
         self._machines: dict[tuple[float, bool], Machine] = {}
         self._set: dict[str, Prepared] = {}
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # What is kept holds addresses of this process.
+        return Prepared, (self.scene, self._threads)
+
     def __repr__(self) -> str:
         return f"Prepared({self.scene.name})"
 

@@ -11,20 +11,20 @@ short where functions of time are not smooth (`halts`).
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numba import carray, njit, typeof, types
+from numba import carray, njit
 
 from shoal.mechanics import constraints, gates
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, loaded, remember
 from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
 from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
-from shoal.mechanics.marched import LoopRoom, Marched, rooms, sampled
+from shoal.mechanics.marched import Frame, LoopRoom, Marched, frame_type, framed, loop_of, sampled
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import gate
-from shoal.mechanics.numerics.pointers import pointer, raw, raw_type
+from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 ASSEMBLY = 30
@@ -35,55 +35,6 @@ CHECK_EVERY = 4
 """An adaptive run is looked at every so many steps, each of which is worth a dozen looks."""
 LOBATTO = 0.5 - 0.5 / np.sqrt(5.0)
 """Inner node of the four-point Lobatto rule on the unit interval, of order 6; its weights are 1/12 and 5/12."""
-
-
-class Frame(NamedTuple):
-    """All that the march of one tile works on.
-
-    step: [s], of schemes of fixed step, which take `steps` of them; adaptive ones end at the last of the times and take
-    at most so many. times: at which the marker rows are sampled [s], increasing, `samples` of them; directed: number of
-    marker rows; halts: where steps end, `stops` times and `marks` marks; there forces may jump, and driven constraints
-    their rates. tolerance: from which rows count as dependent. What is not reached stays nan in the record.
-    """
-
-    tile: Tile
-    scheme: Any
-    arrays: Arrays
-    room: Work
-    own: LoopRoom
-    record: Marched
-    step: float
-    steps: int
-    times: Array
-    samples: int
-    marker_rows: Index
-    directed: int
-    halts: Halts
-    stops: int
-    marks: int
-    tolerance: float
-
-
-def framed(
-    tile: Tile,
-    scheme: Any,
-    arrays: Arrays,
-    room: Work,
-    step: float,
-    steps: int,
-    times: Array,
-    marker_rows: Index,
-    tolerance: float,
-    halts: Halts,
-) -> Frame:
-    """The frame of a march from the state in `room`, with an empty record."""
-    record, own = rooms(tile, arrays, len(times), marker_rows)
-    sizes = len(times), marker_rows.size, halts.times.size, halts.marks.size
-    samples, directed, stops, marks = sizes
-    return Frame(
-        tile, scheme, arrays, room, own, record, step, steps, times, samples,
-        marker_rows, directed, halts, stops, marks, tolerance,
-    )  # fmt: skip
 
 
 class March:
@@ -108,16 +59,6 @@ class March:
 
 _LOOPS: dict[tuple[Any, ...], int] = {}
 """Addresses of the compiled loops."""
-
-
-def loop_of(frame: Frame) -> tuple[Any, ...]:
-    """What the type of a frame depends on: frames that agree in it share a compiled loop."""
-    return len(frame.tile), len(frame.arrays.space), type(frame.scheme), *map(type, frame.arrays.elements)
-
-
-def frame_type(frame: Frame) -> Any:
-    """The compiler's type of a frame's place in memory, which takes a millisecond to find."""
-    return types.CPointer(raw_type(typeof(frame)))
 
 
 def march(*arguments: Any) -> Marched:

@@ -1,14 +1,17 @@
-"""What a march leaves behind, and the room of its loop."""
+"""What a march works on and what it leaves behind."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, typeof, types
 
 from shoal.mechanics import constraints
+from shoal.mechanics.dynamics import Work
+from shoal.mechanics.halts import Halts
 from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics.pointers import raw_type
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 TURN = 2.0 * np.pi
@@ -96,6 +99,65 @@ def rooms(tile: Tile, arrays: Arrays, times: int, marker_rows: Index) -> tuple[M
         np.zeros(arrays.forces.size * width),
     )
     return record, room
+
+
+class Frame(NamedTuple):
+    """All that the march of one tile works on.
+
+    step: [s], of schemes of fixed step, which take `steps` of them; adaptive ones end at the last of the times and take
+    at most so many. times: at which the marker rows are sampled [s], increasing, `samples` of them; directed: number of
+    marker rows; halts: where steps end, `stops` times and `marks` marks; there forces may jump, and driven constraints
+    their rates. tolerance: from which rows count as dependent. What is not reached stays nan in the record.
+    """
+
+    tile: Tile
+    scheme: Any
+    arrays: Arrays
+    room: Work
+    own: LoopRoom
+    record: Marched
+    step: float
+    steps: int
+    times: Array
+    samples: int
+    marker_rows: Index
+    directed: int
+    halts: Halts
+    stops: int
+    marks: int
+    tolerance: float
+
+
+def framed(
+    tile: Tile,
+    scheme: Any,
+    arrays: Arrays,
+    room: Work,
+    step: float,
+    steps: int,
+    times: Array,
+    marker_rows: Index,
+    tolerance: float,
+    halts: Halts,
+) -> Frame:
+    """The frame of a march from the state in `room`, with an empty record."""
+    record, own = rooms(tile, arrays, len(times), marker_rows)
+    sizes = len(times), marker_rows.size, halts.times.size, halts.marks.size
+    samples, directed, stops, marks = sizes
+    return Frame(
+        tile, scheme, arrays, room, own, record, step, steps, times, samples,
+        marker_rows, directed, halts, stops, marks, tolerance,
+    )  # fmt: skip
+
+
+def loop_of(frame: Frame) -> tuple[Any, ...]:
+    """What the type of a frame depends on: frames that agree in it share a compiled loop."""
+    return len(frame.tile), len(frame.arrays.space), type(frame.scheme), *map(type, frame.arrays.elements)
+
+
+def frame_type(frame: Frame) -> Any:
+    """The compiler's type of a frame's place in memory, which takes a millisecond to find."""
+    return types.CPointer(raw_type(typeof(frame)))
 
 
 FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE, STEPS, EVALUATIONS, REACHED = range(7)

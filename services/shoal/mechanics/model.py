@@ -188,7 +188,7 @@ class Model:
         matrix = scatter(pattern, slots, entries)[:, 0]
         factor = matrix.copy()
         _factor_mass(SINGLE, pattern, factor)
-        dense = sparse.matrix(pattern, matrix).toarray() if size <= alike.FEW else np.zeros((0, 0))
+        dense = sparse.dense(pattern, matrix) if size <= alike.FEW else np.zeros((0, 0))
         return Alike(components, pattern, matrix, factor, alike.spread_inverse(dense, components))
 
     def tile(self, tile: Tile, lanes: slice) -> Arrays:

@@ -7,8 +7,6 @@ can only lower it: Rayleigh's interlacing).
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse.linalg
 
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators.scheme import Facts
@@ -84,8 +82,10 @@ def _top(pattern: Pattern, matrix: Array, mass: Array) -> float:
     if not np.any(matrix):
         return 0.0
     if n <= _DENSE:
-        full = [sparse.matrix(pattern, values).toarray() for values in (matrix, mass)]
-        return float(scipy.linalg.eigh(*full, eigvals_only=True, subset_by_index=[n - 1, n - 1])[0])
+        lower = np.linalg.inv(np.linalg.cholesky(sparse.dense(pattern, mass)))
+        return float(np.linalg.eigvalsh(lower @ sparse.dense(pattern, matrix) @ lower.T)[-1])
+    import scipy.sparse.linalg
+
     start = np.cos(np.arange(n))  # a fixed start vector, so that the same scene gives the same limit
     stiff, heavy = (sparse.matrix(pattern, values) for values in (matrix, mass))
     found = scipy.sparse.linalg.eigsh(

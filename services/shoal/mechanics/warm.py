@@ -24,7 +24,8 @@ from shoal.mechanics.assembly.build import build
 from shoal.mechanics.compilation import SECONDS, described
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import INTEGRATORS, choose, halting
-from shoal.mechanics.march import frame_type, framed, loop, store_frame
+from shoal.mechanics.march import loop, store_frame
+from shoal.mechanics.marched import frame_type, framed
 from shoal.mechanics.notes import Note, telling
 from shoal.mechanics.numerics import gate
 from shoal.mechanics.numerics.tile import tiles

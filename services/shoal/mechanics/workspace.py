@@ -12,8 +12,8 @@ from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.gates import Seek, Sought, ready
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, choose, facts
-from shoal.mechanics.march import March, framed
-from shoal.mechanics.marched import Marched
+from shoal.mechanics.march import March
+from shoal.mechanics.marched import Marched, framed
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import Array, Tile, pack
 from shoal.scene import Solver

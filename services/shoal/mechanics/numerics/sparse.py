@@ -100,6 +100,14 @@ def matrix(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
     return scipy.sparse.csc_array(lower + lower.T + scipy.sparse.diags_array(values[:n]))
 
 
+def dense(pattern: Pattern, values: Array) -> Array:
+    """The same as an array, (n, n)."""
+    n = pattern.size
+    full = np.zeros((n, n))
+    full[pattern.row, np.repeat(np.arange(n), np.diff(pattern.column))] = values[n:]
+    return full + full.T + np.diag(values[:n])
+
+
 @njit(cache=True, error_model="numpy")
 def factor(tile: Tile, pattern: Pattern, values: Array) -> None:
     """Replace the matrix (slots, lanes) by L below the diagonal and 1/D on it. Pointers."""
