@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import solve_bvp
+from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import ancf_full, families
 from shoal.mechanics.elements.ancf_full import LAWS
 from shoal.mechanics.numerics.pointers import pointer, raw
@@ -77,28 +78,28 @@ def _bent(seed: int) -> Any:
 
 def _force(family: Any, z: Any) -> Any:
     f = np.zeros(z.size)
-    _force_door(SINGLE, family, z.copy(), f, np.zeros(64))
+    _force_door(SINGLE, family, z.copy(), f, np.zeros(ELEMENT_ROOM))
     return f
 
 
 def _mean_force(family: Any, before: Any, after: Any) -> Any:
     f = np.zeros(before.size)
-    _mean_door(SINGLE, family, before.copy(), after.copy(), f, np.zeros(64))
+    _mean_door(SINGLE, family, before.copy(), after.copy(), f, np.zeros(ELEMENT_ROOM))
     return f
 
 
 def _energy(family: Any, z: Any) -> float:
     energy = np.zeros(1)
-    _energy_door(SINGLE, family, z.copy(), np.zeros(64), energy)
+    _energy_door(SINGLE, family, z.copy(), np.zeros(ELEMENT_ROOM), energy)
     return float(energy[0])
 
 
 def _tangent(family: Any, z: Any) -> Any:
     """Assembled over the chain."""
     out = np.full(144 * family.size, np.nan)
-    _tangent_door(SINGLE, family, z.copy(), np.zeros(64), out)
+    _tangent_door(SINGLE, family, z.copy(), np.zeros(ELEMENT_ROOM), out)
     whole = np.zeros((z.size, z.size))
-    for rows, block in zip(family.rows.reshape(-1, 12), out.reshape(-1, 12, 12), strict=True):
+    for rows, block in zip(family.rows[: 12 * family.size].reshape(-1, 12), out.reshape(-1, 12, 12), strict=True):
         whole[np.ix_(rows, rows)] += block
     return whole
 

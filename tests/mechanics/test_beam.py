@@ -10,6 +10,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk, ellipkinc
+from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import beam, cubic, families, quintic
 from shoal.mechanics.elements.beam import CUBIC, QUINTIC
 from shoal.mechanics.numerics.pointers import pointer, raw
@@ -61,7 +62,12 @@ def _family(
         kind: Any = cubic.Cubics
         variant = cubic.DAMPED if eta else cubic.FULL if rest is None else cubic.CURVED
     else:
-        kind, variant = quintic.Quintics, quintic.DAMPED if eta else quintic.ELASTIC
+        four = rule[1:] == (4, 4)
+        kind, variant = quintic.Quintics, quintic.FOUR if four else quintic.FIVE
+        if eta:
+            variant = quintic.FOUR_DAMPED if four else quintic.FIVE_DAMPED
+        elif rest is not None:
+            variant = quintic.FOUR_CURVED if four else quintic.FIVE_CURVED
     found = families.Collected()
     for number, nodal in enumerate([_straight(vectors, length)] * elements if rest is None else rest):
         places = [np.array([v.real, v.imag]) for v in nodal]
@@ -102,13 +108,15 @@ def _arc(vectors: int, radius: float, length: float, begin: float = 0.0) -> list
 
 def _force(family: Any, z: Any, zdot: Any = None) -> tuple[Any, float]:
     f, power = np.zeros(z.size), np.zeros(1)
-    _force_door(SINGLE, family, z.copy(), np.zeros(z.size) if zdot is None else zdot.copy(), f, np.zeros(64), power)
+    _force_door(
+        SINGLE, family, z.copy(), np.zeros(z.size) if zdot is None else zdot.copy(), f, np.zeros(ELEMENT_ROOM), power
+    )
     return f, float(power[0])
 
 
 def _energy(family: Any, z: Any) -> float:
     energy = np.zeros(1)
-    _energy_door(SINGLE, family, z.copy(), np.zeros(64), energy)
+    _energy_door(SINGLE, family, z.copy(), np.zeros(ELEMENT_ROOM), energy)
     return float(energy[0])
 
 
@@ -116,9 +124,11 @@ def _matrix(family: Any, z: Any, *, viscous: bool = False) -> Any:
     """Assembled over the chain."""
     side = family.side
     out = np.full(family.size * side * side, np.nan)
-    _tangent_door(SINGLE, family, viscous, z.copy(), np.zeros(64), out)
+    _tangent_door(SINGLE, family, viscous, z.copy(), np.zeros(ELEMENT_ROOM), out)
     whole = np.zeros((z.size, z.size))
-    for rows, block in zip(family.rows.reshape(-1, side), out.reshape(-1, side, side), strict=True):
+    for rows, block in zip(
+        family.rows[: side * family.size].reshape(-1, side), out.reshape(-1, side, side), strict=True
+    ):
         whole[np.ix_(rows, rows)] += block
     return whole
 

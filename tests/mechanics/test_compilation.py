@@ -15,7 +15,8 @@ from shoal.mechanics.assembly.build import build
 from shoal.mechanics.march import loop, store_frame
 from shoal.mechanics.model import Gates
 from shoal.mechanics.numerics.tile import SINGLE
-from shoal.mechanics.simulate import at_start, simulate
+from shoal.mechanics.simulate import simulate
+from shoal.mechanics.workspace import at_start
 from shoal.scene import Scene, load_scene
 
 FLEXIBLE, RIGID = load_scene("flexible-double-pendulum"), load_scene("single-pendulum")

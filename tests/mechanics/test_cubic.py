@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 from shoal.engines.casadi.element import cable_element
+from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import beam, cubic, families
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
@@ -56,19 +57,19 @@ def _bent(seed: int) -> Any:
 
 def _force(quadrature: str, z: Any) -> Any:
     f = np.zeros(8)
-    _force_door(SINGLE, _element(quadrature), z.copy(), f, np.zeros(64), np.zeros(1))
+    _force_door(SINGLE, _element(quadrature), z.copy(), f, np.zeros(ELEMENT_ROOM), np.zeros(1))
     return f
 
 
 def _energy(quadrature: str, z: Any) -> float:
     energy = np.zeros(1)
-    _energy_door(SINGLE, _element(quadrature), z.copy(), np.zeros(64), energy)
+    _energy_door(SINGLE, _element(quadrature), z.copy(), np.zeros(ELEMENT_ROOM), energy)
     return float(energy[0])
 
 
 def _tangent(quadrature: str, z: Any) -> Any:
     out = np.full(64, np.nan)
-    _tangent_door(SINGLE, _element(quadrature), z.copy(), np.zeros(64), out)
+    _tangent_door(SINGLE, _element(quadrature), z.copy(), np.zeros(ELEMENT_ROOM), out)
     return out.reshape(8, 8)
 
 
