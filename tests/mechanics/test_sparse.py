@@ -77,7 +77,7 @@ def test_lanes_equal_singles(kernels: Any, system: Any) -> None:
 def test_a_chain_fills_nothing() -> None:
     pattern, _ = sparse.analyse(50, [(k + 1, k) for k in range(49)])
     assert len(pattern.row) == 49
-    assert len(pattern.target) == 49
+    assert len(pattern.left) == 0
 
 
 def test_both_orders_of_an_entry_name_the_same_slot() -> None:

@@ -19,7 +19,7 @@ from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.mechanics.numerics.vector import clear
 
 ELEMENT_ROWS = 64
-ELEMENT_ROOM = 256
+ELEMENT_ROOM = 1024
 """Numbers of room at least: eight elements of a single lane are computed at once."""
 ALL, ELASTIC, SIMPLE, ACCELERATION = 0, 1, 2, 3
 """Parts of the force: everything, the elastic part, the elastic part but for elements that know their mean force; or
@@ -164,6 +164,15 @@ def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, t
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
+def multiply_mass(tile: Tile, m: Arrays, x: Array, y: Array) -> None:
+    """y = M x; (rows, lanes)."""
+    if m.alike.components > 0:
+        alike.multiply(tile, m.space, m.alike, x, y)
+    else:
+        sparse.multiply(tile, m.pattern, m.mass, x, y)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def remember(tile: Tile, m: Arrays, w: Work) -> None:
     """Count the turns of angle forces after a step."""
     if m.forces.size > 0:
@@ -175,10 +184,7 @@ def remember(tile: Tile, m: Arrays, w: Work) -> None:
 def energies(tile: Tile, m: Arrays, w: Work) -> None:
     """Kinetic, elastic and gravitational energy [J] of the state, into w.energy; uses w.stage."""
     width = len(tile)
-    if m.alike.components > 0:
-        alike.multiply(tile, m.space, m.alike, w.zdot, w.stage)
-    else:
-        sparse.multiply(tile, m.pattern, m.mass, w.zdot, w.stage)
+    multiply_mass(tile, m, w.zdot, w.stage)
     for kind in range(3):
         clear(tile, w.energy, kind)
     for i in range(m.unknowns):

@@ -4,22 +4,23 @@
 comes after its coordinates. The pivot of a multiplier is then minus the square of what is left of its row, in the
 mass metric, when the rows before it are taken out; one that vanishes against its first value marks a row that
 depends on the others, and is left out. Its distance from singular enters squared, so the position counts as
-singular earlier than with the orthogonal projection.
+singular earlier than with the orthogonal projection. Implicit steps solve [H C_q'; C_q 0] in the same way, with the
+tangent H of the step and any number of constraints.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from shoal.mechanics.constraints import Constraints
-from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics import simd, sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import copy, scale
+from shoal.mechanics.numerics.vector import copy
 
 SMALL = 16
 """Up to so many constraints the orthogonal projection is used, which is more accurate and about as fast."""
@@ -46,10 +47,9 @@ class Saddle(NamedTuple):
 
 
 class SaddleWork(NamedTuple):
-    """Work space: the factor (slots, lanes), first values of the pivots and a right-hand side (size, lanes)."""
+    """Work space: the factor (slots, lanes) and a right-hand side (size, lanes)."""
 
     values: Array
-    first: Array
     x: Array
 
 
@@ -97,9 +97,9 @@ def order(unknowns: int, entries: Iterable[tuple[int, int]], rows: list[list[int
 
 
 def analyse(
-    unknowns: int, mass: dict[tuple[int, int], Array], constraints: Constraints
+    unknowns: int, mass: Collection[tuple[int, int]], constraints: Constraints
 ) -> tuple[sparse.Pattern, dict[tuple[int, int], int], Index, Index]:
-    """Pattern, slots of the mass matrix, places of all unknowns and slots of the Jacobian's entries."""
+    """Pattern, slots of the mass matrix's entries, places of all unknowns and slots of the Jacobian's entries."""
     rows = [
         constraints.column[constraints.entry[k] : constraints.entry[k + 1]].tolist() for k in range(constraints.size)
     ]
@@ -122,42 +122,37 @@ def factor(tile: Tile, s: Saddle, entries: int, jacobian: Array, w: SaddleWork, 
 
     The factors are solved with by `sparse.solve`, the right-hand side ordered by place.
     """
-    width = len(tile)
-    size = s.size
-    p = s.pattern
-    for row in range(s.slots):
-        copy(tile, w.values, row, s.base, row)
+    simd.assign(w.values, s.base, s.slots * len(tile))
     for e in range(entries):
         copy(tile, w.values, s.slot[e], jacobian, e)
-    for i in range(size * width):
-        w.first[i] = 0.0
-    dropped = 0
-    for k in range(size):
-        if s.multiplier[k]:
-            for lane in range(width):
-                pivot = w.values[k * width + lane]
-                if pivot < -tolerance * w.first[k * width + lane]:
-                    w.values[k * width + lane] = 1.0 / pivot
-                else:
-                    w.values[k * width + lane] = 0.0
-                    dropped += 1
-        else:
-            for lane in range(width):
-                w.values[k * width + lane] = 1.0 / w.values[k * width + lane]
-        for u in range(p.update[k], p.update[k + 1]):
-            target = p.target[u] * width
-            left = (size + p.left[u]) * width
-            right = (size + p.right[u]) * width
-            for lane in range(width):
-                w.values[target + lane] -= w.values[left + lane] * w.values[right + lane] * w.values[k * width + lane]
-            if p.target[u] < size and not s.multiplier[k]:
-                for lane in range(width):
-                    w.first[target + lane] += w.values[left + lane] ** 2 * w.values[k * width + lane]
-        for q in range(size + p.column[k], size + p.column[k + 1]):
-            scale(tile, w.values, q, w.values, k)
+    dropped: int = eliminate(tile, s.pattern, s.multiplier, w.values, tolerance)
+    return dropped
+
+
+@njit(cache=True, error_model="numpy")
+def eliminate(tile: Tile, p: sparse.Pattern, multiplier: Index, values: Array, tolerance: float) -> int:
+    """Replace a matrix with multipliers (slots, lanes) by its factors; returns how many rows were left out. Pointers.
+
+    The pivot of a multiplier is compared with what it is when only its coordinates are taken out.
+    """
+    width, dropped = len(tile), 0
+    for k in range(p.size):
+        for lane in range(width if multiplier[k] else 0):
+            first, pivot = 0.0, values[k * width + lane]
+            for e in range(p.across[k], p.across[k + 1]):
+                taken = values[p.slot[e] * width + lane] ** 2 * values[p.other[e] * width + lane]
+                pivot -= taken
+                first += 0.0 if multiplier[p.other[e]] else taken
+            kept = pivot < -tolerance * first
+            dropped += 0 if kept else 1
+            values[k * width + lane] = 1.0 / pivot if kept else 0.0
+        pivots = sparse.finish_row(tile, p, values, k)
+        if not multiplier[k]:
+            simd.store(values, k * width, 1.0 / pivots)
+        sparse.start_column(tile, p, values, k)
     return dropped
 
 
 def room(size: int, slots: int, width: int) -> SaddleWork:
     """Work space as arrays."""
-    return SaddleWork(np.zeros(slots * width), np.zeros(size * width), np.zeros(size * width))
+    return SaddleWork(np.zeros(slots * width), np.zeros(size * width))

@@ -7,59 +7,99 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import literal_unroll, njit
 
-from shoal.mechanics import forces, gates
+from shoal.mechanics import forces, gates, saddle
 from shoal.mechanics.dynamics import Work, derived_rows
 from shoal.mechanics.model import Arrays, Model, scatter
-from shoal.mechanics.numerics import gate, sparse
+from shoal.mechanics.numerics import gate, simd, sparse
 from shoal.mechanics.numerics.pointers import pointer, raw, shift
 from shoal.mechanics.numerics.tile import Array, Index, Tile, index, pack, stacked
-from shoal.mechanics.numerics.vector import add_product
+from shoal.mechanics.numerics.vector import add, add_product
+
+
+class Held(NamedTuple):
+    """[H C_q'; C_q 0] in one pattern: what `saddle.Saddle` says of it. Without constraints nothing.
+
+    place: position of every coordinate, then of every multiplier; slot: of every entry of the Jacobian; multiplier:
+    whether a position is that of a multiplier.
+    """
+
+    place: Index
+    slot: Index
+    multiplier: Index
 
 
 class Tangent(NamedTuple):
     """Pattern of H = c_M M + c_D D + K and the lists that assemble it, for one tile.
 
-    Contribution k adds coefficient[k] * block[source[k]] to slot[k]; `block` holds the square tangents of all
-    elements, family by family, then those of the force elements: `blocks` rows. Curvature k adds
-    bend[k] * multiplier[owner[k]] to curvature[k]. stiffness, damping: addresses of the kernels of each family.
+    `block` holds the square tangents of all elements, family by family, then those of the force elements: `blocks`
+    rows. Its row source[s] adds to slot s, where none does, a row of zeros behind two such blocks; row more[k] adds to
+    slot also[k], too. Share k adds part[k] * block[shared[k]] to slot[k], for elements whose rows are sums of
+    coordinates. Curvature k adds bend[k] * multiplier[owner[k]] to
+    curvature[k]. stiffness, damping: addresses of the kernels of each family. held: where the constraints' rows are.
     """
 
     pattern: sparse.Pattern
     mass: Array
     blocks: int
-    contributions: int
     source: Index
+    extra: int
+    more: Index
+    also: Index
+    shares: int
+    shared: Index
     slot: Index
-    coefficient: Array
+    part: Array
     curvatures: int
     curvature: Index
     owner: Index
     bend: Array
     stiffness: Index
     damping: Index
+    held: Held
 
 
-def tangent_tile(model: Model, tile: Tile, lanes: slice) -> Tangent:
-    """Analyse the tangent of a model and pack its numbers for one tile of lanes."""
+def tangent_tile(model: Model, tile: Tile, lanes: slice, *, held: bool = False) -> Tangent:
+    """Analyse the tangent of a model, and pack its numbers for one tile of lanes; held: with room for constraints."""
     found, blocks = _contributions(model)
     entries = {key for key, *_ in found} | set(model.mass_entries)
     curved = _curvatures(model)
     entries |= {key for key, *_ in curved}
-    pattern, slot = sparse.analyse(model.unknowns, entries)
+    if held and model.constraints.size:
+        pattern, slot, place, jacobian = saddle.analyse(model.unknowns, entries, model.constraints)
+        multiplier = np.zeros(pattern.size, dtype=np.int64)
+        multiplier[place[model.unknowns :]] = 1
+        rows = Held(place, jacobian, multiplier)
+    else:
+        pattern, slot = sparse.analyse(model.unknowns, entries)
+        rows = Held(*(np.zeros(0, dtype=np.int64),) * 3)
+    source: Index = np.full(pattern.slots, 2 * blocks)
+    extra = []
+    for key, row, c in found:
+        if np.all(c == 1.0):
+            if source[slot[key]] < 2 * blocks:
+                extra.append((slot[key], row))
+            else:
+                source[slot[key]] = row
+    shares = [(slot[key], source, c) for key, source, c in found if np.any(c != 1.0)]
     return Tangent(
         pattern,
         pack(scatter(pattern, slot, model.mass_entries), lanes, tile),
         blocks,
-        len(found),
-        index([source for _, source, _ in found]),
-        index([slot[key] for key, *_ in found]),
-        pack(stacked([c for *_, c in found]), lanes, tile),
+        source,
+        len(extra),
+        np.array([row for _, row in extra], dtype=np.int32),
+        np.array([place for place, _ in extra], dtype=np.int32),
+        len(shares),
+        index([source for _, source, _ in shares]),
+        index([place for place, *_ in shares]),
+        pack(stacked([c for *_, c in shares]), lanes, tile),
         len(curved),
         index([slot[key] for key, *_ in curved]),
         index([owner for _, owner, _ in curved]),
         pack(stacked([c for *_, c in curved]), lanes, tile),
         gates.family_gates("stiffness", tile, model.elements),
         gates.family_gates("damping", tile, model.elements),
+        rows,
     )
 
 
@@ -119,7 +159,7 @@ def assemble(
 ) -> None:
     """values = mass_factor M + damping_factor D + K(z) + curvature of the constraints; (slots, lanes).
 
-    multiplier: one lambda per constraint, (constraints, lanes); block: work space of 2 t.blocks rows.
+    multiplier: one lambda per constraint, (constraints, lanes); block: work space of 2 t.blocks rows and one of zeros.
     The derived rows of z, and those of w.zdot where anything is damped, must be filled. Pointers.
     """
     width = len(tile)
@@ -130,10 +170,13 @@ def assemble(
         _fill_damping(tile, m, t, w, z, other)
         for i in range(end):
             block[i] += damping_factor * other[i]
-    for i in range(slots * width):
-        values[i] = mass_factor * t.mass[i]
-    for k in range(t.contributions):
-        add_product(tile, values, t.slot[k], t.coefficient, k, block, t.source[k])
+    for slot in range(slots):
+        first = simd.load(tile, block, t.source[slot] * width)
+        simd.store(values, slot * width, mass_factor * simd.load(tile, t.mass, slot * width) + first)
+    for k in range(t.extra):
+        add(tile, values, t.also[k], block, t.more[k])
+    for k in range(t.shares):
+        add_product(tile, values, t.slot[k], t.part, k, block, t.shared[k])
     for k in range(t.curvatures):
         add_product(tile, values, t.curvature[k], t.bend, k, multiplier, t.owner[k])
 
@@ -191,8 +234,11 @@ def damping_at(tile: Tile, arrays: Arrays, tangent: Tangent, room: Work) -> Arra
 
 
 def _assembled(tile: Tile, t: Tangent, block: Array) -> Array:
-    values, parts = np.zeros((t.mass.size // len(tile), len(tile))), block.reshape(-1, len(tile))
-    np.add.at(values, t.slot, t.coefficient.reshape(-1, len(tile)) * parts[t.source])
+    width = len(tile)
+    rows = np.concatenate([block, np.zeros((t.blocks + 1) * width)]).reshape(-1, width)
+    values = rows[t.source]
+    np.add.at(values, t.also, rows[t.more])
+    np.add.at(values, t.slot, t.part.reshape(-1, width) * rows[t.shared])
     return values.ravel()
 
 

@@ -52,6 +52,11 @@ def add_sum(tile: Tile, lane: int, count: int, w: Array, total: Array, value: An
     raise NotImplementedError
 
 
+def put(tile: Tile, lane: int, count: int, w: Array, out: Array, row: int, step: int, value: Any) -> None:
+    """Write a vector to a row of out and, for `count` elements, to every step-th one from there; w: room for 8."""
+    raise NotImplementedError
+
+
 @overload(coordinate)
 def _coordinate(tile, family, number, lane, side, k, z):  # type: ignore[no-untyped-def]
     if tile.count == 1:
@@ -111,5 +116,18 @@ def _add_sum(tile, lane, count, w, total, value):  # type: ignore[no-untyped-def
 
     def wide(tile, lane, count, w, total, value):  # type: ignore[no-untyped-def]
         simd.add_to(total, lane, value)
+
+    return single if tile.count == 1 else wide
+
+
+@overload(put)
+def _put(tile, lane, count, w, out, row, step, value):  # type: ignore[no-untyped-def]
+    def single(tile, lane, count, w, out, row, step, value):  # type: ignore[no-untyped-def]
+        simd.store(w, 0, value)
+        for other in range(count):
+            out[row + step * other] = w[other]
+
+    def wide(tile, lane, count, w, out, row, step, value):  # type: ignore[no-untyped-def]
+        simd.store(out, row * len(tile) + lane, value)
 
     return single if tile.count == 1 else wide

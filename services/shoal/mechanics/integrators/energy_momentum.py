@@ -16,12 +16,11 @@ from shoal.mechanics import constraints, dynamics, gates
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.functions import evaluate
-from shoal.mechanics.integrators import newton
+from shoal.mechanics.integrators import guess, newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
@@ -75,7 +74,7 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
     derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
     dynamics.add_mean_force(tile, m, w, w.before, w.z, f)
     gates.energies(tile, m, w)
-    sparse.multiply(tile, m.pattern, m.mass, change, w.stage)
+    dynamics.multiply_mass(tile, m, change, w.stage)
     for lane in range(width):
         work, square = 0.0, 0.0
         for i in range(lane, end, width):
@@ -114,18 +113,21 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
     end = m.unknowns * width
     room = raw(scheme)
     residual, change = room.newton.residual, room.change
+    guess.start(tile, m, room.newton.guess, w.z, h)
     gates.energies(tile, m, w)
     for lane in range(width):
         room.elastic[lane] = w.energy[width + lane]
     for i in range(end):
         w.before[i] = w.z[i]
         w.z[i] += h * w.zdot[i]
-    for _ in range(newton.ITERATIONS):
-        room.evaluations[0] += 1
+    newton.begin(tile, m, w, room.newton, 4.0 / (h * h), 2.0 / h, False)
+    iterations, limit = 0, newton.ITERATIONS
+    while iterations < limit:
+        iterations += 1
         mean_force(tile, room, m, w, t, h, residual)
         for i in range(end):
             change[i] = 2.0 / (h * h) * (change[i] - h * w.zdot[i])
-        sparse.multiply(tile, m.pattern, m.mass, change, w.stage)
+        dynamics.multiply_mass(tile, m, change, w.stage)
         for i in range(end):
             residual[i] -= w.stage[i]
         newton.add_reactions(tile, m, w, room.newton, room.middle)
@@ -137,12 +139,15 @@ def step(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float, h: fl
         newton.correct(tile, m, w, room.newton, room.middle, 4.0 / (h * h), 2.0 / h)
         for i in range(end):
             w.z[i] += 2.0 * residual[i]
-        if newton.largest_change(tile, m, room.newton) <= room.newton.tolerance:
+        verdict = newton.judge(tile, m, w, room.newton, iterations, limit)
+        if verdict == newton.CONVERGED:
             break
-    newton.mark_failures(tile, m, w, room.newton)
+        if verdict == newton.LOST:
+            limit = iterations + newton.ITERATIONS
+    newton.finish(tile, m, w, room.newton)
     for i in range(end):
         w.zdot[i] = 2.0 * (w.z[i] - w.before[i]) / h - w.zdot[i]
-    room.evaluations[0] += 1
+    room.evaluations[0] += iterations + 1
     gates.acceleration(tile, m, w, t + h, w.z, w.zdot, room.newton.rank_tolerance, w.a)
     if dynamics.loaded(m):
         _halve(tile, room, m, w)

@@ -15,13 +15,12 @@ from numba import njit
 
 from shoal.mechanics import dynamics
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.integrators import newton
+from shoal.mechanics.integrators import guess, newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.least import drift
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.pointers import raw
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
@@ -62,7 +61,8 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
     mass_factor = (1 - alpha_m) / (h * h * beta * (1 - alpha_f))
     damping_factor = gamma / (h * beta)
 
-    auxiliary = raw(scheme).auxiliary
+    auxiliary, room = raw(scheme).auxiliary, raw(scheme.newton)
+    guess.start(tile, m, room.guess, w.z, h)
     if scheme.started[0] == 0.0:
         scheme.started[0] = 1.0
         for i in range(end):
@@ -73,7 +73,6 @@ def step(tile: Tile, scheme: GeneralizedAlpha, m: Arrays, w: Work, t: float, h: 
         w.zdot[i] += h * ((1 - gamma) * auxiliary[i] + gamma * predicted)
         auxiliary[i] = predicted
         w.a[i] = 0.0
-    room = raw(scheme.newton)
     scheme.evaluations[0] += newton.solve(tile, m, w, room, t + h, mass_factor, damping_factor)
     newton.take_power(tile, m, w, room, t + h)
     for i in range(end):
@@ -98,7 +97,7 @@ def _count_impulse(tile: Tile, m: Arrays, w: Work, h: float) -> None:
     end = m.unknowns * width
     for i in range(end):
         w.before[i] = w.zdot[i] - w.before[i]
-    sparse.multiply(tile, m.pattern, m.mass, w.before, w.stage)
+    dynamics.multiply_mass(tile, m, w.before, w.stage)
     for i in range(end):
         w.power[i % width] -= (w.zdot[i] - 0.5 * w.before[i]) * w.stage[i] / h
 

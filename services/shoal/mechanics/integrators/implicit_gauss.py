@@ -18,7 +18,7 @@ from numba import njit
 from shoal.mechanics import dynamics, gates
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.functions import evaluate
-from shoal.mechanics.integrators import newton
+from shoal.mechanics.integrators import guess, newton
 from shoal.mechanics.integrators.dense import cubic
 from shoal.mechanics.integrators.newton import Newton, newton_room
 from shoal.mechanics.integrators.scheme import Facts, implement
@@ -57,12 +57,13 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Implicit
 @njit(cache=True, error_model="numpy")
 def step(tile: Tile, scheme: ImplicitGauss, m: Arrays, w: Work, t: float, h: float) -> float:
     """One step of h [s] from the time t."""
-    end = m.unknowns * len(tile)
+    end, room = m.unknowns * len(tile), raw(scheme.newton)
+    guess.start(tile, m, room.guess, w.z, h)
     for i in range(end):
         w.before[i] = w.zdot[i]
         w.z[i] += h * w.zdot[i]
         w.a[i] = 0.0
-    scheme.evaluations[0] += newton.solve(tile, m, w, raw(scheme.newton), t + h, 1.0 / (h * h), 1.0 / h)
+    scheme.evaluations[0] += newton.solve(tile, m, w, room, t + h, 1.0 / (h * h), 1.0 / h)
     if dynamics.loaded(m):
         for i in range(end):
             w.before[i] = 0.5 * (w.before[i] + w.zdot[i])

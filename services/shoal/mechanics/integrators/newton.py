@@ -1,4 +1,10 @@
-"""Newton's iteration of the implicit steps: the sparsely factored tangent, constraints by their multipliers."""
+"""Newton's iteration of the implicit steps, with the factored tangent kept as long as that converges fast.
+
+Coordinates and multipliers are corrected together, by [H C_q'; C_q 0] as one sparse factor. It is kept over iterations
+and over steps (modified Newton) and renewed where the changes shrink too slowly. They shrink by a rate theta, so that
+theta/(1 - theta) of the last change is what is left (Hairer and Wanner, Solving Ordinary Differential Equations II,
+section IV.8). Where they grow, the step begins again, with a new factor, then with one for every iteration.
+"""
 
 from __future__ import annotations
 
@@ -7,28 +13,48 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shoal.mechanics import constraints, dynamics, gates
+from shoal.mechanics import constraints, dynamics, gates, saddle
 from shoal.mechanics import tangent as tangents
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work
-from shoal.mechanics.least import implicit
+from shoal.mechanics.integrators import guess
+from shoal.mechanics.integrators.guess import Guess, guess_room
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.pointers import shift
+from shoal.mechanics.numerics.simd import add_scaled, assign
 from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.vector import add, clear, copy, subtract
 from shoal.mechanics.tangent import Tangent, tangent_tile
 from shoal.scene import Solver
 
 ITERATIONS = 30
+"""With a tangent of its own for each of them, after which a step has failed."""
 SLACK = 1e3
 """A step that misses the tolerance by more than this factor has failed."""
+EXACT = 1e-3
+"""What may be left of a change, as a fraction of the tolerance: stiff parts turn a small error into a large force."""
+FURTHER = 3
+"""A factor that needs more than so many further iterations, or iterations more than a new one, is renewed."""
+NEGLIGIBLE = 1e-4
+"""A change smaller than this fraction of the tolerance is round-off."""
+LONGEST_PAUSE = 63
+"""Steps in a row that begin with a new factor where none served a second step."""
+RENEW, FULL, BEGAN, AGE, USUAL, PAUSE, WAIT, MASS, DAMPING = range(9)
+"""What is remembered of the factor: whether the next iteration needs a new one, and all of this step, and whether its
+first one did; how many steps it has served; how many iterations a step with a new one took; how many steps are to begin
+with a new one, and how many still; the factors of M and D in it."""
+GO_ON, CONVERGED, LOST = range(3)
 
 
 class Newton(NamedTuple):
-    """Settings and room. tolerance: last change of a coordinate [m].
+    """Settings and room. tolerance: of a coordinate [m].
 
-    matrix: the factored tangent, (slots, lanes). block: tangents of the elements. residual: the force that is out
-    of balance, then the change of the coordinates, (rows, lanes). multiplier: lambda, kept from step to step,
-    (constraints, lanes). The kernels take it with pointers (`raw`).
+    matrix: the factored tangent, (slots, lanes); memory: what is known of it. block: tangents of the elements.
+    residual: the force that is out of balance, then the change of the coordinates, (rows, lanes). multiplier: lambda,
+    kept from step to step, (constraints, lanes). x: right-hand side in the order of elimination. begin: coordinates,
+    rates, accelerations and multipliers of the first guess. change, left: the largest change of a coordinate and what
+    is left to change, (lanes,). The kernels take it with pointers (`raw`).
     """
 
     tolerance: float
@@ -36,24 +62,37 @@ class Newton(NamedTuple):
     tangent: Tangent
     slots: int
     matrix: Array
+    memory: Array
     block: Array
     residual: Array
     multiplier: Array
+    x: Array
+    begin: Array
+    change: Array
+    left: Array
+    guess: Guess
 
 
 def newton_room(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Newton:
     """Settings and room for one tile of lanes."""
     width = len(tile)
-    tangent = tangent_tile(model, tile, lanes)
+    tangent = tangent_tile(model, tile, lanes, held=True)
+    held = max(1, model.constraints.size) * width
     return Newton(
         solver.newton_tolerance,
         solver.rank_tolerance,
         tangent,
         tangent.pattern.slots,
         np.zeros(tangent.mass.size),
-        np.zeros(2 * tangent.blocks * width + 1),
+        np.zeros(9),
+        np.zeros((2 * tangent.blocks + 1) * width),
         np.zeros(model.rows * width),
-        np.zeros(max(1, model.constraints.size) * width),
+        np.zeros(held),
+        np.zeros(tangent.pattern.size * width),
+        np.zeros(3 * model.unknowns * width + held),
+        np.zeros(width),
+        np.zeros(width),
+        guess_room(model, tile),
     )
 
 
@@ -72,49 +111,146 @@ def correct(
 ) -> None:
     """Solve H dq + C_q' dlambda = residual, C_q dq = -gap: the residual becomes dq, the multipliers are updated.
 
-    H = mass_factor M + damping_factor D + K + curvature of the constraints at z, whose derived rows are filled;
-    gap: w.gauss.gap.
+    H = mass_factor M + damping_factor D + K + curvature of the constraints at z, whose derived rows are filled, or at
+    an earlier z; C_q, gap: w.gauss.jacobian, w.gauss.gap.
     """
-    pattern = newton.tangent.pattern
-    tangents.assemble(
-        tile,
-        m,
-        newton.tangent,
-        w,
-        z,
-        newton.multiplier,
-        mass_factor,
-        damping_factor,
-        newton.block,
-        newton.matrix,
-        newton.slots,
-    )
-    sparse.factor(tile, pattern, newton.matrix)
-    sparse.solve(tile, pattern, newton.matrix, newton.residual, 0)
-    if m.constraints.size > 0:
-        implicit.prepare(tile, m, newton.matrix, pattern, z, w.gauss)
-        implicit.add_rates(tile, m, w.gauss, newton.residual)
-        implicit.apply(tile, m, w.gauss, newton.rank_tolerance, newton.residual)
-        for k in range(m.constraints.size * len(tile)):
-            newton.multiplier[k] += w.gauss.multiplier[k]
+    pattern, held, count = newton.tangent.pattern, newton.tangent.held, m.constraints.size
+    if newton.memory[RENEW] > 0.0:
+        _renew(tile, m, w, newton, z, mass_factor, damping_factor)
+    if count == 0:
+        sparse.solve(tile, pattern, newton.matrix, newton.residual, 0)
+        return
+    for i in range(m.unknowns):
+        copy(tile, newton.x, held.place[i], newton.residual, i)
+    for k in range(count):
+        clear(tile, newton.x, held.place[m.unknowns + k])
+        subtract(tile, newton.x, held.place[m.unknowns + k], w.gauss.gap, k)
+    sparse.solve(tile, pattern, newton.matrix, newton.x, 0)
+    for i in range(m.unknowns):
+        copy(tile, newton.residual, i, newton.x, held.place[i])
+    for k in range(count):
+        add(tile, newton.multiplier, k, newton.x, held.place[m.unknowns + k])
 
 
 @njit(cache=True, error_model="numpy")
-def largest_change(tile: Tile, m: Arrays, newton: Newton) -> float:
-    """Largest change of a coordinate in any lane; a lane that is no number anymore does not keep the others waiting."""
-    largest = 0.0
-    for i in range(m.unknowns * len(tile)):
-        if abs(newton.residual[i]) > largest:
-            largest = abs(newton.residual[i])
-    return largest
+def _renew(tile: Tile, m: Arrays, w: Work, newton: Newton, z: Array, mass_factor: float, damping_factor: float) -> None:
+    """Factor the tangent at z."""
+    tangent, matrix, memory, c = newton.tangent, newton.matrix, newton.memory, m.constraints
+    factors = mass_factor, damping_factor
+    tangents.assemble(tile, m, tangent, w, z, newton.multiplier, *factors, newton.block, matrix, newton.slots)
+    if c.size == 0:
+        sparse.factor(tile, tangent.pattern, matrix)
+    else:
+        for e in range(c.entry[c.size]):
+            copy(tile, matrix, tangent.held.slot[e], w.gauss.jacobian, e)
+        # Pivots are squares of distances from singular, whose round-off is that of the tangent.
+        tolerance = max(newton.rank_tolerance**2, 1e-13)
+        saddle.eliminate(tile, tangent.pattern, tangent.held.multiplier, matrix, tolerance)
+    memory[RENEW], memory[AGE], memory[MASS], memory[DAMPING] = memory[FULL], 0.0, mass_factor, damping_factor
 
 
 @njit(cache=True, error_model="numpy")
-def mark_failures(tile: Tile, m: Arrays, w: Work, newton: Newton) -> None:
-    """A lane whose iteration did not converge must not go on with a plausible number: it becomes nan."""
-    for i in range(m.unknowns * len(tile)):
-        if not abs(newton.residual[i]) <= SLACK * newton.tolerance:
-            w.z[i] = np.nan
+def begin(
+    tile: Tile, m: Arrays, w: Work, newton: Newton, mass_factor: float, damping_factor: float, tied: bool
+) -> None:
+    """Begin the iteration from the guess in w, or a better one; decide whether the factor serves.
+
+    tied: whether the iteration moves rates and accelerations with the coordinates, as in `solve`.
+    """
+    width, end, memory = len(tile), m.unknowns * len(tile), newton.memory
+    guess.improve(tile, m, newton.guess, w.z, newton.residual)
+    if tied:
+        add_scaled(w.zdot, damping_factor, newton.residual, end)
+        add_scaled(w.a, mass_factor, newton.residual, end)
+    assign(newton.begin, w.z, end)
+    assign(shift(newton.begin, end), w.zdot, end)
+    assign(shift(newton.begin, 2 * end), w.a, end)
+    assign(shift(newton.begin, 3 * end), newton.multiplier, m.constraints.size * width)
+    for lane in range(width):
+        # What is no number now does not keep the others waiting.
+        nothing = 0.0
+        for i in range(lane, end, width):
+            nothing += 0.0 * (w.z[i] + w.zdot[i])
+        newton.change[lane] = np.inf if nothing == 0.0 else np.nan
+    memory[FULL] = 0.0
+    memory[AGE] += 1.0
+    if memory[MASS] != mass_factor or memory[DAMPING] != damping_factor:
+        memory[RENEW] = 1.0
+    if memory[WAIT] > 0.0:
+        memory[WAIT] -= 1.0
+        memory[RENEW] = 1.0
+    memory[BEGAN] = memory[RENEW]
+
+
+@njit(cache=True, error_model="numpy")
+def judge(tile: Tile, m: Arrays, w: Work, newton: Newton, iteration: int, limit: int) -> int:
+    """What the last change of the coordinates, still in the residual, says of the iteration of this number.
+
+    LOST: w and the multipliers are those of the first guess again. limit: the last iteration.
+    """
+    width, end, memory = len(tile), m.unknowns * len(tile), newton.memory
+    fresh, full = memory[AGE] == 0.0, memory[FULL] > 0.0
+    done, slow, lost = True, False, iteration == limit
+    for lane in range(width):
+        before = newton.change[lane]
+        if before != before:
+            continue
+        change = 0.0
+        for i in range(lane, end, width):
+            size = abs(newton.residual[i])
+            if not size <= change and change == change:
+                change = size
+        newton.change[lane], newton.left[lane] = change, change
+        rate = change / before if before > 0.0 else 0.0
+        if before < np.inf and rate < 1.0:
+            newton.left[lane] = min(change, change * rate / (1.0 - rate))
+        within = newton.left[lane] <= EXACT * newton.tolerance or (full and change <= newton.tolerance)
+        # A change that is that small and does not shrink may be round-off, or the factor's fault.
+        if within and (fresh or full or rate <= 0.5 or change <= NEGLIGIBLE * newton.tolerance):
+            continue
+        done = False
+        lost = lost or not change < np.inf or (rate >= 1.0 and not within)
+        slow = slow or within or newton.left[lane] * rate**FURTHER > EXACT * newton.tolerance
+    if done:
+        if full or (not fresh and iteration > memory[USUAL] + FURTHER):
+            memory[RENEW] = 1.0
+        elif memory[BEGAN] > 0.0:
+            memory[USUAL] = iteration
+        return CONVERGED
+    if full:
+        return GO_ON
+    if lost or slow:
+        memory[RENEW] = 1.0
+        if memory[AGE] == 1.0:
+            memory[PAUSE] = min(2.0 * memory[PAUSE] + 1.0, LONGEST_PAUSE)
+            memory[WAIT] = memory[PAUSE]
+        elif not fresh:
+            memory[PAUSE] = 0.0
+    if not lost:
+        return GO_ON
+    memory[FULL] = 1.0 if fresh or iteration == limit else 0.0
+    assign(w.z, newton.begin, end)
+    assign(w.zdot, shift(newton.begin, end), end)
+    assign(w.a, shift(newton.begin, 2 * end), end)
+    assign(newton.multiplier, shift(newton.begin, 3 * end), m.constraints.size * width)
+    for lane in range(width):
+        if newton.change[lane] == newton.change[lane]:
+            newton.change[lane] = np.inf
+    return LOST
+
+
+@njit(cache=True, error_model="numpy")
+def finish(tile: Tile, m: Arrays, w: Work, newton: Newton) -> None:
+    """Remember the end of a step, found or not.
+
+    A lane whose iteration did not converge must not go on with a plausible number: it becomes nan.
+    """
+    width = len(tile)
+    for lane in range(width):
+        if not newton.left[lane] <= SLACK * newton.tolerance:
+            for i in range(lane, m.unknowns * width, width):
+                w.z[i] = np.nan
+    guess.learn(tile, m, newton.guess, w.z)
 
 
 @njit(cache=True, error_model="numpy")
@@ -122,28 +258,31 @@ def solve(tile: Tile, m: Arrays, w: Work, newton: Newton, t: float, mass_factor:
     """Find the end of a step at the time t: M a + C_q' lambda = Q(q, v, t), C(q) = 0; returns the iterations.
 
     The method ties rates and accelerations to coordinates: dv = damping_factor dq, da = mass_factor dq. w holds the
-    first guess, then the solution. The power that is left in w is that of the last guess; see `take_power`.
+    first guess, of a step that `guess.start` was told of, then the solution. The power that is left in w is that of the
+    last guess; see `take_power`.
     """
     residual = newton.residual
     end = m.unknowns * len(tile)
-    iterations = 0
+    iterations, limit = 0, ITERATIONS
     t = dynamics.instant(w, t)
-    while iterations < ITERATIONS:
+    begin(tile, m, w, newton, mass_factor, damping_factor, True)
+    while iterations < limit:
         iterations += 1
         gates.force(tile, m, w, t, w.z, w.zdot, residual)
-        sparse.multiply(tile, m.pattern, m.mass, w.a, w.stage)
-        for i in range(end):
-            residual[i] -= w.stage[i]
+        dynamics.multiply_mass(tile, m, w.a, w.stage)
+        add_scaled(residual, -1.0, w.stage, end)
         add_reactions(tile, m, w, newton, w.z)
         constraints.residual(tile, m.constraints, m.functions, t, w.z, w.gauss.gap)
         correct(tile, m, w, newton, w.z, mass_factor, damping_factor)
-        for i in range(end):
-            w.z[i] += residual[i]
-            w.zdot[i] += damping_factor * residual[i]
-            w.a[i] += mass_factor * residual[i]
-        if largest_change(tile, m, newton) <= newton.tolerance:
+        add_scaled(w.z, 1.0, residual, end)
+        add_scaled(w.zdot, damping_factor, residual, end)
+        add_scaled(w.a, mass_factor, residual, end)
+        verdict = judge(tile, m, w, newton, iterations, limit)
+        if verdict == CONVERGED:
             break
-    mark_failures(tile, m, w, newton)
+        if verdict == LOST:
+            limit = iterations + ITERATIONS
+    finish(tile, m, w, newton)
     return iterations
 
 

@@ -111,7 +111,7 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Radau5:
         np.zeros(slots),
         np.zeros(slots),
         (np.zeros(slots), np.zeros(slots), np.zeros(slots)),
-        np.zeros(2 * tangent.blocks * width + 1),
+        np.zeros((2 * tangent.blocks + 1) * width),
         np.zeros(max(1, model.constraints.size) * width),
         *(np.zeros(size) for size in (*(STAGES * unknowns,) * 7, rows, rows, rows, unknowns, 4 * unknowns, 1, 1)),
     )

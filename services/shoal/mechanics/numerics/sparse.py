@@ -8,11 +8,12 @@ elements for chains.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
+from shoal.mechanics.numerics import simd
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 from shoal.mechanics.numerics.vector import add_product, copy, scale, scale_alike, subtract_dot, subtract_dot_alike
 
@@ -24,15 +25,15 @@ class Pattern(NamedTuple):
     """Lower triangle by columns, fill included. Slots 0..n-1 are the diagonal, then the columns in order.
 
     size: number of rows, n. column[k]:column[k+1] are the entries of column k, `row` their rows; entry p is slot n + p.
-    update[k]:update[k+1] are the eliminations of column k: slot `target` -= L[left] D L[right].
-    The same entries by rows, for the forward substitution: slot[p] and other[p] (the column) of row i for p in
-    across[i]:across[i+1]. by_column holds the slots in the order of the columns.
+    Pairs pair[k]:pair[k+1] change slot `target` of column k, (i, k), by (i, j) and (k, j), j < k, in the slots left
+    and right. The same entries by rows, for the forward substitution: slot[p] and other[p] (the column) of row i for
+    p in across[i]:across[i+1]. by_column holds the slots in the order of the columns.
     """
 
     size: int
     column: Index
     row: Index
-    update: Index
+    pair: Index
     target: Index
     left: Index
     right: Index
@@ -65,16 +66,17 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
             slot[i, k] = size + len(row)
             row.append(i)
         column.append(len(row))
-    update, target, left, right = [0], [], [], []
-    for k in range(size):
-        rows = row[column[k] : column[k + 1]]
-        for a, i in enumerate(rows):
-            for b, j in enumerate(rows[: a + 1]):
-                target.append(slot[i, j])
-                left.append(column[k] + a)
-                right.append(column[k] + b)
-        update.append(len(target))
     by_row = sorted((i, k, slot[i, k]) for i, k in slot if i != k)
+    before: list[list[int]] = [[] for _ in range(size)]
+    for i, k, _ in by_row:
+        before[i].append(k)
+    pair, pairs = [0], []
+    for k in range(size):
+        for j in before[k]:
+            below_k = [i for i in row[column[j] : column[j + 1]] if i > k]
+            pairs += [(slot[i, k], slot[i, j], slot[k, j]) for i in below_k]
+        pair.append(len(pairs))
+    target, left, right = zip(*pairs, strict=True) if pairs else ((), (), ())
     across = np.searchsorted([i for i, _, _ in by_row], np.arange(size + 1))
     slots, others = [p for _, _, p in by_row], [k for _, k, _ in by_row]
     by_column = np.arange(size, size + len(row))
@@ -86,9 +88,8 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
         """Long chains are limited by memory traffic."""
         return np.array(list(values), dtype=np.int32)
 
-    eliminations = (wide(update), wide(target), wide(left), wide(right))
     by_rows = (np.asarray(across, dtype=np.int64), short(slots), short(others), short(by_column))
-    return Pattern(size, wide(column), short(row), *eliminations, *by_rows), slot
+    return Pattern(size, wide(column), short(row), wide(pair), short(target), short(left), short(right), *by_rows), slot
 
 
 def matrix(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
@@ -111,19 +112,36 @@ def dense(pattern: Pattern, values: Array) -> Array:
 @njit(cache=True, error_model="numpy")
 def factor(tile: Tile, pattern: Pattern, values: Array) -> None:
     """Replace the matrix (slots, lanes) by L below the diagonal and 1/D on it. Pointers."""
+    for k in range(pattern.size):
+        pivot = finish_row(tile, pattern, values, k)
+        simd.store(values, k * len(tile), 1.0 / pivot)
+        start_column(tile, pattern, values, k)
+
+
+# Until row i is finished it is that of L D. The pairs of a column are one flat loop, which is foreseen.
+
+
+@njit(error_model="numpy", forceinline=True)
+def finish_row(tile: Tile, pattern: Pattern, values: Array, k: int) -> Any:
+    """Turn row k of L D into that of L; returns D_k. Pointers."""
     width = len(tile)
-    size = pattern.size
-    for k in range(size):
-        for lane in range(width):
-            values[k * width + lane] = 1.0 / values[k * width + lane]
-        for u in range(pattern.update[k], pattern.update[k + 1]):
-            target = pattern.target[u] * width
-            left = (size + pattern.left[u]) * width
-            right = (size + pattern.right[u]) * width
-            for lane in range(width):
-                values[target + lane] -= values[left + lane] * values[right + lane] * values[k * width + lane]
-        for p in range(size + pattern.column[k], size + pattern.column[k + 1]):
-            scale(tile, values, p, values, k)
+    pivot = simd.load(tile, values, k * width)
+    for p in range(pattern.across[k], pattern.across[k + 1]):
+        entry = simd.load(tile, values, pattern.slot[p] * width)
+        finished = entry * simd.load(tile, values, pattern.other[p] * width)
+        simd.store(values, pattern.slot[p] * width, finished)
+        pivot = pivot - entry * finished
+    return pivot
+
+
+@njit(error_model="numpy", forceinline=True)
+def start_column(tile: Tile, pattern: Pattern, values: Array, k: int) -> None:
+    """Column k of L D. Pointers."""
+    width = len(tile)
+    for p in range(pattern.pair[k], pattern.pair[k + 1]):
+        left = simd.load(tile, values, pattern.left[p] * width)
+        right = simd.load(tile, values, pattern.right[p] * width)
+        simd.add_to(values, pattern.target[p] * width, -left * right)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
