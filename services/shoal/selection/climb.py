@@ -50,6 +50,7 @@ class Runs:
     """
 
     def __init__(self, scene: Scene, times: Array, limits: Mapping[str, str], progress: Progress) -> None:
+        scene = scene.with_values({"solver.inertia_cap": False})
         self.scene, self.times, self.limits, self.progress = scene, times, limits, progress
         self.forecast = Forecast(scene, tuple(limits))
         self.rungs: list[Rung] = []

@@ -94,7 +94,6 @@ def select(
         raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
     begin = time.perf_counter()
     asked = sampling_times(scene, times)
-    scene = scene.with_values({"solver.inertia_cap": False})
     scene = scene.with_values({"solver.duration": float(asked[-1])}) if asked[-1] > 0 else scene
     grid = _grid(asked)
     limits, rigid = _open(scene)
