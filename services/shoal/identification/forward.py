@@ -168,7 +168,7 @@ class ForwardModel:
             shared = {path: float(x[0]) for path, x in inputs.items() if _same_in_all(path, x)}
             inputs = {path: x for path, x in inputs.items() if path not in shared}
             view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
-            found = self._simulate(scene.with_values(shared), inputs, instants, view, name)
+            found = self._simulate(scene.with_values(shared) if shared else scene, inputs, instants, view, name)
             rows = shown.reshape(len(together), -1)[np.searchsorted(together, own[lanes])]
             seen[lanes] = np.take_along_axis(found, rows[:, :, None], axis=1)
         return seen

@@ -16,6 +16,7 @@ from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
+from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gates import Seek
 from shoal.mechanics.halts import Halts
@@ -46,6 +47,7 @@ class Machine:
         """alone: whether the model is that of the scene as it is, with no lanes."""
         self.scene, self.model, self.choice = scene, model, choice
         self._alone = alone
+        self.starts = Starts(scene, model)
         self._limits = Limits(scene, model)
         self._turns = _turns(scene, model)
         self._idle: dict[tuple[bytes, int], tuple[Halts, list[Workspace]]] = {}

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from shoal.mechanics.assembly.build import build, with_start
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gates import Seek
 from shoal.mechanics.inertia_cap import capped
@@ -51,7 +51,7 @@ def simulate(
     lanes = len(next(iter(values.values())))
     if all(path.startswith("initial.") for path in values) and not start.gives_numbers(scene):
         kept = machine(scene, end)
-        return kept.run(times, with_start(kept.model, scene.with_lanes(values), lanes), threads=threads, begin=begin)
+        return kept.run(times, kept.starts.at(values, lanes), threads=threads, begin=begin)
     model = capped(build(scene.with_lanes(values), lanes, max(end, scene.solver.duration)))
     choice = pick(scene.solver, model, step_limit if end > 0 else _unlimited)
     return Machine(scene, model, choice, alone=False).run(times, threads=threads, begin=begin)
