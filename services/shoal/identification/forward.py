@@ -223,9 +223,12 @@ class ForwardModel:
     def poses(self, points: Array, name: str | None = None) -> Array:
         """Channels at time zero, (points, channels). No motion is simulated, so nothing is counted as an evaluation."""
         (self.whole or self).placements += len(points)
-        # Placing bodies is the same for every engine, and the native one places all points in one call.
-        native = replace(self, engine=get_engine("gauss"))
-        return native.observe(points, name, np.zeros(1))[:, 0]
+        return self._native.observe(points, name, np.zeros(1))[:, 0]
+
+    @cached_property
+    def _native(self) -> ForwardModel:
+        """Placing bodies is the same for every engine, and the native one places all points in one call."""
+        return replace(self, engine=get_engine("gauss"))
 
     def scene_at(self, point: Array, name: str | None = None) -> Scene:
         """The scene of a point, in a recording (else the first). Raises InputError."""
