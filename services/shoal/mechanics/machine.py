@@ -160,6 +160,7 @@ class Machine:
             "step": scene.solver.step,
             "stability_limit": choice.limit if np.isfinite(choice.limit) else None,
             "evaluations": 0,
+            **({"slowed_modes": model.slowed} if model.slowed else {}),
             **({} if begun is None else self._started(begun)),
             "bodies": {
                 name: {"element": body.element, **({"elements": body.elements} if body.element != "rigid" else {})}
