@@ -23,7 +23,8 @@ class Still:
             matrix[row] = factors @ matrix[sources]
             constant[row] = derived.constant[r, 0] + factors @ constant[sources]
         rows = model.marker_rows.ravel()
-        self._matrix, self._constant, self._shape = matrix[rows], constant[rows, None], (-1, 2, d)
+        self._matrix, self._constant = matrix[rows], constant[rows, None]
+        self._shape = rows.size // (2 * d), 2, d
 
     def told(self, model: Model, turns: Array, anchors: Array, motion: Array, numbers: Array) -> None:
         """As `marched.told`, of the start of a model; nothing has moved or lost energy."""
