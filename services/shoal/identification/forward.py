@@ -26,7 +26,7 @@ from shoal.scene import Scene
 from shoal.swarm import EvaluationCounter
 from shoal.trajectory import Array, Status, Trajectory
 
-_AT_ONCE = 2 * len(WIDE)
+AT_ONCE = 2 * len(WIDE)
 """Lanes of a call where the time is limited: whole tiles, enough for two threads."""
 
 _HARDLY = 0.1
@@ -290,14 +290,17 @@ class ForwardModel:
 
     def _portions(self, points: Array) -> Iterator[Array]:
         """Points by as many as are simulated at once where the time is limited."""
-        size = len(points) if self.deadline is None else _AT_ONCE if self.engine.name == "gauss" else 1
+        size = len(points) if self.deadline is None else AT_ONCE if self.engine.name == "gauss" else 1
         yield from (points[k : k + size] for k in range(0, len(points), max(size, 1)))
 
     def _simulated_residuals(self, points: Array) -> Array:
+        return self.compared(points, {name: self.observe(points, name) for name in self.measurement.recordings})
+
+    def compared(self, points: Array, seen: Mapping[str, Array]) -> Array:
+        """As `residuals`, of points whose channels are known: by recording, as `observe` gives them."""
         columns = []
         for name, recording in self.measurement.recordings.items():
-            seen = self.observe(points, name) - recording.values
-            columns.append(seen[:, np.isfinite(recording.values)])
+            columns.append((seen[name] - recording.values)[:, np.isfinite(recording.values)])
         rows = np.concatenate(columns, axis=1) * self.rows.weight
         if self.problem.loss != "squares":
             rows = flatten(rows, self.problem.loss, self.loss_scale)

@@ -7,7 +7,7 @@ import pickle
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Array, Tile, stacked, tiles
 from shoal.mechanics.start import start
 from shoal.mechanics.start.redundancy import redundant_joints
+from shoal.mechanics.still import Still
 from shoal.mechanics.verdict import Limits
 from shoal.mechanics.workspace import Workspace
 from shoal.scene import Scene
@@ -97,8 +98,13 @@ class Machine:
             if seek is None and self._alike and space.size <= LARGEST:
                 idle.append(space)
 
-        workers = min(most, len(parts)) if end > 0 else 1
-        if workers == 1:
+        workers = min(most, len(parts))
+        if end == 0.0 and seek is None and self._alike and not self.model.constraints.size:
+            self._still.told(moved, turns, limits.anchors, motion, numbers)
+            if single not in self._told:
+                start = np.concatenate([moved.q0[:, 0], moved.v0[:, 0]])
+                self._told[single] = pickle.dumps(self._facts(start if single else None))
+        elif workers == 1:
             for part in parts:
                 march(part)
         else:
@@ -123,6 +129,10 @@ class Machine:
             message=message,
             model=facts,
         )
+
+    @cached_property
+    def _still(self) -> Still:
+        return Still(self.model)
 
     def _parts(self, lanes: int, threads: int) -> list[slice]:
         """What is marched together: whole tiles, and what is left over in one more or, if that is faster, one by one.
