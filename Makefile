@@ -10,6 +10,8 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 SUITABLE := import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))
 
+# Without compiled modules every process of the tests would spend seconds on reading sources.
+unexport PYTHONDONTWRITEBYTECODE
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export DO_NOT_TRACK := true
 

@@ -8,6 +8,7 @@ until it runs.
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -27,6 +28,8 @@ from shoal.errors import ComputationError, InputError, ShoalError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """No room: on the disk, for this user, in this file."""
+RARELY = 100_000, 20, 20
+"""Python looks for circles among its objects so seldom: imports make many that all stay, a tenth of a second's look."""
 EXTRAS = {
     "pipeline": ("prefect", "mlflow"),
     "services": ("fastapi", "starlette", "uvicorn", "pydantic_settings", "orjson"),
@@ -51,6 +54,7 @@ class Program(click.Group):
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run the program and leave with its exit status."""
+        gc.set_threshold(*RARELY)
         try:
             try:
                 with _extras_named():

@@ -242,7 +242,8 @@ def _flexible(scene: Scene) -> dict[str, Rod]:
 
 def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) -> Iterator[Scene]:
     """The same mesh, with the usual treatment of constraints. factor: on the tolerance of an adaptive integrator."""
-    usual = {name: Solver.model_fields[name].default for name in ("acceleration", "project", "rank_tolerance")}
+    named = ("acceleration", "project", "rank_tolerance", "inertia_cap")
+    usual = {name: Solver.model_fields[name].default for name in named}
     settings = {f"solver.{name}": value for name, value in usual.items()}
     if _adaptive(trajectory):
         solver = scene.solver
@@ -263,7 +264,7 @@ def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) 
 def _finer(scene: Scene, times: int) -> Iterator[Scene]:
     """So many times as many elements."""
     finer = {f"bodies.{name}.elements": times * rod.elements for name, rod in _flexible(scene).items()}
-    yield from _able(scene.with_values(finer), scene.solver.step)
+    yield from _able(scene.with_values({**finer, "solver.inertia_cap": False}), scene.solver.step)
 
 
 def _able(scene: Scene, step: float) -> Iterator[Scene]:

@@ -8,6 +8,7 @@ from shoal.mechanics import stability
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.motion_state import LANE
 from shoal.mechanics.assembly.build import build
+from shoal.mechanics.inertia_cap import capped
 from shoal.mechanics.integrators import choose, facts, halting, pick
 from shoal.mechanics.march import march
 from shoal.mechanics.marched import sampled
@@ -23,7 +24,7 @@ def energies(scene: Scene, times: Array) -> Array:
 
     Springs count as elastic; what applied loads could still do does not count. For a scene that `simulate` accepts.
     """
-    model = build(scene, horizon=max(float(times[-1]), scene.solver.duration))
+    model = capped(build(scene, horizon=max(float(times[-1]), scene.solver.duration)))
     instants = times
     if model.forces.size:
         # Turns of torsion springs are counted from sample to sample, which must be less than half a turn apart.

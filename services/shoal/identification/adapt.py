@@ -86,7 +86,7 @@ def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[Forwar
         path: value for rod, level in selection.chosen.levels.items() for path, value in level.fields(rod).items()
     }
     solver = selection.chosen.scene.solver.model_dump(mode="json")
-    for name in ("integrator", "step", "relative_tolerance", "absolute_tolerance"):
+    for name in ("integrator", "step", "inertia_cap", "relative_tolerance", "absolute_tolerance"):
         fields[f"solver.{name}"] = solver[name]
     return replace(model, scene=model.scene.with_values(fields)), selection
 

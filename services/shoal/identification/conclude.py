@@ -181,7 +181,7 @@ def _fitted(scene: Scene) -> dict[str, Any]:
             found[f"bodies.{name}.element"] = body.element
             found |= {f"bodies.{name}.elements": body.elements} if body.element != "rigid" else {}
             found |= {f"bodies.{name}.quadrature": body.quadrature} if body.element == "ancf-cable" else {}
-    return found | {f"solver.{name}": getattr(scene.solver, name) for name in ("integrator", "step")}
+    return found | {f"solver.{name}": getattr(scene.solver, name) for name in ("integrator", "step", "inertia_cap")}
 
 
 def _moved(outcome: Outcome, better: Descent) -> Outcome:

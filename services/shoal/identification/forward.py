@@ -26,7 +26,7 @@ from shoal.scene import Scene
 from shoal.swarm import EvaluationCounter
 from shoal.trajectory import Array, Status, Trajectory
 
-_AT_ONCE = 2 * len(WIDE)
+AT_ONCE = 2 * len(WIDE)
 """Lanes of a call where the time is limited: whole tiles, enough for two threads."""
 
 _HARDLY = 0.1
@@ -168,7 +168,7 @@ class ForwardModel:
             shared = {path: float(x[0]) for path, x in inputs.items() if _same_in_all(path, x)}
             inputs = {path: x for path, x in inputs.items() if path not in shared}
             view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
-            found = self._simulate(scene.with_values(shared), inputs, instants, view, name)
+            found = self._simulate(scene.with_values(shared) if shared else scene, inputs, instants, view, name)
             rows = shown.reshape(len(together), -1)[np.searchsorted(together, own[lanes])]
             seen[lanes] = np.take_along_axis(found, rows[:, :, None], axis=1)
         return seen
@@ -223,9 +223,12 @@ class ForwardModel:
     def poses(self, points: Array, name: str | None = None) -> Array:
         """Channels at time zero, (points, channels). No motion is simulated, so nothing is counted as an evaluation."""
         (self.whole or self).placements += len(points)
-        # Placing bodies is the same for every engine, and the native one places all points in one call.
-        native = replace(self, engine=get_engine("gauss"))
-        return native.observe(points, name, np.zeros(1))[:, 0]
+        return self._native.observe(points, name, np.zeros(1))[:, 0]
+
+    @cached_property
+    def _native(self) -> ForwardModel:
+        """Placing bodies is the same for every engine, and the native one places all points in one call."""
+        return replace(self, engine=get_engine("gauss"))
 
     def scene_at(self, point: Array, name: str | None = None) -> Scene:
         """The scene of a point, in a recording (else the first). Raises InputError."""
@@ -287,14 +290,17 @@ class ForwardModel:
 
     def _portions(self, points: Array) -> Iterator[Array]:
         """Points by as many as are simulated at once where the time is limited."""
-        size = len(points) if self.deadline is None else _AT_ONCE if self.engine.name == "gauss" else 1
+        size = len(points) if self.deadline is None else AT_ONCE if self.engine.name == "gauss" else 1
         yield from (points[k : k + size] for k in range(0, len(points), max(size, 1)))
 
     def _simulated_residuals(self, points: Array) -> Array:
+        return self.compared(points, {name: self.observe(points, name) for name in self.measurement.recordings})
+
+    def compared(self, points: Array, seen: Mapping[str, Array]) -> Array:
+        """As `residuals`, of points whose channels are known: by recording, as `observe` gives them."""
         columns = []
         for name, recording in self.measurement.recordings.items():
-            seen = self.observe(points, name) - recording.values
-            columns.append(seen[:, np.isfinite(recording.values)])
+            columns.append((seen[name] - recording.values)[:, np.isfinite(recording.values)])
         rows = np.concatenate(columns, axis=1) * self.rows.weight
         if self.problem.loss != "squares":
             rows = flatten(rows, self.problem.loss, self.loss_scale)

@@ -11,6 +11,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.identification.problem import RESERVED, Problem
+from shoal.identification.recording.computed import kept
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import camera, observe
 from shoal.identification.recording.plausible import check_units
@@ -63,10 +64,15 @@ def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) 
     truth = scene.with_values({**source.known, **source.values})
     times = np.linspace(0.0, source.stop, source.count + 1)[1:]
     channels = problem.channels_of(source)
-    trajectory = get_engine(source.engine).simulate(truth, times / source.clock + source.delay)
-    if not trajectory.ok:
-        raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
-    values = observe(trajectory, channels, camera(source))[0]
+    instants = times / source.clock + source.delay
+
+    def simulated() -> Array:
+        trajectory = get_engine(source.engine).simulate(truth, instants)
+        if not trajectory.ok:
+            raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
+        return np.asarray(observe(trajectory, channels, camera(source))[0])
+
+    values = kept(source.engine, truth, instants, (channels, camera(source)), simulated)
     values = values + source.noise * np.random.default_rng(source.seed).standard_normal(values.shape)
     origin = ", ".join([source.engine, *(f"{path}={value}" for path, value in source.values.items())])
     origin = origin if source.noise == 0 else f"{origin}, noise {source.noise:g}"

@@ -7,7 +7,7 @@ import pickle
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -16,15 +16,18 @@ from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
+from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gates import Seek
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, halting
+from shoal.mechanics.integrators import facts as facts_of
 from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENERGY_DRIFT, EVALUATIONS, NUMBERS, STEPS, TURN, told
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics.tile import Array, Tile, stacked, tiles
+from shoal.mechanics.numerics.tile import SINGLE, WIDE, Array, Tile, stacked, tiles
 from shoal.mechanics.start import start
 from shoal.mechanics.start.redundancy import redundant_joints
+from shoal.mechanics.still import Still
 from shoal.mechanics.verdict import Limits
 from shoal.mechanics.workspace import Workspace
 from shoal.scene import Scene
@@ -32,6 +35,8 @@ from shoal.trajectory import Trajectory, plain
 
 INSTANTS = 4
 """The workspaces of so many lists of sampling times are kept."""
+ALONE = 5
+"""So many lanes are marched one after the other sooner than in a tile: a single one's elements fill the vectors too."""
 LARGEST = 2**16
 """No workspace of more numbers is kept: beside its march the time to make it does not count."""
 
@@ -46,6 +51,7 @@ class Machine:
         """alone: whether the model is that of the scene as it is, with no lanes."""
         self.scene, self.model, self.choice = scene, model, choice
         self._alone = alone
+        self.starts = Starts(scene, model)
         self._limits = Limits(scene, model)
         self._turns = _turns(scene, model)
         self._idle: dict[tuple[bytes, int], tuple[Halts, list[Workspace]]] = {}
@@ -72,14 +78,16 @@ class Machine:
         single = self._alone and model is None
         turns = self._turns if model is None else _turns(self.scene, model)
         moved = self.model if model is None else model
-        tile, parts = tiles(moved.lanes)
-        halts, idle = self._workspaces(times, tile)
+        most = threads or os.cpu_count() or 1
+        parts = self._parts(moved.lanes, most)
         d = moved.dimensions
         motion = np.empty((len(times), len(self.scene.markers), 2 * d + 2, moved.lanes))
         numbers = np.empty((NUMBERS, moved.lanes))
         limits, floor = self._limits, self._limits.energy_floor(end)
 
         def march(part: slice) -> None:
+            tile = SINGLE if part.stop - part.start == 1 else WIDE
+            halts, idle = self._workspaces(times, tile)
             space = None if seek is not None or not idle else _taken(idle)
             if space is None:
                 space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek)
@@ -90,16 +98,21 @@ class Machine:
             if seek is None and self._alike and space.size <= LARGEST:
                 idle.append(space)
 
-        workers = min(threads or os.cpu_count() or 1, len(parts)) if len(parts) > 1 else 1
-        if workers == 1:
+        workers = min(most, len(parts))
+        if end == 0.0 and seek is None and self._alike and not self.model.constraints.size:
+            self._still.told(moved, turns, limits.anchors, motion, numbers)
+            if single not in self._told:
+                start = np.concatenate([moved.q0[:, 0], moved.v0[:, 0]])
+                self._told[single] = pickle.dumps(self._facts(start if single else None))
+        elif workers == 1:
             for part in parts:
                 march(part)
         else:
             list(_pool(workers).map(march, parts))
         status, message = limits.verdict(numbers, self.choice, moved.failed)
-        most = np.maximum.reduce(numbers, axis=1)
+        largest = np.maximum.reduce(numbers, axis=1)
         facts = pickle.loads(self._told[single])
-        facts["evaluations"] = int(most[EVALUATIONS])
+        facts["evaluations"] = int(largest[EVALUATIONS])
         return Trajectory(
             engine="gauss",
             times=times,
@@ -111,11 +124,28 @@ class Machine:
             status=status,
             energy_drift=numbers[ENERGY_DRIFT],
             constraint_drift=numbers[CONSTRAINT_DRIFT],
-            steps=int(most[STEPS]),
+            steps=int(largest[STEPS]),
             wall_s=time.perf_counter() - begin,
             message=message,
             model=facts,
         )
+
+    @cached_property
+    def _still(self) -> Still:
+        return Still(self.model)
+
+    def _parts(self, lanes: int, threads: int) -> list[slice]:
+        """What is marched together: whole tiles, and what is left over in one more or, if that is faster, one by one.
+
+        Lanes that choose their steps stay together, so that those of neighbours are alike.
+        """
+        _, parts = tiles(lanes)
+        whole, rest = divmod(lanes, len(WIDE))
+        apart = self._alike and not facts_of(self.choice.name).adaptive
+        if lanes > 1 and apart and whole % threads == 0 and rest <= ALONE * threads:
+            first = whole * len(WIDE)
+            parts = parts[:whole] + [slice(k, k + 1) for k in range(first, lanes)]
+        return parts
 
     def _workspaces(self, times: Array, tile: Tile) -> tuple[Halts, list[Workspace]]:
         """Where the steps of a run end, and the workspaces for it that are idle."""
@@ -140,6 +170,7 @@ class Machine:
             "step": scene.solver.step,
             "stability_limit": choice.limit if np.isfinite(choice.limit) else None,
             "evaluations": 0,
+            **({"slowed_modes": model.slowed} if model.slowed else {}),
             **({} if begun is None else self._started(begun)),
             "bodies": {
                 name: {"element": body.element, **({"elements": body.elements} if body.element != "rigid" else {})}

@@ -92,7 +92,9 @@ class Model:
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
     their turns from [rad], (forces, lanes) or (forces, 1). kinks: of every function, where it or a derivative jumps.
     owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
-    (lanes,) or (1,). frames: how bodies hang on the coordinates.
+    (lanes,) or (1,). frames: how bodies hang on the coordinates. mass_entries, stretching_entries: the lower triangles
+    of the mass matrix and of the rods' stiffness against stretching, see `Element`; the latter is empty where nobody
+    wants it. slowed: axial modes whose inertia is raised, see `inertia_cap`.
     """
 
     scene: Scene
@@ -106,6 +108,7 @@ class Model:
     held_rows: int
     derived: Derived
     mass_entries: dict[tuple[int, int], Array]
+    stretching_entries: dict[tuple[int, int], Array]
     weight: Array
     elements: tuple[Any, ...]
     owners: tuple[tuple[str, ...], ...]
@@ -119,6 +122,7 @@ class Model:
     marker_rows: Index
     method: int
     baumgarte: float
+    slowed: int = 0
     shared_tiles: dict[int, Arrays] = field(default_factory=dict, compare=False, repr=False)
     """Arrays by tile width, where no number but the initial state depends on the lane."""
 

@@ -8,9 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from shoal.mechanics.assembly.build import build, with_start
+from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gates import Seek
+from shoal.mechanics.inertia_cap import capped
 from shoal.mechanics.integrators import facts, pick
 from shoal.mechanics.integrators.scheme import Facts
 from shoal.mechanics.machine import Machine
@@ -50,8 +51,8 @@ def simulate(
     lanes = len(next(iter(values.values())))
     if all(path.startswith("initial.") for path in values) and not start.gives_numbers(scene):
         kept = machine(scene, end)
-        return kept.run(times, with_start(kept.model, scene.with_lanes(values), lanes), threads=threads, begin=begin)
-    model = build(scene.with_lanes(values), lanes, max(end, scene.solver.duration))
+        return kept.run(times, kept.starts.at(values, lanes), threads=threads, begin=begin)
+    model = capped(build(scene.with_lanes(values), lanes, max(end, scene.solver.duration)))
     choice = pick(scene.solver, model, step_limit if end > 0 else _unlimited)
     return Machine(scene, model, choice, alone=False).run(times, threads=threads, begin=begin)
 
@@ -76,12 +77,13 @@ _PACE = (
     "newton_tolerance",
     "energy_tolerance",
 )
-"""Settings of the solver that leave the model as it is."""
+"""Settings of the solver that leave the model as it is, unless it raises inertia to suit the step."""
 
 
 def _key(scene: Scene, end: float) -> tuple[str, float]:
     """What a model is built from: the scene, and up to where its functions of time are wanted [s]."""
-    usual = {name: Solver.model_fields[name].default for name in _PACE}
+    kept = ("step", "integrator") if scene.solver.caps_inertia else ()
+    usual = {name: Solver.model_fields[name].default for name in _PACE if name not in kept}
     neutral = scene.model_copy(update={"solver": scene.solver.model_copy(update=usual)})
     return neutral.model_dump_json(), max(end, scene.solver.duration)
 
@@ -89,7 +91,7 @@ def _key(scene: Scene, end: float) -> tuple[str, float]:
 @lru_cache(maxsize=64)
 def _model(scene_json: str, horizon: float) -> Model:
     """Repeated runs, runs by other integrators, and lanes that only start differently share the model."""
-    return build(Scene.model_validate_json(scene_json), horizon=horizon)
+    return capped(build(Scene.model_validate_json(scene_json), horizon=horizon))
 
 
 @lru_cache(maxsize=512)

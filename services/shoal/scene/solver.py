@@ -33,10 +33,11 @@ class Solver(Record):
     longest (no limit if null: a machine at rest may then skip what a drive does later), and `max_steps` the most
     they may take. `spectral_radius` is rho_infinity of generalized-alpha. `acceleration` is how Gauss's principle
     is solved, `baumgarte` [1/s] the rate of Baumgarte's stabilisation, `project` whether drift is removed after
-    every step, `rank_tolerance` how far from a singular position counts as singular. `energy_tolerance` is the
-    relative energy error beyond which a run is rejected. The accelerations `afsa`, `iafsa` and `iafsa-printed` let
-    `swarm_size` fish search for `swarm_iterations` iterations in every time step (the paper's section 4.2, with its
-    numbers); `swarm_seed` makes them repeatable.
+    every step, `rank_tolerance` how far from a singular position counts as singular. `inertia_cap` lets leapfrog, and
+    no other, take steps that axial vibrations are too fast for: their inertia is raised to suit. `energy_tolerance`
+    is the relative energy error beyond which a run is rejected. The accelerations `afsa`, `iafsa` and `iafsa-printed`
+    let `swarm_size` fish search for `swarm_iterations` iterations in every time step (the paper's section 4.2, with
+    its numbers); `swarm_seed` makes them repeatable.
     """
 
     duration: Positive = 1.0
@@ -55,5 +56,11 @@ class Solver(Record):
     swarm_seed: Annotated[int, Field(ge=0)] = 0
     baumgarte: Positive = 20.0
     project: bool = True
+    inertia_cap: bool = False
     rank_tolerance: Positive = 1e-5
     energy_tolerance: Positive = 1e-2
+
+    @property
+    def caps_inertia(self) -> bool:
+        """Whether runs with these settings raise the inertia of axial vibrations."""
+        return self.inertia_cap and self.integrator == "leapfrog"

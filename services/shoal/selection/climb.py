@@ -50,17 +50,19 @@ class Runs:
     """
 
     def __init__(self, scene: Scene, times: Array, limits: Mapping[str, str], progress: Progress) -> None:
+        scene = scene.with_values({"solver.inertia_cap": False})
         self.scene, self.times, self.limits, self.progress = scene, times, limits, progress
         self.forecast = Forecast(scene, tuple(limits))
         self.rungs: list[Rung] = []
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
 
     def __call__(self, levels: Levels, fraction: float = STEP_MARGIN, role: str = "") -> Rung:
-        """The run on these levels with a fraction of the stable step."""
+        """The run on these levels with a fraction of the stable step, see `flexible_scene`."""
         key = tuple(levels.items()), fraction
         if key not in self._done:
             scene = flexible_scene(self.scene, levels, fraction)
-            rung = Rung(dict(levels), scene, run(scene, self.times), self.forecast.work(levels), role=role)
+            work = self.forecast.work(levels) * min(1.0, STEP_MARGIN / fraction)
+            rung = Rung(dict(levels), scene, run(scene, self.times), work, role=role)
             self.add(rung)
             self._done[key] = rung
         return self._done[key]

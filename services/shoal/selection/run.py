@@ -35,14 +35,19 @@ class Rung:
     @property
     def name(self) -> str:
         """Levels in words."""
-        return ", ".join(f"{rod} {level}" for rod, level in self.levels.items()) or "as stated"
+        levels = [f"{rod} {level}" for rod, level in self.levels.items()] or ["as stated"]
+        return ", ".join([*levels, *(["inertia capped"] if self.scene.solver.inertia_cap else [])])
 
 
 def flexible_scene(scene: Scene, levels: Levels, fraction: float) -> Scene:
-    """The scene on these levels, by leapfrog with a fraction of its longest stable step. Raises InputError."""
+    """The scene on these levels, by leapfrog with a fraction of its longest stable step, or with more than that step.
+
+    Beyond it, the inertia of axial modes is raised. Raises InputError.
+    """
     duration, modelled = scene.solver.duration, apply(scene, levels)
     steps = max(int(np.ceil(duration / (fraction * stable_step(modelled, INTEGRATOR)))), scene.solver.samples)
-    return modelled.with_values({"solver.integrator": INTEGRATOR, "solver.step": duration / steps})
+    pace = {"integrator": INTEGRATOR, "step": duration / steps, "inertia_cap": fraction > 1}
+    return modelled.with_values({f"solver.{name}": value for name, value in pace.items()})
 
 
 def rigid_scene(scene: Scene, levels: Levels, tolerance: float) -> Scene:

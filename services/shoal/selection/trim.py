@@ -6,6 +6,9 @@ from itertools import product
 
 import numpy as np
 
+from shoal.errors import InputError
+from shoal.mechanics.numerics.alike import FEW
+from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.selection.climb import Runs, Yardstick
 from shoal.selection.levels import Level, Levels, below
 from shoal.selection.run import Rung, distance
@@ -22,6 +25,10 @@ HOPEFUL = 1.6
 """Errors of rods may cancel: combinations are tried up to this multiple of the tolerance."""
 TRIES = 10
 """Combinations that are run before the climb's own model is taken."""
+STRIDES = (3.0, 2.0, 1.4)
+"""Longer steps, in stable ones, that are tried with capped inertia."""
+VECTORS = {"rigid": 0, "ancf-cable": 2, "ancf-quintic": 3}
+"""Nodal vectors that an element adds, of those whose inertia can be capped."""
 
 
 def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: float) -> Rung | None:
@@ -38,16 +45,40 @@ def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: flo
         harmless = [level for level, part in table.items() if part <= HARMLESS * tolerance]
         cheapest = min(harmless, key=lambda level: runs.forecast.own(rod, level))
         context = judged(runs, yardstick, {**context.levels, rod: cheapest})
-    for levels in _combinations(runs, yardstick, base, tables, tolerance)[:TRIES]:
+    combinations = _combinations(runs, yardstick, base, tables, tolerance)
+    for levels in combinations[:TRIES]:
         rung = judged(runs, yardstick, levels)
         if rung.error <= WITHIN * tolerance:
-            return rung
+            return _strided(runs, yardstick, combinations, tolerance, rung)
     return next((rung for rung in (base, yardstick.rung) if rung.error <= tolerance), None)
 
 
-def judged(runs: Runs, yardstick: Yardstick, levels: Levels) -> Rung:
+def _strided(runs: Runs, yardstick: Yardstick, combinations: list[Levels], tolerance: float, found: Rung) -> Rung:
+    """A cheaper rung within the tolerance by longer steps with capped inertia, or else the one that was found.
+
+    Models whose mass matrix is not inverted as a whole lose more by the capped one than longer steps gain.
+    """
+    few = [levels for levels in combinations if _few(levels)]
+    longer = [(runs.forecast.work(levels) / stride, stride, levels) for levels in few for stride in STRIDES]
+    cheaper = [one for one in longer if one[0] < CHEAPER * found.work]
+    for _, stride, levels in sorted(cheaper, key=lambda one: one[0])[:TRIES]:
+        try:
+            rung = judged(runs, yardstick, levels, stride * STEP_MARGIN)
+        except InputError:
+            continue  # bending is as fast as stretching
+        if rung.error <= WITHIN * tolerance:
+            return rung
+    return found
+
+
+def _few(levels: Levels) -> bool:
+    cappable = all(level.element in VECTORS for level in levels.values())
+    return cappable and sum(VECTORS[level.element] * level.elements for level in levels.values()) <= FEW
+
+
+def judged(runs: Runs, yardstick: Yardstick, levels: Levels, fraction: float = STEP_MARGIN) -> Rung:
     """The run on these levels with its estimated error."""
-    rung = runs(levels, role="candidate")
+    rung = runs(levels, fraction, role="candidate")
     rung.error = distance(rung.trajectory, yardstick.rung.trajectory) + yardstick.error
     return rung
 

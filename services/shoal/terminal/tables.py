@@ -47,7 +47,9 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
         f"status {trajectory.status[0]}{', but its time error is not known' if unknown else ''}; energy off by "
         f"{trajectory.energy_drift[0]:.1e}, constraints by {trajectory.constraint_drift[0]:.1e}"
     )
-    screen.say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms")
+    slowed = trajectory.model.get("slowed_modes")
+    raised = f"; the inertia of {slowed} axial modes is raised to suit the step" if slowed else ""
+    screen.say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms{raised}")
     screen.say(*remarks(trajectory.model))
     if verification is not None:
         screen.say(*estimates(verification))

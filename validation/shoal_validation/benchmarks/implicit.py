@@ -10,23 +10,25 @@ step, the least of some runs, as the longest take seconds. An implicit step coun
 
 from __future__ import annotations
 
+import itertools
 import statistics
 import time
 from collections.abc import Iterator
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.exudyn import ExudynEngine
-from shoal.scene import Scene, load_scene
+from shoal.scene import Rod, Scene, load_scene
 
 from shoal_validation.benchmarks.forward import exudyn_loop, prepare
 from shoal_validation.benchmarks.timing import median_time
-from shoal_validation.work_precision.mesh import with_mesh
 
 STIFFER = 1e4
 RADIUS = 0.8
-MESHES = ("1R/1R", "2R/4R")
+MESHES = ((1, 1), (2, 4))
+"""Cables of reduced quadrature on both rods."""
 STEPS = (0.02, 0.01, 0.005)
 """Exudyn's steps end with the sampling interval, 0.01 s."""
 ELEMENTS = (100, 1000, 10_000)
@@ -53,40 +55,44 @@ class GrowthRow(NamedTuple):
     seconds: float
 
 
-def stiff_scene(mesh: str, step: float) -> Scene:
-    """The stiff double pendulum by generalized-alpha."""
+def stiff_scene(mesh: tuple[int, ...], step: float, element: str = "ancf-cable") -> Scene:
+    """The stiff double pendulum by generalized-alpha; mesh: elements of both rods."""
     scene = load_scene("flexible-double-pendulum")
-    moduli = {
-        f"bodies.{name}.youngs_modulus": STIFFER * getattr(body, "youngs_modulus")  # noqa: B009 - of rods only
-        for name, body in scene.bodies.items()
-    }
-    solver: dict[str, Any] = {"integrator": "generalized-alpha", "step": step, "spectral_radius": RADIUS}
-    return with_mesh(scene.with_values({**moduli, **{f"solver.{name}": x for name, x in solver.items()}}), mesh)
+    values: dict[str, Any] = {"solver.integrator": "generalized-alpha", "solver.step": step}
+    values["solver.spectral_radius"] = RADIUS
+    for (name, body), elements in zip(scene.bodies.items(), mesh, strict=True):
+        assert isinstance(body, Rod)
+        assert body.youngs_modulus is not None
+        quadrature = "reduced" if element == "ancf-cable" else "full"
+        own = {"element": element, "elements": elements, "quadrature": quadrature}
+        own["youngs_modulus"] = STIFFER * body.youngs_modulus
+        values |= {f"bodies.{name}.{field}": value for field, value in own.items()}
+    return scene.with_values(values)
 
 
 def stiff(repeats: int = REPEATS) -> Iterator[StiffRow]:
     """Both solvers on all meshes and steps."""
     ours, exudyn = get_engine("gauss"), ExudynEngine(modified_newton=True, integrator="generalized-alpha")
-    fine = stiff_scene("2Q/4Q", 1e-4)
+    fine = stiff_scene((2, 4), 1e-4, "ancf-quintic")
     times = np.linspace(0.0, fine.solver.duration, 51)[1:]
     truth = ours.simulate(fine, times).points
 
     def error(points: Any) -> float:
         return float(np.max(np.linalg.norm(points - truth, axis=2)))
 
-    for mesh in MESHES:
-        for step in STEPS:
-            scene = stiff_scene(mesh, step)
-            run = ours.simulate(scene, times)
-            loop = median_time(prepare(scene, 1), repeats)
-            call = median_time(lambda scene=scene: ours.simulate(scene, times), repeats)  # type: ignore[misc]
-            yield StiffRow("ours", mesh, step, error(run.points), loop, call)
-            if step > times[0]:
-                continue
-            run = exudyn.simulate(scene, times)
-            loop = statistics.median(exudyn_loop(exudyn, scene) for _ in range(repeats))
-            call = median_time(lambda scene=scene: exudyn.simulate(scene, times), repeats)  # type: ignore[misc]
-            yield StiffRow("Exudyn", mesh, step, error(run.points), loop, call)
+    for mesh, step in itertools.product(MESHES, STEPS):
+        name = "/".join(map(str, mesh))
+        scene = stiff_scene(mesh, step)
+        run = ours.simulate(scene, times)
+        loop = median_time(prepare(scene, 1), repeats)
+        call = median_time(partial(ours.simulate, scene, times), repeats)
+        yield StiffRow("ours", name, step, error(run.points), loop, call)
+        if step > times[0]:
+            continue
+        run = exudyn.simulate(scene, times)
+        loop = statistics.median(exudyn_loop(exudyn, scene) for _ in range(repeats))
+        call = median_time(partial(exudyn.simulate, scene, times), repeats)
+        yield StiffRow("Exudyn", name, step, error(run.points), loop, call)
 
 
 def cable(elements: int, integrator: str, step: float, steps: int) -> Scene:

@@ -36,7 +36,7 @@ def draw_chart(cases: Sequence[Case], path: Path) -> None:
     share = 100 * np.mean([case.error <= case.tolerance for case in met]) if met else 0.0
     above.set_title(f"{share:.3g} % of the {len(met)} models said to meet the tolerance do", loc="left")
     above.legend(loc="lower left")
-    ratios = [case.work / case.least for case in met if np.isfinite(case.least) and case.least > 0]
+    ratios = [case.uncapped / case.least for case in met if np.isfinite(case.least) and case.least > 0]
     below.hist(np.clip(ratios, 1.0, 4.0), bins=np.linspace(1.0, 4.0, 25).tolist(), color="#009E73")
     below.axvline(2.0, color="black", linewidth=1)
     below.set(xlabel="work / work of the cheapest model that would do", ylabel="machines of one or two rods")

@@ -40,6 +40,8 @@ FIXED_STEP = tuple(
     )
 )
 """Our integrators of fixed step."""
+CAPPED = Method("leapfrog, inertia capped", GAUSS, {"solver.integrator": "leapfrog", "solver.inertia_cap": True})
+"""Steps that axial vibrations are too fast for."""
 ADAPTIVE = tuple(ours(name) for name in INTEGRATORS if facts(name).adaptive)
 """Our integrators that choose their steps."""
 AUTO = ours("auto")

@@ -19,6 +19,7 @@ from shoal_validation.stability.contract import Axis, StabilityMap, Watched
 from shoal_validation.stability.methods import (
     ADAPTIVE,
     AUTO,
+    CAPPED,
     CASADI_RK4,
     EXUDYN,
     EXUDYN_DEFAULTS,
@@ -43,7 +44,7 @@ def step_map(name: str, question: str, teaches: str, y: Axis, change: Change) ->
         teaches,
         STEPS,
         y,
-        (*FIXED_STEP, AUTO, *both(*EXUDYN), EXUDYN_DEFAULTS, *both(CASADI_RK4)),
+        (*FIXED_STEP, CAPPED, AUTO, *both(*EXUDYN), EXUDYN_DEFAULTS, *both(CASADI_RK4)),
         watched(change),
         lambda step, _: {"solver.step": step},
     )

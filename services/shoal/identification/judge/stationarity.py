@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.spread.covariance import blocks_of
@@ -86,6 +85,11 @@ def _step(model: ForwardModel, point: Array, seen: Sensitivity) -> Array:
     low, high = model.box_at(point)
     wanted = -left[:, known].T @ (seen.residual / steeper)
     bounds = ((low - point) / sizes, (high - point) / sizes)
+    free = right[known].T @ (wanted / singular[known])
+    if np.all((free >= bounds[0]) & (free <= bounds[1])):
+        return np.asarray(free * sizes)
+    from scipy.optimize import lsq_linear  # slow to import
+
     found = lsq_linear(singular[known, None] * right[known], wanted, bounds, method="bvls")
     return np.asarray(found.x * sizes)
 

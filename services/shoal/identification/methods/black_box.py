@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy import optimize
 
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.lanes import Course, descend_many
@@ -23,6 +22,9 @@ _HUGE = 1e30
 
 def differential_evolution(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
     """Storn and Price 1997, as scipy has it; a generation is one call of the model."""
+    with model.off_the_clock():  # slow to import
+        from scipy import optimize
+
     course = Course(progress)
     span = model.upper - model.lower
 

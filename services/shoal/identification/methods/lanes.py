@@ -82,7 +82,12 @@ Differentiate = Callable[[Sequence[int], Sequence[Array]], tuple[Sequence[Array]
 
 
 def descend_each(
-    models: Sequence[ForwardModel], starts: Sequence[Array], differentiate: Differentiate, *, patience: float, most: int
+    models: Sequence[ForwardModel],
+    starts: Sequence[Array],
+    differentiate: Differentiate,
+    *,
+    patience: float = np.inf,
+    most: int = _ITERATIONS,
 ) -> list[Descent]:
     """As `descend_many`, of several models with as many rows, from a start of each side by side; most: iterations."""
     first = differentiate(range(len(models)), starts)
@@ -110,9 +115,12 @@ def _descend(
     return [search.descent() for search in searches]
 
 
-def differentiate_many(model: ForwardModel, points: Array) -> tuple[Array, Array]:
+def differentiate_many(
+    model: ForwardModel, points: Array, residuals: Callable[[Array, Array], Array] | None = None
+) -> tuple[Array, Array]:
     """Residuals at points, (points, rows), and their forward-difference Jacobians, (points, rows, parameters).
 
+    residuals: instead of the model's, of lanes (lanes, parameters), each beside the point of a number, (lanes,).
     1 + parameters lanes for each point, in one call if the integrator's steps are fixed. Adaptive integrators take the
     same steps in all lanes of a tile, so a point and its neighbours stand in one: differences of runs that were stepped
     differently are those of the integrator's errors.
@@ -121,8 +129,10 @@ def differentiate_many(model: ForwardModel, points: Array) -> tuple[Array, Array
     count, size = points.shape
     shifted = points[:, None] + np.concatenate([np.zeros((count, 1, size)), steps[:, None] * np.eye(size)], axis=1)
     together = _together(model) or count
-    calls = [shifted[k : k + together].reshape(-1, size) for k in range(0, count, together)]
-    found = np.concatenate([model.residuals(call) for call in calls]).reshape(count, 1 + size, -1)
+    calls = [np.arange(k, min(k + together, count)) for k in range(0, count, together)]
+    lanes = [(shifted[call].reshape(-1, size), np.repeat(call, 1 + size)) for call in calls]
+    seen = [model.residuals(one) if residuals is None else residuals(one, owners) for one, owners in lanes]
+    found = np.concatenate(seen).reshape(count, 1 + size, -1)
     with np.errstate(invalid="ignore"):
         jacobians = np.moveaxis((found[:, 1:] - found[:, :1]) / steps[:, :, None], 1, 2)
     return found[:, 0], np.where(np.isfinite(jacobians), jacobians, 0.0)

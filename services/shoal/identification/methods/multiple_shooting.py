@@ -12,7 +12,6 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg.lapack import dgglse
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
@@ -162,6 +161,8 @@ class Segments:
         trust = np.sqrt(squares / numbers) / _TRUST / np.concatenate([np.ones(count * width), self._span])
         equations, wanted = self._equations(states, seen, jacobian, columns, shared)
         matrix, vector = np.concatenate([*rows, np.diag(trust)]), np.concatenate([*right, np.zeros(size)])
+        from scipy.linalg.lapack import dgglse  # slow to import
+
         found: Array = np.asarray(dgglse(matrix, equations, vector, wanted)[3])
         return found[: count * width].reshape(count, width), found[count * width :]
 

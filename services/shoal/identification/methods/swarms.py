@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import fields
 from typing import Any
 
@@ -12,6 +13,7 @@ from shoal.identification.methods.lanes import mean_of
 from shoal.identification.methods.least_squares import least_squares
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import starting_points
+from shoal.mechanics.numerics.tile import WIDE
 from shoal.swarm import Iafsa, minimize
 from shoal.trajectory import Array
 
@@ -19,10 +21,15 @@ ITERATIONS = 100
 
 
 def by_swarm(swarm: type[Any], model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:
-    """A swarm in the box of a problem, with the paper's two additional fish where it has places for them."""
-    has_places = {"traditional", "previous"} <= {field.name for field in fields(swarm)}
-    fish = seeds(model, rng) if has_places else {}
-    return _search(model, swarm(lower=model.lower, upper=model.upper, **fish), rng, progress)
+    """A swarm in the box of a problem, with the paper's two additional fish where it has places for them.
+
+    Where its search does not depend on how many fish are simulated at once, these fill a tile for every core.
+    """
+    known = {field.name for field in fields(swarm)}
+    settings: dict[str, Any] = seeds(model, rng) if {"traditional", "previous"} <= known else {}
+    if "batch" in known:
+        settings["batch"] = (os.cpu_count() or 1) * len(WIDE)
+    return _search(model, swarm(lower=model.lower, upper=model.upper, **settings), rng, progress)
 
 
 def iafsa_unseeded(model: ForwardModel, rng: np.random.Generator, progress: Progress) -> Outcome:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
-from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.least_squares import descend
+from shoal.identification.forward import AT_ONCE, ForwardModel
+from shoal.identification.methods.lanes import Descent, descend_each, differentiate_many
 from shoal.identification.recording.measurement import Recording
 from shoal.trajectory import Array, plain
 
@@ -42,22 +43,47 @@ def bootstrap(
 
     rho: lag-1 correlation of the residuals, which sets the length of the blocks; fewer draws where time ends
     """
-    found, failed = [], 0
-    for _ in range(draws):
-        recordings = {
-            name: _redrawn(recording, predicted[name], rho, len(point), rng)
-            for name, recording in model.measurement.recordings.items()
-        }
-        drawn = model.aside(measurement=replace(model.measurement, recordings=recordings))
+    models = [_redrawn_all(model, predicted, rho, len(point), rng) for _ in range(draws)]
+    together = draws if model.deadline is None else max(1, AT_ONCE // (1 + len(point)))
+    ends = list[Descent]()
+    for first in range(0, draws, max(together, 1)):
         try:
-            end = descend(drawn, point, lambda *_: None)
+            ends += _refitted(model, models[first : first + together], point)
         except TimeIsUp:
             break
-        if np.isfinite(end.fitness):
-            found.append(model.parameters.to_values(end.point))
-        else:
-            failed += 1
-    return Bootstrap(model.names, np.array(found).reshape(-1, len(point)), failed)
+    found = [model.parameters.to_values(end.point) for end in ends if np.isfinite(end.fitness)]
+    return Bootstrap(model.names, np.array(found).reshape(-1, len(point)), len(ends) - len(found))
+
+
+def _refitted(model: ForwardModel, drawn: Sequence[ForwardModel], point: Array) -> list[Descent]:
+    """Descents of models that differ in their data only, from one point: their runs stand side by side."""
+
+    def differentiate(chosen: Sequence[int], points: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+        def residuals(lanes: Array, owners: Array) -> Array:
+            seen = {name: model.observe(lanes, name) for name in model.measurement.recordings}
+            parts = [np.flatnonzero(owners == owner) for owner in np.unique(owners)]
+            rows = [
+                drawn[chosen[owners[part[0]]]].compared(
+                    lanes[part], {name: found[part] for name, found in seen.items()}
+                )
+                for part in parts
+            ]
+            return np.concatenate(rows)
+
+        rows, jacobians = differentiate_many(model, np.array(points), residuals)
+        return list(rows), list(jacobians)
+
+    return descend_each(drawn, [point] * len(drawn), differentiate)
+
+
+def _redrawn_all(
+    model: ForwardModel, predicted: dict[str, Array], rho: float, parameters: int, rng: np.random.Generator
+) -> ForwardModel:
+    recordings = {
+        name: _redrawn(recording, predicted[name], rho, parameters, rng)
+        for name, recording in model.measurement.recordings.items()
+    }
+    return model.aside(measurement=replace(model.measurement, recordings=recordings))
 
 
 def block_length(count: int, rho: float) -> int:

@@ -1,4 +1,4 @@
-"""Mass matrix, weight and flexible elements, body by body."""
+"""Mass matrix, weight, flexible elements and their stiffness against stretching, body by body."""
 
 from __future__ import annotations
 
@@ -17,21 +17,28 @@ from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Number
 from shoal.scene import PointMass, RigidBody, Rod, Scene
 
+Entries = dict[tuple[int, int], Number]
+
 
 class Masses:
-    """The mass matrix as entries (row, column), row >= column, the weight by unknown, and the flexible elements."""
+    """Matrices as entries (row, column), row >= column, the weight by unknown, and the flexible elements.
+
+    mass: the mass matrix; stretching: what `Element.stretching` gives, of all rods, where their inertia is capped.
+    """
 
     def __init__(self, scene: Scene, placement: Placement, rows: Rows) -> None:
         self.scene, self.placement, self.rows = scene, placement, rows
         self.gravity = plane.vector(*scene.gravity)
-        self.entries: dict[tuple[int, int], Number] = {}
+        self.mass: Entries = {}
+        self.stretching: Entries = {}
         self.weight: list[Number] = [0.0] * len(placement.positions)
         self.families = {kind: Collected() for kind in FAMILIES}
         for name, body in scene.bodies.items():
             self._add(name, body)
         for vector in placement.drivers.values():
             # The motion of a moving point of the ground is prescribed, so its mass is of no consequence.
-            self._add_mass([vector], [[min(np.min(np.asarray(body.mass)) for body in scene.bodies.values())]])
+            least = min(np.min(np.asarray(body.mass)) for body in scene.bodies.values())
+            _add(self.mass, [vector], [[least]])
 
     def _add(self, name: str, body: Rod | RigidBody | PointMass) -> None:
         frame = self.placement.frames[name]
@@ -39,7 +46,7 @@ class Masses:
             assert isinstance(body, Rod)
             self._add_rod(name, body, frame)
         elif isinstance(frame, PointFrame):
-            self._add_mass([frame.origin], [[body.mass]])
+            _add(self.mass, [frame.origin], [[body.mass]])
             self._add_load([frame.origin], [body.mass])
         else:
             assert isinstance(frame, RigidFrame)
@@ -49,7 +56,7 @@ class Masses:
             # Of the moments of second order the plane knows the sum only, as its directors turn together.
             inertia = body.inertia + body.mass * (x**2 + y**2)
             vectors = [frame.origin, *frame.directors]
-            self._add_mass(vectors, [[body.mass, mx, my], [mx, inertia, 0.0], [my, 0.0, 0.0]])
+            _add(self.mass, vectors, [[body.mass, mx, my], [mx, inertia, 0.0], [my, 0.0, 0.0]])
             self._add_load(vectors, [body.mass, mx, my])
 
     def _add_rod(self, name: str, rod: Rod, frame: BeamFrame) -> None:
@@ -58,7 +65,9 @@ class Masses:
         for number in range(rod.elements):
             height, width = rod.section((number + 0.5) / rod.elements)
             vectors = frame.of_element(number)
-            self._add_mass(vectors, element.mass(rod.density, height, width, length))
+            _add(self.mass, vectors, element.mass(rod.density, height, width, length))
+            if element.stretching is not None and self.scene.solver.caps_inertia:
+                _add(self.stretching, vectors, element.stretching(rod.youngs_modulus * height * width, length))
             self._add_load(vectors, element.weight(rod.density, height, width, length))
             nodal: list[Any] = []
             for node in (number, number + 1):
@@ -66,19 +75,6 @@ class Masses:
                 nodal += [plane.vector(*rod_axis(rod, s)), *element.nodal_vectors(rod, s)]
             part = element.part(rod, height, width, length, nodal)
             self.families[element.family].add(name, self.rows.of_all(vectors), part)
-
-    def _add_mass(self, vectors: list[Affine], matrix: list[list[Number]]) -> None:
-        """Add T' M T for the body's vectors = T q, whose kinetic energy is 1/2 sum M_ab v_a . v_b."""
-        for left, row in zip(vectors, matrix, strict=True):
-            for right, mass in zip(vectors, row, strict=True):
-                if not np.any(mass):
-                    continue
-                for i, ci in left.terms.items():
-                    for j, cj in right.terms.items():
-                        if i >= j:
-                            value = sum(a * mass * b for a, b in zip(ci, cj, strict=True))
-                            if np.any(value) or i == j:
-                                self.entries[i, j] = self.entries.get((i, j), 0.0) + value
 
     def _add_load(self, vectors: list[Affine], masses: list[Number]) -> None:
         for vector, mass in zip(vectors, masses, strict=True):
@@ -93,3 +89,22 @@ class Masses:
     def owners(self) -> tuple[tuple[str, ...], ...]:
         """The body of every element, by family."""
         return tuple(tuple(found.owners) for found in self.families.values())
+
+
+def _add(entries: Entries, vectors: list[Affine], matrix: list[list[Number]]) -> None:
+    """Add T' M T for the body's vectors = T q, in which it has the quadratic form 1/2 sum M_ab v_a . v_b."""
+    for left, row in zip(vectors, matrix, strict=True):
+        for right, weight in zip(vectors, row, strict=True):
+            if _vanishes(weight):
+                continue
+            for i, ci in left.terms.items():
+                for j, cj in right.terms.items():
+                    if i >= j:
+                        value = sum(a * weight * b for a, b in zip(ci, cj, strict=True))
+                        if i == j or not _vanishes(value):
+                            entries[i, j] = entries.get((i, j), 0.0) + value
+
+
+def _vanishes(value: Number) -> bool:
+    """Whether a number is zero, in all lanes."""
+    return not value if isinstance(value, float) else not np.any(value)

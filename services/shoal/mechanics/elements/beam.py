@@ -107,23 +107,33 @@ def pairs(points: Array, weights: Array) -> Array:
     return np.array([*pairs, (0.0, weights[last // 2] / 2 if last % 2 == 0 else 0.0, last // 2, last // 2)])
 
 
-def _unit_masses(vectors: int) -> Array:
-    """int_0^1 S S' dx, exactly: the product of the shape functions has degree 2 vectors - 2."""
+def _products(vectors: int, derivative: int) -> Array:
+    """int_0^1 S S' dx of derivatives of the shape functions, exactly: S S' has degree 2 vectors - 2 at most."""
     x, weights = _gauss(vectors)
-    shapes = np.array(shape(vectors, x, 1.0, 0))
-    masses = (shapes * weights) @ shapes.T
-    return np.asarray((masses + masses.T) / 2)
+    shapes = np.array(shape(vectors, x, 1.0, derivative))
+    products = (shapes * weights) @ shapes.T
+    return np.asarray((products + products.T) / 2)
 
 
-_UNIT_MASS = {vectors: _unit_masses(vectors) for vectors in HERMITE}
+_UNIT_MASS = {vectors: _products(vectors, 0) for vectors in HERMITE}
+_UNIT_STRETCHING = {vectors: _products(vectors, 1) for vectors in HERMITE}
 
 
 def mass_matrix(vectors: int, mass_per_length: Number, length: Number) -> list[list[Number]]:
     """Consistent mass [kg, kg m, kg m^2, ...] on the nodal vectors, the same for x and y."""
-    order, mass = vectors // 2, mass_per_length * length
+    return _on_nodes(_UNIT_MASS[vectors], mass_per_length * length, length)
+
+
+def stretching(vectors: int, axial: Number, length: Number) -> list[list[Number]]:
+    """EA int dS/ds dS'/ds ds [N/m, N, N m, ...] on the nodal vectors: their stiffness along a straight rod."""
+    return _on_nodes(_UNIT_STRETCHING[vectors], axial / length, length)
+
+
+def _on_nodes(unit: Array, factor: Number, length: Number) -> list[list[Number]]:
+    order = len(unit) // 2
     return [
-        [mass * length ** float(i % order + j % order) * unit for j, unit in enumerate(row)]
-        for i, row in enumerate(_UNIT_MASS[vectors])
+        [factor * length ** float(i % order + j % order) * value for j, value in enumerate(row)]
+        for i, row in enumerate(unit)
     ]
 
 
@@ -162,6 +172,7 @@ def element(
         mass=lambda density, height, width, length: mass_matrix(vectors, density * height * width, length),
         weight=lambda density, height, width, length: weight(vectors, density * height * width, length),
         part=part,
+        stretching=lambda axial, length: stretching(vectors, axial, length),
     )
 
 

@@ -22,6 +22,8 @@ class Element:
     clamp holds. normal: whether that one, and what direction_shape gives, is along the section, a right angle to the
     left of the axis. mass, weight: (density, height, width, length) -> consistent mass on the nodal vectors and load of
     a unit acceleration. part: (rod, height, width, length, nodal vectors at rest) -> one element for its kernel.
+    stretching: (axial stiffness EA [N], length) -> stiffness against stretching on the nodal vectors, the same for
+    every direction, if the element has one.
     """
 
     family: type
@@ -33,3 +35,4 @@ class Element:
     part: Callable[[Rod, Number, Number, Number, list[Number]], Entry]
     clamped: int = 0
     normal: bool = False
+    stretching: Callable[[Number, Number], list[list[Number]]] | None = None

@@ -171,6 +171,8 @@ def _binary(instruction: str) -> Any:
     @intrinsic
     def combined(typing_context, x, y):  # type: ignore[no-untyped-def]
         count = (x if isinstance(x, Vector) else y).count
+        if isinstance(x, Vector) and isinstance(y, Vector) and x.count != y.count:
+            raise TypeError(f"{instruction}: vectors of lengths {x.count} and {y.count}")
 
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
             kinds = zip(signature.args, arguments, strict=True)
