@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-import shoal
 from shoal.errors import InputError
 from shoal.home import home
 from shoal.scene import Scene
@@ -42,7 +41,7 @@ def kept(engine: str, scene: Scene, times: Array, what: object, compute: Callabl
 
 def _program() -> tuple[object, ...]:
     """All that the numbers depend on but for what is asked: packages, and the sources of this one."""
-    root = Path(shoal.__file__).parent
+    root = Path(__file__).parents[2]
     files = sorted((str(file), file.stat()) for file in root.rglob("*.py"))
     sources = tuple((name, about.st_size, about.st_mtime_ns) for name, about in files)
     return sources, versions(("numpy", "exudyn", "casadi"))

@@ -95,11 +95,16 @@ def _add(entries: Entries, vectors: list[Affine], matrix: list[list[Number]]) ->
     """Add T' M T for the body's vectors = T q, in which it has the quadratic form 1/2 sum M_ab v_a . v_b."""
     for left, row in zip(vectors, matrix, strict=True):
         for right, weight in zip(vectors, row, strict=True):
-            if not np.any(weight):
+            if _vanishes(weight):
                 continue
             for i, ci in left.terms.items():
                 for j, cj in right.terms.items():
                     if i >= j:
                         value = sum(a * weight * b for a, b in zip(ci, cj, strict=True))
-                        if np.any(value) or i == j:
+                        if i == j or not _vanishes(value):
                             entries[i, j] = entries.get((i, j), 0.0) + value
+
+
+def _vanishes(value: Number) -> bool:
+    """Whether a number is zero, in all lanes."""
+    return not value if isinstance(value, float) else not np.any(value)
