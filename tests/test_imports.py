@@ -5,10 +5,12 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import numpy as np
+
 FOREIGN = ("scipy", "pandas", "matplotlib", "prefect", "mlflow", "xarray", "casadi", "exudyn", "fastapi", "cma")
 RUN = """
 import sys
-import numba.np.arraymath  # Numba itself looks for the BLAS of scipy.
+import numba.np.arraymath, scipy.linalg.cython_blas  # Whoever compiles a product of matrices needs this.
 before = set(sys.modules)
 import numpy as np
 import shoal
@@ -30,3 +32,18 @@ def test_a_simulation_imports_nothing_that_it_does_not_need() -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.stderr == ""
     assert done.stdout == "[]\n"
+
+
+def test_numba_looks_for_no_linear_algebra_before_a_kernel_wants_it() -> None:
+    program = "import sys, shoal.mechanics.simulate, numba.np.arraymath; print('scipy.linalg' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+
+
+def test_numba_finds_the_linear_algebra_of_scipy_when_a_kernel_wants_it() -> None:
+    import shoal.mechanics.simulate  # noqa: F401 - puts it off
+    from numba import njit
+
+    solved = njit(lambda matrix, vector: np.linalg.solve(matrix, matrix @ vector))
+    vector = np.array([1.0, -2.0])
+    assert np.allclose(solved(np.array([[2.0, 1.0], [1.0, 3.0]]), vector), vector)
