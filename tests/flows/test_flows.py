@@ -193,6 +193,10 @@ def test_a_scene_may_be_given_as_yaml() -> None:
     text = (files("shoal.scene") / "library" / "single-pendulum.yaml").read_text()
     found = run.run_flow("forward", {"scene": json.dumps(text)})
     assert found.trusted
+    from prefect.client.orchestration import get_client
+
+    with get_client(sync_client=True) as client:
+        assert "forward own" in {one.name for one in client.read_flow_runs()}
     assert {"scene.yaml", "call.json", "inputs"} <= {item.path for item in _client().list_artifacts(found.run_id)}
     with pytest.raises(InputError, match=r"scene|bodies"):
         run.run_flow("forward", {"scene": json.dumps(text.replace("bodies", "body"))})

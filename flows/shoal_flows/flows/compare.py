@@ -8,13 +8,13 @@ from shoal.errors import InputError
 
 from shoal_flows.flows import tables
 from shoal_flows.flows.parameters import Engines, SceneName, Values
-from shoal_flows.flows.shown import ended, progress, show_result
+from shoal_flows.flows.shown import ended, named, progress, show_result
 from shoal_flows.flows.tasks import run_engines
 from shoal_flows.inputs import held, title
 from shoal_flows.results import Compared
 
 
-@flow(name="compare", flow_run_name="compare {scene}")
+@flow(name="compare", flow_run_name=named("compare", "scene"))
 def compare(
     scene: SceneName = "flexible-double-pendulum",
     engines: Engines = list(COMPARED),  # noqa: B006 - Prefect shows the default in its form

@@ -6,13 +6,13 @@ from prefect import flow
 
 from shoal_flows.flows import tables
 from shoal_flows.flows.parameters import EngineName, SceneName, Values
-from shoal_flows.flows.shown import ended, progress, show_result
+from shoal_flows.flows.shown import ended, named, progress, show_result
 from shoal_flows.flows.tasks import simulate
 from shoal_flows.inputs import held, title
 from shoal_flows.results import Simulated
 
 
-@flow(name="forward", flow_run_name="forward {scene}")
+@flow(name="forward", flow_run_name=named("forward", "scene"))
 def forward(
     scene: SceneName = "flexible-double-pendulum",
     engine: EngineName = "gauss",

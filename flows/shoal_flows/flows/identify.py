@@ -10,7 +10,7 @@ from shoal.identification.methods import get_method
 
 from shoal_flows.flows.parameters import EngineName, Methods, ProblemName, Seeds, Values
 from shoal_flows.flows.runner import side_by_side
-from shoal_flows.flows.shown import ended, progress, show_result
+from shoal_flows.flows.shown import ended, named, progress, show_result
 from shoal_flows.flows.study import open_running
 from shoal_flows.flows.tasks import measure
 from shoal_flows.inputs import held, title
@@ -20,7 +20,7 @@ from shoal_flows.results import Study
 from shoal_flows.tracking.identification import answer, summary
 
 
-@flow(name="identify", flow_run_name="identify {problem}", task_runner=side_by_side())
+@flow(name="identify", flow_run_name=named("identify", "problem"), task_runner=side_by_side())
 def identify(
     problem: ProblemName = "paper-case-1",
     methods: Methods = ["auto"],  # noqa: B006 - Prefect shows the default in its form; nothing changes it

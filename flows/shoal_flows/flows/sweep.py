@@ -6,13 +6,13 @@ from prefect import flow
 
 from shoal_flows.flows import tables
 from shoal_flows.flows.parameters import Axes, Axis, EngineName, Instant, SceneName
-from shoal_flows.flows.shown import ended, progress, show_result
+from shoal_flows.flows.shown import ended, named, progress, show_result
 from shoal_flows.flows.tasks import run_grid
 from shoal_flows.inputs import held, title
 from shoal_flows.results import Swept
 
 
-@flow(name="sweep", flow_run_name="sweep {scene}")
+@flow(name="sweep", flow_run_name=named("sweep", "scene"))
 def sweep(
     scene: SceneName = "flexible-double-pendulum",
     vary: Axes = [Axis(path="initial.OA.angle", low=0.0, high=1.5, count=61)],  # noqa: B006, B008 - shown in a form
