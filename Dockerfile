@@ -23,19 +23,22 @@ RUN apt-get update \
     && rm -rf /var/lib/apt/lists/* \
     && groupadd --gid 10001 shoal \
     && useradd --uid 10001 --gid shoal --no-create-home --home-dir /var/lib/shoal --shell /usr/sbin/nologin shoal \
-    && install -d -o shoal -g shoal /var/lib/shoal /var/lib/mlflow /var/lib/prefect
+    && install -d -o shoal -g shoal /var/lib/shoal /var/lib/mlflow /var/lib/prefect /var/lib/kernels /var/lib/library
 COPY --from=build /opt/shoal/venv /opt/shoal/venv
 COPY --chmod=755 deploy/entrypoint.sh /opt/shoal/entrypoint.sh
-COPY prefect.yaml /opt/shoal/prefect.yaml
+COPY --chmod=644 prefect.yaml /opt/shoal/prefect.yaml
 ENV PATH=/opt/shoal/venv/bin:${PATH} \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
     SHOAL_HOME=/var/lib/shoal \
+    SHOAL_LIBRARY=/var/lib/library \
     NUMBA_CACHE_DIR=/tmp/kernels \
     MPLCONFIGDIR=/tmp/matplotlib
 # Machine code for the processor that builds the image; on another kind each kernel is compiled when first used.
 RUN NUMBA_CACHE_DIR=/opt/shoal/kernels SHOAL_HOME=/tmp/home MPLCONFIGDIR=/tmp/home \
-    python -m shoal.mechanics.warm && rm -rf /tmp/home
+    python -m shoal.mechanics.warm && rm -rf /tmp/home \
+    && find /opt/shoal/kernels -type f -exec sha256sum {} + > /tmp/files && sha256sum /tmp/files > /tmp/all \
+    && cut -c 1-16 /tmp/all > /opt/shoal/kernels.version && rm /tmp/files /tmp/all
 ARG REVISION=""
 ENV SHOAL_REVISION=${REVISION}
 WORKDIR /opt/shoal

@@ -90,5 +90,6 @@ lock: setup  ## resolve pyproject.toml anew into requirements.lock
 	@$(BIN)/uv pip compile --quiet --upgrade --all-extras --no-emit-index-url --no-header --no-annotate -p 3.11 \
 	  pyproject.toml -o requirements.lock
 
-clean:  ## remove the environment, the state and the caches
-	@rm -rf .venv .shoal .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis dist
+clean:  ## remove the environment, the caches and the state, but for the library
+	@[ ! -d .shoal ] || find .shoal -mindepth 1 -maxdepth 1 ! -name library -exec rm -rf {} +
+	@rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis dist

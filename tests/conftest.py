@@ -15,6 +15,8 @@ from shoal.home import prepare_kernel_cache
 # Before SHOAL_HOME moves: the kernels compiled ahead of the tests lie in the real home.
 prepare_kernel_cache()
 os.environ["MPLBACKEND"] = "Agg"
+# While tests are collected, which some are once for every name: the user's own names are none of theirs.
+os.environ["SHOAL_LIBRARY"] = os.path.join(os.devnull, "none")
 
 Array = Any
 
@@ -31,6 +33,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def own_home(tmp_path_factory: pytest.TempPathFactory) -> None:
     """No test reads or writes the state of the user's own runs."""
     os.environ["SHOAL_HOME"] = str(tmp_path_factory.mktemp("home"))
+    os.environ.pop("SHOAL_LIBRARY", None)
 
 
 @pytest.fixture(scope="session")

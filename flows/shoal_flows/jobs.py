@@ -16,6 +16,8 @@ from shoal.pictures.answer import Answer
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Trajectory
 
+from shoal_flows import inputs
+
 _POINTS = 300
 """Samples of a trajectory that is drawn and logged."""
 
@@ -30,6 +32,11 @@ class Cell:
     engine: str = "gauss"
     values: dict[str, Any] = field(default_factory=dict)
     label: str = ""
+
+    @property
+    def title(self) -> str:
+        """How the problem is called."""
+        return inputs.title(self.problem)
 
     @property
     def name(self) -> str:

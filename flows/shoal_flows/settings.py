@@ -16,6 +16,8 @@ def apply() -> None:
     # Alembic announces every migration of a new database.
     for name in ("mlflow", "alembic"):
         logging.getLogger(name).setLevel(logging.WARNING)
+    # An environment without pip, as of uv and in containers, is none to be warned of with every model.
+    logging.getLogger("mlflow.utils.environment").setLevel(logging.ERROR)
 
 
 def defaults(folder: Path) -> dict[str, str]:

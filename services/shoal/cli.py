@@ -24,6 +24,7 @@ from shoal.commands.built_in import problems, scenes
 from shoal.commands.forward import compare, simulate, sweep
 from shoal.commands.installation import doctor, export_fmu, serve
 from shoal.commands.inverse import design, identify
+from shoal.commands.library import library
 from shoal.errors import ComputationError, InputError, ShoalError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -102,7 +103,7 @@ def _extras_named() -> Iterator[None]:
 @click.group(
     cls=Program,
     commands=[
-        *(scenes, problems),
+        *(scenes, problems, library),
         *(simulate, sweep, compare),
         *(statics, modes, reactions),
         *(identify, design),
@@ -114,5 +115,5 @@ def _extras_named() -> Iterator[None]:
 def main() -> None:
     """Simulate and identify planar rigid-flexible machines, and check the answers against other engines.
 
-    SCENE and PROBLEM are a built-in name (see `shoal scenes`) or a YAML file.
+    SCENE and PROBLEM are a name (see `shoal scenes`; `shoal library add` makes more) or a YAML file.
     """

@@ -19,10 +19,15 @@ _IMPORT = re.compile(r"^\s*from shoal\.((?:mechanics|engines\.tree)[\w.]*) impor
 
 def home() -> Path:
     """The folder of all state, made on demand: $SHOAL_HOME, else ./.shoal. Raises InputError."""
-    folder = Path(os.environ.get("SHOAL_HOME") or ".shoal").expanduser().absolute()
+    folder = stated_home()
     if not _writable(folder):
         raise InputError(f"SHOAL_HOME: cannot write to {folder}; set SHOAL_HOME to a folder that you may write to")
     return folder
+
+
+def stated_home() -> Path:
+    """The same folder, whether or not it is there."""
+    return Path(os.environ.get("SHOAL_HOME") or ".shoal").expanduser().absolute()
 
 
 def kernel_cache(package: Path = _PACKAGE) -> Path:

@@ -61,8 +61,8 @@ def test_large_body(gauss: httpx.Client) -> None:
     "name", ["../../etc/passwd", "/etc/passwd", "x.yaml", "file:///etc/passwd", "n-four-bar-" + "9" * 60, "http://x/"]
 )
 def test_names_are_no_paths(gauss: httpx.Client, name: str) -> None:
-    assert "no built-in scene" in refused(gauss, "/v1/simulate", json={"scene": name})[2]
-    assert "no built-in problem" in refused(gauss, "/v1/identifications", json={"problem": name})[2]
+    assert "no such scene" in refused(gauss, "/v1/simulate", json={"scene": name})[2]
+    assert "no such problem" in refused(gauss, "/v1/identifications", json={"problem": name})[2]
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_expressions(gauss: httpx.Client, machine: Machine, text: str) -> None:
         ({"source": {"kind": "engine", "engine": "http://127.0.0.1:1/", "stop": 1, "count": 5}}, "no engine"),
         ({"source": {"kind": "engine", "engine": "gauss", "stop": 1, "count": 10**12}}, "takes"),
         ({"source": {"kind": "engine", "engine": "gauss", "stop": 1e9, "count": 5}}, "computes"),
-        ({"scene": "machine.yaml"}, "no built-in scene"),
+        ({"scene": "machine.yaml"}, "no such scene"),
         ({"scene": ["single-pendulum"]}, "scene"),
         ({"ties": {"bodies.OA.mass": "theta.__class__"}}, "ties"),
         ({"ties": {"bodies.OA.mass": "theta" + "*1" * 400}}, "longer than"),

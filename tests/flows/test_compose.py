@@ -74,6 +74,69 @@ def test_services_wait_until_what_they_need_is_healthy() -> None:
     assert set(needs["deploy"]) == {"worker"}
 
 
+def test_one_service_builds_the_image_of_all() -> None:
+    """Compose refuses to build the same tag for several services."""
+    assert [name for name, service in SERVICES.items() if "build" in service] == ["mlflow"]
+    assert {SERVICES[name]["image"] for name in OURS} == {SERVICES["mlflow"]["image"]}
+
+
+@pytest.mark.parametrize("name", ["worker", "nightly", "deploy"])
+def test_links_lead_to_where_a_browser_finds_the_servers(name: str) -> None:
+    stated = SERVICES[name]["environment"]
+    for link, server in (("SHOAL_MLFLOW_URL", "mlflow"), ("PREFECT_UI_URL", "prefect")):
+        port = SERVICES[server]["ports"][0].rpartition(":")[0]
+        assert stated[link] == f"http://{port}"
+
+
+def test_kernels_and_the_library_outlive_their_containers() -> None:
+    """Kernels for another processor than that of the build take minutes; entries of the library are a user's."""
+    text = (ROOT / "Dockerfile").read_text()
+    for name in ("worker", "nightly", "gauss", "dask-worker"):
+        mounted = dict(volume.split(":")[1::-1] for volume in SERVICES[name]["volumes"])
+        assert SERVICES[name]["environment"]["NUMBA_CACHE_DIR"] in mounted
+    of_gauss = {v.partition(":")[0] for v in SERVICES["gauss"]["volumes"]}
+    shared = of_gauss & {v.partition(":")[0] for v in SERVICES["worker"]["volumes"]}
+    assert shared == {"library"}, "whoever writes machine code has it run"
+    for name in ("worker", "nightly", "deploy", "gauss", "exudyn", "casadi", "dask-worker"):
+        assert any(volume.startswith("library:/var/lib/library") for volume in SERVICES[name]["volumes"])
+    assert "SHOAL_LIBRARY=/var/lib/library" in text
+    made = re.search(r"install -d -o shoal -g shoal (.+)", text)
+    assert made is not None
+    assert {"/var/lib/library", "/var/lib/kernels"} <= set(made[1].split())
+    assert SERVICES["gauss"]["healthcheck"]["start_period"] == "300s"
+    assert SERVICES["gauss"]["deploy"]["resources"]["limits"]["memory"] == "3g"
+
+
+def test_containers_that_begin_together_find_the_kernels_of_their_image(tmp_path: Path) -> None:
+    image, cache = tmp_path / "image", tmp_path / "cache"
+    (image / "kernels").mkdir(parents=True)
+    (image / "kernels" / "one.nbi").write_text("code")
+    for version in ("first", "second"):
+        (image / "kernels.version").write_text(f"{version}\n")
+        environment = {"PATH": "/usr/bin:/bin", "SHOAL_IMAGE": str(image), "NUMBA_CACHE_DIR": str(cache)}
+        command = ["sh", str(ROOT / "deploy/entrypoint.sh"), "printenv", "NUMBA_CACHE_DIR"]
+        running = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(8)]
+        assert {process.communicate()[0] for process in running} == {f"{cache / version}\n"}
+        assert (cache / version / "one.nbi").read_text() == "code"
+        (cache / version / "two.nbi").write_text("compiled here")
+    assert sorted(path.name for path in cache.iterdir()) == ["first", "second"]
+    assert (cache / "first" / "two.nbi").exists()
+
+
+def test_a_checkout_that_others_may_not_read_starts(tmp_path: Path) -> None:
+    """Files are 0600 then; what containers read as other users is made readable, the passwords' folder is not."""
+    for name in ("secrets.sh", "postgres-init.sh"):
+        shutil.copy(ROOT / "deploy" / name, tmp_path)
+        (tmp_path / name).chmod(0o600)
+    subprocess.run(["sh", "-c", f"umask 077 && sh {tmp_path / 'secrets.sh'}"], check=True)
+    read = [tmp_path / "postgres-init.sh", *(tmp_path / "secrets").iterdir()]
+    assert all(path.stat().st_mode & 0o004 for path in read)
+    assert (tmp_path / "secrets").stat().st_mode & 0o077 == 0
+    copied = re.findall(r"^COPY (?!--from)(.+) /opt/shoal/\S+$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    assert len(copied) == 2
+    assert all(line.startswith("--chmod=") for line in copied)
+
+
 def test_secrets_come_from_files_and_every_volume_is_named() -> None:
     used = {secret for service in SERVICES.values() for secret in service.get("secrets", [])}
     assert used == set(COMPOSE["secrets"])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +12,7 @@ import pytest
 import yaml
 from shoal.engines import ENGINES
 from shoal.identification.methods import METHODS
-from shoal.scene.load import scene_names
+from shoal.scene.load import scene_library, scene_names
 
 DEPLOYMENTS: dict[str, dict[str, Any]] = {
     one["name"]: one for one in yaml.safe_load((Path(__file__).parents[2] / "prefect.yaml").read_text())["deployments"]
@@ -51,6 +54,28 @@ def test_forms_offer_every_scene_engine_and_method(flows: Any) -> None:
     assert forward["scene"]["enum"] == scene_names()
     assert forward["engine"]["enum"] == list(ENGINES)
     assert identify["methods"]["items"]["enum"] == list(METHODS)
+
+
+def test_what_the_form_does_not_offer_is_for_the_flow_to_refuse() -> None:
+    """An entry of the library that is younger than the deployment, YAML, a recording's path."""
+    strict = {name for name, stated in DEPLOYMENTS.items() if stated.get("enforce_parameter_schema", True)}
+    assert strict == {"validation"}
+
+
+def test_forms_offer_the_names_of_the_library(tmp_path: Path) -> None:
+    """As they are when the deployments are stated, which `make up` does at its start."""
+    scene = (scene_library() / "single-pendulum.yaml").read_text()
+    (tmp_path / "arm.yaml").write_text(scene)
+    program = (
+        "from shoal import library; library.add('arm.yaml')\n"
+        "from shoal_flows.flows import FLOWS\n"
+        "from prefect.utilities.callables import parameter_schema\n"
+        "print('arm' in parameter_schema(FLOWS['forward']).properties['scene']['enum'])\n"
+    )
+    environment = {**os.environ, "SHOAL_LIBRARY": str(tmp_path / "library")}
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
 
 
 def test_nights_do_not_pile_up(flows: Any) -> None:

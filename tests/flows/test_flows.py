@@ -7,8 +7,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import yaml
+from shoal import library, simulate
 from shoal.errors import InputError
+from shoal.shelf import shelf
 from shoal_flows import run
 from shoal_flows.rerun import rerun
 
@@ -152,6 +156,50 @@ def test_a_study_is_repeated_from_its_run_alone(tmp_path: Path) -> None:
     # As if the first had found something else.
     _client().log_metric(first.run_id, "final/x", 0.0)
     assert set(rerun(first.run_id).different) == {"final/x"}
+
+
+def test_what_is_taken_from_the_library_is_kept_with_the_run(tmp_path: Path) -> None:
+    """The problem, the scene that it names, and the recording: the library may change and be emptied."""
+    machine = yaml.safe_load((files("shoal.scene") / "library" / "single-pendulum.yaml").read_text())
+    (tmp_path / "arm.yaml").write_text(yaml.safe_dump(machine))
+    library.add(tmp_path / "arm.yaml")
+    motion = simulate("arm", np.linspace(0.0, 0.5, 11), values={"initial.OA.angle": 0.3}, verify=False)
+    rows = np.column_stack([motion.times, *motion.marker("A").T])
+    (tmp_path / "swing.csv").write_text("t,x,y\n" + "\n".join(",".join(map(repr, row)) for row in rows.tolist()) + "\n")
+    library.add(tmp_path / "swing.csv")
+    problem = {
+        "name": "start of the arm",
+        "scene": "arm",
+        "parameters": {"theta": {"path": "initial.OA.angle", "lower": -1.5, "upper": 1.5}},
+        "channels": [{"marker": "A", "quantity": axis, "column": axis} for axis in ("x", "y")],
+        "source": {"kind": "file"},
+    }
+    (tmp_path / "start.yaml").write_text(yaml.safe_dump(problem))
+    library.add(tmp_path / "start.yaml")
+    found = run.run_flow("identify", {"problem": "start", "methods": "least-squares", "data": "swing"})
+    assert found.fits[0].estimate.parameters["theta"].value == pytest.approx(0.3, abs=1e-9)
+    tags = _client().get_run(found.run_id).data.tags
+    assert (tags["problem"], tags["mlflow.runName"]) == ("start", "start · identify")
+    (tmp_path / "arm.yaml").write_text(yaml.safe_dump({**machine, "gravity": [0.0, -1.62]}))
+    library.add(tmp_path / "arm.yaml")
+    for entry in library.entries():
+        shelf().remove(entry.kind, entry.name)
+    again = rerun(found.run_id)
+    assert not again.different
+    assert len(again.figures) > 5
+
+
+def test_a_scene_may_be_given_as_yaml() -> None:
+    text = (files("shoal.scene") / "library" / "single-pendulum.yaml").read_text()
+    found = run.run_flow("forward", {"scene": json.dumps(text)})
+    assert found.trusted
+    from prefect.client.orchestration import get_client
+
+    with get_client(sync_client=True) as client:
+        assert "forward own" in {one.name for one in client.read_flow_runs()}
+    assert {"scene.yaml", "call.json", "inputs"} <= {item.path for item in _client().list_artifacts(found.run_id)}
+    with pytest.raises(InputError, match=r"scene|bodies"):
+        run.run_flow("forward", {"scene": json.dumps(text.replace("bodies", "body"))})
 
 
 def test_an_identification_is_repeated_with_all_its_figures(study: Any) -> None:

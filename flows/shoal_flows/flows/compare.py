@@ -8,12 +8,13 @@ from shoal.errors import InputError
 
 from shoal_flows.flows import tables
 from shoal_flows.flows.parameters import Engines, SceneName, Values
-from shoal_flows.flows.shown import ended, progress, show_result
+from shoal_flows.flows.shown import ended, named, progress, show_result
 from shoal_flows.flows.tasks import run_engines
+from shoal_flows.inputs import held, title
 from shoal_flows.results import Compared
 
 
-@flow(name="compare", flow_run_name="compare {scene}")
+@flow(name="compare", flow_run_name=named("compare", "scene"))
 def compare(
     scene: SceneName = "flexible-double-pendulum",
     engines: Engines = list(COMPARED),  # noqa: B006 - Prefect shows the default in its form
@@ -22,15 +23,17 @@ def compare(
     """Simulate a scene on several engines and log how far apart they come out.
 
     Args:
-        scene: The machine to simulate; `shoal scenes` says what each is.
+        scene: The machine to simulate: a name (see `shoal scenes`), or YAML.
         engines: Who simulates, two or more; gauss is Shoal's own solver.
         values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
     """
     if len(set(engines)) < 2:
         raise InputError(f"engines: give two different ones or more, found {', '.join(engines)}")
-    with progress(1, f"{scene} on {', '.join(engines)}"):
+    scene = held("scene", "scenes", scene)
+    name = title(scene)
+    with progress(1, f"{name} on {', '.join(engines)}"):
         comparison, picture, run_id = run_engines(scene, engines, values)
-    show_result(f"{scene}: engines", tables.of_comparison(comparison), run_id)
-    wrong = [f"{name}: {motion.message}" for name, motion in comparison.trajectories.items() if not motion.ok]
-    refused = [f"{name} refuses the scene: {reason}" for name, reason in comparison.refused.items()]
+    show_result(f"{name}: engines", tables.of_comparison(comparison), run_id)
+    wrong = [f"{engine}: {motion.message}" for engine, motion in comparison.trajectories.items() if not motion.ok]
+    refused = [f"{engine} refuses the scene: {reason}" for engine, reason in comparison.refused.items()]
     return ended(Compared(comparison, run_id, picture), [*refused, *wrong])

@@ -10,16 +10,17 @@ from shoal.identification.methods import get_method
 
 from shoal_flows.flows.parameters import EngineName, Methods, ProblemName, Seeds, Values
 from shoal_flows.flows.runner import side_by_side
-from shoal_flows.flows.shown import ended, progress, show_result
+from shoal_flows.flows.shown import ended, named, progress, show_result
 from shoal_flows.flows.study import open_running
 from shoal_flows.flows.tasks import measure
+from shoal_flows.inputs import held, title
 from shoal_flows.jobs import Cell
 from shoal_flows.pictures import draw_convergence, draw_residuals, draw_trajectory
 from shoal_flows.results import Study
 from shoal_flows.tracking.identification import answer, summary
 
 
-@flow(name="identify", flow_run_name="identify {problem}", task_runner=side_by_side())
+@flow(name="identify", flow_run_name=named("identify", "problem"), task_runner=side_by_side())
 def identify(
     problem: ProblemName = "paper-case-1",
     methods: Methods = ["auto"],  # noqa: B006 - Prefect shows the default in its form; nothing changes it
@@ -31,28 +32,30 @@ def identify(
     """Find the parameters of a problem from measured motion, by every method with every seed.
 
     Args:
-        problem: What is measured and what is to be found from it; `shoal scenes` says what each is.
+        problem: What is measured and what is to be found from it: a name (see `shoal problems`), or YAML.
         methods: How to search; auto takes what suits the problem.
         seeds: Of the random numbers; every method runs once with each.
-        data: Path of a recording (CSV) where the worker runs; empty for the data of the problem.
+        data: Name of a recording in the library, or its path where the worker runs; empty for the data of the problem.
         engine: Who simulates; gauss is Shoal's own solver.
         values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
     """
     for method in methods:
         get_method(method)
+    problem, data = held("problem", "problems", problem), held("data", "recordings", data)
     load_problem(problem).load_scene(values)
+    name = title(problem)
     cells = [Cell(problem, method, seed, engine, values) for method, seed in product(methods, seeds)]
     measurement = measure(problem, data or None)
     pictures = {"convergence": draw_convergence, "trajectory": draw_trajectory, "residuals": draw_residuals}
     with (
-        progress(len(cells), f"{problem}: optimisations") as bar,
-        open_running(f"{problem} · identify", cells, measurement) as study,
+        progress(len(cells), f"{name}: optimisations") as bar,
+        open_running(f"{name} · identify", cells, measurement) as study,
     ):
         for cell in cells:
             study.submit(cell)
-        found = study.finish(problem, pictures, ended=bar.advance)
+        found = study.finish(name, pictures, ended=bar.advance)
         study.publish(found)
-        show_result(problem, summary(found.fits, found.failures), found.run_id, answer(found.fits))
+        show_result(name, summary(found.fits, found.failures), found.run_id, answer(found.fits))
         study.check_any()
     doubtful = {f.cell.name: f.estimate for f in found.fits if not f.estimate.verdict.trusted}
     doubts = [f"{name}: {estimate.verdict}: {estimate.message}" for name, estimate in doubtful.items()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar, cast
 
@@ -16,6 +16,7 @@ from prefect.artifacts import (
 from prefect.states import Completed
 
 from shoal_flows import settings
+from shoal_flows.inputs import headed
 from shoal_flows.tracking.record import LOCAL
 from shoal_flows.tracking.store import connect
 
@@ -65,6 +66,17 @@ def _where(run_id: str) -> str:
         return "MLflow does not answer: the run is kept in the outbox; `shoal upload` sends it."
     address = run_address(run_id)
     return f"[Run {run_id} in MLflow]({address})" if address else f"Run `{run_id}` in MLflow; `shoal ui` shows it."
+
+
+def named(flow: str, parameter: str) -> Callable[[], str]:
+    """How the runs of a flow are called: by the title of what it was given."""
+
+    def name() -> str:
+        from prefect.runtime import flow_run
+
+        return f"{flow} {headed(str(flow_run.parameters[parameter]))}"
+
+    return name
 
 
 class Bar:

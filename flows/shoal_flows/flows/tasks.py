@@ -15,33 +15,33 @@ from shoal.identification import Measurement
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
-from shoal_flows import events, fingerprint, jobs, pictures, remembered, workers
+from shoal_flows import events, fingerprint, inputs, jobs, pictures, remembered, workers
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.pictures import Picture
 from shoal_flows.tracking import engines as tracked
 from shoal_flows.tracking.identification import log_fit
 
 
-@task(task_run_name="measure {problem}", cache_policy=NO_CACHE)
+@task(task_run_name="measure", cache_policy=NO_CACHE)
 def measure(problem: str, data: str | None) -> Measurement:
     """The motion to fit."""
-    with events.work(f"data of {problem}"):
+    with events.work(f"data of {inputs.title(problem)}"):
         return workers.run(jobs.measured, problem, data)
 
 
-@task(task_run_name="{cell.problem} {cell.name}", cache_policy=NO_CACHE)
+@task(task_run_name="{cell.title} {cell.name}", cache_policy=NO_CACHE)
 def optimise(cell: Cell, measurement: Measurement, study: str) -> Fit:
     """One optimisation, logged as a child of the run `study`."""
-    with events.work(f"{cell.problem}, {cell.name}"):
+    with events.work(f"{cell.title}, {cell.name}"):
         fit, album = remembered.run(fingerprint.of_cell(cell, measurement), pictures.fitted, cell, measurement)
         log_fit(fit, album, study)
         return fit
 
 
-@task(task_run_name="compare {scene}", cache_policy=NO_CACHE)
+@task(task_run_name="compare", cache_policy=NO_CACHE)
 def run_engines(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -> tuple[Comparison, Picture, str]:
     """One scene on several engines; with its picture and the id of its run."""
-    with events.work(f"{scene} on {', '.join(engines)}"):
+    with events.work(f"{inputs.title(scene)} on {', '.join(engines)}"):
         key = fingerprint.of_simulations("compare", scene, values, tuple(engines))
         comparison = remembered.run(key, jobs.compared, scene, engines, values)
         marker = tracked.tip(comparison.scene)
@@ -49,18 +49,18 @@ def run_engines(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -
         return comparison, picture, tracked.log_comparison(comparison, picture[0])
 
 
-@task(task_run_name="simulate {scene}", cache_policy=NO_CACHE)
+@task(task_run_name="simulate", cache_policy=NO_CACHE)
 def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene, Trajectory, str]:
     """One motion, with the id of its run."""
-    with events.work(f"{scene} on {engine}"):
+    with events.work(f"{inputs.title(scene)} on {engine}"):
         wanted, motion = workers.run(jobs.simulated, scene, engine, values)
         return wanted, motion, tracked.log_forward(wanted, motion)
 
 
-@task(task_run_name="sweep {scene}", cache_policy=NO_CACHE)
+@task(task_run_name="sweep", cache_policy=NO_CACHE)
 def run_grid(scene: str, vary: Mapping[str, Array], engine: str, time: float | None) -> tuple[Sweep, str]:
     """One scene over a grid, with the id of its run."""
-    with events.work(f"{scene} over {', '.join(vary)}"):
+    with events.work(f"{inputs.title(scene)} over {', '.join(vary)}"):
         whole = joined([part.result() for part in _parts(scene, vary, engine, time)])
         result = workers.run(jobs.spot_checked, whole, engine)
         return result, tracked.log_sweep(result)

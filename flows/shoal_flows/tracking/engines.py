@@ -14,6 +14,7 @@ from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory, json_text
 
+from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
 
@@ -55,6 +56,7 @@ def log_sweep(result: Sweep) -> str:
     with open_run("Sweep", f"{scene.name} · sweep", description=scene.description, tags=tags) as run:
         spans = {f"vary.{path}": f"{v.min():g} to {v.max():g}" for path, v in result.grid.items()}
         run.params({**_scene(scene), "engine": result.engine, "time": result.time, **spans})
+        run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
         run.metric("final/points", len(result.status))
         run.metric("final/wall_s", result.wall_s)
         run.metric("final/failed_points", sum(status != "ok" for status in result.status))
@@ -77,6 +79,7 @@ def tip(scene: Scene) -> str:
 def _log_engine(run: Run, scene: Scene, motion: Trajectory) -> None:
     made = {f"model.{name}": value for name, value in motion.model.items() if not name.startswith("initial")}
     run.params({**_scene(scene), "engine": motion.engine, **made})
+    run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
     x, y = motion.marker(tip(scene))[-1]
     run.metric("final/x", float(x))
     run.metric("final/y", float(y))

@@ -25,7 +25,7 @@ ARCHIVE = "estimate.json"
 @contextmanager
 def open_study(name: str, cells: Sequence[Cell], measurement: Measurement) -> Iterator[Run]:
     """The parent run of a study."""
-    problem = cells[0].problem
+    problem = cells[0].title
     description = f"{len(cells)} optimisations of {problem}; data: {measurement.origin}"
     with open_run("Identification", name, description=description, tags={"kind": "study", "problem": problem}) as run:
         run.params({"problem": problem, "data": measurement.origin, "cells": ", ".join(cell.name for cell in cells)})
@@ -83,13 +83,13 @@ def _values(estimate: Estimate) -> str:
 def log_fit(fit: Fit, album: Album, study: str) -> str:
     """A child of the run `study` with all there is to know about one fit; returns its id."""
     cell, estimate = fit.cell, fit.estimate
-    tags = {"kind": "optimisation", "problem": cell.problem, "method": cell.method, "verdict": str(estimate.verdict)}
+    tags = {"kind": "optimisation", "problem": cell.title, "method": cell.method, "verdict": str(estimate.verdict)}
     with open_run(
         "Identification", cell.name, tags=tags, parent=study, description=estimate.message, took=estimate.wall_s
     ) as run:
         scene = estimate.scene
         mesh = {name: b.elements for name, b in scene.bodies.items() if isinstance(b, Rod) and b.element != "rigid"}
-        run.params({"problem": cell.problem, "method": cell.method, "seed": cell.seed, "engine": cell.engine})
+        run.params({"problem": cell.title, "method": cell.method, "seed": cell.seed, "engine": cell.engine})
         run.params({"scene": scene.name, "scene.fingerprint": scene.fingerprint, "data": estimate.data})
         run.params({"mesh": ", ".join(f"{name}: {n}" for name, n in mesh.items()) or "rigid", **cell.values})
         _log_progress(run, fit)

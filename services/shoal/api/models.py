@@ -30,6 +30,7 @@ from shoal.identification.methods.lanes import differentiate_many
 from shoal.identification.problem import Parameter
 from shoal.identification.recording.source import EngineSource, FileSource
 from shoal.scene.record import one_line
+from shoal.shelf import shelf
 from shoal.trajectory import Array
 
 
@@ -132,8 +133,8 @@ def _problem(bench: Bench, config: Config) -> Problem:
 
 
 @lru_cache(maxsize=4)
-def _model(bench: Bench, name: str, config: bytes) -> VectorFunction:
-    """The model of that name; the data of a problem are computed once."""
+def _model(bench: Bench, name: str, config: bytes, library: int) -> VectorFunction:
+    """The model of that name; the data of a problem are computed once. library: its state, which names depend on."""
     try:
         return _MAKE[name](bench, Config.model_validate(orjson.loads(config)))
     except ValidationError as error:
@@ -144,7 +145,7 @@ def bridge(bench: Bench, asked: ModelTask, note: Note) -> bytes:
     """Answer a call. Raises InputError, ComputationError."""
     call = asked.call
     # Unsorted: the order of the parameters is that of the vectors.
-    model = _model(bench, call.name, orjson.dumps(call.config))
+    model = _model(bench, call.name, orjson.dumps(call.config), shelf().changed)
     if asked.operation == "InputSizes":
         return to_json({"inputSizes": [model.inputs]})
     if asked.operation == "OutputSizes":

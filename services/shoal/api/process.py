@@ -14,14 +14,15 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from shoal.api import models, tasks
+from shoal.api import held, models, tasks
+from shoal.api.held import NoSuch
 from shoal.api.limits import TooMuch
 from shoal.api.settings import Settings
 from shoal.api.tasks import Bench, Note
 from shoal.engines.contract import Engine
 from shoal.errors import InputError, ShoalError
-from shoal.identification import Problem, problem_names
-from shoal.scene import Scene, load_scene, scene_names
+from shoal.identification import Problem
+from shoal.scene import Scene, load_scene
 from shoal.versions import versions
 
 TASKS: dict[str, Callable[[Bench, Any, Note], bytes]] = {
@@ -29,6 +30,7 @@ TASKS: dict[str, Callable[[Bench, Any, Note], bytes]] = {
     "check": tasks.check,
     "identify": tasks.identification,
     "model": models.bridge,
+    "library": held.library,
 }
 PACKAGES = ("shoal", "numpy", "scipy", "numba", "exudyn", "casadi")
 log = logging.getLogger("shoal.api")
@@ -42,6 +44,8 @@ def main(pipe: Connection, make_engine: Callable[[], Engine], settings: Settings
     engine = _made(pipe, make_engine)
     if engine is None:
         return
+    # Where it is does not depend on the folder that this process works in, nor on what a fork server was started with.
+    os.environ["SHOAL_LIBRARY"] = str(settings.library.absolute())
     os.chdir(folder)
     bench = Bench(engine, settings)
     while True:
@@ -68,12 +72,11 @@ def _made(pipe: Connection, make_engine: Callable[[], Engine]) -> Engine | None:
 
 
 def about(engine: Engine) -> dict[str, Any]:
-    """What clients may want to know: the engine's capabilities, built-in names, schemas, versions."""
+    """What clients may want to know: the engine's capabilities, schemas, versions."""
     able = engine.capabilities
     kinds = {name: sorted(getattr(able, name)) for name in ("elements", "joints", "loads", "features")}
     return {
         "capabilities": {"engine": engine.name, "lanes": able.lanes, **kinds},
-        "library": {"scenes": scene_names(), "problems": problem_names()},
         "schemas": {"scene": Scene.model_json_schema(), "problem": Problem.model_json_schema()},
         "version": {"engine": engine.name, "versions": versions(PACKAGES)},
     }
@@ -83,6 +86,8 @@ def _result(bench: Bench, task: str, request: Any, note: Note) -> tuple[str, Any
     """(`done`, JSON), or the kind of a refusal and its text."""
     try:
         return "done", TASKS[task](bench, request, note)
+    except NoSuch as error:
+        return "not-found", str(error)
     except TooMuch as error:
         return "too-much", str(error)
     except InputError as error:

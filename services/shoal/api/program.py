@@ -65,7 +65,7 @@ def create_program(engine: str, settings: Settings | None = None, make_engine: M
     program.state.settings, program.state.keys = settings, settings.keys()
     guard = [Depends(require_key)] if program.state.keys else []
     program.include_router(routes.health)
-    for router in (routes.v1, routes.identifications, umbridge.router):
+    for router in (routes.v1, routes.library, routes.identifications, umbridge.router):
         program.include_router(router, dependencies=guard)
     for kind in (Refusal, RequestValidationError, HTTPException):
         program.add_exception_handler(kind, on_refusal)

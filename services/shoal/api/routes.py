@@ -17,7 +17,11 @@ from shoal.api.schemas import (
     IdentifyRequest,
     JobStatus,
     Library,
+    LibraryDocument,
+    LibraryEntry,
+    LibraryTask,
     Motion,
+    PutRequest,
     SimulateRequest,
     VersionDocument,
 )
@@ -27,6 +31,7 @@ COMPUTING = ("input", "too-much", "body-too-large", "too-slow", "busy", "crashed
 
 health = APIRouter(tags=["health"])
 v1 = APIRouter(prefix="/v1", route_class=StrictRoute)
+library = APIRouter(prefix="/v1/library", route_class=StrictRoute, tags=["library"])
 identifications = APIRouter(prefix="/v1/identifications", route_class=StrictRoute, tags=["identifications"])
 
 
@@ -51,6 +56,8 @@ Ready = Depends(require_ready)
 Calls = Annotated[Pool, Depends(_calls)]
 AllJobs = Annotated[Jobs, Depends(_jobs)]
 JobId = Annotated[str, Path(max_length=64)]
+EntryKind = Annotated[str, Path(max_length=64)]
+EntryName = Annotated[str, Path(max_length=100)]
 
 
 @health.get("/health")
@@ -77,12 +84,6 @@ async def version(calls: Calls) -> VersionDocument:
 async def capabilities(calls: Calls) -> EngineDocument:
     """What the engine can simulate."""
     return EngineDocument(**calls.about["capabilities"])
-
-
-@v1.get("/library", dependencies=[Ready], responses=documented("not-ready"))
-async def library(calls: Calls) -> Library:
-    """Names of the built-in scenes and problems."""
-    return Library(**calls.about["library"])
 
 
 @v1.get("/schemas/{kind}", dependencies=[Ready], responses=documented("not-ready", "input"))
@@ -134,6 +135,40 @@ async def result(id: JobId, jobs: AllJobs) -> Response:
     if job.state != "done":
         raise Refusal("conflict", f"the identification is {job.state}", "id")
     return Response(job.result, media_type="application/json")
+
+
+@library.get("", response_model=Library, dependencies=[Ready], responses=documented(*COMPUTING))
+async def list_library(request: Request, calls: Calls) -> Response:
+    """Names of the built-in scenes and problems, and the entries of the library."""
+    return await _of_library(request, calls, LibraryTask("list"))
+
+
+@library.get(
+    "/{kind}/{name}",
+    response_model=LibraryDocument,
+    dependencies=[Ready],
+    responses=documented("not-found", *COMPUTING),
+)
+async def get_entry(kind: EntryKind, name: EntryName, request: Request, calls: Calls) -> Response:
+    """An entry with its files; NAME@VERSION is an earlier version."""
+    return await _of_library(request, calls, LibraryTask("get", kind, name))
+
+
+@library.put("/{kind}/{name}", response_model=LibraryEntry, dependencies=[Ready], responses=documented(*COMPUTING))
+async def put_entry(kind: EntryKind, name: EntryName, asked: PutRequest, request: Request, calls: Calls) -> Response:
+    """Check an entry and keep it; versions that were there stay."""
+    return await _of_library(request, calls, LibraryTask("put", kind, name, asked.files))
+
+
+@library.delete("/{kind}/{name}", status_code=204, dependencies=[Ready], responses=documented("not-found", *COMPUTING))
+async def delete_entry(kind: EntryKind, name: EntryName, request: Request, calls: Calls) -> None:
+    """Forget an entry with all its versions."""
+    await _of_library(request, calls, LibraryTask("delete", kind, name))
+
+
+async def _of_library(request: Request, calls: Pool, task: LibraryTask) -> Response:
+    answer = await calls.run("library", task, request.app.state.settings.wall_seconds)
+    return Response(answer, media_type="application/json")
 
 
 async def known_job(id: JobId, jobs: AllJobs) -> None:

@@ -24,7 +24,7 @@ class Asked(BaseModel):
 
 
 class SimulateRequest(Asked):
-    """A scene (a built-in name, or an object as /v1/schemas/scene describes it), and when to look at it.
+    """A scene (a name, or an object as /v1/schemas/scene describes it), and when to look at it.
 
     values: fields of the scene to set, by path; times: sampling instants [s], else the scene's own
     lanes: path -> one number per lane; then one scene per lane is simulated
@@ -68,14 +68,15 @@ class Table(Asked):
 
 
 class IdentifyRequest(Asked):
-    """A problem (a built-in name, or an object as /v1/schemas/problem describes it), and how to solve it.
+    """A problem (a name, or an object as /v1/schemas/problem describes it), and how to solve it.
 
-    The `scene` of a problem is a built-in name, or an object. recordings: by the problem's names, `recording` where it
-    has but one source. The other fields are those of `shoal identify`; time_limit in s.
+    The `scene` of a problem is a name, or an object. recordings: by the problem's names, `recording` where it
+    has but one source; each a table, or the name of one in the library. The other fields are those of `shoal identify`;
+    time_limit in s.
     """
 
     problem: BuiltIn | dict[str, Any]
-    recordings: dict[RecordingName, Table] = {}
+    recordings: dict[RecordingName, Table | BuiltIn] = {}
     values: Fields = {}
     method: BuiltIn | None = None
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
@@ -114,11 +115,43 @@ class EngineDocument(BaseModel):
     lanes: bool
 
 
+class LibraryEntry(BaseModel):
+    """What the library holds under a name. kind: scenes, recordings or problems; version: a hash of the content."""
+
+    kind: str
+    name: str
+    version: str
+    description: str
+
+
 class Library(BaseModel):
-    """Built-in names."""
+    """Built-in names, and the entries of this installation's own library."""
 
     scenes: list[str]
     problems: list[str]
+    entries: list[LibraryEntry]
+
+
+class LibraryDocument(LibraryEntry):
+    """An entry with all its versions, the oldest first, and its files (base64) by path."""
+
+    versions: list[str]
+    files: dict[str, str]
+
+
+class PutRequest(Asked):
+    """Files of an entry by path, base64; NAME.yaml is its document, the others are those that it names."""
+
+    files: Annotated[dict[Path, Annotated[str, Field(pattern=r"^[A-Za-z0-9+/]*={0,2}$")]], Field(min_length=1)]
+
+
+class LibraryTask(NamedTuple):
+    """What is asked of the library; name is NAME or NAME@VERSION."""
+
+    operation: Literal["list", "get", "put", "delete"]
+    kind: str = ""
+    name: str = ""
+    files: dict[str, str] | None = None
 
 
 class VersionDocument(BaseModel):

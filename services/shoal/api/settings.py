@@ -10,6 +10,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from shoal.errors import InputError
 from shoal.scene.record import one_line
+from shoal.shelf import shelf
 
 PREFIX = "SHOAL_API_"
 Count = Annotated[int, Field(ge=1)]
@@ -29,6 +30,7 @@ class Settings(BaseSettings):
     max_elements: of a scene; max_values: samples x markers x lanes of a result
     max_memory_mb: data of one worker process [MiB]
     keep_jobs, keep_seconds: how many finished identifications are kept, and for how long
+    library: folder of the library, else that of $SHOAL_LIBRARY; library_mb: of all files in it [MB]
     model: the problem that UM-Bridge's models stand for where a call names none
     """
 
@@ -51,6 +53,8 @@ class Settings(BaseSettings):
     max_memory_mb: Count = 4096
     keep_jobs: Count = 100
     keep_seconds: Seconds = 3600.0
+    library: Path = Field(default_factory=lambda: shelf().root)
+    library_mb: Count = 1000
     model: str = "paper-case-1"
 
     @classmethod

@@ -59,8 +59,9 @@ def check(bench: Bench, request: IdentifyRequest, note: Note) -> bytes:
     for name in request.recordings:
         if name not in problem.sources:
             raise InputError(f"recordings: no recording {name!r}; there are {', '.join(problem.sources)}")
+    written({name: given for name, given in request.recordings.items() if isinstance(given, str)})
     for name, source in problem.sources.items():
-        if isinstance(source, FileSource) and name not in request.recordings:
+        if isinstance(source, FileSource) and source.path is None and name not in request.recordings:
             raise InputError(f"recordings: {name!r} is missing; this problem is fitted to measured motion")
     return b""
 

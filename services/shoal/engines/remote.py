@@ -5,6 +5,7 @@ Doubles cross as JSON in their shortest form, which gives back every bit; what i
 
 from __future__ import annotations
 
+import base64
 import ipaddress
 import logging
 import os
@@ -43,7 +44,7 @@ class RemoteEngine:
         self.name = url.rstrip("/")
         retry = Retry(
             total=RETRIES,
-            allowed_methods=["GET", "POST"],
+            allowed_methods=["GET", "POST", "PUT"],
             status_forcelist=[429, 502, 503],
             retry_on_exceptions=[httpx.NetworkError, httpx.RemoteProtocolError, httpx.ConnectTimeout],
             backoff_factor=0.25,
@@ -88,6 +89,11 @@ class RemoteEngine:
             "lanes": lanes,
         }
         return _trajectory(self._ask("POST", "/v1/simulate", orjson.dumps(request)))
+
+    def put_entry(self, kind: str, name: str, files: Mapping[str, bytes]) -> None:
+        """Put an entry into the service's library, checked there. Raises InputError, ComputationError."""
+        content = {path: base64.b64encode(content).decode() for path, content in files.items()}
+        self._ask("PUT", f"/v1/library/{kind}/{name}", orjson.dumps({"files": content}))
 
     def _ask(self, method: str, path: str, content: bytes | None = None) -> Any:
         """The answer to a request. Raises InputError where it is refused, ComputationError where there is none."""

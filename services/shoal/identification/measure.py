@@ -18,13 +18,16 @@ from shoal.identification.recording.plausible import check_units
 from shoal.identification.recording.reading import described, read
 from shoal.identification.recording.source import Channel, EngineSource, FileSource
 from shoal.scene import Scene
+from shoal.scene.load import unknown
+from shoal.shelf import NAME, located, shelf
 from shoal.trajectory import Array
 
 
 def measure(problem: Problem, scene: Scene, data: str | Mapping[str, str] | None = None) -> Measurement:
     """The measurement of a problem. Raises InputError, ComputationError.
 
-    data: a file (CSV, Parquet, or a recording's YAML) instead of the problem's own, or one for each recording by name
+    data: a file (CSV, Parquet, or a recording's YAML) or a recording of the library instead of the problem's own, or
+        one for each recording by name
     """
     files = _named(problem, data)
     recordings, truth = {}, dict[str, float]()
@@ -42,7 +45,7 @@ def measure(problem: Problem, scene: Scene, data: str | Mapping[str, str] | None
             raise InputError(
                 f"data: {where} needs a recording; give one as data=FILE (on the command line: --data FILE)"
             )
-        recordings[name] = _recorded(problem, scene, source, Path(path))
+        recordings[name] = _recorded(problem, scene, source, _file(path))
     return Measurement(recordings, truth)
 
 
@@ -58,6 +61,15 @@ def _named(problem: Problem, data: str | Mapping[str, str] | None) -> dict[str, 
         if name not in names:
             raise InputError(f"data: no recording {name!r} in {problem.name}; there are {', '.join(names)}")
     return dict(data)
+
+
+def _file(given: str) -> Path:
+    """The file of that path, or of the library's recording of that name. Raises InputError."""
+    path = Path(located("recordings", given))
+    if NAME.fullmatch(given) and not path.exists():
+        known = [entry.name for entry in shelf().entries("recordings")]
+        raise InputError(f"data: {unknown(given, 'file, nor recording of the library', known)}")
+    return path
 
 
 def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) -> tuple[Recording, dict[str, float]]:

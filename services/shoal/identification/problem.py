@@ -16,6 +16,7 @@ from shoal.scene import Scene, expression, load_scene
 from shoal.scene.load import names, read_named
 from shoal.scene.record import Positive, Record, one_line
 from shoal.scene.scene import Name
+from shoal.shelf import NAME, located, shelf
 
 MEASUREMENT = ("clock", "delay", "scale", "x", "y", "tilt")
 """What a parameter can be that is none of the scene's: the path is `measurement.` and one of these."""
@@ -195,13 +196,22 @@ def problem_library() -> Traversable:
 
 
 def problem_names() -> list[str]:
-    """Names of the built-in problems, sorted."""
+    """Names of the built-in problems, then those of one's own library, sorted each."""
+    return [*built_in_problems(), *(entry.name for entry in shelf().entries("problems"))]
+
+
+def built_in_problems() -> list[str]:
+    """Names of the problems that come with Shoal, sorted."""
     return names(problem_library())
 
 
 def load_problem(name: str) -> Problem:
-    """The built-in problem of that name, or the one in that YAML file. Raises InputError."""
-    problem = Problem.parse(read_named(name, problem_library(), "problem"), name)
+    """The problem of that name, built-in or of one's own library, or the one in that YAML file. Raises InputError.
+
+    What a YAML file names is beside it, or a name of the library.
+    """
+    name = name if name in built_in_problems() else located("problems", name)
+    problem = Problem.parse(read_named(name, problem_library(), "problem", problem_names()), name)
     if not Path(name).suffix:
         return problem
     folder = Path(name).parent
@@ -214,7 +224,9 @@ def load_problem(name: str) -> Problem:
 
 
 def _beside(folder: Path, source: EngineSource | FileSource) -> EngineSource | FileSource:
-    """The source with a path that starts from the folder of the YAML file that names it."""
+    """The source with a path that starts from the folder of the YAML file that names it, unless it is a name."""
     if isinstance(source, EngineSource) or source.path is None:
+        return source
+    if not (folder / source.path).exists() and NAME.fullmatch(source.path.partition("@")[0]):
         return source
     return source.model_copy(update={"path": str(folder / source.path)})

@@ -1,4 +1,4 @@
-"""Scenes from the built-in library and from YAML files."""
+"""Scenes by name, from the built-in library and from one's own, and from YAML files."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import yaml
 from shoal.errors import InputError
 from shoal.scene.parametric import EXAMPLES, parametric
 from shoal.scene.scene import Scene
+from shoal.shelf import located, shelf
 
 LARGEST = 2**20
 """Bytes of a file; a table of the most rows that a function of time may have takes half of it."""
@@ -22,6 +23,8 @@ _MOST = 100_000
 """Values in a file, each as often as an alias repeats it."""
 _DEEPEST = 50
 _LONGEST_NUMBER = 400
+_LISTED = 40
+"""Names in an error message."""
 
 
 if yaml.__with_libyaml__:
@@ -109,21 +112,29 @@ def _too_large(source: str) -> InputError:
     )
 
 
-def read_named(name: str, folder: Traversable, what: str) -> Any:
-    """Data of a YAML file given by path, or of a built-in one given by name. Raises InputError."""
+def read_named(name: str, folder: Traversable, what: str, known: list[str]) -> Any:
+    """Data of a YAML file given by path, or of a built-in one given by name. Raises InputError.
+
+    known: names that would have been right
+    """
     path = Path(name)
     if path.suffix in (".yaml", ".yml"):
         return read_yaml(_text(path), name)
     if name not in names(folder):
-        known = names(folder) if what != "scene" else scene_names()
-        raise InputError(f"{unknown(name, what, known)}; give a .yaml file or one of {', '.join(known)}")
+        raise InputError(f"{unknown(name, what, known)}; give a .yaml file or one of {some(known)}")
     return read_yaml((folder / f"{name}.yaml").read_text(encoding="utf-8"), name)
 
 
 def unknown(name: str, what: str, known: list[str]) -> str:
     """That there is no such thing, and which names are like it."""
+    name = name if len(name) <= 80 else name[:77] + "..."
     near = list(dict.fromkeys(get_close_matches(name, known, 3) + [one for one in known if name and name in one][:3]))
     return f"{name}: no such {what}" + (f" (did you mean {' or '.join(near)}?)" if near else "")
+
+
+def some(known: list[str]) -> str:
+    """Names in a line, not all where there are many."""
+    return ", ".join(known[:_LISTED]) + (f" and {len(known) - _LISTED} more" if len(known) > _LISTED else "")
 
 
 def _text(path: Path) -> str:
@@ -152,15 +163,23 @@ def scene_library() -> Traversable:
 
 
 def scene_names() -> list[str]:
-    """Names of the built-in scenes, sorted; of parametric ones the examples."""
+    """Names of the built-in scenes, of parametric ones the examples, then those of one's own library, sorted each."""
+    return [*built_in_scenes(), *(entry.name for entry in shelf().entries("scenes"))]
+
+
+def built_in_scenes() -> list[str]:
+    """Names of the scenes that come with Shoal, sorted."""
     return sorted([*names(scene_library()), *EXAMPLES])
 
 
 def load_scene(name: str) -> Scene:
-    """The built-in scene of that name, or the scene in that YAML file as it is now. Raises InputError."""
+    """The scene of that name, built-in or of one's own library, or in that YAML file as it is now. Raises InputError.
+
+    NAME@VERSION is an earlier version of the library's.
+    """
     if (data := parametric(name)) is not None:
         return Scene.parse(data, name)
-    return _built_in(name) if name in scene_names() else _read(name)
+    return _built_in(name) if name in built_in_scenes() else _read(located("scenes", name))
 
 
 @cache
@@ -169,7 +188,7 @@ def _built_in(name: str) -> Scene:
 
 
 def _read(name: str) -> Scene:
-    data = read_named(name, scene_library(), "scene")
+    data = read_named(name, scene_library(), "scene", scene_names())
     if not isinstance(data, dict):
         raise InputError(f"{name}: a scene is a mapping of fields, found {type(data).__name__}")
     return Scene.parse(data, name)

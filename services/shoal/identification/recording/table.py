@@ -22,6 +22,7 @@ Mask = NDArray[np.bool_]
 
 LARGEST = 200_000_000
 """Bytes of a table, unpacked; more are refused."""
+_MOST_COLUMNS = 2000
 _COMMENT = re.compile(rb"^[ \t]*[#%][^\r\n]*", re.MULTILINE)
 _UNITS = re.compile(r"\W*(m?s|sec|seconds?|[cmu]?m|in|px|pixels?|rad|deg|degrees|rev|°|Hz)(/m?s)?\W*", re.IGNORECASE)
 """A cell of a line of units under the header."""
@@ -81,20 +82,23 @@ class Table:
             raise InputError(f"{self.path}: row {self.rows[k]}, column {column!r}: {_short(found)} {why}")
 
 
-def load_table(path: Path, columns: list[str] | None = None) -> Table:
-    """A table of CSV or Parquet; columns: names, where it has no header line. Raises InputError."""
+def load_table(path: Path, columns: list[str] | None = None, *, largest: int = LARGEST) -> Table:
+    """A table of CSV or Parquet; columns: names, where it has no header line. Raises InputError.
+
+    largest: bytes, unpacked
+    """
     try:
         with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
+            data = file.read(largest + 1)
         if data.startswith(b"\x1f\x8b"):
             with gzip.open(io.BytesIO(data)) as packed:
-                data = packed.read(LARGEST + 1)
+                data = packed.read(largest + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"data: {path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(data) > LARGEST:
-        raise InputError(f"data: {path} holds more than {LARGEST / 1e6:.0f} MB; cut the part to fit on out of it")
+    if len(data) > largest:
+        raise InputError(f"data: {path} holds more than {largest / 1e6:.0f} MB; cut the part to fit on out of it")
     if data.startswith(b"PAR1"):
-        return _parquet(path, data)
+        return _parquet(path, data, largest)
     return _csv(path, _utf8(path, data), columns)
 
 
@@ -115,10 +119,17 @@ def _utf8(path: Path, data: bytes) -> bytes:
     return data
 
 
-def _parquet(path: Path, data: bytes) -> Table:
+def _parquet(path: Path, data: bytes, largest: int) -> Table:
     import pandas
 
     try:
+        from pyarrow import parquet
+
+        stated = parquet.read_metadata(io.BytesIO(data))
+        # A few bytes may say that a value stands a billion times.
+        if stated.num_columns > _MOST_COLUMNS or stated.num_rows * stated.num_columns > largest / 8:
+            size = f"{stated.num_rows} rows of {stated.num_columns} columns"
+            raise InputError(f"data: {path} holds {size}; cut the part to fit on out of it")
         frame = pandas.read_parquet(io.BytesIO(data))
     except ImportError:
         raise InputError(f"data: {path} is Parquet, which needs the package pyarrow; install it, or give CSV") from None
@@ -134,6 +145,8 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
         first, skipped, data, comments = _header(data, columns is not None)
         separator = next((mark for mark in (";", "\t") if mark in first), ",")
         decimal = "," if separator == ";" else "."
+        if first.count(separator) >= _MOST_COLUMNS or len(columns or ()) > _MOST_COLUMNS:
+            raise InputError(f"data: {path} has more than {_MOST_COLUMNS} columns; leave out what is not fitted on")
         header = [name.strip() for name in next(csv.reader([first], delimiter=separator), [])]
         names = columns or header
         if not header:

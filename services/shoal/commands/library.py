@@ -1,0 +1,131 @@
+"""`shoal library`: scenes, problems and recordings of one's own, by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from shoal.commands import options
+
+_kind = click.option("--kind", metavar="KIND", help="scene, recording or problem, where the name alone does not tell.")
+
+
+@click.group()
+def library() -> None:
+    """Keep scenes, recordings and problems of your own under names.
+
+    Their names stand beside the built-in ones in commands, in Python, in services and in flows. They lie in
+    $SHOAL_LIBRARY, else in `library` below Shoal's home. NAME@VERSION is an earlier version.
+    """
+
+
+@library.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--name", help="Under which it is kept; else that of the file.")
+@click.option("--kind", metavar="KIND", help="scene, recording or problem; else what the fields of FILE say.")
+@options.as_json
+def add(file: Path, name: str | None, kind: str | None, as_json: bool) -> None:
+    """Check FILE and keep it, with the files that it names.
+
+    FILE is a scene or a problem (YAML), or a recording (CSV, Parquet, or the YAML that describes one). A name that is
+    there stands for the new version from then on.
+    """
+    from shoal import library
+    from shoal.terminal import screen
+
+    made = library.add(file, name, kind)
+    screen.show(library.about(made), as_json, lambda: screen.say(f"{_title(made)}, version {made.version}"))
+
+
+@library.command("list")
+@click.option("--kind", metavar="KIND", help="Only scenes, recordings or problems.")
+@options.as_json
+def list_entries(kind: str | None, as_json: bool) -> None:
+    """List the entries with their versions."""
+    from shoal import library
+    from shoal.shelf import shelf
+    from shoal.terminal import screen
+
+    wanted = library.kind_of(kind).folder if kind else None
+    found = [library.about(entry) for entry in library.entries(wanted)]
+
+    def draw() -> None:
+        for folder in library.KINDS:
+            if rows := {
+                row["name"]: f"{row['version']}  {row['description']}" for row in found if row["kind"] == folder
+            }:
+                screen.listing(folder, rows)
+        if not found:
+            screen.say(
+                f"nothing in {shelf().root} yet; `shoal library add FILE` keeps a scene, a problem or a recording"
+            )
+
+    screen.show({"folder": str(shelf().root), "entries": found}, as_json, draw)
+
+
+@library.command()
+@click.argument("name")
+@_kind
+@options.as_json
+def show(name: str, kind: str | None, as_json: bool) -> None:
+    """Print the entry NAME as YAML; with --json its versions and files."""
+    from shoal import library
+    from shoal.shelf import shelf
+    from shoal.terminal import screen
+
+    found = library.entry(name, library.kind_of(kind).folder if kind else None)
+    files = found.files()
+    told = {
+        **library.about(found),
+        "versions": shelf().versions(found.kind, found.name),
+        "files": {path: len(content) for path, content in files.items()},
+        "document": files[f"{found.name}.yaml"].decode(),
+    }
+    screen.show(told, as_json, lambda: click.echo(told["document"], nl=False))
+
+
+@library.command()
+@click.argument("name")
+@_kind
+@options.as_json
+def remove(name: str, kind: str | None, as_json: bool) -> None:
+    """Forget the entry NAME with all its versions. Runs keep what they used."""
+    from shoal import library
+    from shoal.shelf import shelf
+    from shoal.terminal import screen
+
+    found = library.entry(name, library.kind_of(kind).folder if kind else None)
+    shelf().remove(found.kind, found.name)
+    screen.show({"kind": found.kind, "name": found.name}, as_json, lambda: screen.say(f"{_title(found)}, removed"))
+
+
+@library.command()
+@click.argument("url")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@_kind
+@options.as_json
+def push(url: str, names: tuple[str, ...], kind: str | None, as_json: bool) -> None:
+    """Put entries, or all there are, into the library of the service at URL."""
+    from shoal import library
+    from shoal.engines.remote import RemoteEngine
+    from shoal.terminal import screen
+
+    wanted = library.kind_of(kind).folder if kind else None
+    chosen = [library.entry(name, wanted) for name in names] or library.entries(wanted)
+    # What a problem names has to be there first.
+    chosen.sort(key=lambda one: list(library.KINDS).index(one.kind))
+    service = RemoteEngine(url)
+    with screen.working(f"to {url}") as tell:
+        for one in chosen:
+            tell(f"{_title(one)} to {url}")
+            service.put_entry(one.kind, one.name, one.files())
+    told: dict[str, Any] = {"url": url, "entries": [library.about(one) for one in chosen]}
+    screen.show(told, as_json, lambda: screen.say(*(f"{_title(one)}, version {one.version}" for one in chosen)))
+
+
+def _title(entry: Any) -> str:
+    from shoal.library import KINDS
+
+    return f"{KINDS[entry.kind].one} {entry.name}"

@@ -1,0 +1,258 @@
+"""The library of one's own: scenes, recordings and problems that are checked before they are kept.
+
+Their names stand beside the built-in ones wherever one is taken. An entry holds all files that it needs and that are
+not themselves in the library; what it names there is looked up anew each time, until a study holds on to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from shoal.errors import InputError
+from shoal.identification import load_problem, measure
+from shoal.identification.problem import built_in_problems
+from shoal.identification.recording.reading import YAML, described, read
+from shoal.identification.recording.source import FileSource
+from shoal.identification.recording.table import load_table
+from shoal.scene import load_scene
+from shoal.scene.load import LARGEST, built_in_scenes, read_yaml, some, unknown
+from shoal.scene.parametric import parametric
+from shoal.shelf import LARGEST as LARGEST_ENTRY
+from shoal.shelf import NAME, Entry, Files, check_name, located, shelf
+
+Documents = dict[str, bytes]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What the library holds. folder: its name there; one: in words; check: of a document, raises InputError.
+
+    mark: the field that only its documents have; built_in: names that are taken; references: how a document names
+    another (the keys that lead there, `*` for any), and of which kind that is
+    """
+
+    folder: str
+    one: str
+    check: Callable[[Path], object]
+    mark: str
+    built_in: Callable[[str], bool] = lambda name: False
+    references: Mapping[tuple[str, ...], str] = field(default_factory=dict)
+
+
+def _check_recording(document: Path) -> None:
+    source = FileSource.model_validate(described({}, document))
+    load_table(Path(source.path or ""), source.columns, largest=LARGEST_ENTRY)
+    if source.channels:
+        read(source, tuple(source.channels))
+
+
+def _check_problem(document: Path) -> None:
+    problem = load_problem(str(document))
+    scene = problem.load_scene()
+    if all(isinstance(source, FileSource) and source.path for source in problem.sources.values()):
+        measure(problem, scene)
+
+
+KINDS = {
+    kind.folder: kind
+    for kind in (
+        Kind("scenes", "scene", lambda document: load_scene(str(document)), "bodies", lambda name: _scene_named(name)),
+        Kind("recordings", "recording", _check_recording, "path"),
+        Kind(
+            *("problems", "problem", _check_problem, "parameters", lambda name: name in built_in_problems()),
+            references={
+                ("scene",): "scenes",
+                ("source", "path"): "recordings",
+                ("recordings", "*", "path"): "recordings",
+            },
+        ),
+    )
+}
+"""In an order in which none needs a later one."""
+
+
+def _scene_named(name: str) -> bool:
+    return name in built_in_scenes() or parametric(name) is not None
+
+
+def kind_of(given: str) -> Kind:
+    """The kind of that name, in the singular or the plural. Raises InputError."""
+    for kind in KINDS.values():
+        if given in (kind.folder, kind.one):
+            return kind
+    raise InputError(f"kind: no kind {given!r}; there are {', '.join(kind.one for kind in KINDS.values())}")
+
+
+def entries(kind: str | None = None) -> list[Entry]:
+    """Everything in the library, or what is of a kind."""
+    return [entry for folder in KINDS if kind in (None, folder) for entry in shelf().entries(folder)]
+
+
+def entry(name: str, kind: str | None = None) -> Entry:
+    """The entry of that NAME or NAME@VERSION. Raises InputError."""
+    found = [one for folder in KINDS if kind in (None, folder) and (one := shelf().find(folder, name)) is not None]
+    if not found:
+        known = [one.name for one in entries(kind)]
+        there = f"there are {some(known)}" if known else "there are none yet; `shoal library add FILE` makes one"
+        raise InputError(f"name: {unknown(name, 'entry of the library', known)}; {there}")
+    if len(found) > 1:
+        kinds = ", ".join(KINDS[one.kind].one for one in found)
+        raise InputError(f"kind: {name} is the name of more than one entry ({kinds}); say which with --kind")
+    return found[0]
+
+
+def about(entry: Entry) -> dict[str, Any]:
+    """What lists and services say of an entry."""
+    try:
+        data = read_yaml(_text(_content(entry.document, LARGEST), entry.document), entry.name)
+        description = str(data.get("description", "")) if isinstance(data, dict) else ""
+    except InputError as error:
+        description = f"cannot be used: {error}"
+    return {"kind": entry.kind, "name": entry.name, "version": entry.version, "description": description}
+
+
+def add(file: str | Path, name: str | None = None, kind: str | None = None) -> Entry:
+    """Check a scene, a problem or a recording (YAML, CSV or Parquet) and keep it with the files that it names.
+
+    name: else that of the file; kind: else what its fields say. Raises InputError.
+    """
+    path = Path(file)
+    wanted = kind_of(kind).folder if kind else _guessed(path)
+    name = check_name(name or path.name.partition(".")[0])
+    return put(wanted, name, gathered(wanted, str(path), name, whole=False))
+
+
+def put(kind: str, name: str, files: Files) -> Entry:
+    """Keep files under a name if they are right; see `Shelf.put`. Raises InputError."""
+    if KINDS[kind].built_in(check_name(name)):
+        raise InputError(f"name: {name} is the name of a built-in {KINDS[kind].one}; choose another")
+    return shelf().put(kind, name, files, lambda document: _check(KINDS[kind], document))
+
+
+def gathered(kind: str, given: str, name: str, *, whole: bool) -> Documents:
+    """All files of a document (a path, or a name of the library) as an entry of that name. Raises InputError.
+
+    whole: with what it names in the library; else such names stay. Built-in names always stay.
+    """
+    path = Path(located(kind, given))
+    if kind == "recordings":
+        return _recording(path, name)
+    content = _content(path, LARGEST)
+    data, files = read_yaml(_text(content, path), str(path)), Documents()
+    for keys, target in KINDS[kind].references.items():
+        for holder, key, label in _places(data, keys):
+            reference = holder[key]
+            beside = path.parent / reference
+            if not beside.exists():
+                inside = shelf().find(target, reference) is not None
+                if not (inside and whole):
+                    if not inside and Path(reference).suffix:
+                        raise InputError(f"{path}: {label}: {reference} cannot be read: no such file")
+                    continue
+                beside = Path(located(target, reference))
+            stem, folder = _stem(beside), label.removesuffix(".path").replace(".", "-")
+            found = gathered(target, str(beside), stem, whole=whole)
+            files |= {f"{folder}/{part}": text for part, text in found.items()}
+            holder[key] = f"{folder}/{stem}.yaml"
+    return {f"{name}.yaml": _as_yaml(data) if files else content, **files}
+
+
+def _recording(path: Path, name: str) -> Documents:
+    """The YAML that describes a table, and the table beside it."""
+    data: dict[str, Any] = {}
+    if path.suffix in YAML:
+        described({}, path)  # raises where it is not one
+        data = read_yaml(_text(_content(path, LARGEST), path), str(path))
+    table = path.parent / data["path"] if data else path
+    ending = "".join(table.suffixes[-2:]) if table.suffix == ".gz" else table.suffix
+    inside = f"{name}{ending or '.csv'}"
+    return {f"{name}.yaml": _as_yaml({**data, "path": inside}), inside: _content(table, LARGEST_ENTRY)}
+
+
+def _check(kind: Kind, document: Path) -> None:
+    """Raises InputError, in which paths are those of the entry."""
+    _check_paths(kind, document)
+    try:
+        kind.check(document)
+    except InputError as error:
+        raise InputError(str(error).replace(f"{document.parent}/", "")) from None
+
+
+def _check_paths(kind: Kind, document: Path) -> None:
+    """Whether a document names nothing but what is below it, and entries of the library. Raises InputError."""
+    size = document.stat().st_size
+    if size > LARGEST:
+        raise InputError(f"{document.name}: larger than the {LARGEST} bytes that are read")
+    data = read_yaml(_text(document.read_bytes(), Path(document.name)), document.name)
+    places = {**kind.references, ("path",): ""} if kind.folder == "recordings" else kind.references
+    for keys in places:
+        for holder, key, label in _places(data, keys):
+            given = holder[key]
+            parts = Path(given).parts
+            if Path(given).is_absolute() or ".." in parts or "\0" in given:
+                raise InputError(f"{document.name}: {label}: {given[:80]!r} leads out of the entry")
+            inside = document.parent / given
+            if not inside.is_file() and (Path(given).suffix or not places[keys]):
+                raise InputError(f"{document.name}: {label}: {given[:80]!r} is not among the files of the entry")
+            if places[keys] and inside.suffix in YAML:
+                _check_paths(KINDS[places[keys]], inside)
+
+
+def _places(data: Any, keys: tuple[str, ...], above: str = "") -> Iterable[tuple[dict[str, Any], str, str]]:
+    """Where texts stand in a document: (mapping, key, path of the field)."""
+    if not isinstance(data, dict):
+        return
+    for key in list(data) if keys[0] == "*" else [key for key in keys[:1] if key in data]:
+        label = f"{above}{key}"
+        if len(keys) > 1:
+            yield from _places(data[key], keys[1:], f"{label}.")
+        elif isinstance(data[key], str):
+            yield data, key, label
+
+
+def _guessed(path: Path) -> str:
+    """The kind of a file by its fields. Raises InputError."""
+    if path.suffix not in YAML:
+        return "recordings"
+    data = read_yaml(_text(_content(path, LARGEST), path), str(path))
+    for kind in KINDS.values():
+        if isinstance(data, dict) and kind.mark in data:
+            return kind.folder
+    marks = ", ".join(f"`{kind.mark}` (a {kind.one})" for kind in KINDS.values())
+    raise InputError(f"{path}: its kind cannot be told: it has none of the fields {marks}; say --kind")
+
+
+def _content(path: Path, largest: int) -> bytes:
+    """Bytes of a file. Raises InputError."""
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: cannot be read: not a file")
+    try:
+        with path.open("rb") as file:
+            content = file.read(largest + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    if len(content) > largest:
+        raise InputError(f"{path}: larger than the {largest} bytes that an entry of the library may have")
+    return content
+
+
+def _text(content: bytes, path: Path) -> str:
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: cannot be read: not UTF-8 text") from None
+
+
+def _stem(path: Path) -> str:
+    """The name of a file that becomes part of an entry."""
+    stem = path.name.partition(".")[0]
+    return stem if NAME.fullmatch(stem) else "part"
+
+
+def _as_yaml(data: Any) -> bytes:
+    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120).encode()
