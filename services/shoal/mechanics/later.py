@@ -16,7 +16,9 @@ def put_off_blas() -> None:
         return
     from numba.np import linalg
 
-    look = linalg.ensure_blas
+    look = getattr(linalg, "ensure_blas", None)
+    if look is None:
+        return
     linalg.ensure_blas = lambda: None
     try:
         import numba.np.arraymath  # noqa: F401 - looks for it on import
