@@ -79,7 +79,7 @@ class Machine:
         turns = self._turns if model is None else _turns(self.scene, model)
         moved = self.model if model is None else model
         most = threads or os.cpu_count() or 1
-        parts = self._parts(moved.lanes, most)
+        parts = self._parts(moved.lanes)
         d = moved.dimensions
         motion = np.empty((len(times), len(self.scene.markers), 2 * d + 2, moved.lanes))
         numbers = np.empty((NUMBERS, moved.lanes))
@@ -134,15 +134,16 @@ class Machine:
     def _still(self) -> Still:
         return Still(self.model)
 
-    def _parts(self, lanes: int, threads: int) -> list[slice]:
+    def _parts(self, lanes: int) -> list[slice]:
         """What is marched together: whole tiles, and what is left over in one more or, if that is faster, one by one.
 
-        Lanes that choose their steps stay together, so that those of neighbours are alike.
+        Lanes that choose their steps stay together, so that those of neighbours are alike. How many threads there are
+        changes nothing.
         """
         _, parts = tiles(lanes)
         whole, rest = divmod(lanes, len(WIDE))
         apart = self._alike and not facts_of(self.choice.name).adaptive
-        if lanes > 1 and apart and whole % threads == 0 and rest <= ALONE * threads:
+        if lanes > 1 and apart and rest <= ALONE:
             first = whole * len(WIDE)
             parts = parts[:whole] + [slice(k, k + 1) for k in range(first, lanes)]
         return parts

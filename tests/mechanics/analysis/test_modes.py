@@ -50,8 +50,9 @@ def test_bernoulli_euler_frequencies_and_their_order(
         assert found.ok
         errors.append(found.frequencies / exact - 1)
     assert np.all(np.abs(errors[1]) < {4: 1e-4, 8: 1e-7}[order])
-    slopes = np.log2(np.abs(errors[0]) / np.abs(errors[1]))
-    assert slopes[1:] == pytest.approx([order, order], abs=0.4)
+    # Of the third mode: errors of the others are near the round-off of matrices with axial stiffness, 1e-10.
+    slope = np.log2(abs(errors[0][2]) / abs(errors[1][2]))
+    assert slope == pytest.approx(order, abs=0.4)
 
 
 def test_ancf_full_vibrates_like_a_beam() -> None:

@@ -82,11 +82,12 @@ class Table:
             raise InputError(f"{self.path}: row {self.rows[k]}, column {column!r}: {_short(found)} {why}")
 
 
-def load_table(path: Path, columns: list[str] | None = None, *, largest: int = LARGEST) -> Table:
+def load_table(path: Path, columns: list[str] | None = None, *, largest: int | None = None) -> Table:
     """A table of CSV or Parquet; columns: names, where it has no header line. Raises InputError.
 
-    largest: bytes, unpacked
+    largest: bytes, unpacked; LARGEST if not stated
     """
+    largest = LARGEST if largest is None else largest
     try:
         with path.open("rb") as file:
             data = file.read(largest + 1)
