@@ -89,7 +89,7 @@ def test_who_listens_is_told_of_a_kernel(monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize(
     ("scene", "lanes"),
-    [(RIGID, 1), (RIGID, 2), (FLEXIBLE, 1), (FLEXIBLE, 2), (CONSTRAINED, 1)],
+    [(RIGID, 1), (RIGID, 2), (FLEXIBLE, 1), (FLEXIBLE, 6), (CONSTRAINED, 1)],
     ids=lambda v: str(v)[:9],
 )
 def test_what_is_compiled_ahead_is_what_a_run_calls(scene: Scene, lanes: int) -> None:
