@@ -1,4 +1,4 @@
-"""Longer steps for leapfrog: more inertia for axial vibrations that are too fast for the step, and for nothing else.
+"""Longer steps for leapfrog: more inertia for axial vibrations that are too fast for the step.
 
 Rods are stiff against stretching, and the step of an explicit integrator has to follow vibrations that hardly move the
 machine. With the stiffness S of all rods against stretching, the same in every direction, and S phi = w^2 M phi,
