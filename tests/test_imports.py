@@ -10,7 +10,7 @@ import numpy as np
 FOREIGN = ("scipy", "pandas", "matplotlib", "prefect", "mlflow", "xarray", "casadi", "exudyn", "fastapi", "cma")
 RUN = """
 import sys
-import numba.np.arraymath, scipy.linalg.cython_blas  # Whoever compiles a product of matrices needs this.
+import numba
 before = set(sys.modules)
 import numpy as np
 import shoal
@@ -31,6 +31,23 @@ def test_a_simulation_imports_nothing_that_it_does_not_need() -> None:
     program = RUN.format(foreign=FOREIGN)
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.stderr == ""
+    assert done.stdout == "[]\n"
+
+
+IDENTIFY = """
+import sys
+from click.testing import CliRunner
+from shoal.cli import main
+told = CliRunner().invoke(main, ["identify", "paper-case-1", "--json"])
+assert '"verdict": "identified"' in told.stdout, told
+lazy = ("scipy.special", "scipy.linalg", "scipy.sparse", "exudyn", "rich.progress", "numba.typed.typeddict")
+print([name for name in lazy if name in sys.modules])
+"""
+
+
+def test_an_identification_that_finds_its_kernels_and_data_imports_little() -> None:
+    for _ in range(2):  # the first may have to compile, and to compute the data
+        done = subprocess.run([sys.executable, "-c", IDENTIFY], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
 
 

@@ -29,7 +29,7 @@ from shoal.errors import ComputationError, InputError, ShoalError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """No room: on the disk, for this user, in this file."""
-RARELY = 100_000, 20, 20
+RARELY = 500_000, 20, 20
 """Python looks for circles among its objects so seldom: imports make many that all stay, a tenth of a second's look."""
 EXTRAS = {
     "pipeline": ("prefect", "mlflow"),

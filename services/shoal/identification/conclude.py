@@ -67,8 +67,10 @@ def conclude(
     model = model.aside()
     if model.deadline is not None:
         model.deadline.extend()
+    predicted = {name: _predicted(model, point, name) for name in measurement.recordings}
     # The intervals look at the neighbourhood of the answer.
-    looked = unless_late(lambda: believed(model, point), None)
+    residual = model.compared(point[None], {name: seen[None] for name, seen in predicted.items()})[0]
+    looked = unless_late(lambda: believed(model, point, residual), None)
     seen = looked or _unseen(model)
     if looked is None:
         outcome = replace(outcome, ended=False, message=outcome.message or "no time was left for the intervals")
@@ -78,7 +80,6 @@ def conclude(
     known = possible and looked is not None
     blocks = blocks_of(model, len(seen.residual))
     at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks)
-    predicted = {name: _predicted(model, point, name) for name in measurement.recordings}
     error = ModelError(None, None)
     if known:
         error = unless_late(lambda: model_error(model, point, predicted, seen.residual), error)

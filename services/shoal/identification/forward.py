@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.engines import get_engine
 from shoal.engines.contract import Engine
@@ -156,8 +157,7 @@ class ForwardModel:
         seen = np.full((len(points), len(times), len(recording.channels)), np.nan)
         pace = np.column_stack([seen_by.pop("clock"), seen_by.pop("delay")])
         possible = self._possible(points, values, scene)
-        paces, numbers_of = np.unique(pace, axis=0, return_inverse=True)
-        own = numbers_of.ravel()
+        paces, own = _distinct(pace)
         moments = np.maximum(times / paces[:, :1] + paces[:, 1:], 0.0)
         for together in _alike(moments[:, -1]):
             lanes = np.flatnonzero(np.logical_and(possible, np.isin(own, together)))
@@ -324,6 +324,14 @@ class ForwardModel:
         values = self.parameters.to_values(points)
         rows = [(values[:, k] - prior.mean) / prior.std for k, prior in self.parameters.priors]
         return (self.rows.noise or 1.0) * np.array(rows).reshape(len(rows), len(points)).T
+
+
+def _distinct(rows: Array) -> tuple[Array, npt.NDArray[np.intp]]:
+    """The rows that differ, and the number of each row among them; mostly they are all the same."""
+    if np.all(rows == rows[:1]):
+        return rows[:1], np.zeros(len(rows), dtype=np.intp)
+    found, numbers = np.unique(rows, axis=0, return_inverse=True)
+    return found, numbers.ravel()
 
 
 def _alike(ends: Array) -> Iterator[Array]:

@@ -33,10 +33,13 @@ from shoal.mechanics.workspace import Workspace
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory, plain
 
-INSTANTS = 4
-"""The workspaces of so many lists of sampling times are kept."""
+INSTANTS = 8
+"""The workspaces of so many lists of sampling times and kinds of tiles are kept."""
 ALONE = 5
 """So many lanes are marched one after the other sooner than in a tile: a single one's elements fill the vectors too."""
+FEW = 4
+"""The same where a tile may be used by half, at two thirds of its cost."""
+HALF = len(WIDE) // 2
 LARGEST = 2**16
 """No workspace of more numbers is kept: beside its march the time to make it does not count."""
 
@@ -54,7 +57,7 @@ class Machine:
         self.starts = Starts(scene, model)
         self._limits = Limits(scene, model)
         self._turns = _turns(scene, model)
-        self._idle: dict[tuple[bytes, int], tuple[Halts, list[Workspace]]] = {}
+        self._idle: dict[tuple[bytes, int, int], tuple[Halts, list[Workspace]]] = {}
         self._told: dict[bool, bytes] = {}
         self._alike = not model.varies
 
@@ -86,11 +89,13 @@ class Machine:
         limits, floor = self._limits, self._limits.energy_floor(end)
 
         def march(part: slice) -> None:
-            tile = SINGLE if part.stop - part.start == 1 else WIDE
-            halts, idle = self._workspaces(times, tile)
+            count = part.stop - part.start
+            tile = SINGLE if count == 1 else WIDE
+            spare = HALF if self._halves and 1 < count <= HALF else 0
+            halts, idle = self._workspaces(times, tile, spare)
             space = None if seek is not None or not idle else _taken(idle)
             if space is None:
-                space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek)
+                space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek, spare)
             record = space.run(moved, part)
             told(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
             if single not in self._told:
@@ -141,16 +146,24 @@ class Machine:
         changes nothing.
         """
         _, parts = tiles(lanes)
-        whole, rest = divmod(lanes, len(WIDE))
-        apart = self._alike and not facts_of(self.choice.name).adaptive
-        if lanes > 1 and apart and rest <= ALONE:
-            first = whole * len(WIDE)
-            parts = parts[:whole] + [slice(k, k + 1) for k in range(first, lanes)]
+        rest = lanes % len(WIDE)
+        if lanes == 1 or facts_of(self.choice.name).adaptive or not self._alike:
+            return parts
+        # A half costs little more than what is left over alone, and computes it as its neighbours: differences are exact.
+        alone = (lanes <= FEW) * lanes if self._halves else (rest <= ALONE) * rest
+        if alone:
+            parts = parts[: lanes // len(WIDE)] + [slice(k, k + 1) for k in range(lanes - alone, lanes)]
         return parts
 
-    def _workspaces(self, times: Array, tile: Tile) -> tuple[Halts, list[Workspace]]:
+    @cached_property
+    def _halves(self) -> bool:
+        """Whether a tile may be used by half: explicit steps of elastic elements, which then act on that half only."""
+        explicit = facts_of(self.choice.name).explicit and not facts_of(self.choice.name).adaptive
+        return explicit and self._alike and self.model.flexible > 0 and not self.model.constraints.size
+
+    def _workspaces(self, times: Array, tile: Tile, spare: int) -> tuple[Halts, list[Workspace]]:
         """Where the steps of a run end, and the workspaces for it that are idle."""
-        key = times.tobytes(), len(tile)
+        key = times.tobytes(), len(tile), spare
         found = self._idle.get(key)
         if found is None:
             halts = halting(self.scene.solver, self.model, self.choice.name, float(times[-1]))

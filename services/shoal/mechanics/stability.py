@@ -16,8 +16,8 @@ from shoal.mechanics.numerics.sparse import Pattern
 from shoal.mechanics.numerics.tile import Array, pack, tiles, unpack
 from shoal.mechanics.tangent import damping_at, stiffness_at, tangent_tile
 
-_DENSE = 60
-"""Up to so many unknowns the dense eigenproblem is the faster one."""
+_DENSE = 200
+"""Up to so many unknowns the dense eigenproblem is the faster one, as Lanczos's method has to be imported first."""
 _ACCURACY = 1e-6
 """Relative, of an eigenvalue by Lanczos's method, whose last digits are no better known along the motion."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ from shoal.mechanics.numerics import gate, simd, sparse
 from shoal.mechanics.numerics.pointers import pointer, raw, shift
 from shoal.mechanics.numerics.tile import Array, Index, Tile, index, pack, stacked
 from shoal.mechanics.numerics.vector import add, add_product
+
+_ONE = np.ones(1)
 
 
 class Held(NamedTuple):
@@ -75,12 +78,12 @@ def tangent_tile(model: Model, tile: Tile, lanes: slice, *, held: bool = False) 
     source: Index = np.full(pattern.slots, 2 * blocks)
     extra = []
     for key, row, c in found:
-        if np.all(c == 1.0):
+        if _is_one(c):
             if source[slot[key]] < 2 * blocks:
                 extra.append((slot[key], row))
             else:
                 source[slot[key]] = row
-    shares = [(slot[key], source, c) for key, source, c in found if np.any(c != 1.0)]
+    shares = [(slot[key], source, c) for key, source, c in found if not _is_one(c)]
     return Tangent(
         pattern,
         pack(scatter(pattern, slot, model.mass_entries), lanes, tile),
@@ -103,10 +106,14 @@ def tangent_tile(model: Model, tile: Tile, lanes: slice, *, held: bool = False) 
     )
 
 
+def _is_one(c: Array) -> bool:
+    return c is _ONE or bool(np.all(c == 1.0))
+
+
 def _expand(model: Model, row: int) -> list[tuple[int, Array]]:
     """The unknowns that a row depends on, with their factors."""
     if row < model.unknowns:
-        return [(row, np.ones(1))]
+        return [(row, _ONE)]
     d, r = model.derived, row - model.unknowns
     return [(int(d.source[t]), d.coefficient[t]) for t in range(d.start[r], d.start[r + 1])]
 
@@ -133,12 +140,12 @@ def _contributions(model: Model) -> tuple[list[tuple[tuple[int, int], int, Array
     counts = [(family, family.side) for family in model.elements]
     for family, size in (*counts, (model.forces, forces.side(model.forces))):
         for rows in family.rows[: family.size * size].reshape(family.size, size).tolist():
-            for a in range(size):
-                for b in range(size):
-                    for i, ci in _expand(model, rows[a]):
-                        for j, cj in _expand(model, rows[b]):
-                            if i >= j:
-                                found.append(((i, j), position + a * size + b, ci * cj))
+            expanded = [_expand(model, row) for row in rows]
+            for a, b in itertools.product(range(size), repeat=2):
+                for i, ci in expanded[a]:
+                    for j, cj in expanded[b]:
+                        if i >= j:
+                            found.append(((i, j), position + a * size + b, ci if cj is _ONE else ci * cj))
             position += size * size
     return found, position
 

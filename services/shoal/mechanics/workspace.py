@@ -44,7 +44,7 @@ def put_at_start(model: Model, tile: Tile, part: slice, arrays: Arrays, room: Wo
 class Workspace:
     """Room for the march of one tile of a model at given times [s], for one march at a time.
 
-    seek: who seeks the accelerations, see `simulate`.
+    seek: who seeks the accelerations, see `simulate`. spare: lanes at the end of the tile on which no element acts.
     """
 
     def __init__(
@@ -57,9 +57,12 @@ class Workspace:
         times: Array,
         halts: Halts,
         seek: Callable[[Arrays, Work], Seek] | None = None,
+        spare: int = 0,
     ) -> None:
         self._model, self._part, self._tile = model, part, tile
         arrays, room = at_start(model, tile, part)
+        if spare:
+            arrays = arrays._replace(elements=tuple(family._replace(spare=spare) for family in arrays.elements))
         scheme = choose(solver, model, tile, part, choice.name)
         steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
         rows = model.marker_rows.ravel()

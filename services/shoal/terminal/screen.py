@@ -9,7 +9,6 @@ from typing import Any
 from rich import box
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from shoal.mechanics.notes import telling
@@ -31,8 +30,14 @@ def show(data: Mapping[str, Any], as_json: bool, draw: Callable[[], None]) -> No
 @contextmanager
 def working(what: str) -> Iterator[Callable[[str], None]]:
     """A spinner beside `what`, or what it is told later, on a terminal; a line for every kernel that is compiled."""
+    if not err.is_terminal:
+        with telling(line):
+            yield lambda _: None
+        return
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress, telling(line):
+    with Progress(*columns, console=err, transient=True) as progress, telling(line):
         task = progress.add_task(what, total=None)
         yield lambda now: progress.update(task, description=now)
 

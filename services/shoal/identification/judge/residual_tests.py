@@ -6,11 +6,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc  # scipy.stats has it too, and takes a second to import
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.noise import noise_of
 from shoal.identification.recording.units import of_channels
+from shoal.identification.spread.chances import above_chi_square
 from shoal.identification.spread.covariance import Block, Noise
 from shoal.trajectory import Array, plain
 
@@ -165,7 +165,7 @@ def residual_tests(
         signal=model.rows.signal,
         mesh=mesh,
         # A product overflows to infinity, which has chance zero; a power would raise OverflowError.
-        chance_of_size=float(chdtrc(freedom, freedom * beyond * beyond)),
+        chance_of_size=above_chi_square(freedom, freedom * beyond * beyond),
         chance_of_white=white,
         outliers=sum(outlying),
         rows=len(rows),
@@ -190,7 +190,8 @@ def ljung_box(signal: Array, lags: int = 10) -> float:
     if lags < 1 or power == 0.0:
         return 1.0
     rho = np.array([signal[lag:] @ signal[:-lag] for lag in range(1, lags + 1)]) / power
-    return float(chdtrc(lags, count * (count + 2) * np.sum(rho**2 / (count - np.arange(1, lags + 1)))))
+    size = count * (count + 2) * np.sum(rho**2 / (count - np.arange(1, lags + 1)))
+    return above_chi_square(lags, float(size))
 
 
 def _without_model(model: ForwardModel) -> float:

@@ -7,11 +7,11 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.special import chdtri
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.lanes import damped_step, differentiate_many, kept_apart
 from shoal.identification.methods.outcome import Outcome
+from shoal.identification.spread.chances import chi_square_above
 from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.identification.spread.value import Value
 from shoal.trajectory import Array
@@ -33,7 +33,7 @@ def as_good(model: ForwardModel, outcome: Outcome, at: Linearisation) -> float:
     """Up to which fitness another point explains the data as well as the answer, as far as the noise can tell."""
     # Of the sum of squares; correlated noise makes larger differences by chance.
     chance = max(seen.variance / seen.independent(1) for seen in at.noise)
-    doubt = float(chdtri(len(outcome.point), 1.0 - LEVEL)) * chance / model.rows.samples
+    doubt = chi_square_above(len(outcome.point), 1.0 - LEVEL) * chance / model.rows.samples
     least = max(outcome.fitness, model.rows.things * (model.rows.noise or 0.0) ** 2)
     return outcome.fitness + min(doubt, 0.5 * least) + 1e-18
 

@@ -52,19 +52,22 @@ class Sensitivity:
         return self.doubt <= AGREED
 
 
-def sensitivity(model: ForwardModel, point: Array) -> Sensitivity:
+def sensitivity(model: ForwardModel, point: Array, residual: Array | None = None) -> Sensitivity:
     """Central differences, in each direction with the neighbouring steps that agree best. Not counted.
+
+    residual: at the point, (rows,), where it is known.
 
     Errors along the strongest direction would hide the weakest, so that the differences are repeated along the
     singular directions found, until these stay. At a bound the difference is taken to the inner side.
     """
     sizes = model.sizes(point)
     basis = np.eye(len(point))
-    residual, columns, doubt = _differences(model, point, sizes, basis, _USUAL)
+    residual = model.uncounted(point[None])[0] if residual is None else residual
+    columns, doubt = _differences(model, point, sizes, basis, _USUAL)
     if np.max(doubt) < _SURE and (growth := _growth(columns)) < _WELL_CONDITIONED:
         return Sensitivity(residual, columns / sizes, float(np.max(doubt)), growth)
     for _ in range(_ROUNDS):
-        residual, columns, doubt = _differences(model, point, sizes, basis, _STEPS)
+        columns, doubt = _differences(model, point, sizes, basis, _STEPS)
         turned = np.linalg.svd(columns, full_matrices=False)[2]
         growth = _growth(columns)
         if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(turned) - np.eye(len(point)))) < AGREED / growth:
@@ -73,12 +76,12 @@ def sensitivity(model: ForwardModel, point: Array) -> Sensitivity:
     return Sensitivity(residual, columns @ basis.T / sizes, float(np.max(doubt)), growth)
 
 
-def believed(model: ForwardModel, point: Array) -> Sensitivity:
+def believed(model: ForwardModel, point: Array, residual: Array | None = None) -> Sensitivity:
     """As `sensitivity`, but of a chaotic motion only of the beginning that has derivatives, where there is one.
 
     Intervals that rest on the beginning are too wide rather than too narrow: what follows is not held to tell anything.
     """
-    seen = sensitivity(model, point)
+    seen = sensitivity(model, point, residual)
     if seen.reliable:
         return seen
     for end in _SHORTER * model.measurement.end:
@@ -101,15 +104,15 @@ def _growth(columns: Array) -> float:
 
 def _differences(
     model: ForwardModel, point: Array, sizes: Array, basis: Array, widths: Array
-) -> tuple[Array, Array, Array]:
-    """Residuals, their derivatives along the columns of `basis` (scaled parameters), and the doubt of each."""
+) -> tuple[Array, Array]:
+    """Derivatives of the residuals along the columns of `basis` (scaled parameters), and the doubt of each."""
     count = len(point)
     steps = np.concatenate([step * sizes * basis.T for step in widths])
     ahead, behind = (_inside(model, point, move) for move in (steps, -steps))
-    seen = model.uncounted(np.concatenate([point[None], point + ahead, point + behind]))
+    seen = model.uncounted(np.concatenate([point + ahead, point + behind]))
     width = np.linalg.norm((ahead - behind) / sizes, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        slopes = (seen[1 : 1 + len(steps)] - seen[1 + len(steps) :]) / width[:, None]
+        slopes = (seen[: len(steps)] - seen[len(steps) :]) / width[:, None]
     slopes = slopes.reshape(len(widths), count, -1)
     columns, doubts = np.zeros((slopes.shape[2], count)), np.full(count, np.inf)
     least = np.zeros(count)
@@ -131,7 +134,7 @@ def _differences(
     usual = min(float(np.max(size)), np.sqrt(columns.shape[0]) * model.rows.signal)
     nothing = (doubts > AGREED) & (np.minimum(size, least) < _NOTHING * usual)
     columns[:, nothing], doubts[nothing] = 0.0, 0.0
-    return seen[0], columns, doubts
+    return columns, doubts
 
 
 def _inside(model: ForwardModel, point: Array, moves: Array) -> Array:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
+from shoal.identification.spread.chances import student_above
 from shoal.identification.spread.covariance import Block, Noise, correlate, estimate_noise
 from shoal.trajectory import Array
 
@@ -89,7 +89,7 @@ def quantile(shares: Array, noise: tuple[Noise, ...]) -> float:
     if total <= 0.0:
         return 0.0
     doubt = float(np.sum([(share / total) ** 2 / seen.freedom for share, seen in zip(shares, noise, strict=True)]))
-    return float(stdtrit(1.0 / max(doubt, 1e-9), 0.5 + LEVEL / 2))
+    return student_above(1.0 / max(doubt, 1e-9), 0.5 - LEVEL / 2)
 
 
 def autocorrelation(residual: Array, blocks: list[Block]) -> float:

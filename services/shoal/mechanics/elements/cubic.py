@@ -176,7 +176,7 @@ def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array,
     number = 0
     while number < family.size:
         count, variant = together(tile, family, number), family.plan[PLAN * number + VARIANT]
-        for lane in range(0, len(tile), len(EIGHT)):
+        for lane in range(0, len(tile) - family.spare, len(EIGHT)):
             at = family, number, count, lane, z, zdot, f, w, power
             if variant == FULL:
                 _force(tile, False, False, _FULL_AXIAL, _FULL_BENDING, *at)

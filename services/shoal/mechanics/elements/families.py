@@ -26,7 +26,8 @@ class Family(NamedTuple):
 
     side: rows of one element. damped: whether any loses energy in itself, otherwise rates are not looked at. table:
     quadrature rules back to back. plan: PLAN numbers an element. rows: `side` an element. coefficients: (numbers *
-    size, lanes); reference: the stress-free shape where the kernel needs it, (any, lanes).
+    size, lanes); reference: the stress-free shape where the kernel needs it, (any, lanes). spare: so many lanes at the
+    end of the tile belong to nobody, and need no force; whole vectors of them.
     """
 
     size: int
@@ -37,6 +38,7 @@ class Family(NamedTuple):
     rows: Index
     coefficients: Array
     reference: Array
+    spare: int = 0
 
 
 class Kernel(NamedTuple):

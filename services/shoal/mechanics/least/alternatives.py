@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.mechanics.least.projection import dot
 from shoal.mechanics.numerics.tile import Array
 
 KKT = 1
@@ -27,7 +28,7 @@ def correct(method: int, rows: Array, target: Array, matrix: Array, scale: Array
     """Move y to W y = target by one of the methods. matrix: (constraints, constraints) and scale: work space."""
     count, n = rows.shape
     for k in range(count):
-        length = np.sqrt(np.dot(rows[k], rows[k]))
+        length = np.sqrt(dot(rows[k], rows[k]))
         scale[k] = 1.0 / length if length > 0.0 else 0.0
         for i in range(n):
             rows[k, i] *= scale[k]
@@ -40,13 +41,13 @@ def correct(method: int, rows: Array, target: Array, matrix: Array, scale: Array
         shift = PROXIMITY
     for i in range(count):
         for j in range(count):
-            matrix[i, j] = np.dot(rows[i], rows[j])
+            matrix[i, j] = dot(rows[i], rows[j])
         matrix[i, i] += shift
     _cholesky(matrix)
     for _ in range(1 if method == KKT else ITERATIONS):
         largest = 0.0
         for k in range(count):
-            step[k] = np.dot(rows[k], y) - scale[k] * target[k]
+            step[k] = dot(rows[k], y) - scale[k] * target[k]
             largest = max(largest, abs(step[k]))
         if not largest > 1e-15:
             break

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics import constraints, functions, saddle
+from shoal.mechanics.least.projection import dot
 from shoal.mechanics.least.work import GaussWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
@@ -89,10 +90,10 @@ def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Arr
                 moves[rank, i] = found[i * width + lane]
                 whole += moves[rank, i] * rows[rank, i]
             for r in range(rank):
-                part = np.dot(rows[r], moves[rank]) / np.dot(rows[r], moves[r])
+                part = dot(rows[r], moves[rank]) / dot(rows[r], moves[r])
                 for i in range(n):
                     moves[rank, i] -= part * moves[r, i]
-            along = np.dot(rows[rank], moves[rank])
+            along = dot(rows[rank], moves[rank])
             if not along > 1e-10 * whole:
                 continue
             gap = target
