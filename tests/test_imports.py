@@ -64,3 +64,27 @@ def test_numba_finds_the_linear_algebra_of_scipy_when_a_kernel_wants_it() -> Non
     solved = njit(lambda matrix, vector: np.linalg.solve(matrix, matrix @ vector))
     vector = np.array([1.0, -2.0])
     assert np.allclose(solved(np.array([[2.0, 1.0], [1.0, 3.0]]), vector), vector)
+
+
+LATER = """
+import sys
+import numpy as np
+import shoal.mechanics.simulate
+from numba import njit
+from shoal.mechanics.numerics import sparse
+from shoal.scene import load_scene
+shoal.mechanics.simulate.simulate(load_scene("single-pendulum"), np.array([1e-3]))
+pattern = sparse.analyse(1, {(0, 0): 0})[0]
+from shoal.mechanics.model import _factor_mass
+values = np.array([4.0])
+_factor_mass((0,), pattern, values)
+again = njit(lambda pattern, values: _factor_mass((0,), pattern, values))
+again(pattern, values)
+print(values[0])
+"""
+
+
+def test_a_kernel_that_was_only_loaded_can_still_be_compiled_into_another() -> None:
+    for _ in range(2):  # the first may have to compile it
+        done = subprocess.run([sys.executable, "-c", LATER], capture_output=True, text=True, check=True)
+    assert float(done.stdout) == 4.0  # the inverse of the inverse

@@ -20,7 +20,6 @@ from typing import Any
 from numba import types
 from numba.core import caching, config, dispatcher, event
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.runtime import rtsys
 
 from shoal.mechanics.notes import tell
 
@@ -38,7 +37,6 @@ SECONDS = {
     "_energies": 1.5,
 }
 """What large kernels take on one core of a server: for the order, and to say how long it will take."""
-_OWN = "shoal."
 _WORTH_A_LINE = 1.0
 """Seconds."""
 
@@ -111,7 +109,6 @@ def _alone(what: str) -> Iterator[None]:
 
 
 _numbas_compile = dispatcher.Dispatcher.compile
-_numbas_load = caching.Cache.load_overload
 _numbas_save = caching.Cache.save_overload
 
 
@@ -121,18 +118,6 @@ def _compile(self: Any, sig: Any) -> Any:
         return _numbas_compile(self, sig)
     with _alone(f"{self.py_func.__module__}.{self.py_func.__qualname__} {sig}"):
         return _numbas_compile(self, sig)
-
-
-def _load(self: Any, sig: Any, context: Any) -> Any:
-    """`Cache.load_overload`, which first has all of Numba's own functions registered: a tenth of a second.
-
-    Who compiles needs them, and has it done then. Machine code needs the runtime only.
-    """
-    if not self._py_func.__module__.startswith(_OWN):
-        return _numbas_load(self, sig, context)
-    rtsys.initialize(context)
-    with self._guard_against_spurious_io_errors():
-        return self._load_overload(sig, context)
 
 
 def _save(self: Any, sig: Any, data: Any) -> None:
@@ -145,6 +130,5 @@ def _save(self: Any, sig: Any, data: Any) -> None:
 def watch() -> None:
     """From now on compile under locks, and tell of it (`notes`)."""
     dispatcher.Dispatcher.compile = _compile  # type: ignore[method-assign]
-    caching.Cache.load_overload = _load
     caching.Cache.save_overload = _save
     event.register("numba:compile", _Listener())

@@ -149,7 +149,7 @@ class Machine:
         rest = lanes % len(WIDE)
         if lanes == 1 or facts_of(self.choice.name).adaptive or not self._alike:
             return parts
-        # A half costs little more than what is left over alone, and computes it as its neighbours: differences are exact.
+        # Half a tile costs hardly more, and computes what is left over as its neighbours: differences are exact.
         alone = (lanes <= FEW) * lanes if self._halves else (rest <= ALONE) * rest
         if alone:
             parts = parts[: lanes // len(WIDE)] + [slice(k, k + 1) for k in range(lanes - alone, lanes)]

@@ -14,7 +14,7 @@ from shoal.mechanics.gates import Seek
 from shoal.mechanics.inertia_cap import capped
 from shoal.mechanics.integrators import facts, pick
 from shoal.mechanics.integrators.scheme import Facts
-from shoal.mechanics.later import put_off_blas
+from shoal.mechanics.later import put_off
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import Array
@@ -22,7 +22,7 @@ from shoal.mechanics.start import start
 from shoal.scene import Scene, Solver
 from shoal.trajectory import Trajectory
 
-put_off_blas()
+put_off()
 
 STEP_MARGIN = 0.95
 """Of the stable step, which is that of the start and varies by a few percent along the motion."""

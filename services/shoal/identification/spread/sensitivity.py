@@ -102,9 +102,7 @@ def _growth(columns: Array) -> float:
     return float(singular[0] / singular[-1]) if singular[-1] > _NONE * singular[0] else np.inf
 
 
-def _differences(
-    model: ForwardModel, point: Array, sizes: Array, basis: Array, widths: Array
-) -> tuple[Array, Array]:
+def _differences(model: ForwardModel, point: Array, sizes: Array, basis: Array, widths: Array) -> tuple[Array, Array]:
     """Derivatives of the residuals along the columns of `basis` (scaled parameters), and the doubt of each."""
     count = len(point)
     steps = np.concatenate([step * sizes * basis.T for step in widths])

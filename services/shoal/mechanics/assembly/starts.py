@@ -44,6 +44,7 @@ class Starts:
         self._angles = [f"initial.{name}.angle" for name in scene.bodies]
         self._rates = [f"initial.{name}.rate" for name in scene.bodies]
         self._known = {*self._angles, *self._rates} if is_direct(scene) else set()
+        self._row = {path: row for row, path in enumerate((*self._angles, *self._rates))}
 
     def at(self, values: Mapping[str, Array], lanes: int) -> Model:
         """The model with so many lanes that start with these numbers: path of an initial value -> (lanes,)."""
@@ -51,9 +52,9 @@ class Starts:
         if not values.keys() <= self._known:
             return with_start(self._model, scene, lanes)
         law = self._law
-        start = [self._scene.start(name) for name in self._scene.bodies]
-        stated = zip((*self._angles, *self._rates), [s.angle for s in start] + [s.rate for s in start], strict=True)
-        found = np.stack([np.broadcast_to(values.get(path, number), lanes) for path, number in stated])
+        found = np.repeat(self._stated, lanes, axis=1)
+        for path, numbers in values.items():
+            found[self._row[path]] = numbers
         angle, rate = np.split(found, 2)
         x, y = plane.rotation(angle)[:, 0]
         return replace(
@@ -64,6 +65,12 @@ class Starts:
             v0=law.drift[:, None] + law.across @ (rate * x) - law.along @ (rate * y),
             start_angles=law.turned[:, None] + law.turns @ angle,
         )
+
+    @cached_property
+    def _stated(self) -> Array:
+        """Angles and rates of the bodies as the scene states them, (2 bodies, 1)."""
+        start = [self._scene.start(name) for name in self._scene.bodies]
+        return np.array([s.angle for s in start] + [s.rate for s in start])[:, None]
 
     @cached_property
     def _law(self) -> _Law:
