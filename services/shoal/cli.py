@@ -31,6 +31,9 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """No room: on the disk, for this user, in this file."""
 RARELY = 500_000, 20, 20
 """Python looks for circles among its objects so seldom: imports make many that all stay, a tenth of a second's look."""
+ONE_THREAD = "OPENBLAS_NUM_THREADS", "1"
+"""Of numpy's linear algebra, unless the user wants more: for our small matrices they wait for each other, and the solver
+has threads of its own. Read when numpy is imported."""
 EXTRAS = {
     "pipeline": ("prefect", "mlflow"),
     "services": ("fastapi", "starlette", "uvicorn", "pydantic_settings", "orjson"),
@@ -56,6 +59,7 @@ class Program(click.Group):
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run the program and leave with its exit status."""
         gc.set_threshold(*RARELY)
+        os.environ.setdefault(*ONE_THREAD)
         try:
             try:
                 with _extras_named():
