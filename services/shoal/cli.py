@@ -32,7 +32,7 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 RARELY = 500_000, 20, 20
 """Python looks for circles among its objects so seldom: imports make many that all stay, a tenth of a second's look."""
 ONE_THREAD = "OPENBLAS_NUM_THREADS", "1"
-"""Of numpy's linear algebra, unless the user wants more: for our small matrices they wait for each other, and the solver
+"""Of numpy's linear algebra, unless the user wants more: several wait for each other at small matrices, and the solver
 has threads of its own. Read when numpy is imported."""
 EXTRAS = {
     "pipeline": ("prefect", "mlflow"),

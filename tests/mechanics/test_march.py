@@ -10,7 +10,7 @@ from shoal.mechanics.integrators import INTEGRATORS, Choice, halting
 from shoal.mechanics.marched import frame_type, framed, loop_of
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
-from shoal.mechanics.simulate import machine
+from shoal.mechanics.simulate import machine, simulate
 from shoal.mechanics.workspace import Workspace, at_start, gathered
 from shoal.scene import load_scene
 
@@ -62,3 +62,18 @@ def test_a_workspace_forgets_its_last_run() -> None:
     second = space.run(kept.model, lane)
     for one, other in zip(first, second, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("element", ["ancf-cable", "ancf-quintic"])
+def test_lanes_of_half_a_tile_move_as_those_of_a_whole_one(element: str) -> None:
+    values = {f"bodies.{name}.element": element for name in ("OA", "AB")} | {"solver.step": 1e-5}
+    scene = load_scene("flexible-double-pendulum").with_values(values)
+    times, angles = np.array([1e-3, 2e-3]), np.linspace(0.6, 0.9, len(WIDE))
+    whole = simulate(scene, times, {"initial.OA.angle": angles})
+    for lanes in (5, 8, 9):
+        part = simulate(scene, times, {"initial.OA.angle": angles[:lanes]})
+        assert part.ok
+        np.testing.assert_array_equal(part.points, whole.points[..., :lanes])
+        np.testing.assert_array_equal(part.energy_drift, whole.energy_drift[:lanes])
+    alone = simulate(scene, times, {"initial.OA.angle": angles[:1]})
+    np.testing.assert_allclose(alone.points[..., 0], whole.points[..., 0], rtol=0, atol=1e-11)
