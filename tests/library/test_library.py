@@ -162,12 +162,10 @@ def test_an_alias_is_written_anew(folder: Path) -> None:
     ],
 )
 def test_a_scene_is_checked_as_a_simulation_would(folder: Path, scene: str, why: str) -> None:
-    """Up to its start, which has to agree with its joints; a problem's scene likewise, but for its start."""
+    """Up to its start, which has to agree with its joints."""
     (folder / "machine.yaml").write_text(scene)
-    begin = time.process_time()
     with pytest.raises(InputError, match=why) as refusal:
         library.add(folder / "machine.yaml")
-    assert time.process_time() - begin < 1.0
     assert "\n" not in str(refusal.value)
     assert library.entries() == []
 
