@@ -96,6 +96,11 @@ class RemoteEngine:
         content = {path: base64.b64encode(content).decode() for path, content in files.items()}
         self.ask("PUT", f"/v1/library/{kind}/{name}", orjson.dumps({"files": content}))
 
+    def get_entry(self, kind: str, name: str) -> dict[str, bytes]:
+        """The files of an entry of the service's library. Raises InputError, ComputationError."""
+        found = self.ask("GET", f"/v1/library/{kind}/{name}")["files"]
+        return {path: base64.b64decode(content) for path, content in found.items()}
+
     def ask(self, method: str, path: str, content: bytes | None = None) -> Any:
         """The answer to a request. Raises InputError where it is refused, ComputationError where there is none."""
         try:
@@ -125,7 +130,7 @@ class RemoteEngine:
         detail = str(found.get("detail", ""))
         if found["type"] == "urn:shoal:unauthorized":
             return wrong(f"SHOAL_API_KEY: {self.name} asks for a key: {detail}")
-        if status in (413, 422):
+        if status in (404, 413, 422):
             return InputError(detail)
         return ComputationError(f"engine: {self.name}: {detail}")
 
