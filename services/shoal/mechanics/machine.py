@@ -202,6 +202,10 @@ def _pool(workers: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(workers, thread_name_prefix="shoal-tiles")
 
 
+# A forked process has the pool of its parent without the threads, and would wait for them forever.
+os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
 def _taken(idle: list[Workspace]) -> Workspace | None:
     """One of the idle workspaces, if another thread has not taken the last."""
     try:
