@@ -51,9 +51,9 @@ def test_deployment_names_a_flow_and_its_form_explains_itself(name: str, flows: 
 def test_forms_offer_every_scene_engine_and_method(flows: Any) -> None:
     forward = schema_of(flows["forward"]).properties
     identify = schema_of(flows["identify"]).properties
-    listed, own = forward["scene"]["anyOf"]
+    own, listed = forward["scene"]["anyOf"]
     assert listed["enum"] == scene_names()
-    assert own == {"type": "string", "title": "YAML, path or address"}
+    assert own == {"type": "string", "title": "name, YAML, path or address"}
     assert forward["engine"]["enum"] == list(ENGINES)
     assert identify["methods"]["items"]["enum"] == list(METHODS)
 
@@ -103,7 +103,7 @@ def test_forms_offer_the_names_of_the_library(tmp_path: Path) -> None:
         "from shoal import library; library.add('arm.yaml')\n"
         "from shoal_flows.flows import FLOWS\n"
         "from prefect.utilities.callables import parameter_schema\n"
-        "print('arm' in parameter_schema(FLOWS['forward']).properties['scene']['anyOf'][0]['enum'])\n"
+        "print('arm' in parameter_schema(FLOWS['forward']).properties['scene']['anyOf'][1]['enum'])\n"
     )
     environment = {**os.environ, "SHOAL_LIBRARY": str(tmp_path / "library")}
     command = [sys.executable, "-c", program]

@@ -239,9 +239,9 @@ def test_forms_follow_the_library(tmp_path: Path, study: Any) -> None:
 
         def offered() -> list[str]:
             properties = client.read_deployment(made).parameter_openapi_schema["properties"]
-            found: list[str] = properties["scene"]["anyOf"][0].pop("enum")
+            found: list[str] = properties["scene"]["anyOf"][1].pop("enum")
             kept = before.model_dump_for_openapi()["properties"]
-            del kept["scene"]["anyOf"][0]["enum"]
+            del kept["scene"]["anyOf"][1]["enum"]
             assert properties == kept
             return found
 

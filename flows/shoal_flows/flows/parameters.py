@@ -26,14 +26,17 @@ def _one_of(names: Iterable[str]) -> Any:
 
 
 def _named(kind: str, own: str) -> Any:
-    """One of the names of a kind, or a text of one's own. The form shows a list, and a field of many lines."""
+    """A text, or one of the names of a kind. The form shows a field of many lines, and a list that fills it.
+
+    The field stands first: some of Prefect's forms return to the first that a text fits whenever it is changed.
+    """
     listed = {"type": "string", "title": "by name", "enum": names(kind), MARK: kind}
-    return WithJsonSchema({"anyOf": [listed, {"type": "string", "title": own}]})
+    return WithJsonSchema({"anyOf": [{"type": "string", "title": own}, listed]})
 
 
-SceneName = Annotated[str, _named("scenes", "YAML, path or address")]
-ProblemName = Annotated[str, _named("problems", "YAML, path or address")]
-Data = Annotated[str, _named("recordings", "path or address")]
+SceneName = Annotated[str, _named("scenes", "name, YAML, path or address")]
+ProblemName = Annotated[str, _named("problems", "name, YAML, path or address")]
+Data = Annotated[str, _named("recordings", "name, path or address")]
 EngineName = Annotated[str, _one_of(ENGINES)]
 Engines = Annotated[list[EngineName], Field(min_length=2, json_schema_extra={"uniqueItems": True})]
 Methods = Annotated[list[Annotated[str, _one_of(METHODS)]], Field(min_length=1)]
