@@ -117,14 +117,18 @@ def compare(
     return compare(_scene(scene, values), list(engines), times)
 
 
-def statics(scene: Scene | str, time: float = 0.0, *, values: Values | None = None) -> Equilibrium:
+def statics(scene: Scene | str, time: float = 0.0, *, values: Values | None = None, verify: bool = True) -> Equilibrium:
     """Where a scene comes to rest, and whether it is stable there. Raises InputError.
 
-    time: what is applied stands as it is then [s]; values: fields of the scene to set, by dotted path
+    time: what is applied stands as it is then [s]; values: fields of the scene to set, by dotted path; verify: estimate
+    the error of the mesh by a second run on twice as many elements
     """
+    from shoal.mechanics.analysis.mesh_error import of_equilibrium
     from shoal.mechanics.analysis.statics import statics
 
-    return statics(_scene(scene, values), time)
+    wanted = _scene(scene, values)
+    found = statics(wanted, time)
+    return of_equilibrium(found, wanted) if verify else found
 
 
 def modes(
@@ -133,14 +137,19 @@ def modes(
     count: int = 10,
     about: Literal["equilibrium", "start"] = "equilibrium",
     values: Values | None = None,
+    verify: bool = True,
 ) -> Modes:
     """The `count` lowest eigenfrequencies of a scene with their shapes, about its equilibrium or its start.
 
-    values: fields of the scene to set, by dotted path. Raises InputError.
+    values: fields of the scene to set, by dotted path; verify: estimate the error of the mesh by a second run on twice
+    as many elements. Raises InputError.
     """
+    from shoal.mechanics.analysis.mesh_error import of_modes
     from shoal.mechanics.analysis.modes import modes
 
-    return modes(_scene(scene, values), about=about, count=count)
+    wanted = _scene(scene, values)
+    found = modes(wanted, about=about, count=count)
+    return of_modes(found, wanted) if verify else found
 
 
 def reactions(scene: Scene | str, times: Times, *, values: Values | None = None) -> list[Reactions]:

@@ -100,7 +100,9 @@ class Sweep(OfScene):
 
 
 class AtRest(OfScene):
-    """What needs no motion."""
+    """What needs no motion. verify: estimate the error of the mesh by a second run on twice as many elements."""
+
+    verify: bool = True
 
     @property
     def instants(self) -> Times | None:
