@@ -18,7 +18,10 @@ from shoal.errors import ComputationError, check_trusted
 )
 @options.as_json
 def run_flow(flow: str, parameters: dict[str, str], as_json: bool) -> None:
-    """Run a Prefect FLOW and log it to MLflow. It is forward, identify, compare, sweep or nightly."""
+    """Run a Prefect FLOW and log it to MLflow.
+
+    It is forward, select, compare, sweep, statics, identify, design or nightly.
+    """
     from shoal_flows import run
 
     check_trusted(run.main(flow, parameters, as_json), "the flow did not end well")

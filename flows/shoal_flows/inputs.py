@@ -9,29 +9,38 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from shoal import library
-from shoal.errors import InputError
-from shoal.scene.load import read_yaml
-from shoal.shelf import NAME, located, shelf
+from shoal.errors import ComputationError, InputError
+from shoal.scene.load import read_yaml, unknown
+from shoal.shelf import NAME, check_files, located, shelf
+
+from shoal_flows.choices import names
 
 
 def held(parameter: str, kind: str, given: str) -> str:
     """The path of a copy of a scene, a problem or a recording with all that it names; built-in names stay.
 
-    parameter: of the flow that runs, whose run keeps the copy; given: a name, a path, or YAML of several lines.
-    Raises InputError.
+    parameter: of the flow that runs, whose run keeps the copy; given: a name, a path, the address of an entry in the
+    library of a service (http://HOST:PORT/v1/library/KIND/NAME), or YAML of several lines. Raises InputError.
     """
     if not given or library.KINDS[kind].built_in(given):
         return given
+    name = headed(given)
     if "\n" in given:
         name, files = _of_text(parameter, kind, given)
+    elif given.startswith(("http://", "https://")):
+        files = _of_service(parameter, kind, given)
     elif located(kind, given) == given and not Path(given).is_file():
-        return given  # whoever uses it says that there is no such thing
+        what = f"{library.KINDS[kind].one}, nor file where this runs"
+        raise InputError(f"{parameter}: {unknown(given, what, [one for one in names(kind) if one])}")
     else:
-        name = title(given)
         files = library.gathered(kind, given, name, whole=True)
-    path = str(shelf().hold(name, files))
-    _remember(parameter, path)
-    return path
+    path = shelf().hold(name, files)
+    try:
+        library.KINDS[kind].check(path)
+    except InputError as error:
+        raise InputError(_said(parameter, path, error)) from None
+    _remember(parameter, str(path))
+    return str(path)
 
 
 def title(given: str) -> str:
@@ -46,16 +55,46 @@ def headed(given: str) -> str:
     return "own" if "\n" in given else title(given)
 
 
-def _of_text(parameter: str, kind: str, text: str) -> tuple[str, Mapping[str, bytes]]:
+def _of_text(parameter: str, kind: str, text: str) -> tuple[str, library.Documents]:
+    """YAML as it was typed into a form, under the name that it gives itself."""
     data: Any = read_yaml(text, parameter)
     name = title(str(data.get("name") or "own")) if isinstance(data, dict) else "own"
+    return name, _gathered(parameter, kind, {f"{name}.yaml": text.encode()}, name)
+
+
+def _of_service(parameter: str, kind: str, address: str) -> library.Documents:
+    """An entry of a service's library, with what it names in the library here."""
+    from shoal.engines.remote import RemoteEngine
+
+    service, _, place = address.partition("/v1/library/")
+    found, _, name = place.strip("/").partition("/")
+    if found != kind or not NAME.fullmatch(name.partition("@")[0]):
+        right = f"http://HOST:8001/v1/library/{kind}/NAME"
+        raise InputError(f"{parameter}: {address[:200]}: no address of an entry, such as {right}")
+    try:
+        files = RemoteEngine(service).get_entry(kind, name)
+    except (InputError, ComputationError) as error:
+        raise type(error)(f"{parameter}: {error}") from None
+    return _gathered(parameter, kind, files, title(name))
+
+
+def _gathered(parameter: str, kind: str, files: Mapping[str, bytes], name: str) -> library.Documents:
+    check_files(name, files)
     with TemporaryDirectory() as folder:
-        file = Path(folder) / f"{name}.yaml"
-        file.write_text(text, encoding="utf-8")
+        document = Path(folder) / f"{name}.yaml"
+        for path, content in files.items():
+            (document.parent / path).parent.mkdir(parents=True, exist_ok=True)
+            (document.parent / path).write_bytes(content)
         try:
-            return name, library.gathered(kind, str(file), name, whole=True)
+            return library.gathered(kind, str(document), name, whole=True)
         except InputError as error:
-            raise InputError(str(error).replace(str(file), parameter)) from None
+            raise InputError(_said(parameter, document, error)) from None
+
+
+def _said(parameter: str, document: Path, error: InputError) -> str:
+    """What is wrong with a document, by the name of the parameter that holds it in place of its path."""
+    text = str(error).replace(str(document), parameter).replace(f"{document.parent}/", "")
+    return text if text.startswith(parameter) else f"{parameter}: {text}"
 
 
 def _remember(parameter: str, path: str) -> None:

@@ -7,7 +7,10 @@ from typing import Any
 
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
+from shoal.identification.design import Design
+from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.scene import Scene
+from shoal.selection import Selection
 from shoal.trajectory import Trajectory, plain
 
 from shoal_flows.jobs import Fit
@@ -95,6 +98,57 @@ class Simulated:
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal run forward --json` prints."""
         return plain({**self.motion.to_json(), "scene": self.scene.name, "run_id": self.run_id})  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """An equilibrium with the id of its run."""
+
+    equilibrium: Equilibrium
+    run_id: str
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it rests there."""
+        return self.equilibrium.ok
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run statics --json` prints."""
+        return {**self.equilibrium.to_json(), "run_id": self.run_id}
+
+
+@dataclass(frozen=True)
+class Selected:
+    """A chosen model with the id of its run."""
+
+    selection: Selection
+    run_id: str
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it meets the tolerance."""
+        return self.selection.met and self.selection.trajectory.ok
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run select --json` prints."""
+        return {**self.selection.trajectory.to_json(), "selection": self.selection.to_json(), "run_id": self.run_id}
+
+
+@dataclass(frozen=True)
+class Designed:
+    """What to measure, with the id of its run."""
+
+    design: Design
+    run_id: str
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the best sensor tells the parameter."""
+        return self.design.ok
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run design --json` prints."""
+        return {**self.design.to_json(), "run_id": self.run_id}
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,9 @@ def following(what: str) -> Iterator[Listener]:
 
 def show(result: Any) -> None:
     """The table of a result."""
-    from shoal_flows.results import Compared, DemoResult, Simulated, Study, Swept
+    from shoal.terminal import tables
+
+    from shoal_flows.results import AtRest, Compared, DemoResult, Designed, Selected, Simulated, Study, Swept
 
     console = Console(highlight=False)
     if isinstance(result, Study):
@@ -65,6 +67,12 @@ def show(result: Any) -> None:
         for name in result.motion.markers:
             x, y = result.motion.marker(name)[-1]
             console.print(f"{name} at {result.motion.times[-1]:g} s: ({x:.9f}, {y:.9f}) m")
+    elif isinstance(result, AtRest):
+        tables.equilibrium_table(result.equilibrium)
+    elif isinstance(result, Selected):
+        tables.selection_table(result.selection)
+    elif isinstance(result, Designed):
+        tables.design_table(result.design)
     elif isinstance(result, Swept):
         console.print(f"{len(result.sweep.status)} points in {result.sweep.wall_s:.2f} s")
         if result.sweep.check is not None:

@@ -8,12 +8,26 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from shoal.client import Client
     from shoal.identification import Estimate, Measurement, Problem, Recording, load_problem, problem_names
-    from shoal.notebook import compare, identify, plot, prepare, select, simulate, sweep
+    from shoal.notebook import (
+        compare,
+        design,
+        identify,
+        modes,
+        plot,
+        prepare,
+        reactions,
+        select,
+        simulate,
+        statics,
+        sweep,
+    )
     from shoal.scene import Scene, load_scene, scene_names
     from shoal.trajectory import Trajectory
 
 __all__ = [
+    "Client",
     "Estimate",
     "Measurement",
     "Problem",
@@ -21,15 +35,19 @@ __all__ = [
     "Scene",
     "Trajectory",
     "compare",
+    "design",
     "identify",
     "load_problem",
     "load_scene",
+    "modes",
     "plot",
     "prepare",
     "problem_names",
+    "reactions",
     "scene_names",
     "select",
     "simulate",
+    "statics",
     "sweep",
 ]
 
@@ -38,6 +56,10 @@ def __getattr__(name: str) -> Any:
     """A name of the list, imported on demand; notebooks then know how to show what it makes."""
     if name not in __all__:
         raise AttributeError(f"module 'shoal' has no attribute {name!r}")
+    if name == "Client":
+        from shoal.client import Client
+
+        return Client
     from shoal import notebook, scene, trajectory
 
     for place in (notebook, scene, trajectory):

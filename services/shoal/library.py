@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
-
-import yaml
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
 
 from shoal.errors import InputError
 from shoal.identification import load_problem, measure
@@ -19,11 +17,15 @@ from shoal.identification.problem import built_in_problems
 from shoal.identification.recording.reading import YAML, described, read
 from shoal.identification.recording.source import FileSource
 from shoal.identification.recording.table import load_table
-from shoal.scene import load_scene
+from shoal.scene import Scene, load_scene
+from shoal.scene.edited import Keys, as_yaml, edited
 from shoal.scene.load import LARGEST, built_in_scenes, read_yaml, some, unknown
 from shoal.scene.parametric import parametric
 from shoal.shelf import LARGEST as LARGEST_ENTRY
-from shoal.shelf import NAME, Entry, Files, check_name, located, shelf
+from shoal.shelf import NAME, Entry, Files, check_name, check_paths, located, shelf
+
+if TYPE_CHECKING:
+    from shoal.mechanics.model import Model
 
 Documents = dict[str, bytes]
 
@@ -33,7 +35,7 @@ class Kind:
     """What the library holds. folder: its name there; one: in words; check: of a document, raises InputError.
 
     mark: the field that only its documents have; built_in: names that are taken; references: how a document names
-    another (the keys that lead there, `*` for any), and of which kind that is
+    another file (the keys that lead there, `*` for any), and of which kind that is; "" is none of them, a table
     """
 
     folder: str
@@ -41,7 +43,21 @@ class Kind:
     check: Callable[[Path], object]
     mark: str
     built_in: Callable[[str], bool] = lambda name: False
-    references: Mapping[tuple[str, ...], str] = field(default_factory=dict)
+    references: Mapping[Keys, str] = field(default_factory=dict)
+
+
+def _check_scene(document: Path) -> None:
+    if _model(load_scene(str(document))).failed.any():
+        raise InputError(f"{document.name}: initial: no start agrees with the joints and with what is stated")
+
+
+def _model(scene: Scene) -> Model:
+    """What a simulation begins with: functions of time that can be computed, a start. Raises InputError."""
+    from shoal.engines.capabilities import check_acceleration
+    from shoal.mechanics.simulate import machine
+
+    check_acceleration(scene)
+    return machine(scene, 0.0).model
 
 
 def _check_recording(document: Path) -> None:
@@ -54,6 +70,7 @@ def _check_recording(document: Path) -> None:
 def _check_problem(document: Path) -> None:
     problem = load_problem(str(document))
     scene = problem.load_scene()
+    _model(scene)
     if all(isinstance(source, FileSource) and source.path for source in problem.sources.values()):
         measure(problem, scene)
 
@@ -61,8 +78,8 @@ def _check_problem(document: Path) -> None:
 KINDS = {
     kind.folder: kind
     for kind in (
-        Kind("scenes", "scene", lambda document: load_scene(str(document)), "bodies", lambda name: _scene_named(name)),
-        Kind("recordings", "recording", _check_recording, "path"),
+        Kind("scenes", "scene", _check_scene, "bodies", lambda name: _scene_named(name)),
+        Kind("recordings", "recording", _check_recording, "path", references={("path",): ""}),
         Kind(
             *("problems", "problem", _check_problem, "parameters", lambda name: name in built_in_problems()),
             references={
@@ -137,16 +154,31 @@ def put(kind: str, name: str, files: Files) -> Entry:
 def gathered(kind: str, given: str, name: str, *, whole: bool) -> Documents:
     """All files of a document (a path, or a name of the library) as an entry of that name. Raises InputError.
 
-    whole: with what it names in the library; else such names stay. Built-in names always stay.
+    whole: with what it names in the library; else such names stay. Built-in names always stay. Texts stay as they are,
+    but for paths that cannot be kept in an entry.
     """
     path = Path(located(kind, given))
+    document = f"{name}.yaml"
+    if kind == "recordings" and path.suffix not in YAML:
+        ending = "".join(path.suffixes[-2:]) if path.suffix == ".gz" else path.suffix
+        table = f"{name}{ending or '.csv'}"
+        return {document: as_yaml({"path": table}).encode(), table: _content(path, LARGEST_ENTRY)}
+    found = _gathered(kind, path, document, whole)
+    return {document: found.pop(document), **found}
+
+
+def _gathered(kind: str, path: Path, document: str, whole: bool) -> Documents:
+    """A file and all that it names, by paths from the folder in which it will be the file `document`."""
+    if not kind or (kind == "recordings" and path.suffix not in YAML):
+        return {document: _content(path, LARGEST_ENTRY)}
     if kind == "recordings":
-        return _recording(path, name)
+        described({}, path)  # raises where it is not one
     content = _content(path, LARGEST)
-    data, files = read_yaml(_text(content, path), str(path)), Documents()
-    for keys, target in KINDS[kind].references.items():
-        for holder, key, label in _places(data, keys):
-            reference = holder[key]
+    text = _text(content, path)
+    data, files, changes = read_yaml(text, str(path)), {document: content}, dict[Keys, str]()
+    for wanted, target in KINDS[kind].references.items():
+        for keys, reference in _places(data, wanted):
+            label = ".".join(keys)
             beside = path.parent / reference
             if not beside.exists():
                 inside = shelf().find(target, reference) is not None
@@ -155,23 +187,27 @@ def gathered(kind: str, given: str, name: str, *, whole: bool) -> Documents:
                         raise InputError(f"{path}: {label}: {reference} cannot be read: no such file")
                     continue
                 beside = Path(located(target, reference))
-            stem, folder = _stem(beside), label.removesuffix(".path").replace(".", "-")
-            found = gathered(target, str(beside), stem, whole=whole)
-            files |= {f"{folder}/{part}": text for part, text in found.items()}
-            holder[key] = f"{folder}/{stem}.yaml"
-    return {f"{name}.yaml": _as_yaml(data) if files else content, **files}
+            where = PurePosixPath(reference)
+            needed = _below(where.parent, _gathered(target, beside, where.name, whole))
+            if path.parent / reference != beside or not _fits(needed, files):
+                where = PurePosixPath(label.removesuffix(".path").replace(".", "-"), _plain(beside))
+                needed = _below(where.parent, _gathered(target, beside, where.name, whole))
+                changes[keys] = str(where)
+            files |= needed
+    return files | {document: edited(text, changes).encode()} if changes else files
 
 
-def _recording(path: Path, name: str) -> Documents:
-    """The YAML that describes a table, and the table beside it."""
-    data: dict[str, Any] = {}
-    if path.suffix in YAML:
-        described({}, path)  # raises where it is not one
-        data = read_yaml(_text(_content(path, LARGEST), path), str(path))
-    table = path.parent / data["path"] if data else path
-    ending = "".join(table.suffixes[-2:]) if table.suffix == ".gz" else table.suffix
-    inside = f"{name}{ending or '.csv'}"
-    return {f"{name}.yaml": _as_yaml({**data, "path": inside}), inside: _content(table, LARGEST_ENTRY)}
+def _below(folder: PurePosixPath, files: Documents) -> Documents:
+    return {str(folder / path): content for path, content in files.items()}
+
+
+def _fits(more: Documents, files: Documents) -> bool:
+    """Whether files can be kept beside others under the paths that they have."""
+    try:
+        check_paths([*more, *files])
+    except InputError:
+        return False
+    return all(files.get(path, content) == content for path, content in more.items())
 
 
 def _check(kind: Kind, document: Path) -> None:
@@ -189,30 +225,27 @@ def _check_paths(kind: Kind, document: Path) -> None:
     if size > LARGEST:
         raise InputError(f"{document.name}: larger than the {LARGEST} bytes that are read")
     data = read_yaml(_text(document.read_bytes(), Path(document.name)), document.name)
-    places = {**kind.references, ("path",): ""} if kind.folder == "recordings" else kind.references
-    for keys in places:
-        for holder, key, label in _places(data, keys):
-            given = holder[key]
-            parts = Path(given).parts
+    for wanted, target in kind.references.items():
+        for keys, given in _places(data, wanted):
+            label, parts = ".".join(keys), Path(given).parts
             if Path(given).is_absolute() or ".." in parts or "\0" in given:
                 raise InputError(f"{document.name}: {label}: {given[:80]!r} leads out of the entry")
             inside = document.parent / given
-            if not inside.is_file() and (Path(given).suffix or not places[keys]):
+            if not inside.is_file() and (Path(given).suffix or not target):
                 raise InputError(f"{document.name}: {label}: {given[:80]!r} is not among the files of the entry")
-            if places[keys] and inside.suffix in YAML:
-                _check_paths(KINDS[places[keys]], inside)
+            if target and inside.suffix in YAML:
+                _check_paths(KINDS[target], inside)
 
 
-def _places(data: Any, keys: tuple[str, ...], above: str = "") -> Iterable[tuple[dict[str, Any], str, str]]:
-    """Where texts stand in a document: (mapping, key, path of the field)."""
+def _places(data: Any, wanted: Keys, above: Keys = ()) -> Iterable[tuple[Keys, str]]:
+    """Where texts stand in a document: the keys that lead there, and the text."""
     if not isinstance(data, dict):
         return
-    for key in list(data) if keys[0] == "*" else [key for key in keys[:1] if key in data]:
-        label = f"{above}{key}"
-        if len(keys) > 1:
-            yield from _places(data[key], keys[1:], f"{label}.")
+    for key in list(data) if wanted[0] == "*" else [key for key in wanted[:1] if key in data]:
+        if len(wanted) > 1:
+            yield from _places(data[key], wanted[1:], (*above, key))
         elif isinstance(data[key], str):
-            yield data, key, label
+            yield (*above, key), data[key]
 
 
 def _guessed(path: Path) -> str:
@@ -248,11 +281,7 @@ def _text(content: bytes, path: Path) -> str:
         raise InputError(f"{path}: cannot be read: not UTF-8 text") from None
 
 
-def _stem(path: Path) -> str:
+def _plain(path: Path) -> str:
     """The name of a file that becomes part of an entry."""
-    stem = path.name.partition(".")[0]
-    return stem if NAME.fullmatch(stem) else "part"
-
-
-def _as_yaml(data: Any) -> bytes:
-    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120).encode()
+    stem, dot, ending = path.name.partition(".")
+    return f"{stem if NAME.fullmatch(stem) else 'part'}{dot}{ending}"

@@ -5,10 +5,11 @@ A scene or problem is given as an object, as the name of a built-in one, or as t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -25,11 +26,16 @@ if TYPE_CHECKING:
     from shoal.engines.prepared import Prepared
     from shoal.engines.sweep import Sweep
     from shoal.identification import Estimate, Problem
+    from shoal.identification.design import Design
+    from shoal.mechanics.analysis.equilibrium import Equilibrium
+    from shoal.mechanics.analysis.modes import Modes
+    from shoal.mechanics.analysis.reactions import Reactions
     from shoal.pictures.inline import Picture
     from shoal.selection import Selection
 
 Values = Mapping[str, Any]
 Times = Sequence[float] | npt.NDArray[np.float64]
+Data: TypeAlias = "str | Path | pd.DataFrame | Mapping[str, str] | None"
 
 
 def simulate(
@@ -111,28 +117,109 @@ def compare(
     return compare(_scene(scene, values), list(engines), times)
 
 
+def statics(scene: Scene | str, time: float = 0.0, *, values: Values | None = None, verify: bool = True) -> Equilibrium:
+    """Where a scene comes to rest, and whether it is stable there. Raises InputError.
+
+    time: what is applied stands as it is then [s]; values: fields of the scene to set, by dotted path; verify: estimate
+    the error of the mesh by a second run on twice as many elements
+    """
+    from shoal.mechanics.analysis.mesh_error import of_equilibrium
+    from shoal.mechanics.analysis.statics import statics
+
+    wanted = _scene(scene, values)
+    found = statics(wanted, time)
+    return of_equilibrium(found, wanted) if verify else found
+
+
+def modes(
+    scene: Scene | str,
+    *,
+    count: int = 10,
+    about: Literal["equilibrium", "start"] = "equilibrium",
+    values: Values | None = None,
+    verify: bool = True,
+) -> Modes:
+    """The `count` lowest eigenfrequencies of a scene with their shapes, about its equilibrium or its start.
+
+    values: fields of the scene to set, by dotted path; verify: estimate the error of the mesh by a second run on twice
+    as many elements. Raises InputError.
+    """
+    from shoal.mechanics.analysis.mesh_error import of_modes
+    from shoal.mechanics.analysis.modes import modes
+
+    wanted = _scene(scene, values)
+    found = modes(wanted, about=about, count=count)
+    return of_modes(found, wanted) if verify else found
+
+
+def reactions(scene: Scene | str, times: Times, *, values: Values | None = None) -> list[Reactions]:
+    """Forces and torques in the joints of a scene at times [s] of its motion. Raises InputError, ComputationError.
+
+    values: fields of the scene to set, by dotted path
+    """
+    from shoal.mechanics.analysis.reactions import reactions
+
+    return reactions(_scene(scene, values), [float(t) for t in times])
+
+
 def identify(
-    problem: Problem | str, data: str | Path | pd.DataFrame | Mapping[str, str] | None = None, **options: Any
+    problem: Problem | str,
+    data: Data = None,
+    *,
+    method: str | None = None,
+    values: Values | None = None,
+    seed: int = 0,
+    engine: str = "gauss",
+    tolerance: float | None = None,
+    time_limit: float | None = None,
+    profiles: bool = False,
+    bootstrap: int = 0,
+    **options: Any,
 ) -> Estimate:
     """Find the parameters of a problem from measured motion.
 
     data: a file, or a table whose columns are those that the problem's channels name, instead of the problem's own
-    recording; for several recordings a mapping from their names to files. options: those of
-    `shoal.identification.identify` (method, values, seed, tolerance, engine, time_limit, measurement, wishes, ...).
+    recording; for several recordings a mapping from their names to files; method: one of `METHODS`, else the problem's;
+    values: fields of the scene to set; tolerance: error [m] that the model may have, for which it is chosen;
+    time_limit: of all of it [s]; profiles: the profile likelihood of every parameter; bootstrap: how many draws;
+    options: further ones of `shoal.identification.identify` (progress, measurement, checkpoint, wishes).
     Raises InputError, ComputationError.
     """
-    from shoal.identification import Estimate, identify, load_problem
+    from shoal.identification import Estimate, identify
+    from shoal.identification.conclude import Wishes
 
     setattr(Estimate, _HTML, _html)
-    wanted = load_problem(problem) if isinstance(problem, str) else problem
-    if data is None or isinstance(data, Mapping):
-        return identify(wanted, data=data, **options)
-    if isinstance(data, str | Path):
-        return identify(wanted, data=str(data), **options)
-    with TemporaryDirectory(prefix="shoal-") as folder:
-        table = Path(folder) / "table.csv"
-        data.to_csv(table, index=False)
-        return identify(wanted, data=str(table), **options)
+    options = {"wishes": Wishes(profiles=profiles, bootstrap=bootstrap), **options}
+    options |= {"method": method, "values": values, "seed": seed, "engine": engine, "tolerance": tolerance}
+    with _files(data) as files:
+        return identify(_problem(problem), data=files, time_limit=time_limit, **options)
+
+
+def design(
+    problem: Problem | str,
+    data: Data = None,
+    *,
+    about: Literal["answer", "start"] | None = None,
+    values: Values | None = None,
+    noise: float | None = None,
+    angle_noise: float | None = None,
+    duration: float | None = None,
+    rate: float | None = None,
+    parameter: str | None = None,
+) -> Design:
+    """What to measure to know the parameters of a problem best: which marker, how long and how often.
+
+    data: as for `identify`; about: the answer from the data, where there are any, or the start; noise [m], angle_noise
+    [rad]: standard deviations, duration [s] and rate [1/s] of the measurement, else those of the problem and its data;
+    parameter: to be sharpened, else the weakest. Raises InputError, ComputationError where no answer can be trusted.
+    """
+    from shoal.identification.design import about_answer, design, has_data
+
+    wanted, how = _problem(problem), dict[str, Any](noise=noise, angle_noise=angle_noise, duration=duration, rate=rate)
+    if about == "answer" or (about is None and (data is not None or has_data(wanted))):
+        with _files(data) as files:
+            return about_answer(wanted, data=files, values=values, parameter=parameter, **how)
+    return design(wanted, values=values, parameter=parameter, **how)
 
 
 def plot(result: Scene | Trajectory | Estimate | Sweep | Comparison) -> Picture:
@@ -145,6 +232,26 @@ def plot(result: Scene | Trajectory | Estimate | Sweep | Comparison) -> Picture:
 def _scene(given: Scene | str, values: Values | None) -> Scene:
     scene = load_scene(given) if isinstance(given, str) else given
     return scene.with_values(values) if values else scene
+
+
+def _problem(given: Problem | str) -> Problem:
+    from shoal.identification import load_problem
+
+    return load_problem(given) if isinstance(given, str) else given
+
+
+@contextmanager
+def _files(data: Data) -> Iterator[str | Mapping[str, str] | None]:
+    """Recordings as files, that of a table for as long as the block lasts."""
+    if data is None or isinstance(data, Mapping):
+        yield data
+    elif isinstance(data, str | Path):
+        yield str(data)
+    else:
+        with TemporaryDirectory(prefix="shoal-") as folder:
+            table = Path(folder) / "table.csv"
+            data.to_csv(table, index=False)
+            yield str(table)
 
 
 def _html(result: Any) -> str:

@@ -13,7 +13,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -236,18 +236,27 @@ def check_files(name: str, files: Files) -> None:
     """Whether files can be kept as an entry. Raises InputError."""
     if f"{name}.yaml" not in files:
         raise InputError(f"{name}: files: {name}.yaml is missing; there are {', '.join(sorted(files)[:5]) or 'none'}")
-    if len(files) > _MOST:
-        raise InputError(f"{name}: files: an entry has at most {_MOST}, found {len(files)}")
-    for path in files:
-        parts = path.split("/")
-        if len(parts) > _DEEPEST or not all(_FILE.fullmatch(part) for part in parts):
-            raise InputError(f"{name}: files: {path[:80]!r} is not a plain path below the entry's folder")
-        if any("/".join(parts[:k]) in files for k in range(1, len(parts))):
-            raise InputError(f"{name}: files: {path!r} lies in what is a file itself")
+    try:
+        check_paths(files)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
     if (size := sum(map(len, files.values()))) > LARGEST:
         raise InputError(
             f"{name}: files: {size / 1e6:.0f} MB; an entry of the library has at most {LARGEST / 1e6:.0f} MB"
         )
+
+
+def check_paths(files: Iterable[str]) -> None:
+    """Whether these can be the paths of an entry's files. Raises InputError."""
+    paths = set(files)
+    if len(paths) > _MOST:
+        raise InputError(f"files: an entry has at most {_MOST}, found {len(paths)}")
+    for path in sorted(paths):
+        parts = path.split("/")
+        if len(parts) > _DEEPEST or not all(_FILE.fullmatch(part) for part in parts):
+            raise InputError(f"files: {path[:80]!r} is not a plain path below the entry's folder")
+        if any("/".join(parts[:k]) in paths for k in range(1, len(parts))):
+            raise InputError(f"files: {path!r} lies in what is a file itself")
 
 
 def _replace(path: Path, content: bytes) -> None:

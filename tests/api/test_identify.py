@@ -15,7 +15,7 @@ from shoal.engines import get_engine
 from shoal.scene import Scene
 
 Machine = dict[str, Any]
-JOBS = "/v1/identifications"
+JOBS = "/v1/jobs/identify"
 
 
 @pytest.fixture(scope="module")
@@ -79,8 +79,8 @@ def test_job_survives_its_client(
 
 def test_unknown_job(gauss: httpx.Client) -> None:
     for path in ("", "/result", "/events"):
-        assert gauss.get(f"{JOBS}/nothing{path}").json()["type"] == "urn:shoal:not-found"
-    assert gauss.delete(f"{JOBS}/nothing").status_code == 404
+        assert gauss.get(f"/v1/jobs/nothing{path}").json()["type"] == "urn:shoal:not-found"
+    assert gauss.delete("/v1/jobs/nothing").status_code == 404
 
 
 def test_wrong_recording_fails_the_job(gauss: httpx.Client, machine: Machine, problem: Machine) -> None:

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from shoal.api.jobs import Jobs
+from shoal.api.operations import Identify
 from shoal.api.refusal import Refusal
-from shoal.api.schemas import IdentifyRequest
 from shoal.api.settings import Settings
 from shoal.cli import main
 from shoal.engines import ENGINES
 from shoal.ports import PORTS
 
-REQUEST = IdentifyRequest(problem="paper-case-1")
+REQUEST = Identify(problem="paper-case-1")
 
 
 class Instant:
@@ -41,7 +41,7 @@ def test_finished_jobs_are_bounded() -> None:
         jobs = Jobs(Instant(), settings)  # type: ignore[arg-type]
         found = []
         for _ in range(3):
-            found.append(jobs.submit(REQUEST))
+            found.append(jobs.submit("identify", REQUEST))
             await asyncio.sleep(0.01)
         assert all(job.state == "done" for job in found)
         return [is_gone(jobs, job.id) for job in found]
@@ -54,9 +54,9 @@ def test_too_many_jobs_are_refused() -> None:
     async def submit() -> None:
         jobs = Jobs(Instant(), Settings(job_workers=1, job_queue=1))  # type: ignore[arg-type]
         for _ in range(3):  # nothing runs before this gives way
-            jobs.submit(REQUEST)
+            jobs.submit("identify", REQUEST)
 
-    with pytest.raises(Refusal, match="2 identifications are running or waiting"):
+    with pytest.raises(Refusal, match="2 jobs are running or waiting"):
         asyncio.run(submit())
 
 

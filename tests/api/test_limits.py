@@ -7,18 +7,17 @@ from typing import Any
 import orjson
 import pytest
 from shoal.api.limits import TooMuch
-from shoal.api.schemas import SimulateRequest
+from shoal.api.operations import Simulate
 from shoal.api.settings import Settings
-from shoal.api.tasks import Bench, simulate
+from shoal.api.tasks import Bench, call
 from shoal.engines import get_engine
 
 
 def ask(work: int, **values: Any) -> dict[str, Any]:
     """Ten seconds of a pendulum by a service that computes so much."""
-    request = SimulateRequest(
-        scene="single-pendulum", times=[10.0], values={f"solver.{k}": v for k, v in values.items()}
-    )
-    found: dict[str, Any] = orjson.loads(simulate(Bench(get_engine("gauss"), Settings(max_work=work)), request, print))
+    request = Simulate(scene="single-pendulum", times=[10.0], values={f"solver.{k}": v for k, v in values.items()})
+    bench = Bench(get_engine("gauss"), Settings(max_work=work))
+    found: dict[str, Any] = orjson.loads(call(bench, ("simulate", request), print))
     return found
 
 

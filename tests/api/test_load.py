@@ -51,7 +51,7 @@ def crowd(settings: Settings, machine: Machine, clients: int, seconds: float) ->
     return statuses, served
 
 
-@pytest.mark.parametrize("router", [routes.health, routes.v1, routes.identifications, umbridge.router])
+@pytest.mark.parametrize("router", [routes.health, routes.v1, routes.jobs, routes.by_id, umbridge.router])
 def test_nothing_of_a_call_goes_to_another_thread(router: APIRouter) -> None:
     """What is no coroutine runs on a thread of its own; two such dependencies were half of a call's overhead."""
     assert inspect.iscoroutinefunction(program.require_key)

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import problem_names
+from shoal.scene.load import scene_library
 
 pytestmark = pytest.mark.slow
 
@@ -27,8 +28,9 @@ def of_ours(said: list[str]) -> list[str]:
 
 
 def choose(page: Any, shown: str, *wanted: str) -> list[str]:
-    """Click on options of one of Prefect's lists, found by what it shows; returns all it offers."""
-    page.get_by_role("button", name=shown, exact=True).focus()
+    """Click on options of one of Prefect's lists, found by what it shows, if anything; returns all it offers."""
+    lists = page.locator(".p-select-button__control").filter(has_not_text=re.compile(r"\S"))
+    (page.get_by_role("button", name=shown, exact=True) if shown else lists.first).focus()
     page.keyboard.press("ArrowDown")
     page.get_by_role("option").first.wait_for()
     offered = [text.strip() for text in page.get_by_role("option").all_inner_texts()]
@@ -49,7 +51,9 @@ def test_a_study_is_started_from_prefects_form_and_answers_there(desk: Any, visi
     page.get_by_text("Custom run").click()
     for words in ("What is measured and what is to be found", "How to search", "empty for the data of the problem"):
         expect(page.get_by_text(words)).to_be_visible()
-    assert set(choose(page, "paper-case-1", "paper-case-1")) == set(problem_names())
+    page.get_by_role("button", name="by name").first.click()
+    assert set(choose(page, "", "paper-case-1")) == set(problem_names())
+    expect(page.locator("textarea").first).to_have_value("paper-case-1")
     assert set(choose(page, "auto", "least-squares", "iafsa", "auto")) == set(METHODS)
     one.shoot("form")
     page.get_by_role("button", name="Submit").click()
@@ -70,6 +74,38 @@ def test_a_study_is_started_from_prefects_form_and_answers_there(desk: Any, visi
     expect(page.get_by_text("paper-case-1 · identify").first).to_be_visible()
     assert of_ours(one.said) == []
     assert one.elsewhere == []
+
+
+def test_a_machine_of_ones_own_is_typed_into_the_form(desk: Any, visit: Callable[[], Any]) -> None:
+    """Its YAML, key by key; what is wrong with it stands in the state of the run, with the field."""
+    from background import until
+    from deployed import call
+    from playwright.sync_api import expect
+
+    one = visit()
+    page = one.page
+    text = (scene_library() / "single-pendulum.yaml").read_text(encoding="utf-8")
+    runs = f"{desk.at['PREFECT']}/api/flow_runs/filter"
+    wanted = {"flow_runs": {"name": {"any_": ["forward own"]}}}
+    for mass, state in (("2.0", "COMPLETED"), ("-1.0", "FAILED")):
+        page.goto(f"{desk.at['PREFECT']}/deployments")
+        page.get_by_role("link", name="forward").first.click()
+        page.get_by_role("button", name="Run", exact=True).first.click()
+        page.get_by_text("Custom run").click()
+        field = page.locator("textarea").first
+        expect(field).to_have_value("flexible-double-pendulum")
+        field.fill("")
+        field.press_sequentially(text.replace("mass: 1.0", f"mass: {mass}"))
+        expect(field).to_have_value(text.replace("mass: 1.0", f"mass: {mass}"))
+        one.shoot(f"typed{mass}")
+        page.get_by_role("button", name="Submit").click()
+        until(lambda state=state: any(run["state_type"] == state for run in call(runs, wanted)), f"it has {state}")  # type: ignore[misc]
+    messages = [run["state"]["message"] for run in call(runs, wanted)]
+    assert any("InputError: scene: bodies.OA.mass: " in str(message) for message in messages), messages
+    page.goto(f"{desk.at['PREFECT']}/runs")
+    expect(page.get_by_text("forward own").first).to_be_visible()
+    one.shoot("runs")
+    assert of_ours(one.said) == []
 
 
 def test_the_best_run_is_found_compared_and_seen_moving(desk: Any, visit: Callable[[], Any]) -> None:

@@ -19,9 +19,9 @@ import orjson
 import psutil
 import pytest
 from click.testing import CliRunner
-from shoal.api.schemas import SimulateRequest
+from shoal.api.operations import Simulate
 from shoal.api.settings import Settings
-from shoal.api.tasks import Bench, simulate
+from shoal.api.tasks import Bench, call
 from shoal.cli import main
 from shoal.engines import get_engine, remote
 
@@ -43,8 +43,8 @@ class Mortal(httpx.BaseTransport):
             if self.last is None:
                 raise httpx.ConnectError("Connection refused")
             return self.last
-        asked = SimulateRequest.model_validate(orjson.loads(request.read()))
-        return httpx.Response(200, content=simulate(self._bench, asked, lambda _: None))
+        asked = Simulate.model_validate(orjson.loads(request.read()))
+        return httpx.Response(200, content=call(self._bench, ("simulate", asked), lambda _: None))
 
 
 def answer(text: str) -> dict[str, Any]:

@@ -45,15 +45,48 @@ def test_deployment_names_a_flow_and_its_form_explains_itself(name: str, flows: 
     schema = schema_of(flow).model_dump_for_openapi()
     assert all(field.get("description") for field in schema["properties"].values())
     defaults = {key: field["default"] for key, field in schema["properties"].items()}
-    validate({**defaults, **stated.get("parameters", {})}, schema)
+    assert validate({**defaults, **stated.get("parameters", {})}, schema) == []
 
 
 def test_forms_offer_every_scene_engine_and_method(flows: Any) -> None:
     forward = schema_of(flows["forward"]).properties
     identify = schema_of(flows["identify"]).properties
-    assert forward["scene"]["enum"] == scene_names()
+    own, listed = forward["scene"]["anyOf"]
+    assert listed["enum"] == scene_names()
+    assert own == {"type": "string", "title": "name, YAML, path or address"}
     assert forward["engine"]["enum"] == list(ENGINES)
     assert identify["methods"]["items"]["enum"] == list(METHODS)
+
+
+@pytest.mark.parametrize(
+    ("name", "right", "wrong"),
+    [
+        ("forward", {"scene": "bodies:\n  OA: 1"}, {"scene": 1}),
+        ("select", {"scene": "arm.yaml", "tolerance": 0.01}, {"tolerance": 0}),
+        ("statics", {"time": 1.5, "values": {"gravity": [0, 0]}}, {"time": -1}),
+        ("identify", {"problem": "a: 1\nb: 2", "data": "http://gauss:8001/v1/library/recordings/run"}, {"seeds": []}),
+        ("design", {"about": "start", "noise": 1e-3, "parameter": "theta1", "rate": None}, {"about": "noon"}),
+        ("design", {"data": "run", "duration": 2}, {"noise": -1}),
+        ("compare", {"engines": ["gauss", "casadi"]}, {"engines": ["gauss"]}),
+        ("sensitivity", {"vary": [{"path": "gravity", "low": 0, "high": 1, "count": 2}]}, {"vary": []}),
+        ("validation", {"only": "four-bar-2", "quick": True}, {"only": "guess"}),
+    ],
+)
+def test_forms_take_what_is_right_and_no_more(
+    name: str, right: dict[str, Any], wrong: dict[str, Any], flows: Any
+) -> None:
+    from prefect.utilities.schema_tools import validate
+
+    stated = DEPLOYMENTS[name]
+    schema = schema_of(flows[stated["entrypoint"].rpartition(":")[2]]).model_dump_for_openapi()
+    defaults = {key: field["default"] for key, field in schema["properties"].items()}
+    assert validate({**defaults, **right}, schema) == []
+    assert validate({**defaults, **wrong}, schema) != []
+
+
+def test_every_flow_has_a_deployment(flows: Any) -> None:
+    """But for the demo, which is a command of its own."""
+    assert {stated["entrypoint"].rpartition(":")[2] for stated in DEPLOYMENTS.values()} == {*flows} - {"demo"}
 
 
 def test_what_the_form_does_not_offer_is_for_the_flow_to_refuse() -> None:
@@ -70,7 +103,7 @@ def test_forms_offer_the_names_of_the_library(tmp_path: Path) -> None:
         "from shoal import library; library.add('arm.yaml')\n"
         "from shoal_flows.flows import FLOWS\n"
         "from prefect.utilities.callables import parameter_schema\n"
-        "print('arm' in parameter_schema(FLOWS['forward']).properties['scene']['enum'])\n"
+        "print('arm' in parameter_schema(FLOWS['forward']).properties['scene']['anyOf'][1]['enum'])\n"
     )
     environment = {**os.environ, "SHOAL_LIBRARY": str(tmp_path / "library")}
     command = [sys.executable, "-c", program]

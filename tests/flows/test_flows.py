@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from click.testing import CliRunner
 from shoal import library, simulate
+from shoal.cli import main
 from shoal.errors import InputError
 from shoal.shelf import shelf
 from shoal_flows import run
@@ -198,8 +200,55 @@ def test_a_scene_may_be_given_as_yaml() -> None:
     with get_client(sync_client=True) as client:
         assert "forward own" in {one.name for one in client.read_flow_runs()}
     assert {"scene.yaml", "call.json", "inputs"} <= {item.path for item in _client().list_artifacts(found.run_id)}
-    with pytest.raises(InputError, match=r"scene|bodies"):
-        run.run_flow("forward", {"scene": json.dumps(text.replace("bodies", "body"))})
+    with pytest.raises(InputError, match=r"^scene: bodies\.OA\.mass: .* found -1"):
+        run.run_flow("forward", {"scene": json.dumps(text.replace("mass: 1.0", "mass: -1.0"))})
+    with get_client(sync_client=True) as client:
+        messages = {one.state.message for one in client.read_flow_runs() if one.state and one.state.is_failed()}
+    assert any("InputError: scene: bodies.OA.mass: " in str(message) for message in messages), messages
+
+
+def test_what_else_there_is_of_a_machine_is_logged() -> None:
+    """The cheapest model within a tolerance, its place of rest, a design of a measurement; each can be repeated."""
+    duration = "{solver.duration: 0.1}"
+    asked = {
+        "select": {"scene": "flexible-double-pendulum", "tolerance": "1e-3", "values": duration},
+        "statics": {"scene": "rigid-double-pendulum"},
+        "design": {"problem": "paper-case-1", "about": "start", "noise": "1e-3"},
+    }
+    for flow, parameters in asked.items():
+        found = run.run_flow(flow, parameters)
+        assert found.trusted
+        assert found.to_json()["run_id"] == found.run_id
+        there = _client().get_run(found.run_id)
+        assert (there.info.status, there.data.tags["kind"]) == ("FINISHED", {"select": "selection"}.get(flow, flow))
+        assert not rerun(found.run_id).different
+    with pytest.raises(InputError, match="theta3"):
+        run.run_flow("design", {**asked["design"], "parameter": "theta3"})
+
+
+def test_forms_follow_the_library(tmp_path: Path, study: Any) -> None:
+    """Of a server that runs: names come and go with `shoal library`, and nothing else of the form changes."""
+    from prefect.client.orchestration import get_client
+    from prefect.utilities.callables import parameter_schema
+    from shoal_flows.flows import FLOWS
+
+    before = parameter_schema(FLOWS["forward"])
+    with get_client(sync_client=True) as client:
+        flow = client.create_flow_from_name("forward")
+        made = client.create_deployment(flow, "form", parameter_openapi_schema=before.model_dump_for_openapi())
+
+        def offered() -> list[str]:
+            properties = client.read_deployment(made).parameter_openapi_schema["properties"]
+            found: list[str] = properties["scene"]["anyOf"][1].pop("enum")
+            kept = before.model_dump_for_openapi()["properties"]
+            del kept["scene"]["anyOf"][1]["enum"]
+            assert properties == kept
+            return found
+
+        (tmp_path / "lever.yaml").write_text((files("shoal.scene") / "library" / "single-pendulum.yaml").read_text())
+        for command in (["add", str(tmp_path / "lever.yaml")], ["remove", "lever"]):
+            assert CliRunner().invoke(main, ["library", *command]).exit_code == 0
+            assert ("lever" in offered()) == (command[0] == "add")
 
 
 def test_an_identification_is_repeated_with_all_its_figures(study: Any) -> None:

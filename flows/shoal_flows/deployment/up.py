@@ -15,7 +15,7 @@ from rich.console import Console
 from shoal.errors import ComputationError, ShoalError
 from shoal.home import home
 
-from shoal_flows import settings
+from shoal_flows import choices, settings
 from shoal_flows.deployment import processes
 from shoal_flows.deployment.parts import Line, honcho, look_after
 from shoal_flows.deployment.postgres import Postgres
@@ -56,6 +56,8 @@ def run(stages: Sequence[Sequence[str]], *, postgres: bool = False) -> None:
             started = [line for stage in stages for line in _stage(stage, environment, stack, console)]
             if any("worker" in stage for stage in stages):
                 _deploy(environment)
+                choices.remember(environment["PREFECT_API_URL"])
+                stack.callback(choices.remember, None)
             _announce(console)
             look_after([*keeping, *started], console)
     except KeyboardInterrupt:

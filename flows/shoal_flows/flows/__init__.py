@@ -12,11 +12,16 @@ from prefect import Flow  # noqa: E402 - it reads the settings when it is import
 
 from shoal_flows.flows.compare import compare  # noqa: E402
 from shoal_flows.flows.demo import demo  # noqa: E402
+from shoal_flows.flows.design import design  # noqa: E402
 from shoal_flows.flows.forward import forward  # noqa: E402
 from shoal_flows.flows.identify import identify  # noqa: E402
 from shoal_flows.flows.nightly import nightly  # noqa: E402
+from shoal_flows.flows.select import select  # noqa: E402
+from shoal_flows.flows.statics import statics  # noqa: E402
 from shoal_flows.flows.sweep import sweep  # noqa: E402
 
-FLOWS: dict[str, Flow[..., Any]] = {flow.name: flow for flow in (forward, identify, compare, sweep, nightly, demo)}
+FLOWS: dict[str, Flow[..., Any]] = {
+    flow.name: flow for flow in (forward, select, compare, sweep, statics, identify, design, nightly, demo)
+}
 
 __all__ = ["FLOWS"]

@@ -23,7 +23,7 @@ def compare(
     """Simulate a scene on several engines and log how far apart they come out.
 
     Args:
-        scene: The machine to simulate: a name (see `shoal scenes`), or YAML.
+        scene: The machine to simulate: a name (see `shoal scenes`), or its YAML.
         engines: Who simulates, two or more; gauss is Shoal's own solver.
         values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
     """

@@ -21,7 +21,7 @@ def forward(
     """Simulate a scene on one engine and log its motion.
 
     Args:
-        scene: The machine to simulate: a name (see `shoal scenes`), or YAML.
+        scene: The machine to simulate: a name (see `shoal scenes`), or its YAML.
         engine: Who simulates; gauss is Shoal's own solver.
         values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
     """

@@ -8,7 +8,7 @@ from prefect import flow
 from shoal.identification import load_problem
 from shoal.identification.methods import get_method
 
-from shoal_flows.flows.parameters import EngineName, Methods, ProblemName, Seeds, Values
+from shoal_flows.flows.parameters import Data, EngineName, Methods, ProblemName, Seeds, Values
 from shoal_flows.flows.runner import side_by_side
 from shoal_flows.flows.shown import ended, named, progress, show_result
 from shoal_flows.flows.study import open_running
@@ -25,17 +25,18 @@ def identify(
     problem: ProblemName = "paper-case-1",
     methods: Methods = ["auto"],  # noqa: B006 - Prefect shows the default in its form; nothing changes it
     seeds: Seeds = [0],  # noqa: B006
-    data: str = "",
+    data: Data = "",
     engine: EngineName = "gauss",
     values: Values = {},  # noqa: B006
 ) -> Study:
     """Find the parameters of a problem from measured motion, by every method with every seed.
 
     Args:
-        problem: What is measured and what is to be found from it: a name (see `shoal problems`), or YAML.
+        problem: What is measured and what is to be found from it: a name (see `shoal problems`), or its YAML.
         methods: How to search; auto takes what suits the problem.
         seeds: Of the random numbers; every method runs once with each.
-        data: Name of a recording in the library, or its path where the worker runs; empty for the data of the problem.
+        data: A recording: a name of the library, a path where the worker runs, or the address of one in a service's
+            library; empty for the data of the problem.
         engine: Who simulates; gauss is Shoal's own solver.
         values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
     """

@@ -1,38 +1,52 @@
 """The types of the flows' parameters, with the choices that Prefect's form offers.
 
-The choices are advice to the form, and its server refuses others; what is called in Python may also be a
-file, or an engine elsewhere, and is checked by who uses it. What a parameter means stands in the docstring of
-its flow, from where Prefect takes it.
+The choices are advice to the form: beside the names of scenes, problems and recordings it has a field for YAML, a path
+or an address. What is given is checked by who uses it. What a parameter means stands in the docstring of its flow,
+from where Prefect takes it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import BaseModel, BeforeValidator, Field, WithJsonSchema
 from shoal.engines import ENGINES
 from shoal.identification.methods import METHODS
-from shoal.identification.problem import problem_names
-from shoal.scene.load import scene_names
 from shoal.trajectory import Array
 from shoal_validation.nightly.plan import IDENTIFICATION
 from shoal_validation.problems import PROBLEMS
+
+from shoal_flows.choices import MARK, names
 
 
 def _one_of(names: Iterable[str]) -> Any:
     return Field(json_schema_extra={"enum": list(names)})
 
 
-SceneName = Annotated[str, _one_of(scene_names())]
-ProblemName = Annotated[str, _one_of(problem_names())]
+def _named(kind: str, own: str) -> Any:
+    """A text, or one of the names of a kind. The form shows a field of many lines, and a list that fills it.
+
+    The field stands first: some of Prefect's forms return to the first that a text fits whenever it is changed.
+    """
+    listed = {"type": "string", "title": "by name", "enum": names(kind), MARK: kind}
+    return WithJsonSchema({"anyOf": [{"type": "string", "title": own}, listed]})
+
+
+SceneName = Annotated[str, _named("scenes", "name, YAML, path or address")]
+ProblemName = Annotated[str, _named("problems", "name, YAML, path or address")]
+Data = Annotated[str, _named("recordings", "name, path or address")]
 EngineName = Annotated[str, _one_of(ENGINES)]
 Engines = Annotated[list[EngineName], Field(min_length=2, json_schema_extra={"uniqueItems": True})]
 Methods = Annotated[list[Annotated[str, _one_of(METHODS)]], Field(min_length=1)]
 Seeds = Annotated[list[int], Field(min_length=1)]
 Values = dict[str, Any]
 Instant = Annotated[float | None, Field(ge=0)]
+Time = Annotated[float, Field(ge=0)]
+Tolerance = Annotated[float, Field(gt=0)]
+Size = Annotated[float | None, Field(gt=0)]
+About = Literal["answer", "start"] | None
 ALL = "all"
 Only = Annotated[str, _one_of((ALL, *PROBLEMS, *IDENTIFICATION))]
 

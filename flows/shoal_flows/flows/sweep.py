@@ -22,7 +22,7 @@ def sweep(
     """Simulate a scene over the full grid of some of its values and log where its markers have moved.
 
     Args:
-        scene: The machine to simulate: a name (see `shoal scenes`), or YAML.
+        scene: The machine to simulate: a name (see `shoal scenes`), or its YAML.
         vary: Values of which every combination is simulated, each evenly from one number to another.
         engine: Who simulates; gauss is Shoal's own solver.
         time: Instant [s] at which to look; none means the end of the scene's duration.

@@ -7,6 +7,9 @@ from typing import Any
 
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
+from shoal.identification.design import Design
+from shoal.mechanics.analysis.equilibrium import Equilibrium
+from shoal.selection import Selection
 from shoal.trajectory import Trajectory
 
 _ROWS = 50
@@ -34,6 +37,25 @@ def of_sweep(result: Sweep) -> str:
     notes = [] if result.check is None else [f"{result.check}."]
     notes += [f"The first {_ROWS} of {len(rows)} points; all are in sweep.csv."] if len(rows) > _ROWS else []
     return "\n\n".join([shown, *notes])
+
+
+def of_equilibrium(found: Equilibrium) -> str:
+    """Where the markers rest, and the evidence."""
+    rows = [(name, *found.marker(name), found.angle(name)) for name in found.markers]
+    evidence = f"{found.status}; {found.residual:.1e} of the forces is not balanced, {found.iterations} iterations"
+    return table(("marker", "x [m]", "y [m]", "angle [rad]"), rows) + f"\n\n{evidence}"
+
+
+def of_selection(found: Selection) -> str:
+    """Every model that was tried, and why the chosen one."""
+    rows = ((rung.name, rung.role, rung.error, "chosen" if rung is found.chosen else "") for rung in found.rungs)
+    return table(("model", "role", "estimated error [m]", ""), rows) + f"\n\n{found.reason}"
+
+
+def of_design(found: Design) -> str:
+    """What could be measured, the best first: how well it would tell every parameter."""
+    rows = [(sensor.label, *precision.std) for sensor, precision in found.ranked]
+    return table(("sensor", *(f"std of {name}" for name in found.aim.names)), [("today", *found.now.std), *rows])
 
 
 def table(headings: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:

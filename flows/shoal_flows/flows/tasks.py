@@ -8,16 +8,21 @@ from typing import Any
 
 from prefect import task
 from prefect.cache_policies import NO_CACHE
+from shoal import notebook
 from shoal.engines.compare import Comparison
 from shoal.engines.pieces import joined, pieces
 from shoal.engines.sweep import Sweep
 from shoal.identification import Measurement
+from shoal.identification.design import Design
+from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.scene import Scene
+from shoal.selection import Selection
 from shoal.trajectory import Array, Trajectory
 
 from shoal_flows import events, fingerprint, inputs, jobs, pictures, remembered, workers
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.pictures import Picture
+from shoal_flows.tracking import analyses
 from shoal_flows.tracking import engines as tracked
 from shoal_flows.tracking.identification import log_fit
 
@@ -55,6 +60,30 @@ def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene,
     with events.work(f"{inputs.title(scene)} on {engine}"):
         wanted, motion = workers.run(jobs.simulated, scene, engine, values)
         return wanted, motion, tracked.log_forward(wanted, motion)
+
+
+@task(task_run_name="statics", cache_policy=NO_CACHE)
+def at_rest(scene: str, time: float, values: Mapping[str, Any]) -> tuple[Equilibrium, str]:
+    """Where a scene comes to rest, with the id of its run."""
+    with events.work(f"{inputs.title(scene)} at rest"):
+        found = workers.run(notebook.statics, scene, time, values=values)
+        return found, analyses.log_statics(found)
+
+
+@task(task_run_name="select", cache_policy=NO_CACHE)
+def select(scene: str, tolerance: float, values: Mapping[str, Any]) -> tuple[Selection, str]:
+    """The cheapest model that meets a tolerance, with the id of its run."""
+    with events.work(f"{inputs.title(scene)} within {tolerance:g} m"):
+        found = workers.run(notebook.select, scene, tolerance, values=values)
+        return found, analyses.log_selection(found)
+
+
+@task(task_run_name="design", cache_policy=NO_CACHE)
+def plan(problem: str, data: str | None, how: Mapping[str, Any]) -> tuple[Design, str]:
+    """What to measure, with the id of its run."""
+    with events.work(f"a measurement for {inputs.title(problem)}"):
+        found = workers.run(notebook.design, problem, data, **how)
+        return found, analyses.log_design(found)
 
 
 @task(task_run_name="sweep", cache_policy=NO_CACHE)

@@ -24,7 +24,7 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
     scene = comparison.scene
     tags = {"kind": "study", "scene": scene.name}
     with open_run("Comparison", f"{scene.name} · compare", description=scene.description, tags=tags) as study:
-        study.params({**_scene(scene), "engines": ", ".join(comparison.trajectories), **_refused(comparison)})
+        study.params({**stated(scene), "engines": ", ".join(comparison.trajectories), **_refused(comparison)})
         for row in comparison.differences():
             pair = "-".join(row["engines"])
             for part in ("largest", "final"):
@@ -36,7 +36,7 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
         study.text(json_text(comparison.differences(), indent=1), "differences.json")
         for name, motion in comparison.trajectories.items():
             with open_run("Comparison", name, tags={"kind": "engine", "scene": scene.name}, parent=study.run_id) as run:
-                _log_engine(run, scene, motion)
+                log_motion_of(run, scene, motion)
         return study.run_id
 
 
@@ -45,7 +45,7 @@ def log_forward(scene: Scene, motion: Trajectory) -> str:
     tags = {"kind": "forward", "scene": scene.name}
     name = f"{scene.name} · {motion.engine}"
     with open_run("Forward", name, description=scene.description, tags=tags) as run:
-        _log_engine(run, scene, motion)
+        log_motion_of(run, scene, motion)
         return run.run_id
 
 
@@ -55,7 +55,7 @@ def log_sweep(result: Sweep) -> str:
     tags = {"kind": "sweep", "scene": scene.name}
     with open_run("Sweep", f"{scene.name} · sweep", description=scene.description, tags=tags) as run:
         spans = {f"vary.{path}": f"{v.min():g} to {v.max():g}" for path, v in result.grid.items()}
-        run.params({**_scene(scene), "engine": result.engine, "time": result.time, **spans})
+        run.params({**stated(scene), "engine": result.engine, "time": result.time, **spans})
         run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
         run.metric("final/points", len(result.status))
         run.metric("final/wall_s", result.wall_s)
@@ -76,9 +76,10 @@ def tip(scene: Scene) -> str:
     return list(scene.markers)[-1]
 
 
-def _log_engine(run: Run, scene: Scene, motion: Trajectory) -> None:
+def log_motion_of(run: Run, scene: Scene, motion: Trajectory) -> None:
+    """What was computed of a scene, and where its last marker went."""
     made = {f"model.{name}": value for name, value in motion.model.items() if not name.startswith("initial")}
-    run.params({**_scene(scene), "engine": motion.engine, **made})
+    run.params({**stated(scene), "engine": motion.engine, **made})
     run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
     x, y = motion.marker(tip(scene))[-1]
     run.metric("final/x", float(x))
@@ -90,7 +91,8 @@ def _log_engine(run: Run, scene: Scene, motion: Trajectory) -> None:
     log_motion(run, motion, tip(scene))
 
 
-def _scene(scene: Scene) -> dict[str, Any]:
+def stated(scene: Scene) -> dict[str, Any]:
+    """Which scene it is."""
     return {"scene": scene.name, "scene.fingerprint": scene.fingerprint, "step": scene.solver.step}
 
 

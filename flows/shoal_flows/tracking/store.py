@@ -30,6 +30,9 @@ _EXPERIMENTS = {
     "Comparison": "One scene on several engines: a parent run per scene, a child per engine.",
     "Sweep": "One scene over a grid of values.",
     "Forward": "Motion of one scene on one engine.",
+    "Statics": "Where a scene comes to rest.",
+    "Selection": "The cheapest model of a scene that meets a tolerance.",
+    "Design": "What to measure to know the parameters of a problem.",
     "Validation": "The nights of `shoal validate`: error and time of every problem, engine and method.",
 }
 

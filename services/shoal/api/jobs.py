@@ -1,4 +1,4 @@
-"""Identifications as jobs: they go on when the client leaves, and their results are kept for a while."""
+"""Computations in the background: they go on when the client leaves, and their results are kept for a while."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from typing import Literal
 
+from shoal.api.operations import Request
 from shoal.api.pool import Pool
 from shoal.api.refusal import Refusal
-from shoal.api.schemas import IdentifyRequest, JobStatus, Progress
+from shoal.api.schemas import JobStatus
 from shoal.api.settings import Settings
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
@@ -19,11 +20,12 @@ State = Literal["queued", "running", "done", "failed", "cancelled"]
 
 @dataclass
 class Job:
-    """One identification. changed: set, and replaced, whenever something new is known."""
+    """One computation. changed: set, and replaced, whenever something new is known."""
 
+    operation: str
     id: str = field(default_factory=lambda: secrets.token_urlsafe(16))
     state: State = "queued"
-    progress: Progress | None = None
+    progress: dict[str, float | None] | None = None
     result: bytes = b""
     refusal: Refusal | None = None
     ended: float | None = None
@@ -36,10 +38,9 @@ class Job:
             self.ended = time.monotonic()
         self.tell()
 
-    def note(self, row: tuple[int, float, float, int]) -> None:
-        """A row of progress."""
-        iteration, best, mean, evaluations = row
-        self.progress = Progress(iteration=iteration, best=best, mean=mean, evaluations=evaluations)
+    def note(self, progress: dict[str, float | None]) -> None:
+        """How far it is, in numbers by name."""
+        self.progress = progress
         self.tell()
 
     def tell(self) -> None:
@@ -51,7 +52,9 @@ class Job:
     def status(self) -> JobStatus:
         """What a client sees."""
         problem = None if self.refusal is None else self.refusal.document.model_dump(exclude_none=True)
-        return JobStatus(id=self.id, status=self.state, progress=self.progress, problem=problem)
+        return JobStatus(
+            id=self.id, operation=self.operation, status=self.state, progress=self.progress, problem=problem
+        )
 
     async def news(self) -> AsyncIterator[JobStatus]:
         """The status now, and whenever it has changed, until the end."""
@@ -64,23 +67,23 @@ class Job:
 
 
 class Jobs:
-    """The identifications of a service, running and finished."""
+    """The jobs of a service, running and finished."""
 
     def __init__(self, pool: Pool, settings: Settings) -> None:
         self._pool, self._settings = pool, settings
         self._jobs: dict[str, Job] = {}
         self._running: dict[str, asyncio.Task[None]] = {}
 
-    def submit(self, request: IdentifyRequest) -> Job:
+    def submit(self, operation: str, request: Request) -> Job:
         """Take a request that was checked. Raises Refusal if too many wait already."""
         self._forget()
         going = sum(job.ended is None for job in self._jobs.values())
         if going >= self._settings.job_workers + self._settings.job_queue:
-            text = f"{going} identifications are running or waiting; come again"
+            text = f"{going} jobs are running or waiting; come again"
             raise Refusal("busy", text, headers={"Retry-After": "10"})
-        job = Job()
+        job = Job(operation)
         self._jobs[job.id] = job
-        task = asyncio.create_task(self._run(job, request))
+        task = asyncio.create_task(self._run(job, (operation, request)))
         self._running[job.id] = task
         task.add_done_callback(lambda _: self._running.pop(job.id, None))
         return job
@@ -89,7 +92,7 @@ class Jobs:
         """The job of that id. Raises Refusal."""
         self._forget()
         if name not in self._jobs:
-            raise Refusal("not-found", "there is no such identification; results are kept for a while only", "id")
+            raise Refusal("not-found", "there is no such job; results are kept for a while only", "id")
         return self._jobs[name]
 
     def cancel(self, name: str) -> None:
@@ -99,10 +102,10 @@ class Jobs:
             job.become("cancelled")
             self._running[name].cancel()
 
-    async def _run(self, job: Job, request: IdentifyRequest) -> None:
+    async def _run(self, job: Job, asked: tuple[str, Request]) -> None:
         try:
             job.result = await self._pool.run(
-                "identify", request, self._settings.job_seconds, job.note, lambda: job.become("running")
+                "call", asked, self._settings.job_seconds, job.note, lambda: job.become("running")
             )
         except Refusal as refusal:
             job.refusal = refusal

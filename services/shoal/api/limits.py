@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import product
 
 from shoal.api.settings import Settings
 from shoal.engines.swarm_motion import asked_for
@@ -77,10 +78,26 @@ def check_lanes(
         raise InputError("lanes: needs at least one path, and one number or more for each")
     count = max(len(column) for column in lanes.values())
     check_scene(scene, settings, times, count)
-    # What the work depends on may itself differ from lane to lane.
-    costly = {
-        path: column for path, column in lanes.items() if path.startswith("solver.") or path.endswith(".elements")
-    }
+    costly = {path: column for path, column in lanes.items() if _costly(path)}
     for lane in range(count) if costly else ():
         numbers = {path: column[min(lane, len(column) - 1)] for path, column in costly.items()}
         check_scene(scene.with_values(numbers), settings, times, count)
+
+
+def check_grid(
+    scene: Scene, settings: Settings, times: Sequence[float] | None, axes: Mapping[str, Sequence[float]]
+) -> None:
+    """Whether a scene may be simulated over the full grid of these values. Raises InputError."""
+    count = math.prod(len(axis) for axis in axes.values())
+    check_scene(scene, settings, times, count)
+    for path, axis in axes.items():
+        for extreme in (min(axis), max(axis)):
+            scene.with_values({path: extreme})
+    costly = {path: axis for path, axis in axes.items() if _costly(path)}
+    for numbers in product(*costly.values()) if costly else ():
+        check_scene(scene.with_values(dict(zip(costly, numbers, strict=True))), settings, times, count)
+
+
+def _costly(path: str) -> bool:
+    """Whether the work depends on it, which then may differ from lane to lane."""
+    return path.startswith("solver.") or path.endswith(".elements")

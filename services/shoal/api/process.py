@@ -20,15 +20,15 @@ from shoal.api.limits import TooMuch
 from shoal.api.settings import Settings
 from shoal.api.tasks import Bench, Note
 from shoal.engines.contract import Engine
+from shoal.engines.verification import verified
 from shoal.errors import InputError, ShoalError
 from shoal.identification import Problem
 from shoal.scene import Scene, load_scene
 from shoal.versions import versions
 
 TASKS: dict[str, Callable[[Bench, Any, Note], bytes]] = {
-    "simulate": tasks.simulate,
+    "call": tasks.call,
     "check": tasks.check,
-    "identify": tasks.identification,
     "model": models.bridge,
     "library": held.library,
 }
@@ -62,7 +62,7 @@ def _made(pipe: Connection, make_engine: Callable[[], Engine]) -> Engine | None:
     try:
         engine = make_engine()
         scene = load_scene("flexible-double-pendulum")
-        engine.simulate(scene, [2 * scene.solver.step])
+        verified(engine, scene, [2 * scene.solver.step])
     except Exception as error:
         log.exception("the engine could not be made")
         pipe.send(("not-ready", f"the engine could not be made: {error}"))

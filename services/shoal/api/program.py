@@ -65,8 +65,10 @@ def create_program(engine: str, settings: Settings | None = None, make_engine: M
     program.state.settings, program.state.keys = settings, settings.keys()
     guard = [Depends(require_key)] if program.state.keys else []
     program.include_router(routes.health)
-    for router in (routes.v1, routes.library, routes.identifications, umbridge.router):
+    for router in (routes.v1, routes.library, routes.jobs, routes.earlier, umbridge.router):
         program.include_router(router, dependencies=guard)
+    program.include_router(routes.by_id, prefix=routes.JOBS, dependencies=guard)
+    program.include_router(routes.by_id, prefix=routes.EARLIER, dependencies=guard, include_in_schema=False)
     for kind in (Refusal, RequestValidationError, HTTPException):
         program.add_exception_handler(kind, on_refusal)
     program.add_exception_handler(Exception, on_failure)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import AsyncIterator
 from typing import Annotated, Any, Literal
 
@@ -9,30 +10,34 @@ from fastapi import APIRouter, Depends, Path, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from shoal.api.jobs import Jobs
+from shoal.api.operations import OPERATIONS
+from shoal.api.operations import Request as Operation
 from shoal.api.pool import Pool
 from shoal.api.refusal import Refusal, documented
 from shoal.api.schemas import (
     EngineDocument,
     Health,
-    IdentifyRequest,
     JobStatus,
     Library,
     LibraryDocument,
     LibraryEntry,
     LibraryTask,
-    Motion,
     PutRequest,
-    SimulateRequest,
     VersionDocument,
 )
 from shoal.api.strict import StrictRoute
 
 COMPUTING = ("input", "too-much", "body-too-large", "too-slow", "busy", "crashed", "not-ready", "timeout")
+JOBS = "/v1/jobs"
+EARLIER = "/v1/identifications"
+"""Where jobs were when there was but one kind of them; they still answer there."""
 
 health = APIRouter(tags=["health"])
 v1 = APIRouter(prefix="/v1", route_class=StrictRoute)
 library = APIRouter(prefix="/v1/library", route_class=StrictRoute, tags=["library"])
-identifications = APIRouter(prefix="/v1/identifications", route_class=StrictRoute, tags=["identifications"])
+jobs = APIRouter(prefix=JOBS, route_class=StrictRoute, tags=["jobs"])
+by_id = APIRouter(route_class=StrictRoute, tags=["jobs"])
+earlier = APIRouter(prefix=EARLIER, route_class=StrictRoute)
 
 
 async def require_ready(request: Request) -> None:
@@ -48,8 +53,8 @@ async def _calls(request: Request) -> Pool:
 
 
 async def _jobs(request: Request) -> Jobs:
-    jobs: Jobs = request.app.state.jobs
-    return jobs
+    found: Jobs = request.app.state.jobs
+    return found
 
 
 Ready = Depends(require_ready)
@@ -93,47 +98,57 @@ async def schema(kind: Literal["scene", "problem"], calls: Calls) -> dict[str, A
     return found
 
 
-@v1.post("/simulate", dependencies=[Ready], response_model=Motion, responses=documented(*COMPUTING))
-async def simulate(asked: SimulateRequest, request: Request, calls: Calls) -> Response:
-    """Simulate a scene, or one per lane. A run that failed carries its status."""
-    seconds = request.app.state.settings.wall_seconds
-    answer = await calls.run("simulate", asked, seconds, gone=request.is_disconnected)
-    return Response(answer, media_type="application/json")
+def _answering(name: str, kind: type[Operation]) -> None:
+    """The endpoints of an operation: at once, and as a job."""
+
+    async def now(asked: Operation, request: Request, calls: Calls) -> Response:
+        seconds = request.app.state.settings.wall_seconds
+        answer = await calls.run("call", (name, asked), seconds, gone=request.is_disconnected)
+        return Response(answer, media_type="application/json")
+
+    async def later(asked: Operation, request: Request, response: Response, calls: Calls, jobs: AllJobs) -> JobStatus:
+        seconds = request.app.state.settings.wall_seconds
+        await calls.run("check", (name, asked), seconds, gone=request.is_disconnected)
+        job = jobs.submit(name, asked)
+        response.headers["Location"] = f"{JOBS}/{job.id}"
+        return job.status
+
+    for function, what in ((now, name), (later, f"{name}-job")):
+        function.__name__ = what
+        function.__annotations__["asked"] = kind
+    about: dict[str, Any] = {"dependencies": [Ready], "responses": documented(*COMPUTING)}
+    described: dict[str, Any] = {"summary": name.capitalize(), "description": inspect.cleandoc(kind.__doc__ or "")}
+    v1.post(f"/{name}", response_model=kind.answer, **described, **about)(now)
+    checked = f"Checked, then computed in the background; `Location` says where to ask. The body is that of /v1/{name}."
+    jobs.post(f"/{name}", status_code=202, summary=f"{name.capitalize()} as a job", description=checked, **about)(later)
+    if name == "identify":
+        earlier.post("", status_code=202, include_in_schema=False, **about)(later)
 
 
-@identifications.post("", status_code=202, dependencies=[Ready], responses=documented(*COMPUTING))
-async def identify(
-    asked: IdentifyRequest, request: Request, response: Response, calls: Calls, jobs: AllJobs
-) -> JobStatus:
-    """Check a request, and identify in the background; `Location` says where to ask."""
-    await calls.run("check", asked, request.app.state.settings.wall_seconds, gone=request.is_disconnected)
-    job = jobs.submit(asked)
-    response.headers["Location"] = f"/v1/identifications/{job.id}"
-    return job.status
+for _name, _kind in OPERATIONS.items():
+    _answering(_name, _kind)
 
 
-@identifications.get("/{id}", responses=documented("not-found", "input"))
+@by_id.get("/{id}", responses=documented("not-found", "input"))
 async def status(id: JobId, jobs: AllJobs) -> JobStatus:
-    """How an identification goes."""
+    """How a job goes."""
     return jobs.get(id).status
 
 
-@identifications.delete("/{id}", status_code=204, responses=documented("not-found", "input"))
+@by_id.delete("/{id}", status_code=204, responses=documented("not-found", "input"))
 async def cancel(id: JobId, jobs: AllJobs) -> None:
-    """Stop an identification; one that has ended stays as it is."""
+    """Stop a job; one that has ended stays as it is."""
     jobs.cancel(id)
 
 
-@identifications.get(
-    "/{id}/result", response_model=dict[str, Any], responses=documented("not-found", "conflict", *COMPUTING)
-)
+@by_id.get("/{id}/result", response_model=dict[str, Any], responses=documented("not-found", "conflict", *COMPUTING))
 async def result(id: JobId, jobs: AllJobs) -> Response:
-    """The object that `shoal identify --json` prints."""
+    """What the operation answers."""
     job = jobs.get(id)
     if job.refusal is not None:
         raise job.refusal
     if job.state != "done":
-        raise Refusal("conflict", f"the identification is {job.state}", "id")
+        raise Refusal("conflict", f"the job is {job.state}", "id")
     return Response(job.result, media_type="application/json")
 
 
@@ -176,13 +191,13 @@ async def known_job(id: JobId, jobs: AllJobs) -> None:
     jobs.get(id)
 
 
-@identifications.get(
+@by_id.get(
     "/{id}/events",
     response_class=EventSourceResponse,
     dependencies=[Depends(known_job)],
     responses=documented("not-found", "input"),
 )
 async def events(id: JobId, jobs: AllJobs) -> AsyncIterator[ServerSentEvent]:
-    """Server-sent events: the status of an identification whenever it changes, until it ends."""
+    """Server-sent events: the status of a job whenever it changes, until it ends."""
     async for news in jobs.get(id).news():
         yield ServerSentEvent(event="status", data=news)

@@ -23,25 +23,14 @@ class Asked(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
 
-class SimulateRequest(Asked):
-    """A scene (a name, or an object as /v1/schemas/scene describes it), and when to look at it.
-
-    values: fields of the scene to set, by path; times: sampling instants [s], else the scene's own
-    lanes: path -> one number per lane; then one scene per lane is simulated
-    """
-
-    scene: BuiltIn | dict[str, Any]
-    values: Fields = {}
-    times: list[float] | None = None
-    lanes: dict[Path, list[float]] | None = None
-
-
 class Motion(BaseModel):
     """Motion of one scene per lane.
 
     times [s]: (samples,); points: marker positions [m], (samples, markers, 2, lanes); angles [rad]: (samples, markers,
     lanes); velocities [m/s] and rates [rad/s] likewise, null where the engine does not tell them
     status, energy_drift, constraint_drift: one per lane; steps: time steps; wall_s: of the computation
+    model: what was computed; its `verification` holds the estimated errors [m], of lanes the largest of a few of them
+    selection: with a tolerance, how the model was found
     Numbers that are not finite are null.
     """
 
@@ -59,6 +48,7 @@ class Motion(BaseModel):
     wall_s: float
     message: str
     model: dict[str, Any]
+    selection: dict[str, Any] | None = None
 
 
 class Table(Asked):
@@ -67,40 +57,13 @@ class Table(Asked):
     columns: Annotated[dict[Column, list[Number]], Field(min_length=1, max_length=100)]
 
 
-class IdentifyRequest(Asked):
-    """A problem (a name, or an object as /v1/schemas/problem describes it), and how to solve it.
-
-    The `scene` of a problem is a name, or an object. recordings: by the problem's names, `recording` where it
-    has but one source; each a table, or the name of one in the library. The other fields are those of `shoal identify`;
-    time_limit in s.
-    """
-
-    problem: BuiltIn | dict[str, Any]
-    recordings: dict[RecordingName, Table | BuiltIn] = {}
-    values: Fields = {}
-    method: BuiltIn | None = None
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
-    tolerance: Annotated[float, Field(gt=0)] | None = None
-    time_limit: Annotated[float, Field(gt=0)] | None = None
-    profiles: bool = False
-    bootstrap: Annotated[int, Field(ge=0, le=10_000)] = 0
-
-
-class Progress(BaseModel):
-    """How a search goes. best: fitness; mean: of the last iteration; evaluations: simulations so far."""
-
-    iteration: int
-    best: Number
-    mean: Number
-    evaluations: int
-
-
 class JobStatus(BaseModel):
-    """An identification. problem: why it failed, as a problem document."""
+    """A computation in the background. progress: how it goes, if it tells; problem: why it failed, as a document."""
 
     id: str
+    operation: str
     status: Literal["queued", "running", "done", "failed", "cancelled"]
-    progress: Progress | None = None
+    progress: dict[str, Number] | None = None
     problem: dict[str, Any] | None = None
 
 

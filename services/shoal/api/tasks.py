@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from inspect import signature
 from typing import Any
 
 import numpy as np
 import orjson
 
+from shoal import notebook
 from shoal.api.content import problem_of, scene_of, written
-from shoal.api.limits import check_end, check_lanes, check_scene, within
-from shoal.api.schemas import IdentifyRequest, SimulateRequest
+from shoal.api.limits import check_end, check_grid, check_lanes, within
+from shoal.api.operations import OfProblem, OfScene, Request, Simulate
 from shoal.api.settings import Settings
 from shoal.engines.contract import Engine
+from shoal.engines.spot_checks import spot_check
+from shoal.engines.verification import verified
 from shoal.errors import InputError
-from shoal.identification import identify
-from shoal.identification.conclude import Wishes
 from shoal.identification.methods import get_method
 from shoal.identification.recording.source import FileSource
-from shoal.trajectory import Trajectory
+from shoal.scene import Scene
+from shoal.trajectory import Trajectory, plain
 
 Note = Callable[[Any], None]
 """Told how a computation goes."""
@@ -33,64 +38,115 @@ class Bench:
     settings: Settings
 
 
-def simulate(bench: Bench, request: SimulateRequest, note: Note) -> bytes:
-    """The motion of a scene, or of one per lane. Raises InputError."""
-    scene, settings, times = scene_of(request.scene, request.values), bench.settings, request.times
-    if request.lanes is None:
-        check_scene(scene, settings, times)
-        bounded = within(scene, settings)
-        found = bench.engine.simulate(bounded, times)
-    else:
-        check_lanes(scene, settings, times, request.lanes)
-        values = {path: np.array(numbers) for path, numbers in request.lanes.items()}
-        bounded = within(scene, settings, max(len(column) for column in values.values()))
-        found = bench.engine.simulate_many(bounded, values, times)
-    if bounded is not scene:
-        check_end(found, bounded)
-    return motion(found)
+Call = tuple[str, Request]
+"""What is asked of a worker: one of `operations.OPERATIONS` by its name."""
+Computation = Callable[[Note], bytes]
 
 
-def check(bench: Bench, request: IdentifyRequest, note: Note) -> bytes:
-    """Nothing, if the request can be tried. Raises InputError."""
-    problem = problem_of(request.problem, bench.settings, request.values)
-    get_method(request.method or problem.method)
-    if request.tolerance is not None and bench.engine.name != "gauss":
-        raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {bench.engine.name!r}")
-    for name in request.recordings:
-        if name not in problem.sources:
-            raise InputError(f"recordings: no recording {name!r}; there are {', '.join(problem.sources)}")
-    written({name: given for name, given in request.recordings.items() if isinstance(given, str)})
-    for name, source in problem.sources.items():
-        if isinstance(source, FileSource) and source.path is None and name not in request.recordings:
-            raise InputError(f"recordings: {name!r} is missing; this problem is fitted to measured motion")
+def call(bench: Bench, asked: Call, note: Note) -> bytes:
+    """The answer to a call. Raises InputError, ComputationError."""
+    return _prepared(bench, asked)(note)
+
+
+def check(bench: Bench, asked: Call, note: Note) -> bytes:
+    """Nothing, if the call can be tried. Raises InputError."""
+    _prepared(bench, asked)
     return b""
 
 
-def identification(bench: Bench, request: IdentifyRequest, note: Note) -> bytes:
-    """The estimate of a problem. Raises InputError, ComputationError."""
-    estimate = identify(
-        problem_of(request.problem, bench.settings, request.values),
-        method=request.method,
-        data=written(request.recordings) or None,
-        engine=bench.engine.name,
-        values=request.values,
-        seed=request.seed,
-        tolerance=request.tolerance,
-        time_limit=request.time_limit,
-        wishes=Wishes(profiles=request.profiles, bootstrap=request.bootstrap),
-        progress=lambda *row: note(row),
-    )
-    return to_json(estimate.to_json())
+def _prepared(bench: Bench, asked: Call) -> Computation:
+    """What answers a call whose scene or problem is right and not too large. Raises InputError."""
+    name, request = asked
+    if getattr(request, "tolerance", None) is not None and bench.engine.name != "gauss":
+        raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {bench.engine.name!r}")
+    if isinstance(request, OfScene):
+        scene, bounded = _of_scene(bench, request)
+        if isinstance(request, Simulate):
+            return partial(_simulated, bench, request, bounded, bounded is not scene)
+        arguments: dict[str, Any] = {"scene": bounded}
+    else:
+        assert isinstance(request, OfProblem)
+        arguments = _of_problem(bench, request)
+    stated = request.model_dump(exclude={"scene", "problem", "recordings", "values"}, exclude_unset=True)
+    return partial(_computed, bench, name, {**stated, **arguments}, request.follows)
 
 
-def motion(trajectory: Trajectory) -> bytes:
-    """A trajectory as schemas.Motion, every lane and every digit of it."""
+def _of_scene(bench: Bench, request: OfScene) -> tuple[Scene, Scene]:
+    """The scene of a request, and the same with no more steps than the service computes. Raises InputError."""
+    scene, settings = scene_of(request.scene, request.values), bench.settings
+    lanes = request.lanes if isinstance(request, Simulate) else None
+    if lanes is None:
+        check_grid(scene, settings, request.instants, request.varied)
+        count = math.prod(len(axis) for axis in request.varied.values())
+    else:
+        if getattr(request, "tolerance", None) is not None:
+            raise InputError("tolerance: a model is chosen for one scene; leave `lanes` out")
+        check_lanes(scene, settings, request.instants, lanes)
+        count = max(len(column) for column in lanes.values())
+    return scene, within(scene, settings, count)
+
+
+def _of_problem(bench: Bench, request: OfProblem) -> dict[str, Any]:
+    problem = problem_of(request.problem, bench.settings, request.values)
+    if (method := getattr(request, "method", None)) is not None or request.measured:
+        get_method(method or problem.method)
+    for name in request.recordings:
+        if name not in problem.sources:
+            raise InputError(f"recordings: no recording {name!r}; there are {', '.join(problem.sources)}")
+    for name, source in problem.sources.items() if request.measured else ():
+        if isinstance(source, FileSource) and source.path is None and name not in request.recordings:
+            raise InputError(f"recordings: {name!r} is missing; this problem is fitted to measured motion")
+    return {"problem": problem, "data": written(request.recordings) or None, "values": request.values}
+
+
+def _computed(bench: Bench, name: str, arguments: dict[str, Any], follows: tuple[str, ...], note: Note) -> bytes:
+    """What the library's function of that name gives, as the command of that name prints it."""
+    function = getattr(notebook, name)
+    if "engine" in signature(function).parameters:
+        arguments = {**arguments, "engine": bench.engine.name}
+    if follows:
+        arguments = {**arguments, "progress": lambda *row: note(dict(zip(follows, row, strict=True)))}
+    return to_json(plain(told(function(**arguments))))
+
+
+def told(found: Any) -> Any:
+    """A result as the command line prints it with --json."""
+    if isinstance(found, list):
+        ok = all(one.ok for one in found)
+        return {"status": "ok" if ok else "unbalanced", "reactions": [one.to_json() for one in found]}
+    trajectory = getattr(found, "trajectory", None)
+    return found.to_json() if trajectory is None else {**trajectory.to_json(), "selection": found.to_json()}
+
+
+def _simulated(bench: Bench, request: Simulate, scene: Scene, bounded: bool, note: Note) -> bytes:
+    """The motion of a scene, or of one per lane. bounded: whether it takes as many steps as the service computes."""
+    times, engine = request.times, bench.engine
+    if request.tolerance is not None:
+        selection = notebook.select(scene, request.tolerance, times)
+        return motion(selection.trajectory, selection.to_json())
+    if request.lanes is None:
+        found = verified(engine, scene, times) if request.verify else engine.simulate(scene, times)
+    else:
+        values = {path: np.array(numbers) for path, numbers in request.lanes.items()}
+        found = engine.simulate_many(scene, values, times)
+        if request.verify:
+            checked = spot_check(engine, scene, values, found.status, found.times)
+            model = {**found.model, "verification": plain(asdict(checked))}
+            found = replace(found, model=model, message=found.message or checked.complaint)
+    if bounded:
+        check_end(found, scene)
+    return motion(found)
+
+
+def motion(trajectory: Trajectory, selection: dict[str, Any] | None = None) -> bytes:
+    """A trajectory as schemas.Motion, every lane and every digit of it; selection: how its model was found."""
     arrays = {
         name: None if (array := getattr(trajectory, name)) is None else np.ascontiguousarray(array)
         for name in ("times", "points", "angles", "velocities", "rates", "energy_drift", "constraint_drift")
     }
-    plain = ("engine", "markers", "status", "steps", "wall_s", "message", "model")
-    return to_json({name: getattr(trajectory, name) for name in plain} | arrays)
+    same = ("engine", "markers", "status", "steps", "wall_s", "message", "model")
+    stated = {name: getattr(trajectory, name) for name in same}
+    return to_json({**stated, **arrays, "selection": selection})
 
 
 def to_json(data: Any) -> bytes:

@@ -15,16 +15,17 @@ from shoal.errors import check_trusted
 @click.argument("scene")
 @click.option("--time", default=0.0, show_default=True, metavar="T", help="Applied stand as they are at T [s].")
 @options.values
+@options.verify
 @options.as_json
-def statics(scene: str, time: float, values: Values, as_json: bool) -> None:
+def statics(scene: str, time: float, values: Values, verify: bool, as_json: bool) -> None:
     """Find where SCENE comes to rest, and if it is stable there."""
-    from shoal.mechanics.analysis.statics import statics
+    from shoal.notebook import statics
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"balancing {wanted.name}"):
-        equilibrium = statics(wanted, time)
+        equilibrium = statics(wanted, time, verify=verify)
     screen.show(equilibrium.to_json(), as_json, lambda: tables.equilibrium_table(equilibrium))
     check_trusted(equilibrium.ok, equilibrium.message)
 
@@ -34,16 +35,19 @@ def statics(scene: str, time: float, values: Values, as_json: bool) -> None:
 @click.option("--count", default=10, show_default=True, type=click.IntRange(min=1), help="How many, lowest first.")
 @click.option("--about", default="equilibrium", show_default=True, type=click.Choice(["equilibrium", "start"]))
 @options.values
+@options.verify
 @options.as_json
-def modes(scene: str, count: int, about: Literal["equilibrium", "start"], values: Values, as_json: bool) -> None:
+def modes(
+    scene: str, count: int, about: Literal["equilibrium", "start"], values: Values, verify: bool, as_json: bool
+) -> None:
     """Eigenfrequencies and mode shapes of SCENE. About its equilibrium, or its start."""
-    from shoal.mechanics.analysis.modes import modes
+    from shoal.notebook import modes
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"modes of {wanted.name}"):
-        found = modes(wanted, about=about, count=count)
+        found = modes(wanted, about=about, count=count, verify=verify)
     screen.show(found.to_json(), as_json, lambda: tables.modes_table(found))
     check_trusted(found.ok, "it does not stay there: a motion grows")
 

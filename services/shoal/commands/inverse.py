@@ -87,16 +87,13 @@ def design(
 ) -> None:
     """Say what to measure to know the parameters of PROBLEM best. Which marker, how long and how often."""
     from shoal.identification import load_problem
-    from shoal.identification.design import about_answer, design, has_data
+    from shoal.notebook import design
     from shoal.pictures import files
     from shoal.terminal import screen, tables
 
     wanted = load_problem(problem)
     with screen.working(f"designing a measurement for {wanted.name}"):
-        if about == "answer" or (about is None and (data is not None or has_data(wanted))):
-            found = about_answer(wanted, data=data, **how)
-        else:
-            found = design(wanted, **how)
+        found = design(wanted, data, about=about, **how)
     if out is not None:
         files.design(found, out)
     screen.show(found.to_json(), as_json, lambda: tables.design_table(found))

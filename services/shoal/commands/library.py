@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ def add(file: Path, name: str | None, kind: str | None, as_json: bool) -> None:
     from shoal.terminal import screen
 
     made = library.add(file, name, kind)
+    _changed()
     screen.show(library.about(made), as_json, lambda: screen.say(f"{_title(made)}, version {made.version}"))
 
 
@@ -98,6 +100,7 @@ def remove(name: str, kind: str | None, as_json: bool) -> None:
 
     found = library.entry(name, library.kind_of(kind).folder if kind else None)
     shelf().remove(found.kind, found.name)
+    _changed()
     screen.show({"kind": found.kind, "name": found.name}, as_json, lambda: screen.say(f"{_title(found)}, removed"))
 
 
@@ -121,8 +124,19 @@ def push(url: str, names: tuple[str, ...], kind: str | None, as_json: bool) -> N
         for one in chosen:
             tell(f"{_title(one)} to {url}")
             service.put_entry(one.kind, one.name, one.files())
+        there = service.ask("GET", "/v1/library")["entries"]
+    _changed({kind: [entry["name"] for entry in there if entry["kind"] == kind] for kind in library.KINDS})
     told: dict[str, Any] = {"url": url, "entries": [library.about(one) for one in chosen]}
     screen.show(told, as_json, lambda: screen.say(*(f"{_title(one)}, version {one.version}" for one in chosen)))
+
+
+def _changed(names: dict[str, list[str]] | None = None) -> None:
+    """Tell whoever shows the names of the library; names: by kind, else those of the library here.
+
+    Other packages add whom to call by the entry points of the group `shoal.library`.
+    """
+    for point in entry_points(group="shoal.library"):
+        point.load()(names)
 
 
 def _title(entry: Any) -> str:

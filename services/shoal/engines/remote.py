@@ -44,7 +44,7 @@ class RemoteEngine:
         self.name = url.rstrip("/")
         retry = Retry(
             total=RETRIES,
-            allowed_methods=["GET", "POST", "PUT"],
+            allowed_methods=["GET", "POST", "PUT", "DELETE"],
             status_forcelist=[429, 502, 503],
             retry_on_exceptions=[httpx.NetworkError, httpx.RemoteProtocolError, httpx.ConnectTimeout],
             backoff_factor=0.25,
@@ -66,7 +66,7 @@ class RemoteEngine:
     @cached_property
     def capabilities(self) -> Capabilities:
         """What the engine there can simulate. Raises InputError, ComputationError."""
-        found = self._ask("GET", "/v1/capabilities")
+        found = self.ask("GET", "/v1/capabilities")
         return Capabilities(**{kind: frozenset(found[kind]) for kind in _KINDS}, lanes=found["lanes"])
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
@@ -87,15 +87,21 @@ class RemoteEngine:
             "scene": scene.model_dump(mode="json"),
             "times": None if times is None else np.asarray(times, dtype=float).tolist(),
             "lanes": lanes,
+            "verify": False,
         }
-        return _trajectory(self._ask("POST", "/v1/simulate", orjson.dumps(request)))
+        return trajectory_of(self.ask("POST", "/v1/simulate", orjson.dumps(request)))
 
     def put_entry(self, kind: str, name: str, files: Mapping[str, bytes]) -> None:
         """Put an entry into the service's library, checked there. Raises InputError, ComputationError."""
         content = {path: base64.b64encode(content).decode() for path, content in files.items()}
-        self._ask("PUT", f"/v1/library/{kind}/{name}", orjson.dumps({"files": content}))
+        self.ask("PUT", f"/v1/library/{kind}/{name}", orjson.dumps({"files": content}))
 
-    def _ask(self, method: str, path: str, content: bytes | None = None) -> Any:
+    def get_entry(self, kind: str, name: str) -> dict[str, bytes]:
+        """The files of an entry of the service's library. Raises InputError, ComputationError."""
+        found = self.ask("GET", f"/v1/library/{kind}/{name}")["files"]
+        return {path: base64.b64decode(content) for path, content in found.items()}
+
+    def ask(self, method: str, path: str, content: bytes | None = None) -> Any:
         """The answer to a request. Raises InputError where it is refused, ComputationError where there is none."""
         try:
             response = self._client.request(method, path, content=content, headers={"Content-Type": "application/json"})
@@ -104,6 +110,8 @@ class RemoteEngine:
                 f"engine: {self.name} does not answer: {str(error) or type(error).__name__}; "
                 "start it with `shoal serve`, or leave --engine out"
             ) from None
+        if response.status_code == 204:
+            return None
         try:
             found = orjson.loads(response.content)
         except orjson.JSONDecodeError:
@@ -122,7 +130,7 @@ class RemoteEngine:
         detail = str(found.get("detail", ""))
         if found["type"] == "urn:shoal:unauthorized":
             return wrong(f"SHOAL_API_KEY: {self.name} asks for a key: {detail}")
-        if status in (413, 422):
+        if status in (404, 413, 422):
             return InputError(detail)
         return ComputationError(f"engine: {self.name}: {detail}")
 
@@ -146,7 +154,8 @@ def loopback(host: str) -> bool:
         return host == "localhost"
 
 
-def _trajectory(found: dict[str, Any]) -> Trajectory:
+def trajectory_of(found: dict[str, Any]) -> Trajectory:
+    """The motion that a service answers, to the last bit."""
     plain: dict[str, Any] = {name: found[name] for name in ("engine", "steps", "wall_s", "message", "model")}
     arrays: dict[str, Any] = {name: np.array(found[name], dtype=float) for name in _ARRAYS}
     known = (name for name in ("velocities", "rates") if found[name] is not None)

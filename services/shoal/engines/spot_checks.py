@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.engines.sweep import SpotCheck, Sweep
 from shoal.engines.verification import verified
-from shoal.trajectory import Status
+from shoal.scene import Scene
+from shoal.trajectory import Array, Status
 
 POINTS = 5
 """Looked at, from the first point of the grid to the last, evenly."""
@@ -17,23 +19,34 @@ POINTS = 5
 
 def spot_checked(found: Sweep, engine: Engine) -> Sweep:
     """A sweep with the errors that are estimated at a few of its points. Points that failed are not looked at."""
-    good = np.flatnonzero([status is Status.OK for status in found.status])
-    if not good.size:
-        return found
-    looked_at = good[np.unique(np.linspace(0, good.size - 1, POINTS).round().astype(int))]
     times = np.unique([0.0, found.time])
-    check = SpotCheck(len(looked_at), len(found.status))
+    check = spot_check(engine, found.scene, found.grid, found.status, times)
+    return replace(found, check=check) if check.looked_at else found
+
+
+def spot_check(
+    engine: Engine, scene: Scene, values: Mapping[str, Array], status: Sequence[Status], times: Sequence[float] | Array
+) -> SpotCheck:
+    """The errors that are estimated at a few of the points that did not fail, up to `times` [s].
+
+    values: path -> one number per point; status: of every point
+    """
+    good = np.flatnonzero([one is Status.OK for one in status])
+    if not good.size:
+        return SpotCheck(0, len(status))
+    looked_at = good[np.unique(np.linspace(0, good.size - 1, POINTS).round().astype(int))]
+    check = SpotCheck(len(looked_at), len(status))
     for point in looked_at:
-        values = {path: float(lanes[point]) for path, lanes in found.grid.items()}
-        run = verified(engine, found.scene.with_values(values), times)
+        here = {path: float(column[point]) for path, column in values.items()}
+        run = verified(engine, scene.with_values(here), times)
         estimated = run.model.get("verification", {})
         check = replace(
             check,
             time_error=_larger(check.time_error, estimated.get("time_error")),
             mesh_error=_larger(check.mesh_error, estimated.get("mesh_error")),
-            complaint=check.complaint or ("" if run.ok else f"{_words(values)}: {run.message}"),
+            complaint=check.complaint or ("" if run.ok else f"{_words(here)}: {run.message}"),
         )
-    return replace(found, check=check)
+    return check
 
 
 def _larger(one: float | None, other: float | None) -> float | None:

@@ -136,6 +136,7 @@ def equilibrium_table(equilibrium: Equilibrium) -> None:
     screen.say(
         f"status {equilibrium.status}{f' ({equilibrium.message})' if equilibrium.message else ''}; "
         f"unbalanced {equilibrium.residual:.1e} of all forces, joints gape by {equilibrium.gap:.1e}"
+        + ("" if equilibrium.mesh_error is None else f"; estimated mesh error {equilibrium.mesh_error:.1e} m")
         + "".join(f"; lowest eigenvalue {value:.4g} rad^2/s^2" for value in lowest)
         + f"; {equilibrium.iterations} iterations"
     )
@@ -167,6 +168,8 @@ def modes_table(modes: Modes) -> None:
         numbers = (mode.frequency, mode.angular_frequency, mode.damping_ratio, mode.eigenvalue.real)
         table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind)
     screen.out.print(table)
+    if modes.mesh_errors:
+        screen.say(f"estimated mesh error of the eigenvalues: {max(modes.mesh_errors):.1e} of their size, at most")
     if not modes.balanced:
         screen.say("the forces do not balance there; these are motions relative to its fall")
 

@@ -34,6 +34,7 @@ class Equilibrium:
     relative to all forces; gap: worst violation of a joint; correction: the last one, relative to the machine's size.
     eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
     stable. steps: load steps. reactions: in the joints. turns: what angle forces have counted [rad].
+    mesh_error: largest distance of a marker from where twice as many elements bring it [m], None where it is not known.
     """
 
     scene: Scene
@@ -56,6 +57,7 @@ class Equilibrium:
     steps: int
     reactions: Reactions | None
     turns: Array = field(repr=False)
+    mesh_error: float | None = None
 
     @property
     def ok(self) -> bool:
@@ -89,6 +91,7 @@ class Equilibrium:
             "energy": self.energy,
             "strain_energy": self.strain_energy,
             "residual": self.residual,
+            "mesh_error": self.mesh_error,
             "constraint_gap": self.gap,
             "correction": plain(self.correction),
             "eigenvalues": plain(np.real(self.eigenvalues)[:6]),

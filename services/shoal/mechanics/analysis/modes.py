@@ -76,7 +76,10 @@ class Mode:
 
 @dataclass(frozen=True)
 class Modes:
-    """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance."""
+    """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
+
+    mesh_errors: of each mode, how much its eigenvalue differs on twice as many elements, relative; empty if not known
+    """
 
     scene: Scene
     about: str
@@ -85,6 +88,7 @@ class Modes:
     q: Array
     markers: tuple[str, ...]
     modes: tuple[Mode, ...]
+    mesh_errors: tuple[float, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -111,6 +115,7 @@ class Modes:
                     "damped_frequency": mode.damped_frequency,
                     "damping_ratio": mode.damping_ratio,
                     "growth": mode.eigenvalue.real,
+                    "mesh_error": self.mesh_errors[number] if self.mesh_errors else None,
                     "shape": {
                         name: {
                             "dx": _two(mode.points[k, 0]),
@@ -120,7 +125,7 @@ class Modes:
                         for k, name in enumerate(self.markers)
                     },
                 }
-                for mode in self.modes
+                for number, mode in enumerate(self.modes)
             ],
         }
 

@@ -1,0 +1,49 @@
+"""Flow: what to measure to know the parameters of one problem."""
+
+from __future__ import annotations
+
+from prefect import flow
+from shoal.identification import load_problem
+
+from shoal_flows.flows import tables
+from shoal_flows.flows.parameters import About, Data, ProblemName, Size, Values
+from shoal_flows.flows.shown import ended, named, progress, show_result
+from shoal_flows.flows.tasks import plan
+from shoal_flows.inputs import held, title
+from shoal_flows.results import Designed
+
+
+@flow(name="design", flow_run_name=named("design", "problem"))
+def design(
+    problem: ProblemName = "paper-case-1",
+    data: Data = "",
+    about: About = None,
+    noise: Size = None,
+    angle_noise: Size = None,
+    duration: Size = None,
+    rate: Size = None,
+    parameter: str | None = None,
+    values: Values = {},  # noqa: B006 - Prefect shows the default in its form; nothing changes it
+) -> Designed:
+    """Rank what could be measured by how well it would tell the parameters of a problem.
+
+    Args:
+        problem: What is to be found: a name (see `shoal problems`), or its YAML.
+        data: A recording: a name of the library, a path where the worker runs, or the address of one in a service's
+            library; empty for the data of the problem.
+        about: About what the data tell, or about the start; else the first, where there are data.
+        noise: Standard deviation of positions [m]; else the problem's.
+        angle_noise: Standard deviation of angles [rad]; else the problem's.
+        duration: Of the measurement [s]; else that of the data.
+        rate: Samples per second; else that of the data.
+        parameter: To be sharpened; else the weakest.
+        values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
+    """
+    problem, data = held("problem", "problems", problem), held("data", "recordings", data)
+    load_problem(problem).load_scene(values)
+    name = title(problem)
+    how = {"about": about, "noise": noise, "angle_noise": angle_noise, "duration": duration, "rate": rate}
+    with progress(1, f"a measurement for {name}"):
+        result = Designed(*plan(problem, data or None, {**how, "parameter": parameter, "values": values}))
+    show_result(f"{name}: what to measure", tables.of_design(result.design), result.run_id)
+    return ended(result, ["no candidate tells every parameter; name one as `parameter`"])

@@ -1,0 +1,61 @@
+"""Equilibria, chosen models and designs of measurements in MLflow: one run each, which ends in its figures."""
+
+from __future__ import annotations
+
+from shoal.identification.design import Design
+from shoal.mechanics.analysis.equilibrium import Equilibrium
+from shoal.pictures.design import design as draw_design
+from shoal.pictures.ladder import ladder
+from shoal.pictures.style import png
+from shoal.selection import Selection
+from shoal.trajectory import json_text
+
+from shoal_flows.tracking.engines import log_motion_of, stated
+from shoal_flows.tracking.model.files import as_yaml
+from shoal_flows.tracking.store import open_run
+
+
+def log_statics(found: Equilibrium) -> str:
+    """One run; returns its id."""
+    scene = found.scene
+    tags = {"kind": "statics", "scene": scene.name, "verdict": str(found.status)}
+    with open_run("Statics", f"{scene.name} · statics", description=scene.description, tags=tags) as run:
+        run.params({**stated(scene), "time": found.time})
+        run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
+        run.text(json_text(found.to_json(), indent=1), "equilibrium.json")
+        for name in found.markers:
+            for axis, value in zip("xy", found.marker(name), strict=True):
+                run.metric(f"final/{name}/{axis}", float(value))
+        run.metric("final/residual", found.residual)
+        run.metric("final/iterations", found.iterations)
+        return run.run_id
+
+
+def log_selection(found: Selection) -> str:
+    """One run with the motion of the chosen model, and the ladder that led there; returns its id."""
+    scene = found.chosen.scene
+    tags = {"kind": "selection", "scene": scene.name, "verdict": "met" if found.met else "not met"}
+    with open_run("Selection", f"{scene.name} · select", description=scene.description, tags=tags) as run:
+        log_motion_of(run, scene, found.trajectory)
+        run.params({"tolerance": found.tolerance, "chosen": found.chosen.name})
+        run.metric("final/estimated_error", found.chosen.error)
+        run.metric("final/rungs", len(found.rungs))
+        run.text(json_text(found.to_json(), indent=1), "selection.json")
+        run.picture(png(ladder(found)), "ladder.png")
+        return run.run_id
+
+
+def log_design(found: Design) -> str:
+    """One run with the table of what could be measured; returns its id."""
+    tags = {"kind": "design", "problem": found.problem, "verdict": "ok" if found.ok else "failed"}
+    with open_run("Design", f"{found.problem} · design", tags=tags) as run:
+        asked = {"noise": found.noise, "duration": found.duration, "rate": found.rate}
+        run.params({"problem": found.problem, "best": found.ranked[0][0].label, **asked})
+        best = found.ranked[0][1]
+        for kind, precision in (("now", found.now), ("best", best)):
+            for name, std in zip(found.aim.names, precision.std, strict=True):
+                run.metric(f"final/{kind}/{name}", float(std))
+        run.metric("final/doubt", found.doubt)
+        run.text(json_text(found.to_json(), indent=1), "design.json")
+        run.picture(png(draw_design(found)), "design.png")
+        return run.run_id

@@ -1,0 +1,169 @@
+"""What a service computes: one request each, by the name of the library's function that answers it.
+
+The fields of a request are the arguments of that function. Quantities are in SI units, angles in radians. The service's
+own process knows the requests only; who computes them is `tasks`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+
+from shoal.api.schemas import Asked, BuiltIn, Fields, Motion, Path, RecordingName, Table
+
+Times = list[float]
+Positive = Annotated[float, Field(gt=0)]
+Some = Annotated[Times, Field(min_length=1)]
+
+
+class Request(Asked):
+    """Base of all. answer: what comes back; follows: the numbers by which a job tells how far it is."""
+
+    answer: ClassVar[Any] = dict[str, Any]
+    follows: ClassVar[tuple[str, ...]] = ()
+
+
+class OfScene(Request):
+    """A scene (a name, or an object as /v1/schemas/scene describes it). values: fields of it to set, by path."""
+
+    scene: BuiltIn | dict[str, Any]
+    values: Fields = {}
+
+    @property
+    def instants(self) -> Times | None:
+        """When it is looked at [s]; None is its own times."""
+        return getattr(self, "times", None)
+
+    @property
+    def varied(self) -> dict[str, Times]:
+        """Axes of a grid over which it is computed."""
+        return {}
+
+
+class OfProblem(Request):
+    """A problem (a name, or an object as /v1/schemas/problem describes it). values: fields of its scene to set.
+
+    The `scene` of a problem is a name, or an object. recordings: by the problem's names, `recording` where it
+    has but one source; each a table, or the name of one in the library. measured: whether none may be missing
+    """
+
+    measured: ClassVar[bool] = False
+
+    problem: BuiltIn | dict[str, Any]
+    recordings: dict[RecordingName, Table | BuiltIn] = {}
+    values: Fields = {}
+
+
+class Simulate(OfScene):
+    """The motion of a scene, or of one per lane. A run that failed carries its status.
+
+    times: sampling instants [s], else the scene's own; verify: estimate the errors by more careful runs
+    tolerance: error [m] that the markers may have, for which the cheapest model is found
+    lanes: path -> one number per lane; then one scene per lane is simulated
+    """
+
+    answer: ClassVar[Any] = Motion
+
+    times: Times | None = None
+    tolerance: Positive | None = None
+    verify: bool = True
+    lanes: dict[Path, Times] | None = None
+
+
+class Select(OfScene):
+    """The cheapest model whose estimated error at the markers is below a tolerance [m], with its motion."""
+
+    tolerance: Positive
+    times: Times | None = None
+
+
+class Sweep(OfScene):
+    """Marker positions at one instant `time` [s], the scene's end if not stated, over the full grid of `vary`.
+
+    vary: path -> values; verify: estimate the errors at some of its points by more careful runs
+    """
+
+    vary: Annotated[dict[Path, Some], Field(min_length=1)]
+    time: Annotated[float, Field(ge=0)] | None = None
+    verify: bool = True
+
+    @property
+    def instants(self) -> Times | None:
+        """When it is looked at [s]; None is its own times."""
+        return None if self.time is None else [self.time]
+
+    @property
+    def varied(self) -> dict[str, Times]:
+        """Axes of a grid over which it is computed."""
+        return self.vary
+
+
+class AtRest(OfScene):
+    """What needs no motion. verify: estimate the error of the mesh by a second run on twice as many elements."""
+
+    verify: bool = True
+
+    @property
+    def instants(self) -> Times | None:
+        """The start."""
+        return [0.0]
+
+
+class Statics(AtRest):
+    """Where a scene comes to rest, with what is applied as it is at `time` [s], and whether it is stable there."""
+
+    time: Annotated[float, Field(ge=0)] = 0.0
+
+
+class Modes(AtRest):
+    """The `count` lowest eigenfrequencies and their shapes, about the equilibrium or the start."""
+
+    count: Annotated[int, Field(ge=1, le=1000)] = 10
+    about: Literal["equilibrium", "start"] = "equilibrium"
+
+
+class Reactions(OfScene):
+    """Forces and torques in the joints at `times` [s] of the motion."""
+
+    times: Some
+
+
+class Identify(OfProblem):
+    """The parameters of a problem from measured motion; the fields are those of `shoal identify`. time_limit in s."""
+
+    measured: ClassVar[bool] = True
+    follows: ClassVar[tuple[str, ...]] = ("iteration", "best", "mean", "evaluations")
+
+    method: BuiltIn | None = None
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+    tolerance: Positive | None = None
+    time_limit: Positive | None = None
+    profiles: bool = False
+    bootstrap: Annotated[int, Field(ge=0, le=10_000)] = 0
+
+
+class Design(OfProblem):
+    """What to measure to know the parameters best; the fields are those of `shoal design`.
+
+    about: `answer` is what the data tell, `start` needs none; noise in m, angle_noise in rad, duration in s, rate in Hz
+    """
+
+    about: Literal["answer", "start"] | None = None
+    noise: Positive | None = None
+    angle_noise: Positive | None = None
+    duration: Positive | None = None
+    rate: Positive | None = None
+    parameter: BuiltIn | None = None
+
+
+OPERATIONS: dict[str, type[Request]] = {
+    "simulate": Simulate,
+    "select": Select,
+    "sweep": Sweep,
+    "statics": Statics,
+    "modes": Modes,
+    "reactions": Reactions,
+    "identify": Identify,
+    "design": Design,
+}

@@ -1,0 +1,199 @@
+"""The library's functions, computed by a service: one class, one line for each of them.
+
+Names of scenes, problems and recordings are the service's; objects and files are the caller's, and are sent along.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from inspect import Parameter, Signature, signature
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+
+from shoal import notebook
+from shoal.engines.remote import RemoteEngine, trajectory_of
+from shoal.errors import ComputationError, InputError
+from shoal.identification import Problem, load_problem
+from shoal.identification.recording.reading import YAML, described
+from shoal.identification.recording.source import FileSource
+from shoal.identification.recording.table import Table, load_table
+from shoal.scene import Scene, load_scene
+from shoal.shelf import NAME
+from shoal.trajectory import Array, Trajectory
+
+PAUSES = (0.02, 1.0)
+"""Between two looks at a job, the shortest and the longest [s]."""
+Answer = dict[str, Any]
+"""What the command of the same name prints with --json."""
+
+
+def _by_service(function: Callable[..., Any], *, job: bool = False) -> Any:
+    """A method with the arguments of a function of the library. job: whether it may take long, and is waited for."""
+
+    def method(self: Client, *args: Any, **kwargs: Any) -> Any:
+        told = kwargs.pop("progress", None) if job else None
+        if job:
+            return self._awaited(self.submit(function.__name__, *args, **kwargs), told)
+        return self._answer("POST", f"/v1/{function.__name__}", self._request(function.__name__, *args, **kwargs))
+
+    stated = signature(function)
+    own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
+    returned = Trajectory if function is notebook.simulate else Answer
+    method.__signature__ = Signature([own, *stated.parameters.values()], return_annotation=returned)  # type: ignore[attr-defined]
+    method.__name__, method.__doc__ = function.__name__, function.__doc__
+    return method
+
+
+class Client:
+    """The service at an http(s) address. The key, if it asks for one, is SHOAL_API_KEY.
+
+    Each method takes what the function of the library with its name takes; `engine` is the service's own. `simulate`
+    gives the same Trajectory, to the last bit, the others the object that the command of their name prints with --json.
+    They raise InputError where the service refuses, ComputationError where it fails or does not answer. What takes long
+    is a job of the service; `submit` makes one of any of them, and `status`, `result` and `cancel` take its id.
+    """
+
+    simulate = _by_service(notebook.simulate)
+    statics = _by_service(notebook.statics)
+    modes = _by_service(notebook.modes)
+    reactions = _by_service(notebook.reactions)
+    select = _by_service(notebook.select, job=True)
+    sweep = _by_service(notebook.sweep, job=True)
+    identify = _by_service(notebook.identify, job=True)
+    design = _by_service(notebook.design, job=True)
+
+    def __init__(self, url: str) -> None:
+        self._service = RemoteEngine(url)
+
+    def __repr__(self) -> str:
+        return f"Client({self._service.name})"
+
+    def submit(self, operation: str, /, *args: Any, **kwargs: Any) -> str:
+        """Begin an operation, given by the name of its method and its arguments; returns the id of the job."""
+        job = self._answer("POST", f"/v1/jobs/{operation}", self._request(operation, *args, **kwargs))
+        return str(job["id"])
+
+    def status(self, job: str) -> Answer:
+        """How a job goes: its `status` is queued, running, done, failed or cancelled; `problem` says why it failed."""
+        return dict(self._answer("GET", f"/v1/jobs/{job}"))
+
+    def result(self, job: str) -> Any:
+        """What a job that is done has found."""
+        return self._answer("GET", f"/v1/jobs/{job}/result")
+
+    def cancel(self, job: str) -> None:
+        """Stop a job; one that has ended stays as it is."""
+        self._answer("DELETE", f"/v1/jobs/{job}")
+
+    def _awaited(self, job: str, told: Callable[..., None] | None) -> Any:
+        pause, last = PAUSES[0], None
+        try:
+            while (found := self.status(job))["status"] in ("queued", "running"):
+                if told is not None and (now := found["progress"]) not in (None, last):
+                    last = now
+                    told(*now.values())
+                time.sleep(pause)
+                pause = min(1.5 * pause, PAUSES[1])
+        except KeyboardInterrupt:
+            self.cancel(job)
+            raise
+        if found["status"] == "cancelled":
+            raise ComputationError(f"{found['operation']}: the job was cancelled")
+        return self.result(job)
+
+    def _answer(self, method: str, path: str, content: Answer | None = None) -> Any:
+        body = None if content is None else orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
+        found = self._service.ask(method, path, body)
+        return trajectory_of(found) if isinstance(found, dict) and "points" in found else found
+
+    def _request(self, operation: str, *args: Any, **kwargs: Any) -> Answer:
+        """The arguments of a function of the library as the fields of a request. Raises InputError."""
+        if not isinstance(getattr(Client, operation, None), Callable) or not hasattr(notebook, operation):  # type: ignore[arg-type]
+            raise InputError(f"operation: no operation {operation!r}")
+        given = dict(signature(getattr(notebook, operation)).bind(*args, **kwargs).arguments)
+        given |= given.pop("options", {})
+        engine = given.pop("engine", None)
+        if engine is not None and engine != (own := self._service.ask("GET", "/v1/capabilities")["engine"]):
+            raise InputError(f"engine: the service at {self._service.name} runs {own}, found {engine!r}")
+        if "scene" in given:
+            given["scene"] = _scene(given["scene"])
+        if "problem" in given:
+            given["problem"], given["recordings"] = _problem(given["problem"], given.pop("data", None))
+        return {name: _plain(value) for name, value in given.items() if value is not None}
+
+
+def _scene(given: Scene | str) -> Any:
+    if isinstance(given, str) and Path(given).suffix not in YAML:
+        return given
+    scene = load_scene(given) if isinstance(given, str) else given
+    return scene.model_dump(mode="json")
+
+
+def _problem(given: Problem | str, data: Any) -> tuple[Any, Answer]:
+    """A problem, with its scene, and its recordings by name. Raises InputError."""
+    if isinstance(given, str) and Path(given).suffix not in YAML:
+        return given, {name: _recording(FileSource(), one)[1] for name, one in _by_name(data).items()}
+    problem = load_problem(given) if isinstance(given, str) else given
+    stated = {**problem.model_dump(mode="json", exclude_unset=True), "scene": _scene(problem.scene)}
+    found = _by_name(data, next(iter(problem.sources)))
+    for name, source in problem.sources.items():
+        if isinstance(source, FileSource) and (path := found.get(name, source.path)) is not None:
+            fields, found[name] = _recording(source, path)
+            if problem.recordings:
+                stated["recordings"][name] = fields
+            else:
+                stated["source"] = fields
+    return stated, found
+
+
+def _by_name(data: Any, single: str = "recording") -> Answer:
+    if data is None:
+        return {}
+    return dict(data) if isinstance(data, Mapping) else {single: data}
+
+
+def _recording(source: FileSource, given: Any) -> tuple[Answer, Any]:
+    """The fields of a source without where it lies, and its table, or the name of a recording of the service.
+
+    given: a file, a table, or such a name. Raises InputError.
+    """
+    frames = None
+    if not isinstance(given, str | Path):
+        columns = {str(name): given[name].to_numpy(dtype=float) for name in given.columns}
+    elif isinstance(given, str) and NAME.fullmatch(given.partition("@")[0]) and not Path(given).exists():
+        return source.model_dump(mode="json", exclude_unset=True, exclude={"path"}), given
+    else:
+        fields = described(source.model_dump(exclude_unset=True), Path(given))
+        source = FileSource.model_validate(fields)
+        table = load_table(Path(fields["path"]), source.columns)
+        columns, frames = _numbers(table), table.frames
+    if frames is not None and len(frames):
+        # A line that is blank is a frame too.
+        blank = np.full((len(columns), frames[-1] + 1), np.nan)
+        for row, numbers in zip(blank, columns.values(), strict=True):
+            row[frames] = numbers
+        columns = dict(zip(columns, blank, strict=True))
+    stated = source.model_dump(mode="json", exclude_unset=True, exclude={"path", "columns"})
+    return {**stated, "kind": "file"}, {"columns": columns}
+
+
+def _numbers(table: Table) -> dict[str, Array]:
+    """The columns that hold numbers; a problem that needs another is refused by the service."""
+    found = {}
+    for name in table.frame.columns:
+        with suppress(InputError):
+            found[str(name)] = table.numbers(name)
+    return found
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(one) for one in value]
+    return value

@@ -1,0 +1,217 @@
+"""Whatever a service computes: the library's answers, its signatures, its refusals; at once and as a job."""
+
+from __future__ import annotations
+
+import inspect
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pandas as pd
+import pytest
+import shoal
+import yaml
+from running import eventually, serving
+from shoal.api.operations import OPERATIONS
+from shoal.api.settings import Settings
+from shoal.api.tasks import told
+from shoal.client import Client
+from shoal.errors import ComputationError, InputError
+from shoal.trajectory import Trajectory, plain
+
+SCENE = "rigid-double-pendulum"
+ANGLES = np.linspace(0.1, 0.5, 3)
+CALLS: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {
+    "simulate": ((SCENE, [0.1, 0.2]), {"values": {"initial.OA.angle": 0.3}}),
+    "select": (("flexible-double-pendulum", 1e-3), {"times": [0.1], "values": {"solver.duration": 0.1}}),
+    "sweep": ((SCENE, {"initial.OA.angle": ANGLES}), {"time": 0.2}),
+    "statics": (("flexible-double-pendulum",), {"values": {"gravity": [0.5, -1.62]}}),
+    "modes": (("flexible-double-pendulum",), {"count": 3, "about": "equilibrium"}),
+    "reactions": ((SCENE, np.array([0.0, 0.1])), {}),
+    "identify": (("paper-case-1",), {"method": "least-squares", "seed": 1}),
+    "design": (("paper-case-1",), {"about": "start", "noise": 1e-3}),
+}
+ERRORS: dict[str, tuple[str, ...]] = {
+    "select": ("selection", "estimated_error"),
+    "sweep": ("verification", "time_error"),
+    "statics": ("mesh_error",),
+    "modes": ("modes", "0", "mesh_error"),
+    "reactions": ("reactions", "0", "unbalanced"),
+    "identify": ("parameters", "theta1", "std"),
+    "design": ("doubt",),
+}
+"""Where an answer says how far it may be off."""
+
+
+@pytest.fixture(scope="module")
+def client(gauss: httpx.Client) -> Client:
+    return Client(str(gauss.base_url))
+
+
+def known(found: Any) -> Any:
+    """An answer without what differs from run to run."""
+    if isinstance(found, dict):
+        return {key: known(one) for key, one in found.items() if key not in ("wall_s", "seconds")}
+    return [known(one) for one in found] if isinstance(found, list | tuple) else found
+
+
+def test_every_operation_is_a_method_with_the_signature_of_its_function() -> None:
+    assert set(CALLS) == set(OPERATIONS)
+    for name in OPERATIONS:
+        of_library, of_client = (inspect.signature(getattr(place, name)) for place in (shoal, Client))
+        assert list(of_client.parameters.values())[1:] == list(of_library.parameters.values())
+        assert getattr(Client, name).__doc__ == getattr(shoal, name).__doc__
+
+
+def test_every_field_of_a_request_is_an_argument_of_its_function() -> None:
+    """But for recordings, which are data, and lanes, which engines know."""
+    for name, request in OPERATIONS.items():
+        fields = set(request.model_fields) - {"recordings", "lanes"}
+        assert fields <= set(inspect.signature(getattr(shoal, name)).parameters), name
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_the_answer_is_the_librarys(client: Client, name: str) -> None:
+    arguments, options = CALLS[name]
+    far, near = (getattr(place, name)(*arguments, **options) for place in (client, shoal))
+    if isinstance(near, Trajectory):
+        assert far.points.tobytes() == near.points.tobytes()
+        assert (far.status, far.message, far.model) == (near.status, near.message, near.model)
+        assert far.model["verification"]["time_error"] > 0
+        return
+    assert known(far) == known(plain(told(near)))
+    place = far
+    for key in ERRORS.get(name, ()):
+        place = place[int(key)] if key.isdigit() else place[key]
+    assert place is not None
+
+
+def test_jobs_are_submitted_followed_and_cancelled(client: Client) -> None:
+    job = client.submit("sweep", SCENE, {"initial.OA.angle": ANGLES}, verify=False)
+    eventually(lambda: client.status(job)["status"] == "done")
+    assert client.status(job)["operation"] == "sweep"
+    assert len(client.result(job)["rows"]) == 3
+    told: list[Any] = []
+    found = client.identify("paper-case-1", method="iafsa", progress=lambda *row: told.append(row))
+    assert found["status"] == "ok"
+    assert all(len(row) == 4 for row in told)
+    job = client.submit("identify", "paper-case-1", method="iafsa", bootstrap=10_000)
+    client.cancel(job)
+    assert client.status(job)["status"] == "cancelled"
+    with pytest.raises(ComputationError, match="the job is cancelled"):
+        client.result(job)
+    with pytest.raises(InputError, match="no operation 'guess'"):
+        client.submit("guess")
+
+
+def test_a_callers_own_scene_problem_and_recording(client: Client, problem: dict[str, Any], tmp_path: Path) -> None:
+    """Objects, files and tables are sent along; nothing of them is on the service."""
+    machine = shoal.Scene.parse(problem["scene"]).with_values({"initial.OA.angle": 0.3})
+    motion = client.simulate(machine, np.linspace(0.0, 1.0, 21))
+    x, y = motion.marker("A").T
+    table = pd.DataFrame({"t": motion.times, "x": x, "y": y})
+    table.to_csv(tmp_path / "run.csv", index=False)
+    (tmp_path / "run.yaml").write_text("path: run.csv\nduration: 0.5\n")
+    (tmp_path / "machine.yaml").write_text(yaml.safe_dump(problem["scene"]))
+    stated = {**problem, "scene": "machine.yaml"}
+    (tmp_path / "start.yaml").write_text(yaml.safe_dump(stated))
+    (tmp_path / "whole.yaml").write_text(yaml.safe_dump({**stated, "source": {"kind": "file", "path": "run.csv"}}))
+    start, counts = str(tmp_path / "start.yaml"), []
+    for asked in [
+        (start, table), (start, str(tmp_path / "run.csv")), (start, tmp_path / "run.yaml"),
+        (str(tmp_path / "whole.yaml"), None), (shoal.load_problem(start), {"recording": str(tmp_path / "run.csv")}),
+    ]:  # fmt: skip
+        found = client.identify(*asked)
+        assert found["parameters"]["theta"]["value"] == pytest.approx(0.3, abs=1e-6)
+        counts.append(found["data"].rpartition(", ")[2])
+    assert counts == ["21 samples", "21 samples", "11 samples", "21 samples", "21 samples"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "detail"),
+    [
+        ("simulate", {"tolerance": 1e-3, "lanes": {"initial.OA.angle": [0.1]}}, "tolerance: a model is chosen for one"),
+        ("sweep", {"vary": {"initial.XY.angle": [0.1]}}, "initial.XY"),
+        ("sweep", {"vary": {"initial.OA.angle": []}}, "vary.initial.OA.angle: "),
+        ("sweep", {"vary": {f"initial.OA.angle{k}": [0.0] * 1000 for k in range(9)}}, "times: "),
+        ("sweep", {"vary": {"solver.step": [1e-3, 1e-12]}}, "solver.step: "),
+        ("statics", {"time": -1}, "time: "),
+        ("modes", {"count": 0}, "count: "),
+        ("modes", {"about": "noon"}, "about: "),
+        ("reactions", {"times": []}, "times: "),
+        ("reactions", {}, "times: "),
+        ("select", {"tolerance": 0}, "tolerance: "),
+        ("select", {"tolerance": 1, "engine": "exudyn"}, "engine: "),
+    ],
+)
+def test_what_is_wrong_is_one_line_that_names_the_field(
+    gauss: httpx.Client, path: str, body: dict[str, Any], detail: str
+) -> None:
+    """The same at once and as a job, which is not even begun."""
+    for place in (f"/v1/{path}", f"/v1/jobs/{path}"):
+        answer = gauss.post(place, json={"scene": SCENE, **body})
+        assert answer.status_code == 422, answer.text
+        assert detail in answer.json()["detail"]
+        assert "\n" not in answer.json()["detail"]
+
+
+def test_wrong_calls_are_refused(client: Client) -> None:
+    with pytest.raises(InputError, match=r"engine: the service at .* runs gauss, found 'exudyn'"):
+        client.simulate(SCENE, engine="exudyn")
+    assert client.simulate(SCENE, [0.1], engine="gauss").ok
+    with pytest.raises(InputError, match="no such scene"):
+        client.simulate("single-pendolum")
+    with pytest.raises(InputError, match="measurement: "):
+        client.identify("paper-case-1", measurement=1)
+    with pytest.raises(TypeError, match="colour"):
+        client.simulate(SCENE, colour="red")
+
+
+def test_lanes_are_looked_at(gauss: httpx.Client) -> None:
+    """A few of them, as of a sweep: the largest of the errors."""
+    lanes = {"initial.OA.angle": ANGLES.tolist()}
+    body = {"scene": SCENE, "times": [0.2], "lanes": lanes}
+    found, bare = (gauss.post("/v1/simulate", json={**body, **more}).json() for more in ({}, {"verify": False}))
+    assert found["points"] == bare["points"]
+    checked = found["model"]["verification"]
+    assert (checked["looked_at"], checked["points"]) == (3, 3)
+    assert checked["time_error"] == shoal.sweep(SCENE, lanes, 0.2).check.time_error  # type: ignore[union-attr]
+    assert "verification" not in bare["model"]
+
+
+def test_a_tolerance_chooses_the_model(gauss: httpx.Client) -> None:
+    body = {"scene": "flexible-double-pendulum", "times": [0.1], "tolerance": 1e-3}
+    found = gauss.post("/v1/simulate", json=body).json()
+    assert found["status"] == ["ok"]
+    assert found["selection"]["estimated_error"] <= 1e-3
+    near = shoal.simulate("flexible-double-pendulum", [0.1], tolerance=1e-3)
+    assert np.array(found["points"]).tobytes() == near.points.tobytes()
+
+
+@pytest.fixture(scope="module")
+def casadi() -> Iterator[httpx.Client]:
+    with serving("casadi", Settings(workers=1)) as url, httpx.Client(base_url=url, timeout=300) as client:
+        yield client
+
+
+def test_another_engine_is_verified_by_the_native_solver(casadi: httpx.Client) -> None:
+    far = Client(str(casadi.base_url)).simulate("single-pendulum", [0.1])
+    near = shoal.simulate("single-pendulum", [0.1], engine="casadi")
+    assert far.engine == near.engine == "casadi"
+    assert far.model["verification"] == near.model["verification"]
+    answer = casadi.post("/v1/select", json={"scene": "single-pendulum", "tolerance": 1e-3})
+    assert answer.json()["detail"] == "tolerance: models are chosen for engine gauss only, found engine 'casadi'"
+
+
+def test_where_jobs_were_they_still_are(gauss: httpx.Client) -> None:
+    made = gauss.post("/v1/identifications", json={"problem": "paper-case-1", "method": "least-squares"})
+    assert made.status_code == 202
+    place = f"/v1/identifications/{made.json()['id']}"
+    deadline = time.monotonic() + 300
+    while gauss.get(place).json()["status"] in ("queued", "running"):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    assert gauss.get(f"{place}/result").json()["status"] == "ok"
