@@ -202,9 +202,9 @@ def _figure(name: str, studies: Sequence[Study], line: Drift | None, says: str) 
     if line is not None:
         ends = np.array([studies[0].started, studies[-1].started])
         axes.plot([_date(end) for end in ends], line.at(ends), color=GREY, linestyle="--")
-    locator = AutoDateLocator()
+    locator = AutoDateLocator()  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
-    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
     axes.set_xlabel("begin of the study (UTC)")
     axes.set_ylabel(name)
     headline(figure, says)
