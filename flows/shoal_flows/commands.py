@@ -38,13 +38,28 @@ def rerun(run_id: str, as_json: bool) -> None:
 
 
 @click.command()
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@click.argument("runs", nargs=-1, metavar="RUN...")
+@click.option("--all", "everything", is_flag=True, help="All studies in MLflow over time, instead of RUN.")
+@click.option("--machine", help="With --all: of this machine only.")
 @options.out(".html", default="report.html")
-def report(runs: tuple[str, ...], out: Path) -> None:
-    """Make one page of identifications of one problem.
+def report(runs: tuple[str, ...], everything: bool, machine: str | None, out: Path) -> None:
+    """Make one page of identifications of one problem, or of all studies over time.
 
     RUN is a file that `shoal identify --out FILE.json` wrote, or the id of a run in MLflow.
     """
+    if everything == bool(runs):
+        raise click.UsageError("give one RUN or more, or --all")
+    if machine is not None and not everything:
+        raise click.UsageError("--machine goes with --all")
+    if everything:
+        from shoal.pictures.files import save
+
+        from shoal_flows.report.overview import overview
+
+        text = overview(machine)
+        save(out, {".html": lambda: text})
+        click.echo(f"report: {out}")
+        return
     from shoal.pictures import archive
     from shoal.pictures.files import save
     from shoal.pictures.study import best_of, study

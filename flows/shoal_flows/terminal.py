@@ -18,6 +18,9 @@ from shoal_flows.events import Listener
 from shoal_flows.tracking import outbox
 from shoal_flows.tracking.record import LOCAL
 
+UI = "http://127.0.0.1:5000"
+"""Where `shoal ui` serves the runs if it is not told otherwise."""
+
 if TYPE_CHECKING:
     from shoal_flows.jobs import Fit
     from shoal_flows.results import Compared, DemoResult, Study
@@ -78,7 +81,10 @@ def show(result: Any) -> None:
         if result.sweep.check is not None:
             console.print(str(result.sweep.check), soft_wrap=True)
     if not isinstance(result, DemoResult) and not result.run_id.startswith(LOCAL):
-        console.print(f"MLflow run {result.run_id}; browse it with `shoal ui`", soft_wrap=True)
+        from shoal_flows.tracking.addresses import run_address
+
+        address = run_address(result.run_id, UI)
+        console.print(f"MLflow run {result.run_id}; browse it with `shoal ui`: {address}", soft_wrap=True)
 
 
 def notice() -> None:

@@ -16,6 +16,7 @@ from shoal.errors import ComputationError, InputError
 from shoal.ports import check_free
 
 from shoal_flows import settings
+from shoal_flows.tracking.addresses import latest_study
 
 _PATIENCE = 60.0
 
@@ -33,6 +34,10 @@ def ui(host: str, port: int) -> None:
     try:
         _wait(process, host, port)
         console.print(f"MLflow:  http://{host}:{port}  (Ctrl-C stops it)", soft_wrap=True)
+        latest = latest_study(f"http://{host}:{port}")
+        if latest is not None:
+            console.print(f"the latest study:  {latest[0]}", soft_wrap=True)
+            console.print(f"all studies:       {latest[1]}", soft_wrap=True)
         where = f"PREFECT_HOME={os.environ['PREFECT_HOME']} {sys.executable} -m prefect server start"
         console.print(f"Prefect's flow runs: {where}", soft_wrap=True)
         while process.poll() is None:

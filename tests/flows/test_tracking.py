@@ -14,7 +14,7 @@ from shoal.pictures.signals import signals
 from shoal_flows import pictures
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.report.stored import stored
-from shoal_flows.tracking import store
+from shoal_flows.tracking import addresses, store
 from shoal_flows.tracking.engines import log_comparison, log_sweep
 from shoal_flows.tracking.identification import log_fit, log_outcome, open_study
 from shoal_flows.tracking.store import connect
@@ -150,3 +150,39 @@ def test_pages_are_told_to_open_on_runs_and_metrics() -> None:
     assert page.index("mlflow.workflowType_v1") < page.index("static-files/static/js/main")
     assert "mlflow.workflowType_v1" not in browser.get("/version").text
     assert entry_points(group="mlflow.app")["shoal"].value == "shoal_flows.tracking.dashboard:app"
+
+
+def test_a_recording_is_a_data_set_by_which_runs_group(client: Any, fits: list[Fit]) -> None:
+    measurement = fits[0].estimate.measurement
+    halved = measurement.changed(lambda recording: recording.every(2))
+    found = []
+    for data in (measurement, measurement, halved):
+        with open_study("data", [fits[0].cell], data) as study:
+            pass
+        (one,) = client.get_run(study.run_id).inputs.dataset_inputs
+        found.append(one.dataset)
+    first, again, other = found
+    assert first.name == "exudyn"
+    assert first.digest == again.digest != other.digest
+    columns = [column["name"] for column in json.loads(first.schema)["mlflow_colspec"]]
+    assert columns == ["t", "B.x", "B.y"]
+    assert json.loads(first.profile)["num_rows"] == len(measurement.first.times)
+    experiment = client.get_experiment_by_name("Identification").experiment_id
+    runs = client.search_runs([experiment], f"dataset.digest = '{other.digest}'")
+    assert [run.info.run_id for run in runs] == [study.run_id]
+
+
+def test_the_pages_of_a_run_and_of_all_studies_are_named(
+    client: Any, fits: list[Fit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SHOAL_MLFLOW_URL", raising=False)
+    with open_study("latest", [fits[0].cell], fits[0].estimate.measurement) as study:
+        pass
+    experiment = client.get_run(study.run_id).info.experiment_id
+    page = f"http://here/#/experiments/{experiment}/runs/{study.run_id}"
+    table = f"http://here/#/experiments/{experiment}/runs?viewStateShareKey=studies"
+    assert addresses.run_address(study.run_id) is None
+    assert addresses.run_address(study.run_id, "http://here/") == page
+    assert addresses.table_address(study.run_id, "http://here") == table
+    assert addresses.latest_study("http://here") == (page, table)
+    assert "mlflow.sharedViewState.studies" in client.get_experiment(experiment).tags

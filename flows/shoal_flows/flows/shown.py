@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar, cast
@@ -15,10 +14,9 @@ from prefect.artifacts import (
 )
 from prefect.states import Completed
 
-from shoal_flows import settings
 from shoal_flows.inputs import headed
+from shoal_flows.tracking.addresses import run_address, table_address
 from shoal_flows.tracking.record import LOCAL
-from shoal_flows.tracking.store import connect
 
 
 class Result(Protocol):
@@ -49,23 +47,13 @@ def show_result(title: str, table: str, run_id: str, answer: str = "") -> None:
         create_link_artifact(address, link_text="The run in MLflow", key="mlflow-run", description=title)
 
 
-def run_address(run_id: str) -> str | None:
-    """The page of a run; None if the runs are in a database without a server, or the run is still in the outbox.
-
-    SHOAL_MLFLOW_URL is the server's address as a browser sees it, where that is not the address that tasks use.
-    """
-    server = os.environ.get("SHOAL_MLFLOW_URL") or settings.tracking_server()
-    if not server or run_id.startswith(LOCAL):
-        return None
-    experiment = connect().get_run(run_id).info.experiment_id
-    return f"{server.rstrip('/')}/#/experiments/{experiment}/runs/{run_id}"
-
-
 def _where(run_id: str) -> str:
     if run_id.startswith(LOCAL):
         return "MLflow does not answer: the run is kept in the outbox; `shoal upload` sends it."
     address = run_address(run_id)
-    return f"[Run {run_id} in MLflow]({address})" if address else f"Run `{run_id}` in MLflow; `shoal ui` shows it."
+    if address:
+        return f"[Run {run_id} in MLflow]({address}), [beside the others]({table_address(run_id)})"
+    return f"Run `{run_id}` in MLflow; `shoal ui` shows it."
 
 
 def named(flow: str, parameter: str) -> Callable[[], str]:

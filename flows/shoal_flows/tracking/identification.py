@@ -15,6 +15,7 @@ from shoal.trajectory import json_text
 
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.pictures import Album
+from shoal_flows.tracking.data import of_measurement
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
 
@@ -29,6 +30,7 @@ def open_study(name: str, cells: Sequence[Cell], measurement: Measurement) -> It
     description = f"{len(cells)} optimisations of {problem}; data: {measurement.origin}"
     with open_run("Identification", name, description=description, tags={"kind": "study", "problem": problem}) as run:
         run.params({"problem": problem, "data": measurement.origin, "cells": ", ".join(cell.name for cell in cells)})
+        run.data = of_measurement(measurement)
         yield run
 
 
@@ -43,11 +45,14 @@ def log_outcome(study: Run, fits: Sequence[Fit], failures: Mapping[str, str], pi
     study.describe(f"{table}\n{study.tags['mlflow.note.content']}")
     if best := best_of(fits):
         study.tags["verdict"] = str(best.estimate.verdict)
+        study.tags["machine"] = best.estimate.scene.name
         study.params({"method": best.cell.name})
         study.metric("final/fitness", best.estimate.fitness)
         study.metric("final/rms", best.estimate.rms)
         for name, value in best.estimate.parameters.items():
             study.metric(f"final/{name}", value.value)
+            study.metric(f"interval/{name}/lower", value.lower)
+            study.metric(f"interval/{name}/upper", value.upper)
 
 
 def best_of(fits: Sequence[Fit]) -> Fit | None:
@@ -88,6 +93,7 @@ def log_fit(fit: Fit, album: Album, study: str) -> str:
         "Identification", cell.name, tags=tags, parent=study, description=estimate.message, took=estimate.wall_s
     ) as run:
         scene = estimate.scene
+        run.data = of_measurement(estimate.measurement)
         mesh = {name: b.elements for name, b in scene.bodies.items() if isinstance(b, Rod) and b.element != "rigid"}
         run.params({"problem": cell.title, "method": cell.method, "seed": cell.seed, "engine": cell.engine})
         run.params({"scene": scene.name, "scene.fingerprint": scene.fingerprint, "data": estimate.data})

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, Self
 from uuid import uuid4
 
+from shoal_flows.tracking.data import Data
+
 LOCAL = "outbox-"
 """How the id of a run begins that MLflow has not given one yet."""
 MODEL = "model"
@@ -40,8 +42,8 @@ class Run:
     """A run that is being filled; what is added is sent when it ends.
 
     run_id: MLflow's, or one of our own as long as MLflow cannot be reached; name, description in words; parent: the
-    run_id of the study; params never change; metrics: (name, value, time [ms], step); files: artifacts by path;
-    started, ended [ms]; took: work [s] that had ended before the start
+    run_id of the study; params never change; metrics: (name, value, time [ms], step); files: artifacts by path
+    data: what it was fitted to; started, ended [ms]; took: work [s] that had ended before the start
     registration: of the model below `model/` among the files, if there is one
     """
 
@@ -57,6 +59,7 @@ class Run:
     kept_params: dict[str, str] = field(default_factory=dict)
     metrics: list[tuple[str, float, int, int]] = field(default_factory=list)
     files: dict[str, bytes] = field(default_factory=dict)
+    data: list[Data] = field(default_factory=list)
     registration: Registration | None = None
 
     @property
@@ -117,6 +120,7 @@ class Run:
         data["metrics"] = [(name, value, when, step) for name, value, when, step in data["metrics"]]
         if stated := data.get("registration"):
             data["registration"] = Registration(**stated)
+        data["data"] = [Data(**one) for one in data.get("data", [])]
         where = folder / _FILES
         found = [path for path in where.rglob("*") if path.is_file()]
         data["files"] = {path.relative_to(where).as_posix(): path.read_bytes() for path in found}

@@ -15,7 +15,7 @@ from typing import Any
 from shoal.errors import ComputationError
 
 from shoal_flows import provenance, settings
-from shoal_flows.tracking import origin, outbox, registry, views
+from shoal_flows.tracking import data, origin, outbox, registry, views
 from shoal_flows.tracking.record import LOCAL, Run
 
 log = logging.getLogger(__name__)
@@ -128,6 +128,8 @@ def _send(run: Run) -> None:
     for start in range(0, max(len(metrics), 10 * len(params)), _BATCH):
         some = params[start // 10 : start // 10 + _BATCH // 10]
         client.log_batch(run.run_id, metrics=metrics[start : start + _BATCH], params=some)
+    if run.data:
+        client.log_inputs(run.run_id, data.inputs(run.data))
     with TemporaryDirectory() as folder:
         run.write_files(Path(folder))
         client.log_artifacts(run.run_id, folder)

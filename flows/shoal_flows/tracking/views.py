@@ -49,8 +49,20 @@ VIEWS: dict[str, dict[str, View]] = {
     "Identification": {
         "best": View("Fits, best first", _FIT, _BEST),
         "best-today": View("Fits of the last 24 hours, best first", _FIT, {**_BEST, "startTime": "LAST_24_HOURS"}),
-        "studies": View("Studies", _FIT[:-1], {"searchFilter": "tags.kind = 'study'"}),
-    }
+        "studies": View("Studies", (*_FIT[:-1], "attributes.Dataset"), {"searchFilter": "tags.kind = 'study'"}),
+    },
+    "Comparison": {
+        "studies": View("Comparisons", ("params.scene", "params.engines"), {"searchFilter": "tags.kind = 'study'"}),
+    },
+    "Forward": {
+        "studies": View("Motions", ("params.scene", "params.engine", "metrics.final/energy_drift")),
+    },
+    "Sweep": {
+        "studies": View("Sweeps", ("params.scene", "params.engine", "metrics.final/points")),
+    },
+    "Validation": {
+        "studies": View("Nights", ("tags.verdict", "params.night", "metrics.lines/passed", "metrics.lines/failed")),
+    },
 }
 """By experiment and key."""
 
