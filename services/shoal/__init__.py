@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         simulate,
         statics,
         sweep,
+        uncertain,
     )
     from shoal.scene import Scene, load_scene, scene_names
     from shoal.trajectory import Trajectory
@@ -49,6 +50,7 @@ __all__ = [
     "simulate",
     "statics",
     "sweep",
+    "uncertain",
 ]
 
 

@@ -25,6 +25,7 @@ from shoal.commands.forward import compare, simulate, sweep
 from shoal.commands.installation import doctor, export_fmu, serve
 from shoal.commands.inverse import design, identify
 from shoal.commands.library import library
+from shoal.commands.uncertain import uncertain
 from shoal.errors import ComputationError, InputError, ShoalError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -108,7 +109,7 @@ def _extras_named() -> Iterator[None]:
     cls=Program,
     commands=[
         *(scenes, problems, library),
-        *(simulate, sweep, compare),
+        *(simulate, sweep, uncertain, compare),
         *(statics, modes, reactions),
         *(identify, design),
         *(serve, export_fmu, doctor),

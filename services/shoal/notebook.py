@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from shoal.mechanics.analysis.modes import Modes
     from shoal.mechanics.analysis.reactions import Reactions
     from shoal.pictures.inline import Picture
+    from shoal.response import Response
     from shoal.selection import Selection
 
 Values = Mapping[str, Any]
@@ -106,6 +107,30 @@ def sweep(
     grid = {path: np.asarray(lanes, dtype=float) for path, lanes in vary.items()}
     found = sweep(_scene(scene, values), grid, get_engine(engine), time)
     return spot_checked(found, get_engine(engine)) if verify else found
+
+
+def uncertain(
+    scene: Scene | str,
+    vary: Mapping[str, Any] | Sequence[str],
+    times: Times | None = None,
+    *,
+    values: Values | None = None,
+    method: str = "auto",
+    tolerance: float | None = None,
+    verify: bool = True,
+    seed: int = 0,
+    **options: Any,
+) -> Response:
+    """How the markers may move if fields of the scene are known as intervals or distributions only.
+
+    vary: path -> (low, high), a text such as "normal(1, 0.01)" or a frozen distribution of scipy; times: instants [s],
+    else the scene's own; options: the others of `shoal.response.uncertain` (gap, correlations, degree, count, most,
+    engine). Raises InputError, ComputationError.
+    """
+    from shoal.response import uncertain
+
+    given = _scene(scene, values)
+    return uncertain(given, vary, times, method=method, tolerance=tolerance, verify=verify, seed=seed, **options)
 
 
 def compare(

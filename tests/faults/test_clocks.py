@@ -12,8 +12,8 @@ import pytest
 import shoal
 import shoal_flows
 from shoal.api.jobs import Jobs
+from shoal.api.operations import Identify
 from shoal.api.refusal import Refusal
-from shoal.api.schemas import IdentifyRequest
 from shoal.api.settings import Settings
 
 STAMPS = {shoal_flows: {"tracking/record.py": 1}, shoal: {"doctor.py": 1}}
@@ -56,14 +56,14 @@ def test_a_result_is_kept_over_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
 
     async def kept() -> list[bool]:
         jobs = Jobs(Instant(), Settings(keep_seconds=3600.0))  # type: ignore[arg-type]
-        name = jobs.submit(IdentifyRequest(problem="paper-case-1")).id
+        name = jobs.submit("identify", Identify(problem="paper-case-1")).id
         await asyncio.sleep(0.01)
         found, now, steady = [], time.time(), time.monotonic()
         for jump in (3.2e7, -3.2e7):
             monkeypatch.setattr(time, "time", lambda jump=jump: now + jump)
             found.append(jobs.get(name).state == "done")
         monkeypatch.setattr("shoal.api.jobs.time.monotonic", lambda: steady + 3700.0)
-        with pytest.raises(Refusal, match="there is no such identification"):
+        with pytest.raises(Refusal, match="there is no such job"):
             jobs.get(name)
         return found
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from shoal.identification import Estimate, Problem
     from shoal.identification.design import Design
     from shoal.pictures.answer import Answer
+    from shoal.response import Response
     from shoal.scene import Scene
     from shoal.selection import Selection
     from shoal.trajectory import Trajectory
@@ -126,6 +127,22 @@ def rows(result: Sweep) -> str:
     return stream.getvalue()
 
 
+def response(found: Response, path: Path) -> None:
+    """Bounds or statistics of every marker over time, or those of the last marker as a picture."""
+
+    def table() -> str:
+        header, rows = found.table()
+        return "\n".join([",".join(header), *(",".join(f"{x:.12g}" for x in row) for row in rows), ""])
+
+    def drawn() -> bytes:
+        from shoal.pictures.response import response
+        from shoal.pictures.style import png
+
+        return png(response(found, found.markers[-1]))
+
+    save(path, {".csv": table, ".json": _json(found), ".png": drawn})
+
+
 def comparison(result: Comparison, path: Path) -> None:
     """All distances, or the engines over each other at the last marker."""
     save(path, {".json": _json(result), ".png": lambda: _plotted(result)})
@@ -139,6 +156,6 @@ def _plotted(result: Estimate | Sweep | Comparison) -> bytes:
     return png(plot(result).figure)
 
 
-def _json(result: Trajectory | Design | Sweep | Comparison) -> Callable[[], str]:
+def _json(result: Trajectory | Design | Sweep | Comparison | Response) -> Callable[[], str]:
     """What `--json` prints, one number a line."""
     return lambda: json_text(result.to_json(), indent=1)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from shoal.mechanics.analysis.equilibrium import Equilibrium
     from shoal.mechanics.analysis.modes import Modes
     from shoal.mechanics.analysis.reactions import Reactions
+    from shoal.response import Response
     from shoal.scene import Scene
     from shoal.selection import Selection
     from shoal.trajectory import Trajectory
@@ -91,6 +92,54 @@ def sweep_table(sweep: Sweep) -> None:
     screen.out.print(table)
     if sweep.check is not None:
         screen.say(str(sweep.check))
+
+
+def response_table(response: Response) -> None:
+    """The end: bounds with their gap, or mean, deviation and what it is owed to."""
+    title = f"{response.scene} at t = {response.times[-1]:g} s, {response.method}"
+    if response.bounds is not None:
+        headings = "lower", "upper", "outer lower", "outer upper"
+        found = response.bounds
+        columns = [found.lower, found.upper, found.lower_outer, found.upper_outer]
+    else:
+        assert response.statistics is not None
+        headings = "mean", "deviation", "5 %", "95 %"
+        told = response.statistics
+        columns = [told.mean, told.std, told.quantiles[1], told.quantiles[-2]]
+    table = screen.table(title, "", *headings)
+    for marker in response.markers:
+        for quantity in response.quantities:
+            unit = "rad" if quantity == "angle" else "m"
+            numbers = (response.column(marker, quantity, column)[-1] for column in columns)
+            table.add_row(f"{marker}.{quantity} [{unit}]", *("-" if np.isnan(x) else f"{x:z.6f}" for x in numbers))
+    screen.out.print(table)
+    if response.statistics is not None:
+        _shares(response)
+    screen.say(f"status {response.status}; {response.evaluations} runs in {response.wall_s:.2f} s; {response.why}")
+    if response.repeated or response.failed:
+        screen.say(f"{response.repeated} runs were repeated with smaller steps, {response.failed} failed all the same")
+    if response.bounds is not None:
+        gap = response.bounds.gap
+        known = (
+            "the gap to the outer ones is not known" if np.isnan(gap) else f"outer ones lie {gap:.1e} of the width off"
+        )
+        screen.say(f"bounds are attained by runs; {known}; they hold until {response.horizon:g} s")
+    errors = {"mesh": response.mesh_error, "step": response.step_error}
+    told_of = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
+    if told_of:
+        screen.say(f"estimated errors of the runs that decide: {', '.join(told_of)}")
+
+
+def _shares(response: Response) -> None:
+    """Sobol's total indices at the end."""
+    assert response.statistics is not None
+    marker = response.markers[-1]
+    axes = [quantity for quantity in response.quantities if quantity != "angle"]
+    table = screen.table(f"share of the variance of {marker} (total Sobol index)", "", *axes)
+    for k, name in enumerate(response.inputs.names):
+        shares = [response.column(marker, axis, response.statistics.total[k])[-1] for axis in axes]
+        table.add_row(escape(name), *("-" if np.isnan(x) else f"{x:.3f}" for x in shares))
+    screen.out.print(table)
 
 
 def _short(paths: list[str]) -> list[str]:

@@ -1,0 +1,96 @@
+"""Motions of a scene whose parameters are known as intervals or distributions only."""
+
+from __future__ import annotations
+
+import click
+
+from shoal.commands import options
+from shoal.commands.options import Out, Times, Values
+from shoal.errors import check_trusted
+
+
+def _methods() -> str:
+    from shoal.response.methods import METHODS
+
+    return f"One of {', '.join(METHODS)}."
+
+
+@click.command()
+@click.argument("scene")
+@click.option(
+    "--vary",
+    "vary",
+    multiple=True,
+    required=True,
+    metavar="PATH=LOW:HIGH|PATH~DISTRIBUTION",
+    help='An interval (-2%:2% is relative) or a distribution, such as "bodies.OA.length~normal(1,0.01)" (repeatable). '
+    "PATH,PATH=... ties fields together.",
+)
+@click.option("--correlate", "pairs", multiple=True, metavar="PATH,PATH=VALUE", help="Correlation of two of them.")
+@click.option("--method", cls=options.LateHelp, told=_methods, default="auto", show_default=True, metavar="NAME")
+@click.option(
+    "--gap", type=click.FloatRange(0, 1, min_open=True), metavar="SHARE", help="Between bounds, to be reached."
+)
+@click.option("--runs", "most", type=click.IntRange(3), default=20_000, show_default=True, help="That may be made.")
+@click.option("--degree", type=click.IntRange(1, 40), help="Of a method that has one.")
+@click.option("--count", type=click.IntRange(1), help="Runs of a method that samples.")
+@options.engine
+@options.values
+@options.at
+@click.option("--tolerance", type=float, metavar="METRES", help="Find the cheapest model with errors below.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@options.verify
+@options.as_json
+@options.out(".csv", ".json", ".png")
+def uncertain(
+    scene: str,
+    vary: tuple[str, ...],
+    pairs: tuple[str, ...],
+    method: str,
+    gap: float | None,
+    most: int,
+    degree: int | None,
+    count: int | None,
+    engine: str,
+    values: Values,
+    times: Times,
+    tolerance: float | None,
+    seed: int,
+    verify: bool,
+    as_json: bool,
+    out: Out,
+) -> None:
+    """How SCENE may move if some of its fields are intervals or distributions.
+
+    Intervals give bounds that runs attain, distributions give means, deviations, quantiles and Sobol indices.
+    """
+    from shoal.pictures import files
+    from shoal.response import uncertain
+    from shoal.response.read import correlations, parameters
+    from shoal.scene import load_scene
+    from shoal.terminal import screen, tables
+
+    wanted = load_scene(scene).with_values(values)
+    known, correlated = parameters(vary, wanted), correlations(pairs)
+    with screen.working(f"{wanted.name}: uncertain response") as tell:
+        screen.compile_for(engine, [1, 2], wanted)
+        response = uncertain(
+            wanted,
+            known,
+            times,
+            method=method,
+            gap=gap,
+            correlations=correlated,
+            degree=degree,
+            count=count,
+            tolerance=tolerance,
+            engine=engine,
+            verify=verify,
+            seed=seed,
+            most=most,
+            tell=lambda now: tell(f"{wanted.name}: {now}"),
+        )
+    if out is not None:
+        files.response(response, out)
+    screen.show(response.to_json(), as_json, lambda: tables.response_table(response))
+    check_trusted(response.ok, response.message)

@@ -1,0 +1,58 @@
+"""Where a marker may be over time: the band between its bounds, or the fan of its quantiles."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from shoal.pictures.numbers import length
+from shoal.pictures.style import BLUE, GREY, ORANGE, canvas, headline, styled
+from shoal.response import Response
+
+FANS = ((0, -1, 0.2), (1, -2, 0.3), (2, -3, 0.4))
+"""Pairs of quantiles, from the widest, and how dark what lies between them is."""
+
+
+@styled
+def response(found: Response, marker: str) -> Figure:
+    """x and y of one marker."""
+    figure, axes = canvas(6.6, nrows=2, sharex=True)
+    widest = 0.0
+    for panel, quantity in zip(axes, ("x", "y"), strict=True):
+        widest = max(widest, _panel(panel, found, marker, quantity))
+    axes[0].legend()
+    axes[-1].set_xlabel("time [s]")
+    what = "apart at most, as attained by runs" if found.bounds is not None else "standard deviation at most"
+    trust = "" if found.ok else f" ({found.status}: see the message)"
+    headline(figure, f"{found.scene}: places of {marker} are {length(widest)} {what}{trust}")
+    return figure
+
+
+def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
+    """One coordinate; the largest width or deviation [m]."""
+    t = found.times
+    if found.bounds is not None:
+        lower, upper, low, high = (
+            found.column(marker, quantity, of)
+            for of in (found.bounds.lower, found.bounds.upper, found.bounds.lower_outer, found.bounds.upper_outer)
+        )
+        panel.fill_between(t, lower, upper, color=BLUE, alpha=0.35, label="attained by runs")
+        within = t <= found.horizon
+        panel.plot(t[within], low[within], color=ORANGE, linestyle="--", label="outer bounds")
+        panel.plot(t[within], high[within], color=ORANGE, linestyle="--")
+        if not within.all():
+            panel.axvline(found.horizon, color=GREY, linestyle=":", label="horizon")
+        widest = float(np.max(upper - lower))
+    else:
+        told = found.statistics
+        assert told is not None
+        quantiles = found.column(marker, quantity, told.quantiles)
+        for one, other, dark in FANS:
+            panel.fill_between(t, quantiles[one], quantiles[other], color=BLUE, alpha=dark, linewidth=0)
+        panel.plot(
+            t, found.column(marker, quantity, told.mean), color=BLUE, label="mean; 50, 90, 98 % lie in the bands"
+        )
+        widest = float(np.max(found.column(marker, quantity, told.std)))
+    panel.set_ylabel(f"{quantity} of {marker} [m]")
+    return widest

@@ -1,0 +1,147 @@
+"""The uncertain parameters together: from germs to values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy import special
+from scipy.stats import qmc
+
+from shoal.errors import InputError
+from shoal.response.marginals import Marginal, Normal
+from shoal.response.polynomials import HERMITE, Recurrence, Terms
+from shoal.trajectory import Array
+
+BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+Correlations = Mapping[tuple[str, str], float]
+"""Of the normal variables behind two parameters (a Gaussian copula), by their names."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An uncertain parameter.
+
+    name: as it was given; factors: path -> what its value is multiplied by there (more than one path: a tie)
+    """
+
+    name: str
+    marginal: Marginal
+    factors: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Parameters and their correlations. Raises InputError."""
+
+    parameters: tuple[Parameter, ...]
+    correlations: Correlations | None = None
+
+    def __post_init__(self) -> None:
+        names = self.names
+        if not names:
+            raise InputError("vary: needs at least one parameter, such as bodies.OA.length=0.98:1.02")
+        paths = [path for one in self.parameters for path in one.factors]
+        if twice := sorted({path for path in paths if paths.count(path) > 1}):
+            raise InputError(f"vary: {twice[0]} is varied twice")
+        for pair in self.correlations or {}:
+            for name in pair:
+                if name not in names:
+                    raise InputError(f"correlate: {name!r} is not varied; there are {', '.join(names)}")
+                if not self.parameters[names.index(name)].marginal.random:
+                    raise InputError(f"correlate: {name} is an interval; only random parameters correlate")
+        if self.correlations:
+            _ = self._factor
+
+    @property
+    def names(self) -> list[str]:
+        """Of the parameters, in order."""
+        return [one.name for one in self.parameters]
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    @cached_property
+    def random(self) -> BoolArray:
+        """Which parameters are random, (parameters,)."""
+        return np.array([one.marginal.random for one in self.parameters], dtype=bool)
+
+    @cached_property
+    def _correlated(self) -> list[int]:
+        named = {name for pair in self.correlations or {} for name in pair}
+        return [k for k, name in enumerate(self.names) if name in named]
+
+    @cached_property
+    def _factor(self) -> Array:
+        """Cholesky's factor of the correlated parameters. Raises InputError."""
+        names = [self.names[k] for k in self._correlated]
+        matrix = np.eye(len(names))
+        for (one, other), value in (self.correlations or {}).items():
+            if not -1 < value < 1 or one == other:
+                raise InputError(f"correlate: {one},{other}={value:g}: needs two parameters and a value in (-1, 1)")
+            i, j = names.index(one), names.index(other)
+            matrix[i, j] = matrix[j, i] = value
+        try:
+            return np.asarray(np.linalg.cholesky(matrix), dtype=float)
+        except np.linalg.LinAlgError:
+            raise InputError("correlate: these correlations contradict each other (no positive matrix)") from None
+
+    def _standard(self, k: int) -> bool:
+        """Whether the germ of a parameter is a standard normal variable whatever its distribution."""
+        return k in self._correlated
+
+    def values(self, germs: Array) -> dict[str, Array]:
+        """Path -> value of every run; germs: (runs, parameters)."""
+        given = {}
+        correlated = germs[:, self._correlated] @ self._factor.T if self._correlated else None
+        for k, one in enumerate(self.parameters):
+            s = germs[:, k]
+            if correlated is not None and self._standard(k):
+                z = correlated[:, self._correlated.index(k)]
+                s = z if isinstance(one.marginal, Normal) else one.marginal.germ(special.ndtr(z))
+            value = one.marginal.value(s)
+            given.update({path: value * factor for path, factor in one.factors.items()})
+        return given
+
+    def named(self, germs: Array) -> Array:
+        """Values of the parameters as the user states them, (runs, parameters)."""
+        values = self.values(np.atleast_2d(germs))
+        return np.stack([values[next(iter(one.factors))] for one in self.parameters], axis=1)
+
+    def germs(self, x: Array) -> Array:
+        """Germs at independent probabilities, both (runs, parameters)."""
+        found = [
+            special.ndtri(x[:, k]) if self._standard(k) else one.marginal.germ(x[:, k])
+            for k, one in enumerate(self.parameters)
+        ]
+        return np.stack(found, axis=1)
+
+    def sobol(self, count: int, seed: int, skip: int = 0) -> Array:
+        """Quasi-random germs: Sobol's sequence, scrambled (Owen), after the first `skip`."""
+        power = max(int(np.ceil(np.log2(max(skip + count, 1)))), 0)
+        return self.germs(inside(qmc.Sobol(len(self), rng=seed).random_base2(power)[skip : skip + count]))
+
+    def drawn(self, count: int, seed: int) -> Array:
+        """Random germs."""
+        return self.germs(inside(np.random.default_rng(seed).random((count, len(self)))))
+
+    def basis(self, germs: Array, terms: Terms) -> Array:
+        """Every product of polynomials at every germ, (runs, terms)."""
+        found = np.ones((len(germs), len(terms)))
+        for k, one in enumerate(self.parameters):
+            recurrence: Recurrence = HERMITE if self._standard(k) else one.marginal.basis
+            degree = int(terms[:, k].max())
+            if degree:
+                found *= recurrence(germs[:, k], degree)[:, terms[:, k]]
+        return found
+
+    def only(self, chosen: Sequence[int]) -> Inputs:
+        """Some of the parameters."""
+        return replace(self, parameters=tuple(self.parameters[k] for k in chosen))
+
+
+def inside(x: Array) -> Array:
+    """Probabilities off 0 and 1, where quantiles are infinite."""
+    return np.clip(x, 1e-12, 1 - 1e-12)

@@ -1,0 +1,160 @@
+"""What is known about one parameter: an interval, or a distribution.
+
+Methods work in the germ s of a parameter: its place in [-1, 1] for intervals and uniform distributions, the standard
+normal variable for normal and lognormal ones, the standardised value for others (arbitrary polynomial chaos: Oladyshkin
+and Nowak, Reliability Engineering and System Safety 106, 2012).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from scipy import special
+
+from shoal.response.polynomials import HERMITE, LEGENDRE, Recurrence, of_measure
+from shoal.trajectory import Array
+
+QUADRATURE = 32, 64
+"""Gauss points in each of so many parts of the probability that a measure is integrated over."""
+
+
+class Marginal(Protocol):
+    """What methods ask of a parameter."""
+
+    @property
+    def random(self) -> bool:
+        """Whether it has a distribution."""
+        ...
+
+    @property
+    def text(self) -> str:
+        """As the user wrote it."""
+        ...
+
+    @property
+    def basis(self) -> Recurrence:
+        """Polynomials in the germ that are orthonormal under its measure."""
+        ...
+
+    def germ(self, x: Array) -> Array:
+        """The germ at probabilities x in (0, 1)."""
+        ...
+
+    def value(self, s: Array) -> Array:
+        """The parameter at germs s."""
+        ...
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Between two bounds, and no more is known."""
+
+    low: float
+    high: float
+    text: str = ""
+    random = False
+    basis = LEGENDRE
+
+    def germ(self, x: Array) -> Array:
+        """Evenly over [-1, 1]."""
+        return np.asarray(2 * x - 1)
+
+    def value(self, s: Array) -> Array:
+        """The bounds at -1 and 1, to the last bit."""
+        within = 0.5 * (self.low + self.high) + 0.5 * (self.high - self.low) * s
+        return np.where(s == -1, self.low, np.where(s == 1, self.high, within))
+
+
+@dataclass(frozen=True)
+class Uniform(Interval):
+    """Each value between two bounds as likely as another."""
+
+    random = True
+
+
+@dataclass(frozen=True)
+class Normal:
+    """A normal distribution of the value or, `logarithmic`, of its logarithm."""
+
+    mean: float
+    deviation: float
+    text: str = ""
+    logarithmic: bool = False
+    random = True
+    basis = HERMITE
+
+    def germ(self, x: Array) -> Array:
+        """The standard normal variable."""
+        return np.asarray(special.ndtri(x))
+
+    def value(self, s: Array) -> Array:
+        """Mean and deviation are those of the normal variable."""
+        normal = self.mean + self.deviation * s
+        return np.exp(normal) if self.logarithmic else np.asarray(normal)
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """Any distribution of scipy, or another object with `ppf`, `mean` and `std`."""
+
+    distribution: Any
+    text: str = ""
+    random = True
+
+    @cached_property
+    def _scale(self) -> tuple[float, float]:
+        return float(self.distribution.mean()), float(self.distribution.std())
+
+    @cached_property
+    def basis(self) -> Recurrence:
+        """By quadrature over the probability."""
+        points, parts = QUADRATURE
+        nodes, weights = np.polynomial.legendre.leggauss(points)
+        # Finer towards both ends, where quantiles change fastest.
+        edges = 0.5 * (1 + np.sin(0.5 * np.pi * np.linspace(-1, 1, parts + 1)))
+        half, middle = 0.5 * np.diff(edges), 0.5 * (edges[1:] + edges[:-1])
+        x = (middle[:, None] + half[:, None] * nodes).ravel()
+        return of_measure(self.germ(x), (half[:, None] * weights).ravel())
+
+    def germ(self, x: Array) -> Array:
+        """The standardised value."""
+        mean, deviation = self._scale
+        return np.asarray((self.distribution.ppf(x) - mean) / deviation)
+
+    def value(self, s: Array) -> Array:
+        """The value."""
+        mean, deviation = self._scale
+        return np.asarray(mean + deviation * s)
+
+
+@dataclass(frozen=True)
+class Empirical:
+    """Observed values, each as likely as another."""
+
+    data: Array
+    text: str = ""
+    random = True
+
+    @cached_property
+    def _scale(self) -> tuple[float, float]:
+        return float(np.mean(self.data)), float(np.std(self.data))
+
+    @cached_property
+    def basis(self) -> Recurrence:
+        """Orthonormal over the observations."""
+        mean, deviation = self._scale
+        return of_measure((self.data - mean) / deviation, np.full(len(self.data), 1 / len(self.data)))
+
+    def germ(self, x: Array) -> Array:
+        """The standardised observation."""
+        mean, deviation = self._scale
+        ranks = np.minimum((np.asarray(x) * len(self.data)).astype(int), len(self.data) - 1)
+        return np.asarray((np.sort(self.data)[ranks] - mean) / deviation)
+
+    def value(self, s: Array) -> Array:
+        """The observation."""
+        mean, deviation = self._scale
+        return np.asarray(mean + deviation * s)

@@ -1,0 +1,38 @@
+"""The methods: one list. `auto` is the one a user gets who does not choose; the others serve comparison as well."""
+
+from __future__ import annotations
+
+from shoal.errors import InputError
+from shoal.response.methods.auto import auto
+from shoal.response.methods.chaos import chaos
+from shoal.response.methods.chebyshev import chebyshev
+from shoal.response.methods.legendre import legendre
+from shoal.response.methods.rbf import rbf
+from shoal.response.methods.sampling import monte_carlo, sobol
+from shoal.response.methods.scan import scan
+from shoal.response.methods.taylor import taylor
+from shoal.response.methods.vertices import vertices
+from shoal.response.study import Method
+
+METHODS: dict[str, Method] = {
+    "auto": auto,
+    "scan": scan,
+    "vertices": vertices,
+    "monte-carlo": monte_carlo,
+    "sobol": sobol,
+    "taylor": taylor,
+    "chebyshev": chebyshev,
+    "legendre": legendre,
+    "chaos": chaos,
+    "rbf": rbf,
+}
+
+
+def get_method(name: str) -> Method:
+    """The method of that name. Raises InputError."""
+    if name not in METHODS:
+        raise InputError(f"method: no method {name!r}; there are {', '.join(METHODS)}")
+    return METHODS[name]
+
+
+__all__ = ["METHODS", "get_method"]

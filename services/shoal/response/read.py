@@ -1,0 +1,195 @@
+"""What users write of uncertain parameters: PATH=LOW:HIGH, PATH~normal(MEAN,SD), ... Raises InputError."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from shoal.errors import InputError
+from shoal.response.inputs import Correlations, Parameter
+from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
+from shoal.scene import Scene
+
+FORM = "PATH=LOW:HIGH or PATH~normal(MEAN,SD)"
+_CALL = re.compile(r"^\s*([a-z-]+)\s*\((.*)\)\s*$")
+EVERYTHING = 10
+"""Observations that an empirical distribution needs."""
+
+
+def _normal(mean: float, deviation: float) -> Marginal:
+    return Normal(mean, _positive("the deviation", deviation))
+
+
+def _uniform(low: float, high: float) -> Marginal:
+    return Uniform(low, _above(low, high))
+
+
+def _lognormal(mean: float, deviation: float) -> Marginal:
+    _positive("the mean", mean), _positive("the deviation", deviation)
+    spread = math.sqrt(math.log1p((deviation / mean) ** 2))
+    return Normal(math.log(mean) - 0.5 * spread**2, spread, logarithmic=True)
+
+
+def _truncated(mean: float, deviation: float, low: float, high: float) -> Marginal:
+    _positive("the deviation", deviation), _above(low, high)
+    return Frozen(stats.truncnorm((low - mean) / deviation, (high - mean) / deviation, mean, deviation))
+
+
+def _triangular(low: float, mode: float, high: float) -> Marginal:
+    if not low <= mode <= _above(low, high):
+        raise ValueError(f"the mode {mode:g} is not between {low:g} and {high:g}")
+    return Frozen(stats.triang((mode - low) / (high - low), low, high - low))
+
+
+def _beta(a: float, b: float, low: float, high: float) -> Marginal:
+    _positive("a", a), _positive("b", b)
+    return Frozen(stats.beta(a, b, low, _above(low, high) - low))
+
+
+DISTRIBUTIONS: dict[str, tuple[Callable[..., Marginal], str]] = {
+    "normal": (_normal, "MEAN,SD"),
+    "uniform": (_uniform, "LOW,HIGH"),
+    "lognormal": (_lognormal, "MEAN,SD"),
+    "truncated-normal": (_truncated, "MEAN,SD,LOW,HIGH"),
+    "triangular": (_triangular, "LOW,MODE,HIGH"),
+    "beta": (_beta, "A,B,LOW,HIGH"),
+}
+"""Name -> what makes it from its numbers, and what these are. `empirical(FILE.csv)` is another."""
+
+
+def parameters(vary: Mapping[str, Any] | Sequence[str | Parameter], scene: Scene) -> tuple[Parameter, ...]:
+    """The uncertain parameters of a scene, each of which it accepts at its ends. Raises InputError."""
+    if isinstance(vary, Mapping):
+        return tuple(_parameter(name, known, scene) for name, known in vary.items())
+    return tuple(one if isinstance(one, Parameter) else _parameter(*_split(one), scene) for one in vary)
+
+
+def correlations(pairs: Sequence[str]) -> Correlations | None:
+    """PATH,PATH=VALUE texts. Raises InputError."""
+    found: dict[tuple[str, str], float] = {}
+    for text in pairs:
+        names, _, value = text.rpartition("=")
+        one, comma, other = names.partition(",")
+        try:
+            found[one.strip(), other.strip()] = float(value)
+        except ValueError:
+            comma = ""
+        if not comma:
+            raise InputError(f"correlate: {text!r} is not PATH,PATH=VALUE, such as bodies.A.length,bodies.B.length=0.8")
+    return found or None
+
+
+def _split(text: str) -> tuple[str, Any]:
+    for sign in ("~", "="):
+        name, found, known = text.partition(sign)
+        if found and name.strip() and known.strip() and (sign == "~" or "~" not in name):
+            return name.strip(), known.strip() if sign == "~" else _ends(text, known)
+    raise InputError(f"vary: {text!r} is not {FORM}")
+
+
+def _ends(text: str, known: str) -> tuple[str, str]:
+    low, colon, high = known.partition(":")
+    if not colon or ":" in high:
+        raise InputError(f"vary: {text} is not {FORM}")
+    return low.strip(), high.strip()
+
+
+def _parameter(name: str, known: Any, scene: Scene) -> Parameter:
+    paths = [path.strip() for path in name.split(",")]
+    nominal = {path: _nominal(path, scene) for path in paths}
+    marginal = _marginal(name, known, nominal[paths[0]])
+    factors = dict.fromkeys(paths, 1.0)
+    if len(paths) > 1 and nominal[paths[0]]:
+        # Tied fields keep the ratios that the scene states.
+        factors = {path: value / nominal[paths[0]] for path, value in nominal.items()}
+    low, high = marginal.value(marginal.germ(np.array([1e-12, 1 - 1e-12])))
+    if isinstance(marginal, Interval):
+        low, high = marginal.low, marginal.high
+    for end in (low, high):
+        scene.with_values({path: float(end) * factor for path, factor in factors.items()})
+    return Parameter(name, marginal, factors)
+
+
+def _nominal(path: str, scene: Scene) -> float:
+    value = scene.value(path)
+    if value is None and path.startswith("initial."):
+        return 0.0
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"vary: {path} is {value!r}, which is no number")
+    if isinstance(value, int) and path.split(".")[-1] in ("elements", "samples", "max_steps"):
+        raise InputError(f"vary: {path} is a whole number, which cannot vary continuously")
+    return float(value)
+
+
+def _marginal(name: str, known: Any, nominal: float) -> Marginal:
+    if isinstance(known, str):
+        return _distribution(name, known)
+    if hasattr(known, "ppf"):
+        return Frozen(known, str(getattr(getattr(known, "dist", known), "name", known)))
+    if isinstance(known, Sequence) and len(known) == 2:
+        low, high = (_number(name, end, nominal) for end in known)
+        if not low < high:
+            raise InputError(f"vary: {name}={low:g}:{high:g}: LOW must be below HIGH")
+        return Interval(low, high, f"{low:g}:{high:g}")
+    raise InputError(f"vary: {name}: {known!r} is neither (low, high) nor a distribution")
+
+
+def _number(name: str, end: Any, nominal: float) -> float:
+    """A bound; with a per cent sign it is relative to what the scene states."""
+    text = str(end).strip()
+    try:
+        value = nominal + abs(nominal) * float(text[:-1]) / 100 if text.endswith("%") else float(text)
+    except ValueError:
+        raise InputError(f"vary: {name}: {text!r} is no number; write {FORM}") from None
+    if not math.isfinite(value):
+        raise InputError(f"vary: {name}: bounds are finite, found {text}")
+    return value
+
+
+def _distribution(name: str, text: str) -> Marginal:
+    called = _CALL.match(text)
+    if called is None or called[1] not in (*DISTRIBUTIONS, "empirical"):
+        forms = ", ".join(f"{one}({form})" for one, (_, form) in DISTRIBUTIONS.items())
+        raise InputError(f"vary: {name}~{text}: no such distribution; there are {forms}, empirical(FILE.csv)")
+    kind, inside = called[1], called[2]
+    if kind == "empirical":
+        return _empirical(name, inside.strip(), text)
+    make, form = DISTRIBUTIONS[kind]
+    try:
+        numbers = [float(part) for part in inside.split(",")]
+        if len(numbers) != len(form.split(",")) or not np.isfinite(numbers).all():
+            raise ValueError(f"write {kind}({form}) with finite numbers")
+        made = make(*numbers)
+    except ValueError as error:
+        reason = str(error) if "could not convert" not in str(error) else f"write {kind}({form})"
+        raise InputError(f"vary: {name}~{text}: {reason}") from None
+    object.__setattr__(made, "text", text)
+    return made
+
+
+def _empirical(name: str, file: str, text: str) -> Marginal:
+    try:
+        data = np.loadtxt(Path(file), delimiter=",", comments="#", ndmin=1, dtype=float)
+    except (OSError, ValueError) as error:
+        raise InputError(f"vary: {name}~{text}: cannot read one column of numbers: {error}") from None
+    if data.ndim != 1 or len(data) < EVERYTHING or not np.isfinite(data).all() or np.ptp(data) == 0:
+        raise InputError(f"vary: {name}~{text}: needs one column of at least {EVERYTHING} different finite numbers")
+    return Empirical(np.asarray(data, dtype=float), text)
+
+
+def _positive(what: str, value: float) -> float:
+    if value <= 0:
+        raise ValueError(f"{what} must be positive, found {value:g}")
+    return value
+
+
+def _above(low: float, high: float) -> float:
+    if not low < high:
+        raise ValueError(f"{high:g} is not above {low:g}")
+    return high

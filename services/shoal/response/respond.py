@@ -1,0 +1,297 @@
+"""The main path: scene, what is known of its parameters -> runs by a method -> bounds or statistics -> their errors."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.engines.contract import sampling_times
+from shoal.engines.verification import verified
+from shoal.errors import ComputationError, InputError
+from shoal.mechanics import reach
+from shoal.response.enclosure import Enclosure, enclosure
+from shoal.response.expansion import Expansion
+from shoal.response.extremes import Extremes, Surrogate, extremes
+from shoal.response.inputs import Correlations, Inputs, Parameter
+from shoal.response.machine import QUANTITIES, Machine
+from shoal.response.methods import get_method
+from shoal.response.methods.bounds import HOPELESS
+from shoal.response.read import parameters
+from shoal.response.result import Bounds, Response
+from shoal.response.runs import Model, Runs, TooManyRunsError
+from shoal.response.statistics import Statistics, masked, of_expansion, of_runs
+from shoal.response.study import Found, Study
+from shoal.scene import Scene, load_scene
+from shoal.trajectory import Array
+
+MOST = 20_000
+"""Runs that a study may make unless another limit is asked for."""
+CHECKED = 6
+"""Extremal runs, or drawn ones, that are looked at by more careful runs."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is found of any model: bounds or statistics of its columns, and how."""
+
+    found: Found
+    runs: Runs
+    bounds: Bounds | None
+    statistics: Statistics | None
+
+    @property
+    def horizon(self) -> float:
+        """Up to when bounds hold [s], infinite if always."""
+        return math.inf if self.bounds is None else self.bounds.horizon
+
+
+def respond(
+    model: Model,
+    inputs: Inputs,
+    columns: int,
+    *,
+    method: str = "auto",
+    groups: Array | None = None,
+    instants: Array | None = None,
+    gap: float | None = None,
+    degree: int | None = None,
+    count: int | None = None,
+    seed: int = 0,
+    most: int = MOST,
+    tell: Callable[[str], None] = lambda line: None,
+) -> Answer:
+    """Bounds or statistics of any function of named values; see `Study`.
+
+    model: path -> values, (runs,), to answers, (runs, columns). Raises InputError, ComputationError.
+    """
+    runs = Runs(model, inputs, most, tell)
+    group = np.arange(columns) if groups is None else np.asarray(groups, dtype=np.int64)
+    when = np.zeros(columns) if instants is None else instants
+    study = Study(runs, group, when, seed, gap, degree, count)
+    try:
+        found = get_method(method)(study)
+    except TooManyRunsError:
+        raise InputError(f"runs: method {method} needs more than the {most} runs that it may make") from None
+    if not len(runs.values):
+        raise ComputationError(f"all {runs.evaluations} runs failed: {runs.why}")
+    random = inputs.random
+    bounds = None if random.any() else _bounds(study, found)
+    statistics = _statistics(study, found) if random.all() else None
+    return Answer(found, runs, bounds, statistics)
+
+
+def uncertain(
+    scene: Scene | str,
+    vary: Mapping[str, Any] | Sequence[str | Parameter],
+    times: Sequence[float] | Array | None = None,
+    *,
+    values: Mapping[str, Any] | None = None,
+    method: str = "auto",
+    gap: float | None = None,
+    correlations: Correlations | None = None,
+    degree: int | None = None,
+    count: int | None = None,
+    tolerance: float | None = None,
+    engine: str = "gauss",
+    verify: bool = True,
+    seed: int = 0,
+    most: int = MOST,
+    tell: Callable[[str], None] = lambda line: None,
+) -> Response:
+    """How the markers of a scene may move if some of its fields are known as intervals or distributions only.
+
+    vary: path -> (low, high), a text such as "normal(1, 0.01)" or a frozen distribution of scipy, or a list of what
+    `--vary` takes; times: instants [s], else the scene's own; method: one of `METHODS`; gap: between outer and attained
+    bounds, as a share of the largest width, that must be reached; correlations: of pairs of random parameters;
+    degree, count: of a method that has one; tolerance: error [m] that the markers of the middle machine may have, for
+    which the cheapest model is found; verify: estimate mesh and step errors of extremal runs; most: runs that may be
+    made; tell: is told how many there are. Raises InputError, ComputationError.
+    """
+    begin = time.perf_counter()
+    wanted = load_scene(scene) if isinstance(scene, str) else scene
+    wanted = wanted.with_values(values) if values else wanted
+    inputs = Inputs(parameters(vary, wanted), correlations)
+    if inputs.random.any() and not inputs.random.all():
+        one, other = (inputs.names[int(np.argmax(inputs.random == kind))] for kind in (True, False))
+        raise InputError(f"vary: {one} has a distribution and {other} an interval; give both the one or the other")
+    when = sampling_times(wanted, times)
+    if tolerance is not None:
+        wanted = _modelled(wanted, inputs, tolerance, when, engine)
+    machine = Machine(wanted, when, get_engine(engine))
+    count_t, count_m, count_q = machine.columns
+    answer = respond(
+        machine,
+        inputs,
+        count_t * count_m * count_q,
+        method=method,
+        groups=np.tile(np.arange(count_m * count_q), count_t),
+        instants=np.repeat(when, count_m * count_q),
+        gap=gap,
+        degree=degree,
+        count=count,
+        seed=seed,
+        most=most,
+        tell=tell,
+    )
+    bounds = answer.bounds
+    if bounds is not None and math.isfinite(answer.horizon):
+        bounds = _beyond(wanted, inputs, bounds, machine)
+    mesh, step, rejected = _errors(machine, answer, seed) if verify else (None, None, "")
+    status, message = _status(answer, gap, rejected)
+    return Response(
+        status=status,
+        message=message,
+        scene=wanted.name,
+        method=method,
+        why=answer.found.why,
+        inputs=inputs,
+        times=when,
+        markers=tuple(wanted.markers),
+        quantities=QUANTITIES,
+        evaluations=answer.runs.evaluations,
+        repeated=answer.runs.repeated,
+        failed=answer.runs.failed,
+        seed=seed,
+        wall_s=time.perf_counter() - begin,
+        horizon=min(answer.horizon, float(when[-1])),
+        bounds=bounds,
+        statistics=answer.statistics,
+        mesh_error=mesh,
+        step_error=step,
+    )
+
+
+def _bounds(study: Study, found: Found) -> Bounds:
+    """Attained bounds of all runs, after the extremal points of the surrogate are run, and outer ones by its error."""
+    runs, error, surrogate = study.runs, found.error, found.surrogate
+    foretold = None
+    if surrogate is not None:
+        foretold = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed)
+        if error is None:
+            error = _confirmed(study, surrogate, foretold)
+    values, germs = runs.values, runs.germs
+    lower, upper = values.min(axis=0), values.max(axis=0)
+    unknown = np.full(len(lower), np.nan)
+    told = Enclosure(lower, upper, unknown, unknown, unknown)
+    if surrogate is not None and foretold is not None and error is not None:
+        told = enclosure(study, surrogate, foretold, error)
+    end = _horizon(study, told.gap)
+    within = told.gap[study.instants <= end]
+    return Bounds(
+        lower,
+        upper,
+        told.lower_outer,
+        told.upper_outer,
+        study.inputs.named(germs[values.argmin(axis=0)]),
+        study.inputs.named(germs[values.argmax(axis=0)]),
+        float(within.max()) if within.size else math.nan,
+        end,
+    )
+
+
+def _confirmed(study: Study, surrogate: Surrogate, foretold: Extremes) -> Array | None:
+    """The error of a surrogate at its own extremal points, which are run; None if there are no runs left for it."""
+    runs = study.runs
+    wanted: Array = np.unique(np.round(np.vstack([foretold.at_lower, foretold.at_upper]), 2), axis=0)
+    wanted = wanted[: max(0, min(len(wanted), runs.left, study.fair))]
+    made = len(runs.germs)
+    if not len(wanted) or runs(wanted) == 0:
+        return None
+    return np.asarray(np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0))
+
+
+def _statistics(study: Study, found: Found) -> Statistics:
+    runs = study.runs
+    if isinstance(found.surrogate, Expansion):
+        told = of_expansion(found.surrogate, study.inputs, found.error, runs.evaluations, study.seed)
+    else:
+        told = of_runs(runs.values, found.indices, len(study.inputs))
+    return masked(told, study.largest(np.nan_to_num(told.std), runs.values))
+
+
+def _horizon(study: Study, gap: Array) -> float:
+    """The last instant up to which outer and attained bounds meet [s]; infinite if they do at all, or are unknown."""
+    first = study.instants[np.nan_to_num(gap) > max(study.gap or 0.0, HOPELESS)].min(initial=math.inf)
+    if math.isinf(first):
+        return math.inf
+    return float(study.instants[study.instants < first].max(initial=0.0))
+
+
+def _beyond(scene: Scene, inputs: Inputs, bounds: Bounds, machine: Machine) -> Bounds:
+    """Outer bounds that are the kinematic reach beyond the horizon, where there is one; angles have none."""
+    ends = inputs.values(np.array([-np.ones(len(inputs)), np.ones(len(inputs))]))
+    length = max(float(np.max(reach.size(scene.with_lanes(ends)))), 0.0) if reach.tethered(scene) else math.inf
+    anchors = reach.anchors(scene)
+    far = np.full((*machine.columns, 2), math.nan)
+    for axis in range(2):
+        far[:, :, axis, 0] = anchors[:, axis].min() - reach.MARGIN * length
+        far[:, :, axis, 1] = anchors[:, axis].max() + reach.MARGIN * length
+    late = np.repeat(machine.times > bounds.horizon, int(np.prod(machine.columns[1:])))
+    lower, upper = bounds.lower_outer.copy(), bounds.upper_outer.copy()
+    lower[late], upper[late] = far.reshape(-1, 2)[late].T
+    return replace(bounds, lower_outer=lower, upper_outer=upper)
+
+
+def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, float | None, str]:
+    """Largest mesh and step errors [m] of the runs that attain most bounds, or of some that were drawn."""
+    runs = answer.runs
+    if answer.bounds is not None:
+        values = runs.values
+        used = Counter([*values.argmin(axis=0).tolist(), *values.argmax(axis=0).tolist()])
+        chosen = [run for run, _ in used.most_common(CHECKED)]
+    else:
+        chosen = np.random.default_rng(seed).choice(len(runs.germs), min(CHECKED, len(runs.germs)), False).tolist()
+    mesh: float | None = None
+    step: float | None = None
+    for run in chosen:
+        given = {path: float(at[0]) for path, at in runs.inputs.values(runs.germs[[run]]).items()}
+        careful = verified(machine.engine, machine.scene.with_values(given), machine.times)
+        if not careful.ok:
+            return mesh, step, f"a more careful run does not bear one out: {careful.message}"
+        estimated = careful.model.get("verification", {})
+        mesh = _larger(mesh, estimated.get("mesh_error"))
+        step = _larger(step, estimated.get("time_error"))
+    return mesh, step, ""
+
+
+def _larger(one: float | None, other: float | None) -> float | None:
+    return max((error for error in (one, other) if error is not None), default=None)
+
+
+def _status(answer: Answer, gap: float | None, rejected: str) -> tuple[str, str]:
+    """ok, or what speaks against believing the answer, and why."""
+    runs, bounds = answer.runs, answer.bounds
+    if runs.failed:
+        return "failed-runs", f"{runs.failed} of {runs.evaluations} runs failed even with smaller steps: {runs.why}"
+    if rejected:
+        return "model-rejected", rejected
+    if math.isfinite(answer.horizon):
+        return "beyond-horizon", (
+            f"bounds hold until {answer.horizon:g} s; beyond, small changes of the parameters change everything, and "
+            "what is told is what runs attained and how far the machine reaches"
+        )
+    if bounds is not None and gap is not None and not bounds.gap <= gap:
+        found = "is not known" if math.isnan(bounds.gap) else f"is {bounds.gap:.1e}"
+        return "gap-not-reached", f"the gap between outer and attained bounds {found} of the width, asked for {gap:g}"
+    return "ok", ""
+
+
+def _modelled(scene: Scene, inputs: Inputs, tolerance: float, times: Array, engine: str) -> Scene:
+    """The cheapest model for the machine in the middle."""
+    from shoal.selection import select
+
+    if engine != "gauss":
+        raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
+    middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
+    selection = select(scene.with_values({path: float(at[0]) for path, at in middle.items()}), tolerance, times)
+    if not selection.met:
+        raise ComputationError(f"tolerance: no model within {tolerance:g} m: {selection.reason}")
+    stated = {path: scene.value(path) for path in middle}
+    return selection.chosen.scene.with_values(stated)

@@ -1,0 +1,156 @@
+"""The answer of a study: bounds with the runs that attain them, statistics, and how far either is to be believed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shoal.response.inputs import Inputs
+from shoal.response.marginals import Interval
+from shoal.response.statistics import QUANTILES, Statistics
+from shoal.trajectory import Array, plain
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Of every column. lower, upper: attained by runs; lower_outer, upper_outer: no run is expected beyond, nan where
+    the method cannot tell, (columns,); at_lower, at_upper: values of the parameters there, (columns, parameters);
+    gap: the largest distance between both as a share of the width within the horizon, nan where it is not known;
+    horizon: the last instant up to which they meet [s], infinite if they always do
+    """
+
+    lower: Array
+    upper: Array
+    lower_outer: Array
+    upper_outer: Array
+    at_lower: Array
+    at_upper: Array
+    gap: float
+    horizon: float
+
+
+@dataclass(frozen=True)
+class Response:
+    """How the markers of a scene may move.
+
+    status: ok, gap-not-reached, beyond-horizon, failed-runs or model-rejected; message: why it is not ok; why: what the
+    method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds: None if a parameter is
+    random; statistics: None if none is; columns are (instants, markers, quantities x, y, angle) in this order;
+    mesh_error, step_error: of extremal runs [m], None where not estimated
+    """
+
+    status: str
+    message: str
+    scene: str
+    method: str
+    why: str
+    inputs: Inputs
+    times: Array
+    markers: tuple[str, ...]
+    quantities: tuple[str, ...]
+    evaluations: int
+    repeated: int
+    failed: int
+    seed: int
+    wall_s: float
+    horizon: float
+    bounds: Bounds | None
+    statistics: Statistics | None
+    mesh_error: float | None
+    step_error: float | None
+
+    @property
+    def ok(self) -> bool:
+        """Whether the answer can be believed as it stands."""
+        return self.status == "ok"
+
+    def column(self, marker: str, quantity: str, of: Array) -> Array:
+        """What belongs to one marker and quantity over time; of: (..., columns) -> (..., instants)."""
+        shape = len(self.times), len(self.markers), len(self.quantities)
+        whole = of.reshape(*of.shape[:-1], *shape)
+        return np.asarray(whole[..., self.markers.index(marker), self.quantities.index(quantity)])
+
+    def table(self) -> tuple[list[str], Array]:
+        """Header and rows over time of what is told of every marker, (instants, columns)."""
+        told: dict[str, Array] = {}
+        if self.bounds is not None:
+            told = {name: getattr(self.bounds, name) for name in ("lower", "upper", "lower_outer", "upper_outer")}
+        if self.statistics is not None:
+            told = {"mean": self.statistics.mean, "std": self.statistics.std}
+            told |= {f"q{q:g}": self.statistics.quantiles[k] for k, q in enumerate(QUANTILES)}
+        header, columns = ["t"], [self.times]
+        for marker in self.markers:
+            for quantity in self.quantities:
+                header += [f"{marker}.{quantity}.{name}" for name in told]
+                columns += [self.column(marker, quantity, of) for of in told.values()]
+        return header, np.column_stack(columns)
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal uncertain --json` prints."""
+        return {
+            "status": self.status,
+            "message": self.message,
+            "scene": self.scene,
+            "method": self.method,
+            "why": self.why,
+            "evaluations": self.evaluations,
+            "repeated": self.repeated,
+            "failed": self.failed,
+            "seed": self.seed,
+            "wall_s": self.wall_s,
+            "horizon": plain(self.horizon),
+            "gap": None if self.bounds is None else plain(self.bounds.gap),
+            "parameters": self._parameters(),
+            "bounds": {} if self.bounds is None else self._by_marker(self._bounds),
+            "statistics": {} if self.statistics is None else self._by_marker(self._statistics),
+            "mesh_error": plain(self.mesh_error),
+            "step_error": plain(self.step_error),
+            "limits": [],
+        }
+
+    def _parameters(self) -> dict[str, Any]:
+        described: dict[str, dict[str, Any]] = {}
+        for one in self.inputs.parameters:
+            kind = "distribution" if one.marginal.random else "interval"
+            described[one.name] = {"kind": kind, "known": one.marginal.text, "paths": dict(one.factors)}
+            if isinstance(one.marginal, Interval):
+                described[one.name] |= {"low": one.marginal.low, "high": one.marginal.high}
+        return described
+
+    def _by_marker(self, told: Any) -> dict[str, Any]:
+        return {marker: {name: told(marker, name) for name in self.quantities} for marker in self.markers}
+
+    def _bounds(self, marker: str, quantity: str) -> dict[str, Any]:
+        found = self.bounds
+        assert found is not None
+
+        def at(of: Array) -> Any:
+            return plain(self.column(marker, quantity, of))
+
+        return {
+            "t": plain(self.times),
+            **{name: at(getattr(found, name)) for name in ("lower", "upper", "lower_outer", "upper_outer")},
+            "argument_lower": plain(self.column(marker, quantity, found.at_lower.T).T),
+            "argument_upper": plain(self.column(marker, quantity, found.at_upper.T).T),
+        }
+
+    def _statistics(self, marker: str, quantity: str) -> dict[str, Any]:
+        found = self.statistics
+        assert found is not None
+
+        def at(of: Array) -> Any:
+            return plain(self.column(marker, quantity, of))
+
+        return {
+            "t": plain(self.times),
+            "mean": at(found.mean),
+            "std": at(found.std),
+            "mean_error": at(found.error),
+            "quantiles": {f"{q:g}": at(found.quantiles[k]) for k, q in enumerate(QUANTILES)},
+            "sobol": {
+                name: {"first": at(found.first[k]), "total": at(found.total[k])}
+                for k, name in enumerate(self.inputs.names)
+            },
+        }

@@ -1,0 +1,111 @@
+"""Every run of a study: at which germs, with which answer, and whether it may be believed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.response.inputs import BoolArray, Inputs
+from shoal.trajectory import Array
+
+Model = Callable[[Mapping[str, Array]], "Answers"]
+"""Path -> values, (runs,), to answers."""
+SAME = 1e-9
+"""Germs closer than this are one run."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Of several runs.
+
+    values: (runs, columns); good: which may be believed, (runs,); repeated: how many took smaller steps; why: of the
+    first that may not be believed
+    """
+
+    values: Array
+    good: BoolArray
+    repeated: int = 0
+    why: str = ""
+
+
+class TooManyRunsError(Exception):
+    """The study has used up its runs."""
+
+
+@dataclass
+class Runs:
+    """A model with a memory: call it with germs.
+
+    most: runs that it may make; tell: is told after every call how many there are
+    """
+
+    model: Model
+    inputs: Inputs
+    most: int
+    tell: Callable[[str], None] = lambda line: None
+    repeated: int = 0
+    why: str = ""
+    _germs: list[Array] = field(default_factory=list)
+    _values: list[Array] = field(default_factory=list)
+    _good: list[BoolArray] = field(default_factory=list)
+
+    def __call__(self, germs: Array) -> int:
+        """Make the runs at these germs that have not been made; how many they are.
+
+        Raises TooManyRunsError, InputError.
+        """
+        return self.all(self._fresh(np.atleast_2d(germs)))
+
+    def all(self, fresh: Array) -> int:
+        """Make the runs at all of these germs; how many they are. Raises TooManyRunsError, InputError."""
+        if not len(fresh):
+            return 0
+        if self.evaluations + len(fresh) > self.most:
+            raise TooManyRunsError
+        answers = self.model(self.inputs.values(fresh))
+        if answers.values.shape[0] != len(fresh):
+            raise InputError(f"model: needs one answer a run, found {answers.values.shape[0]} for {len(fresh)}")
+        self._germs.append(fresh)
+        self._values.append(answers.values)
+        self._good.append(answers.good)
+        self.repeated += answers.repeated
+        self.why = self.why or answers.why
+        self.tell(f"{self.evaluations} runs")
+        return len(fresh)
+
+    def _fresh(self, germs: Array) -> Array:
+        kept: list[Array] = []
+        known = np.concatenate(self._germs) if self._germs else np.empty((0, germs.shape[1]))
+        for germ in germs:
+            beside = np.concatenate([known, np.array(kept)]) if kept else known
+            if not len(beside) or np.min(np.max(np.abs(beside - germ), axis=1)) > SAME:
+                kept.append(germ)
+        return np.array(kept).reshape(-1, germs.shape[1])
+
+    @property
+    def left(self) -> int:
+        """Runs that may still be made."""
+        return self.most - self.evaluations
+
+    @property
+    def evaluations(self) -> int:
+        """Runs made, those that failed among them."""
+        return sum(map(len, self._germs))
+
+    @property
+    def failed(self) -> int:
+        """Runs that failed and went on failing with smaller steps."""
+        return self.evaluations - int(sum(good.sum() for good in self._good))
+
+    @property
+    def germs(self) -> Array:
+        """Of the good runs, (runs, parameters)."""
+        return np.concatenate(self._germs)[np.concatenate(self._good)]
+
+    @property
+    def values(self) -> Array:
+        """Of the good runs, (runs, columns)."""
+        return np.concatenate(self._values)[np.concatenate(self._good)]

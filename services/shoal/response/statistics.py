@@ -1,0 +1,76 @@
+"""What a distribution of answers is like: from an expansion where there is one, else from the runs themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shoal.response.expansion import Expansion
+from shoal.response.inputs import Inputs
+from shoal.trajectory import Array
+
+QUANTILES = 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99
+DRAWN = 2**14
+"""Places at which an expansion is evaluated for quantiles."""
+NOTHING = 1e-9
+"""A deviation below this share of the largest of its group has no shares to tell of."""
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """mean, std: (columns,); quantiles: (quantiles, columns); first, total: Sobol's indices, (parameters, columns), nan
+    where nothing varies or nothing is known; error: of the mean, one standard deviation, (columns,)
+    """
+
+    mean: Array
+    std: Array
+    quantiles: Array
+    first: Array
+    total: Array
+    error: Array
+
+
+def of_expansion(found: Expansion, inputs: Inputs, error: Array | None, runs: int, seed: int) -> Statistics:
+    """Of a polynomial chaos; error: its own at runs it had not seen, (columns,)."""
+    variance = found.variance
+    first = np.full((len(inputs), len(variance)), np.nan)
+    total = first.copy()
+    varies = variance > 0
+    if not inputs.correlations:
+        squares = found.coefficients**2
+        for k in range(len(inputs)):
+            involved = found.terms[:, k] > 0
+            alone = involved & (np.delete(found.terms, k, axis=1).sum(axis=1) == 0)
+            first[k, varies] = squares[alone].sum(axis=0)[varies] / variance[varies]
+            total[k, varies] = squares[involved].sum(axis=0)[varies] / variance[varies]
+    quantiles = np.empty((len(QUANTILES), len(variance)))
+    places = inputs.basis(inputs.sobol(DRAWN, seed + 1), found.terms)
+    block = 256
+    for k in range(0, len(variance), block):
+        quantiles[:, k : k + block] = np.quantile(places @ found.coefficients[:, k : k + block], QUANTILES, axis=0)
+    known = np.full(len(variance), np.nan) if error is None else error / np.sqrt(runs)
+    return Statistics(found.mean, np.sqrt(variance), quantiles, first, total, known)
+
+
+def of_runs(values: Array, indices: Array | None, parameters: int) -> Statistics:
+    """Of runs that are drawn from the distributions; indices: Sobol's, (2, parameters, columns)."""
+    unknown = np.full((2, parameters, values.shape[1]), np.nan)
+    first, total = unknown if indices is None else indices
+    deviation = values.std(axis=0, ddof=1) if len(values) > 1 else np.full(values.shape[1], np.nan)
+    return Statistics(
+        values.mean(axis=0),
+        deviation,
+        np.quantile(values, QUANTILES, axis=0),
+        first,
+        total,
+        deviation / np.sqrt(len(values)),
+    )
+
+
+def masked(found: Statistics, scale: Array) -> Statistics:
+    """Without indices where the deviation is nothing beside that of other instants; scale: the largest, (columns,)."""
+    nothing = (scale == 0) | ~(found.std > NOTHING * scale)
+    first, total = found.first.copy(), found.total.copy()
+    first[:, nothing] = total[:, nothing] = np.nan
+    return replace(found, first=first, total=total)

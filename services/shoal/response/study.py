@@ -1,0 +1,92 @@
+"""What a method is given, and what it gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.response.extremes import IntArray, Surrogate
+from shoal.response.inputs import BoolArray, Inputs
+from shoal.response.polynomials import size
+from shoal.response.runs import Runs
+from shoal.trajectory import Array
+
+FINE_GAP = 1e-6
+"""The gap that is aimed at where none is asked for: a share of the width."""
+ROUNDING = 1e-11
+"""A spread below this share of the answers is none."""
+FAIR_GAP = 2e-2
+"""The gap that is good enough, where none is asked for, once many runs are made."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A question to a method.
+
+    gap: how far outer bounds may lie from attained ones, as a share of the largest width of their group, None: as
+    little as a fair number of runs gives; degree, count: of a method that has one, None: its own choice; groups: of
+    every column, which of them have one width (a marker's coordinate at all instants), (columns,); instants: of every
+    column [s], (columns,)
+    """
+
+    runs: Runs
+    groups: IntArray
+    instants: Array
+    seed: int = 0
+    gap: float | None = None
+    degree: int | None = None
+    count: int | None = None
+
+    @property
+    def inputs(self) -> Inputs:
+        """The parameters."""
+        return self.runs.inputs
+
+    @property
+    def fair(self) -> int:
+        """Runs that a study may take without further reason: some more than a polynomial of degree four has terms."""
+        return max(18, int(1.3 * size(len(self.inputs), 4)))
+
+    def widths(self, values: Array) -> Array:
+        """Of the envelope of these answers, the largest of each group, (columns,)."""
+        return self.largest(values.max(axis=0) - values.min(axis=0), values)
+
+    def largest(self, spread: Array, values: Array) -> Array:
+        """The largest of each group, (columns,); zero where it is the rounding of these answers."""
+        largest, size = np.zeros((2, self.groups.max() + 1))
+        np.maximum.at(largest, self.groups, spread)
+        np.maximum.at(size, self.groups, np.abs(values).max(axis=0))
+        return np.where(largest > ROUNDING * size, largest, 0.0)[self.groups]
+
+    def intervals_only(self, method: str) -> None:
+        """Raises InputError where a parameter is random."""
+        self._only(method, ~self.inputs.random, "an interval", "PATH=LOW:HIGH")
+
+    def random_only(self, method: str) -> None:
+        """Raises InputError where a parameter is an interval."""
+        self._only(method, self.inputs.random, "a distribution", "PATH~normal(MEAN,SD)")
+
+    def _only(self, method: str, fits: BoolArray, wanted: str, form: str) -> None:
+        if not fits.all():
+            name = self.inputs.names[int(np.argmin(fits))]
+            raise InputError(f"vary: method {method} needs {wanted} for {name}, such as {form}")
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a method leaves beside its runs.
+
+    surrogate: of the answers, if it made one; error: what that is off by at runs it had not seen, (columns,); why: what
+    it did, in words; indices: first and total Sobol indices by sampling, (2, parameters, columns)
+    """
+
+    why: str
+    surrogate: Surrogate | None = None
+    error: Array | None = None
+    indices: Array | None = None
+
+
+Method = Callable[[Study], Found]

@@ -1,0 +1,169 @@
+"""Bounds and statistics of functions whose answers are known in closed form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+from scipy import stats
+from shoal.errors import InputError
+from shoal.response import respond
+from shoal.response.inputs import Inputs, Parameter
+from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
+from shoal.response.methods import METHODS
+from shoal.response.runs import Answers, Model
+from shoal.trajectory import Array
+
+OSCILLATOR = np.array([5.0, 20.0, 50.0])
+OSCILLATES = np.array([[0.16031344, 0.39960545], [-0.07348299, 0.79968089], [0.03927549, 1.0]])
+"""cos(sqrt(k) t) for k in [0.95, 1.05]: at the ends, or where the argument is a multiple of pi."""
+
+
+def model(function: Callable[[Mapping[str, Array]], Array]) -> Model:
+    def answers(values: Mapping[str, Array]) -> Answers:
+        found = function(values)
+        return Answers(found, np.ones(len(found), dtype=bool))
+
+    return answers
+
+
+def inputs(**known: Marginal) -> Inputs:
+    return Inputs(tuple(Parameter(name, marginal, {name: 1.0}) for name, marginal in known.items()))
+
+
+oscillator = model(lambda v: np.cos(np.sqrt(v["k"])[:, None] * OSCILLATOR))
+
+
+def test_bounds_of_an_oscillator() -> None:
+    """To a millionth of their width, with a dozen runs; the true ones lie within the outer ones."""
+    answer = respond(oscillator, inputs(k=Interval(0.95, 1.05)), 3)
+    assert answer.bounds is not None
+    width = np.diff(OSCILLATES, axis=1)[:, 0]
+    assert np.all(np.abs(answer.bounds.lower - OSCILLATES[:, 0]) < 1e-6 * width + 1e-8)
+    assert np.all(np.abs(answer.bounds.upper - OSCILLATES[:, 1]) < 1e-6 * width + 1e-8)
+    assert np.all(answer.bounds.lower_outer <= OSCILLATES[:, 0] + 1e-8)
+    assert np.all(answer.bounds.upper_outer >= OSCILLATES[:, 1] - 1e-8)
+    assert answer.runs.evaluations <= 20
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "chaos"])
+def test_no_method_attains_what_is_not_there(method: str) -> None:
+    """Attained bounds lie within the true ones; a gap that is told covers what is missing."""
+    answer = respond(oscillator, inputs(k=Interval(0.95, 1.05)), 3, method=method)
+    found = answer.bounds
+    assert found is not None
+    assert np.all(found.lower >= OSCILLATES[:, 0] - 1e-8)
+    assert np.all(found.upper <= OSCILLATES[:, 1] + 1e-8)
+    if not math.isnan(found.gap) and math.isinf(found.horizon):
+        assert np.all(found.upper_outer >= OSCILLATES[:, 1] - 1e-8)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_random_run_lies_beyond_the_outer_bounds(seed: int) -> None:
+    """Random smooth functions of one to four intervals, with maxima inside, at faces and at corners."""
+    random = np.random.default_rng(seed)
+    count = 1 + seed % 4
+    slopes, waves = random.normal(size=(count, 5)), random.normal(size=(count, 5))
+    shift, strength = random.uniform(0, 6, 5), random.uniform(0, 2, 5)
+
+    def function(values: Mapping[str, Array]) -> Array:
+        x = np.stack([values[f"p{k}"] for k in range(count)], axis=1)
+        return np.asarray(x @ slopes + strength * np.sin(x @ waves + shift))
+
+    known = inputs(**{f"p{k}": Interval(-1.0, 1.0) for k in range(count)})
+    answer = respond(model(function), known, 5, seed=seed)
+    found = answer.bounds
+    assert found is not None
+    assert found.gap < 0.1
+    drawn = function({f"p{k}": random.uniform(-1, 1, 100_000) for k in range(count)})
+    corners = function(known.values(random.choice([-1.0, 1.0], (64, count))))
+    beyond = found.gap * (found.upper - found.lower)
+    for values in (drawn, corners):
+        assert np.all(values.min(axis=0) >= found.lower - beyond)
+        assert np.all(values.max(axis=0) <= found.upper + beyond)
+
+
+def test_statistics_of_an_oscillator() -> None:
+    """cos(sqrt(g / L) t), L normal: mean and variance by Gauss-Hermite quadrature of 200 points."""
+    times = np.array([10.0, 100.0])
+    nodes, weights = np.polynomial.hermite_e.hermegauss(200)
+    exact = np.cos(np.sqrt(9.81 / (1 + 0.01 * nodes))[:, None] * times)
+    mean = weights @ exact / weights.sum()
+    deviation = np.sqrt(weights @ (exact - mean) ** 2 / weights.sum())
+    swing = model(lambda v: np.cos(np.sqrt(9.81 / v["L"])[:, None] * times))
+    answer = respond(swing, inputs(L=Normal(1.0, 0.01)), 2)
+    assert answer.statistics is not None
+    assert answer.statistics.mean == pytest.approx(mean, abs=1e-3)
+    assert answer.statistics.std == pytest.approx(deviation, rel=5e-3)
+    assert answer.runs.evaluations <= 300
+
+
+def test_indices_of_ishigamis_function() -> None:
+    """S1 = .31390519, S2 = .44241114, ST1 = .55758886 (Ishigami and Homma, 1990, a = 7, b = 0.1)."""
+    angle = Uniform(-math.pi, math.pi)
+    ishigami = model(lambda v: (np.sin(v["a"]) + 7 * np.sin(v["b"]) ** 2 + 0.1 * v["c"] ** 4 * np.sin(v["a"]))[:, None])
+    answer = respond(ishigami, inputs(a=angle, b=angle, c=angle), 1)
+    assert answer.statistics is not None
+    assert answer.statistics.first[:, 0] == pytest.approx([0.31390519, 0.44241114, 0.0], abs=1e-4)
+    assert answer.statistics.total[0, 0] == pytest.approx(0.55758886, abs=1e-4)
+
+
+def test_indices_where_polynomials_fail() -> None:
+    """Sobol's g-function has kinks; sampling takes over. V_i = 1 / (3 (1 + a_i)^2)."""
+    weights = np.array([0.0, 1.0, 4.5, 9.0])
+    partial = 1 / (3 * (1 + weights) ** 2)
+    first = partial / (np.prod(1 + partial) - 1)
+    function = model(
+        lambda v: np.prod([(np.abs(4 * v[f"x{k}"] - 2) + a) / (1 + a) for k, a in enumerate(weights)], axis=0)[:, None]
+    )
+    answer = respond(function, inputs(**{f"x{k}": Uniform(0.0, 1.0) for k in range(4)}), 1, method="sobol", count=12288)
+    assert answer.statistics is not None
+    assert answer.statistics.first[:, 0] == pytest.approx(first, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        Uniform(1.0, 3.0),
+        Normal(2.0, 0.3),
+        Normal(0.5, 0.1, logarithmic=True),
+        Frozen(stats.triang(0.3, 1.0, 2.0)),
+        Frozen(stats.beta(2.0, 3.0, 1.0, 2.0)),
+        Frozen(stats.truncnorm(-1.0, 2.0, 2.0, 0.5)),
+        Empirical(np.array([1.0, 1.1, 1.4, 1.5, 1.9, 2.0, 2.2, 2.9, 3.0, 3.1])),
+    ],
+    ids=lambda known: type(known).__name__,
+)
+def test_moments_of_a_square(known: Marginal) -> None:
+    """Mean and deviation of x^2 from the moments that the distribution has in closed form or by quadrature."""
+    answer = respond(model(lambda v: v["x"][:, None] ** 2), inputs(x=known), 1, method="chaos", degree=6)
+    x = (np.arange(2_000_000) + 0.5) / 2_000_000
+    exact = known.value(known.germ(x)) ** 2
+    assert answer.statistics is not None
+    assert answer.statistics.mean[0] == pytest.approx(exact.mean(), rel=1e-5)
+    assert answer.statistics.std[0] == pytest.approx(exact.std(), rel=1e-4)
+
+
+def test_correlation_of_two_normal_parameters() -> None:
+    """Var(x + y) = 1 + 4 + 2 * 2 * 0.5."""
+    pair = (Parameter("x", Normal(0.0, 1.0), {"x": 1.0}), Parameter("y", Normal(0.0, 2.0), {"y": 1.0}))
+    known = Inputs(pair, {("x", "y"): 0.5})
+    answer = respond(model(lambda v: (v["x"] + v["y"])[:, None]), known, 1)
+    assert answer.statistics is not None
+    assert answer.statistics.std[0] == pytest.approx(math.sqrt(7.0), rel=1e-9)
+    assert np.isnan(answer.statistics.first).all()
+
+
+def test_the_same_seed_gives_the_same_answer() -> None:
+    one, other = (respond(oscillator, inputs(k=Interval(0.9, 1.1)), 3, seed=5) for _ in range(2))
+    assert one.bounds is not None
+    assert other.bounds is not None
+    assert np.array_equal(one.bounds.upper_outer, other.bounds.upper_outer)
+
+
+@pytest.mark.parametrize(("method", "known"), [("chaos", Interval(0.0, 1.0)), ("scan", Normal(0.0, 1.0))])
+def test_methods_refuse_what_they_cannot(method: str, known: Marginal) -> None:
+    with pytest.raises(InputError, match="vary: method"):
+        respond(oscillator, inputs(k=known), 3, method=method)

@@ -1,0 +1,130 @@
+"""`shoal uncertain`: machines whose fields are known as intervals or distributions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shoal
+from click.testing import CliRunner
+from shoal.cli import main
+from shoal.errors import InputError
+from shoal.response import uncertain
+from shoal.scene import Scene
+
+PENDULUM = {
+    "name": "pendulum",
+    "gravity": [0.0, -9.81],
+    "bodies": {
+        "OA": {
+            "kind": "rigid-body",
+            "mass": 1.0,
+            "inertia": 0.0,
+            "centre_of_mass": [1.0, 0.0],
+            "named_points": {"end": [1.0, 0.0]},
+        }
+    },
+    "joints": {
+        "O": {
+            "kind": "revolute",
+            "first": {"body": "ground", "point": [0, 0]},
+            "second": {"body": "OA", "point": "start"},
+        }
+    },
+    "markers": {"A": {"body": "OA", "point": "end"}},
+    "initial": {"OA": {"angle": 1.0 - np.pi / 2}},
+    "solver": {"duration": 10.0, "samples": 10, "integrator": "dop853"},
+}
+"""1 m long, released from 1 rad to the vertical: an inertia m k^2 makes it swing as one of length 1 + k^2."""
+
+
+def test_bounds_of_a_pendulum() -> None:
+    """Angle from the vertical at 10 s for lengths between 0.98 and 1.02 m: elliptic functions, two ways.
+
+    An inertia I about the centre makes the length 1 + I, so lengths below 1 m are those of stronger gravity.
+    """
+    scene = Scene.parse({**PENDULUM, "gravity": [0.0, -9.81 / 0.98]})
+    found = uncertain(scene, {"bodies.OA.inertia": (0.0, 1.02 / 0.98 - 1)}, [10.0])
+    assert found.ok
+    assert found.bounds is not None
+    lower, upper = (found.column("A", "angle", of)[0] + np.pi / 2 for of in (found.bounds.lower, found.bounds.upper))
+    assert (lower, upper) == pytest.approx((-0.69833601, -0.17730048), abs=1e-7)
+    assert found.evaluations <= 20
+
+
+def test_bounds_are_attained() -> None:
+    """Running the scene with the values that are named gives the bound, to the last bit but rounding."""
+    vary = {"initial.OA.angle": ("-2%", "2%"), "bodies.AB.length": ("-1%", "1%")}
+    found = uncertain("flexible-double-pendulum", vary, [0.25, 0.5], verify=False)
+    assert found.ok
+    assert found.bounds is not None
+    for name, at in (("lower", found.bounds.at_lower), ("upper", found.bounds.at_upper)):
+        values = found.column("B", "x", at.T)[:, -1]
+        given = dict(zip(vary, values.tolist(), strict=True))
+        run = shoal.simulate("flexible-double-pendulum", [0.25, 0.5], values=given, verify=False)
+        assert run.marker("B")[-1, 0] == pytest.approx(
+            found.column("B", "x", getattr(found.bounds, name))[-1], abs=1e-9
+        )
+
+
+def test_beyond_the_horizon_nothing_is_claimed() -> None:
+    """A double pendulum that turns over: bounds until some instant, beyond it the reach; exit status 3."""
+    vary = ["initial.OA.angle=0.75:0.82", "initial.AB.angle=0.5:0.56"]
+    found = uncertain("rigid-double-pendulum", vary, np.linspace(0.5, 12.0, 24), verify=False)
+    assert found.status == "beyond-horizon"
+    assert 0.5 <= found.horizon < 12.0
+    assert found.bounds is not None
+    outer = found.column("B", "x", found.bounds.upper_outer)
+    assert outer[-1] >= found.column("B", "x", found.bounds.upper)[-1]
+    assert outer[-1] > 1.0
+
+
+@pytest.mark.parametrize(
+    ("vary", "names"),
+    [
+        (["bodies.OA.mass"], "is not PATH=LOW:HIGH"),
+        (["bodies.OA.mass=1"], "is not PATH=LOW:HIGH"),
+        (["bodies.OA.mass=2:1"], "LOW must be below HIGH"),
+        (["bodies.OA.mass=a:b"], "is no number"),
+        (["bodies.OA.mass=-1:1"], "bodies.OA.mass"),
+        (["bodies.XY.mass=1:2"], "XY"),
+        (["gravity=1:2"], "no number"),
+        (["bodies.OA.mass~gauss(1,2)"], "no such distribution"),
+        (["bodies.OA.mass~normal(1)"], r"normal\(MEAN,SD\)"),
+        (["bodies.OA.mass~normal(1,-1)"], "must be positive"),
+        (["bodies.OA.mass~empirical(nowhere.csv)"], "cannot read"),
+        (["bodies.OA.mass=1:2", "bodies.OA.mass=1:2"], "varied twice"),
+        (["bodies.OA.mass=1:2", "bodies.OA.inertia~normal(1,0.1)"], "give both the one or the other"),
+    ],
+)
+def test_wrong_input_is_named(vary: list[str], names: str) -> None:
+    with pytest.raises(InputError, match=names):
+        uncertain("single-pendulum", vary)
+
+
+def test_the_command_prints_what_the_contract_says(tmp_path: Path) -> None:
+    out = tmp_path / "bounds.csv"
+    words = ["uncertain", "single-pendulum", "--vary", "initial.OA.angle=-0.1:0.1", "--at", "0.5,1", "--json"]
+    run = CliRunner().invoke(main, [*words, "--out", str(out)])
+    assert run.exit_code == 0, run.output
+    told = json.loads(run.stdout)
+    assert told["status"] == "ok"
+    assert {"method", "why", "evaluations", "failed", "wall_s", "horizon", "mesh_error", "step_error"} <= told.keys()
+    assert told["parameters"]["initial.OA.angle"]["low"] == -0.1
+    bounds = told["bounds"]["A"]["angle"]
+    assert bounds["t"] == [0.5, 1.0]
+    assert bounds["lower_outer"][0] <= bounds["lower"][0] < bounds["upper"][0] <= bounds["upper_outer"][0]
+    assert len(bounds["argument_lower"]) == 2
+    assert out.read_text().startswith("t,A.x.lower")
+
+
+def test_statistics_of_a_machine() -> None:
+    """A pendulum at rest that hangs down stays there whatever its mass: no variance, and no shares of it."""
+    scene = Scene.parse({**PENDULUM, "initial": {"OA": {"angle": -np.pi / 2}}})
+    found = uncertain(scene, ["bodies.OA.mass~lognormal(1,0.1)"], [1.0], verify=False)
+    assert found.statistics is not None
+    assert found.column("A", "y", found.statistics.mean)[0] == pytest.approx(-1.0)
+    assert found.column("A", "y", found.statistics.std)[0] == pytest.approx(0.0, abs=1e-12)
+    assert found.to_json()["statistics"]["A"]["y"]["sobol"]["bodies.OA.mass"]["total"] == [None]
