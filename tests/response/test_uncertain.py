@@ -128,3 +128,17 @@ def test_statistics_of_a_machine() -> None:
     assert found.column("A", "y", found.statistics.mean)[0] == pytest.approx(-1.0)
     assert found.column("A", "y", found.statistics.std)[0] == pytest.approx(0.0, abs=1e-12)
     assert found.to_json()["statistics"]["A"]["y"]["sobol"]["bodies.OA.mass"]["total"] == [None]
+
+
+def test_an_expansion_does_not_run_away() -> None:
+    """Mean and deviation of the tip by chaos agree with those of a thousand other runs, within their scatter."""
+    vary = ["initial.OA.angle~normal(0.785,0.02)"]
+    auto, sampled = (
+        uncertain("flexible-double-pendulum", vary, [0.25, 0.5], method=method, verify=False, seed=seed)
+        for method, seed in (("auto", 0), ("monte-carlo", 1))
+    )
+    one, other = auto.statistics, sampled.statistics
+    assert one is not None
+    assert other is not None
+    assert np.all(np.abs(one.mean - other.mean) < 5 * other.error)
+    assert one.std == pytest.approx(other.std, rel=0.15)

@@ -23,9 +23,13 @@ def response(found: Response, marker: str) -> Figure:
         widest = max(widest, _panel(panel, found, marker, quantity))
     axes[0].legend()
     axes[-1].set_xlabel("time [s]")
-    what = "apart at most, as attained by runs" if found.bounds is not None else "standard deviation at most"
+    says = (
+        "places of {0} are {1} apart at most, as attained by runs"
+        if found.bounds is not None
+        else "{0} scatters with a standard deviation of {1} at most"
+    )
     trust = "" if found.ok else f" ({found.status}: see the message)"
-    headline(figure, f"{found.scene}: places of {marker} are {length(widest)} {what}{trust}")
+    headline(figure, f"{found.scene}: {says.format(marker, length(widest))}{trust}")
     return figure
 
 

@@ -18,7 +18,7 @@ class Recurrence:
     """Orthonormal polynomials by their three-term recurrence.
 
     sqrt(b_{k+1}) p_{k+1} = (s - a_k) p_k - sqrt(b_k) p_{k-1} with p_0 = 1 (Gautschi, Orthogonal Polynomials, 2004,
-    eq. 1.3.13). a, b: coefficients, (degrees,); b_0 is not used.
+    section 1.3). a, b: coefficients, (degrees,); b_0 is not used.
     """
 
     a: Array

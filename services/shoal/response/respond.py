@@ -26,7 +26,7 @@ from shoal.response.methods.bounds import HOPELESS
 from shoal.response.read import parameters
 from shoal.response.result import Bounds, Response
 from shoal.response.runs import Model, Runs, TooManyRunsError
-from shoal.response.statistics import Statistics, masked, of_expansion, of_runs
+from shoal.response.statistics import Statistics, either, masked, of_expansion, of_runs
 from shoal.response.study import Found, Study
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
@@ -209,10 +209,10 @@ def _confirmed(study: Study, surrogate: Surrogate, foretold: Extremes) -> Array 
 
 def _statistics(study: Study, found: Found) -> Statistics:
     runs = study.runs
+    told = sampled = of_runs(runs.values, found.indices, len(study.inputs))
     if isinstance(found.surrogate, Expansion):
         told = of_expansion(found.surrogate, study.inputs, found.error, runs.evaluations, study.seed)
-    else:
-        told = of_runs(runs.values, found.indices, len(study.inputs))
+        told = told if found.coarse is None else either(found.coarse, sampled, told)
     return masked(told, study.largest(np.nan_to_num(told.std), runs.values))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shoal.response.expansion import Expansion
-from shoal.response.inputs import Inputs
+from shoal.response.inputs import BoolArray, Inputs
 from shoal.trajectory import Array
 
 QUANTILES = 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99
@@ -66,6 +66,12 @@ def of_runs(values: Array, indices: Array | None, parameters: int) -> Statistics
         total,
         deviation / np.sqrt(len(values)),
     )
+
+
+def either(first: BoolArray, one: Statistics, other: Statistics) -> Statistics:
+    """The one in some columns, the other elsewhere."""
+    chosen = {name: np.where(first, getattr(one, name), of) for name, of in vars(other).items()}
+    return Statistics(**chosen)
 
 
 def masked(found: Statistics, scale: Array) -> Statistics:

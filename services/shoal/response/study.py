@@ -80,13 +80,15 @@ class Found:
     """What a method leaves beside its runs.
 
     surrogate: of the answers, if it made one; error: what that is off by at runs it had not seen, (columns,); why: what
-    it did, in words; indices: first and total Sobol indices by sampling, (2, parameters, columns)
+    it did, in words; indices: first and total Sobol indices by sampling, (2, parameters, columns);
+    coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,)
     """
 
     why: str
     surrogate: Surrogate | None = None
     error: Array | None = None
     indices: Array | None = None
+    coarse: BoolArray | None = None
 
 
 Method = Callable[[Study], Found]

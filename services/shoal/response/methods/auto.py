@@ -19,8 +19,10 @@ def auto(study: Study) -> Found:
     study.random_only("auto")
     found = chaos.grown(study, study.count or chaos.RUNS)
     assert isinstance(found.surrogate, Expansion)
-    off = chaos.share(study, found.surrogate)
-    if off < TOO_COARSE:
+    off = chaos.shares(study, found.surrogate)
+    coarse = off > TOO_COARSE
+    if not coarse.any():
         return found
     sampled = sampling.of_distributions(study, SAMPLED)
-    return Found(f"{found.why} is off by {off:.1g} of the standard deviation; {sampled.why}", indices=sampled.indices)
+    why = f"{found.why} is off by up to {off.max():.1g} of the standard deviation; where it is, {sampled.why} tell"
+    return Found(why, found.surrogate, found.error, sampled.indices, coarse)

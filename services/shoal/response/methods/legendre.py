@@ -1,4 +1,4 @@
-"""Legendre polynomials of total degree, fitted to quasi-random runs (Wang, Zhang and Ma's Legendre surrogates)."""
+"""Legendre polynomials of total degree, fitted to quasi-random runs by least squares."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Sampling: random (Monte Carlo) or quasi-random (Sobol's sequence), with Sobol's indices by Jansen's estimator.
 
 Jansen, Analysis of variance designs for model output, Computer Physics Communications 117, 1999; Saltelli et al.,
-Variance based sensitivity analysis of model output, 2010, table 2 (b, f).
+Variance based sensitivity analysis of model output, 2010, table 2 (c, f).
 """
 
 from __future__ import annotations
