@@ -64,6 +64,7 @@ class Client:
     reactions = _by_service(notebook.reactions)
     select = _by_service(notebook.select, job=True)
     sweep = _by_service(notebook.sweep, job=True)
+    uncertain = _by_service(notebook.uncertain, job=True)
     identify = _by_service(notebook.identify, job=True)
     design = _by_service(notebook.design, job=True)
 

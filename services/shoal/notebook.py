@@ -5,7 +5,7 @@ A scene or problem is given as an object, as the name of a built-in one, or as t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -115,22 +115,44 @@ def uncertain(
     times: Times | None = None,
     *,
     values: Values | None = None,
+    engine: str = "gauss",
     method: str = "auto",
+    gap: float | None = None,
     tolerance: float | None = None,
+    correlations: Mapping[tuple[str, str], float] | None = None,
+    degree: int | None = None,
+    count: int | None = None,
+    most: int = 20_000,
     verify: bool = True,
     seed: int = 0,
-    **options: Any,
+    progress: Callable[[int], None] | None = None,
 ) -> Response:
     """How the markers may move if fields of the scene are known as intervals or distributions only.
 
-    vary: path -> (low, high), a text such as "normal(1, 0.01)" or a frozen distribution of scipy; times: instants [s],
-    else the scene's own; options: the others of `shoal.response.uncertain` (gap, correlations, degree, count, most,
-    engine). Raises InputError, ComputationError.
+    vary: path -> (low, high), a text such as "normal(1, 0.01)" or a frozen distribution of scipy, or a list of what
+    `--vary` takes; times: instants [s], else the scene's own; gap: between outer and attained bounds, as a share of the
+    largest width, that must be reached; tolerance: error [m] of the model; correlations: of pairs of random parameters;
+    degree, count: of a method that has one; most: runs that may be made; verify: estimate mesh and step errors of
+    extremal runs; progress: is told how many runs there are. Raises InputError, ComputationError.
     """
     from shoal.response import uncertain
 
-    given = _scene(scene, values)
-    return uncertain(given, vary, times, method=method, tolerance=tolerance, verify=verify, seed=seed, **options)
+    return uncertain(
+        _scene(scene, values),
+        vary,
+        times,
+        engine=engine,
+        method=method,
+        gap=gap,
+        tolerance=tolerance,
+        correlations=correlations,
+        degree=degree,
+        count=count,
+        most=most,
+        verify=verify,
+        seed=seed,
+        progress=progress,
+    )
 
 
 def compare(

@@ -28,6 +28,7 @@ CALLS: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {
     "simulate": ((SCENE, [0.1, 0.2]), {"values": {"initial.OA.angle": 0.3}}),
     "select": (("flexible-double-pendulum", 1e-3), {"times": [0.1], "values": {"solver.duration": 0.1}}),
     "sweep": ((SCENE, {"initial.OA.angle": ANGLES}), {"time": 0.2}),
+    "uncertain": ((SCENE, {"initial.OA.angle": (0.3, 0.32)}, [0.1, 0.2]), {"most": 200, "seed": 3}),
     "statics": (("flexible-double-pendulum",), {"values": {"gravity": [0.5, -1.62]}}),
     "modes": (("flexible-double-pendulum",), {"count": 3, "about": "equilibrium"}),
     "reactions": ((SCENE, np.array([0.0, 0.1])), {}),
@@ -37,6 +38,7 @@ CALLS: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {
 ERRORS: dict[str, tuple[str, ...]] = {
     "select": ("selection", "estimated_error"),
     "sweep": ("verification", "time_error"),
+    "uncertain": ("gap",),
     "statics": ("mesh_error",),
     "modes": ("modes", "0", "mesh_error"),
     "reactions": ("reactions", "0", "unbalanced"),

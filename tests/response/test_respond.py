@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 from scipy import stats
-from shoal.errors import InputError
+from shoal.errors import ComputationError, InputError
 from shoal.response import respond
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
@@ -161,6 +161,19 @@ def test_the_same_seed_gives_the_same_answer() -> None:
     assert one.bounds is not None
     assert other.bounds is not None
     assert np.array_equal(one.bounds.upper_outer, other.bounds.upper_outer)
+
+
+def test_failed_runs_are_told_of() -> None:
+    """A model that fails on one side of the box: what succeeds is bounded, what failed is counted."""
+
+    def half(values: Mapping[str, Array]) -> Answers:
+        return Answers(values["x"][:, None] ** 2, values["x"] < 0.5, 0, "too large")
+
+    answer = respond(half, inputs(x=Interval(-1.0, 1.0)), 1)
+    assert answer.runs.failed > 0
+    assert answer.runs.why == "too large"
+    with pytest.raises(ComputationError, match="runs failed: too large"):
+        respond(half, inputs(x=Interval(0.6, 1.0)), 1)
 
 
 @pytest.mark.parametrize(("method", "known"), [("chaos", Interval(0.0, 1.0)), ("scan", Normal(0.0, 1.0))])

@@ -15,6 +15,8 @@ from shoal.api.schemas import Asked, BuiltIn, Fields, Motion, Path, RecordingNam
 Times = list[float]
 Positive = Annotated[float, Field(gt=0)]
 Some = Annotated[Times, Field(min_length=1)]
+Distribution = Annotated[str, Field(max_length=200, pattern=r"^\s*[a-z-]+\s*\([-+0-9.eE,\s]*\)\s*$")]
+"""With numbers: files of the service are not read for anybody."""
 
 
 class Request(Asked):
@@ -39,6 +41,11 @@ class OfScene(Request):
     def varied(self) -> dict[str, Times]:
         """Axes of a grid over which it is computed."""
         return {}
+
+    @property
+    def runs(self) -> int:
+        """How often it is computed beside that."""
+        return 1
 
 
 class OfProblem(Request):
@@ -97,6 +104,33 @@ class Sweep(OfScene):
     def varied(self) -> dict[str, Times]:
         """Axes of a grid over which it is computed."""
         return self.vary
+
+
+class Uncertain(OfScene):
+    """How the markers may move if fields of the scene are intervals or distributions; see `shoal uncertain`.
+
+    vary: path -> [low, high], or a text such as "normal(1, 0.01)"; times: instants [s], else the scene's own; gap:
+    between outer and attained bounds, as a share of the width, to be reached; tolerance: error [m] of the model
+    verify: estimate mesh and step errors of extremal runs; most: runs that may be made
+    """
+
+    follows: ClassVar[tuple[str, ...]] = ("runs",)
+
+    vary: Annotated[dict[Path, tuple[float, float] | Distribution], Field(min_length=1, max_length=100)]
+    times: Some | None = None
+    method: BuiltIn = "auto"
+    gap: Annotated[float, Field(gt=0, le=1)] | None = None
+    tolerance: Positive | None = None
+    verify: bool = True
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+    degree: Annotated[int, Field(ge=1, le=40)] | None = None
+    count: Annotated[int, Field(ge=1)] | None = None
+    most: Annotated[int, Field(ge=3, le=20_000)] = 2_000
+
+    @property
+    def runs(self) -> int:
+        """That may be made."""
+        return self.most
 
 
 class AtRest(OfScene):
@@ -161,6 +195,7 @@ OPERATIONS: dict[str, type[Request]] = {
     "simulate": Simulate,
     "select": Select,
     "sweep": Sweep,
+    "uncertain": Uncertain,
     "statics": Statics,
     "modes": Modes,
     "reactions": Reactions,

@@ -14,7 +14,7 @@ import orjson
 
 from shoal import notebook
 from shoal.api.content import problem_of, scene_of, written
-from shoal.api.limits import check_end, check_grid, check_lanes, within
+from shoal.api.limits import check_end, check_grid, check_lanes, check_scene, within
 from shoal.api.operations import OfProblem, OfScene, Request, Simulate
 from shoal.api.settings import Settings
 from shoal.engines.contract import Engine
@@ -77,7 +77,8 @@ def _of_scene(bench: Bench, request: OfScene) -> tuple[Scene, Scene]:
     lanes = request.lanes if isinstance(request, Simulate) else None
     if lanes is None:
         check_grid(scene, settings, request.instants, request.varied)
-        count = math.prod(len(axis) for axis in request.varied.values())
+        check_scene(scene, settings, request.instants, request.runs)
+        count = request.runs * math.prod(len(axis) for axis in request.varied.values())
     else:
         if getattr(request, "tolerance", None) is not None:
             raise InputError("tolerance: a model is chosen for one scene; leave `lanes` out")

@@ -88,7 +88,7 @@ def uncertain(
             verify=verify,
             seed=seed,
             most=most,
-            tell=lambda now: tell(f"{wanted.name}: {now}"),
+            progress=lambda runs: tell(f"{wanted.name}: {runs} runs"),
         )
     if out is not None:
         files.response(response, out)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -136,10 +136,6 @@ class Inputs:
             if degree:
                 found *= recurrence(germs[:, k], degree)[:, terms[:, k]]
         return found
-
-    def only(self, chosen: Sequence[int]) -> Inputs:
-        """Some of the parameters."""
-        return replace(self, parameters=tuple(self.parameters[k] for k in chosen))
 
 
 def inside(x: Array) -> Array:

@@ -65,13 +65,13 @@ def respond(
     count: int | None = None,
     seed: int = 0,
     most: int = MOST,
-    tell: Callable[[str], None] = lambda line: None,
+    progress: Callable[[int], None] | None = None,
 ) -> Answer:
     """Bounds or statistics of any function of named values; see `Study`.
 
     model: path -> values, (runs,), to answers, (runs, columns). Raises InputError, ComputationError.
     """
-    runs = Runs(model, inputs, most, tell)
+    runs = Runs(model, inputs, most, progress)
     group = np.arange(columns) if groups is None else np.asarray(groups, dtype=np.int64)
     when = np.zeros(columns) if instants is None else instants
     study = Study(runs, group, when, seed, gap, degree, count)
@@ -79,8 +79,6 @@ def respond(
         found = get_method(method)(study)
     except TooManyRunsError:
         raise InputError(f"runs: method {method} needs more than the {most} runs that it may make") from None
-    if not len(runs.values):
-        raise ComputationError(f"all {runs.evaluations} runs failed: {runs.why}")
     random = inputs.random
     bounds = None if random.any() else _bounds(study, found)
     statistics = _statistics(study, found) if random.all() else None
@@ -103,7 +101,7 @@ def uncertain(
     verify: bool = True,
     seed: int = 0,
     most: int = MOST,
-    tell: Callable[[str], None] = lambda line: None,
+    progress: Callable[[int], None] | None = None,
 ) -> Response:
     """How the markers of a scene may move if some of its fields are known as intervals or distributions only.
 
@@ -112,7 +110,7 @@ def uncertain(
     bounds, as a share of the largest width, that must be reached; correlations: of pairs of random parameters;
     degree, count: of a method that has one; tolerance: error [m] that the markers of the middle machine may have, for
     which the cheapest model is found; verify: estimate mesh and step errors of extremal runs; most: runs that may be
-    made; tell: is told how many there are. Raises InputError, ComputationError.
+    made; progress: is told how many there are. Raises InputError, ComputationError.
     """
     begin = time.perf_counter()
     wanted = load_scene(scene) if isinstance(scene, str) else scene
@@ -138,7 +136,7 @@ def uncertain(
         count=count,
         seed=seed,
         most=most,
-        tell=tell,
+        progress=progress,
     )
     bounds = answer.bounds
     if bounds is not None and math.isfinite(answer.horizon):

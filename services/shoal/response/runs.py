@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shoal.errors import InputError
+from shoal.errors import ComputationError, InputError
 from shoal.response.inputs import BoolArray, Inputs
 from shoal.trajectory import Array
 
@@ -39,13 +39,13 @@ class TooManyRunsError(Exception):
 class Runs:
     """A model with a memory: call it with germs.
 
-    most: runs that it may make; tell: is told after every call how many there are
+    most: runs that it may make; progress: is told after every call how many there are
     """
 
     model: Model
     inputs: Inputs
     most: int
-    tell: Callable[[str], None] = lambda line: None
+    progress: Callable[[int], None] | None = None
     repeated: int = 0
     why: str = ""
     _germs: list[Array] = field(default_factory=list)
@@ -60,7 +60,10 @@ class Runs:
         return self.all(self._fresh(np.atleast_2d(germs)))
 
     def all(self, fresh: Array) -> int:
-        """Make the runs at all of these germs; how many they are. Raises TooManyRunsError, InputError."""
+        """Make the runs at all of these germs; how many they are.
+
+        Raises TooManyRunsError, InputError, and ComputationError if none may be believed.
+        """
         if not len(fresh):
             return 0
         if self.evaluations + len(fresh) > self.most:
@@ -73,7 +76,10 @@ class Runs:
         self._good.append(answers.good)
         self.repeated += answers.repeated
         self.why = self.why or answers.why
-        self.tell(f"{self.evaluations} runs")
+        if self.failed == self.evaluations:
+            raise ComputationError(f"all {self.evaluations} runs failed: {self.why}")
+        if self.progress is not None:
+            self.progress(self.evaluations)
         return len(fresh)
 
     def _fresh(self, germs: Array) -> Array:
