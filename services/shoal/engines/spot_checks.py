@@ -42,14 +42,15 @@ def spot_check(
         estimated = run.model.get("verification", {})
         check = replace(
             check,
-            time_error=_larger(check.time_error, estimated.get("time_error")),
-            mesh_error=_larger(check.mesh_error, estimated.get("mesh_error")),
+            time_error=larger(check.time_error, estimated.get("time_error")),
+            mesh_error=larger(check.mesh_error, estimated.get("mesh_error")),
             complaint=check.complaint or ("" if run.ok else f"{_words(here)}: {run.message}"),
         )
     return check
 
 
-def _larger(one: float | None, other: float | None) -> float | None:
+def larger(one: float | None, other: float | None) -> float | None:
+    """The larger of two errors, as far as they are known."""
     return max((error for error in (one, other) if error is not None), default=None)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
+from shoal.engines.spot_checks import larger
 from shoal.engines.verification import verified
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import reach
@@ -254,13 +255,9 @@ def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, 
         if not careful.ok:
             return mesh, step, f"a more careful run does not bear one out: {careful.message}"
         estimated = careful.model.get("verification", {})
-        mesh = _larger(mesh, estimated.get("mesh_error"))
-        step = _larger(step, estimated.get("time_error"))
+        mesh = larger(mesh, estimated.get("mesh_error"))
+        step = larger(step, estimated.get("time_error"))
     return mesh, step, ""
-
-
-def _larger(one: float | None, other: float | None) -> float | None:
-    return max((error for error in (one, other) if error is not None), default=None)
 
 
 def _status(answer: Answer, gap: float | None, rejected: str) -> tuple[str, str]:
