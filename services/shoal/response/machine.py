@@ -12,6 +12,7 @@ from shoal.errors import InputError
 from shoal.response.inputs import BoolArray
 from shoal.response.runs import Answers
 from shoal.scene import Scene
+from shoal.scene.dimensions import require_plane
 from shoal.trajectory import Array, Status, Trajectory
 
 CHUNK = 2_000_000
@@ -32,6 +33,9 @@ class Machine:
     scene: Scene
     times: Array
     engine: Engine
+
+    def __post_init__(self) -> None:
+        require_plane(self.scene, "bounds and statistics are")
 
     @property
     def columns(self) -> tuple[int, int, int]:
