@@ -151,6 +151,12 @@ def test_secrets_come_from_files_and_every_volume_is_named() -> None:
         assert {source for source in mounted if not source.startswith("./")} <= set(COMPOSE["volumes"])
 
 
+def test_who_is_told_of_a_bad_night_is_one_setting() -> None:
+    """And what is told leads to a page that a browser on this machine opens: the server writes the link."""
+    assert SERVICES["deploy"]["environment"]["SHOAL_ALERT"] == "${SHOAL_ALERT:-}"
+    assert SERVICES["prefect"]["environment"]["PREFECT_UI_URL"] == SERVICES["worker"]["environment"]["PREFECT_UI_URL"]
+
+
 def test_profiles_are_those_of_make_up() -> None:
     profiles = {profile for service in SERVICES.values() for profile in service.get("profiles", [])}
     of_compose = {p: {name for name, s in SERVICES.items() if p in s.get("profiles", [])} for p in profiles}
