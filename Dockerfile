@@ -13,13 +13,22 @@ COPY README.md LICENSE ./
 COPY services services
 COPY flows flows
 COPY validation validation
-RUN VIRTUAL_ENV=/opt/shoal/venv uv pip install --no-cache --no-deps --build-constraints requirements.lock .
+COPY deploy/slim.py deploy/slim.py
+RUN VIRTUAL_ENV=/opt/shoal/venv uv pip install --no-cache --no-deps --build-constraints requirements.lock . \
+    && python deploy/slim.py /opt/shoal/venv/lib/python3.11/site-packages
+
+# Exudyn is linked against a viewer, even where nothing is shown. These three pass calls on to drivers, which stay here.
+FROM python:${PYTHON} AS viewer
+# hadolint ignore=DL3008
+RUN apt-get update && apt-get install --no-install-recommends --yes libgl1 \
+    && mkdir /viewer && cp -L /usr/lib/*-linux-gnu/libGL.so.1 /usr/lib/*-linux-gnu/libGLX.so.0 \
+       /usr/lib/*-linux-gnu/libGLdispatch.so.0 /viewer
 
 FROM python:${PYTHON} AS runtime
-# Exudyn is linked against a viewer, even where nothing is shown.
+COPY --from=viewer /viewer/ /usr/local/lib/
 # hadolint ignore=DL3008
 RUN apt-get update \
-    && apt-get install --no-install-recommends --yes libgl1 libx11-6 \
+    && apt-get install --no-install-recommends --yes libx11-6 && ldconfig \
     && rm -rf /var/lib/apt/lists/* \
     && groupadd --gid 10001 shoal \
     && useradd --uid 10001 --gid shoal --no-create-home --home-dir /var/lib/shoal --shell /usr/sbin/nologin shoal \

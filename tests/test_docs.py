@@ -6,6 +6,7 @@ import json
 import os
 import re
 import runpy
+import shlex
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from click.testing import CliRunner
 from shoal import swarm
 from shoal.cli import main
 from shoal.identification import METHODS, methods
+from shoal_flows.deployment import processes, up
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -57,19 +59,42 @@ def test_notebook_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert run("notebook.md")["estimate"].parameters["angle"].value == pytest.approx(0.3, abs=1e-6)
 
 
-def test_tutorial_finds_the_angle_that_it_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its own machine, recording and problem, as the page says, from an angle that the problem does not know."""
+@pytest.fixture
+def tutorial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The page, with its files in the folder in which the test runs, and a library of its own."""
     monkeypatch.chdir(tmp_path)
-    (problem,) = blocks("tutorial.md", "yaml")
-    Path("find.yaml").write_text(problem)
-    runner = CliRunner()
-    Path("mine.yaml").write_text(runner.invoke(main, ["scenes", "single-pendulum"]).stdout)
-    command = re.search(r"shoal (simulate mine.yaml .*run.csv)", (DOCS / "tutorial.md").read_text(encoding="utf-8"))
-    assert command
-    assert runner.invoke(main, [*command[1].split(), "--set", "initial.OA.angle=0.4"]).exit_code == 0
-    result = runner.invoke(main, ["identify", "find.yaml", "--json"])
-    assert result.exit_code == 0, result.stderr
-    assert json.loads(result.stdout)["parameters"]["angle"]["value"] == pytest.approx(0.4, abs=1e-6)
+    monkeypatch.setenv("SHOAL_LIBRARY", str(tmp_path / "library"))
+    monkeypatch.delenv("PREFECT_API_URL", raising=False)
+    text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+    for name, content in re.findall(r"`(\w+\.yaml)`:\n\n```yaml\n(.*?)```", text, re.DOTALL):
+        Path(name).write_text(content)
+    return text
+
+
+def test_every_command_of_the_tutorial_runs_and_finds_what_the_page_says(tutorial: str) -> None:
+    """In the order of the page, each with what it needs from those before."""
+    commands = re.findall(r"^\.venv/bin/shoal (.*)$", tutorial, re.MULTILINE)
+    answers = [CliRunner().invoke(main, shlex.split(command)) for command in commands]
+    assert [(done.exit_code, done.stderr) for done in answers if done.exit_code] == []
+    assert [command.split()[0] for command in commands] == ["identify", "simulate", "simulate", "identify", "library"]
+    for table in re.findall(r"^ (theta\d .*)$", tutorial, re.MULTILINE):
+        assert table in answers[0].stdout
+    assert Path("paper.html").stat().st_size > 10_000
+    assert Path("arm.html").stat().st_size > 10_000
+    again = json.loads(CliRunner().invoke(main, ["identify", "find", "--json"]).stdout)
+    said = re.search(r"finds a friction of (\S+) N m s/rad and an angle of (\S+) rad", tutorial)
+    assert said
+    for name, value in zip(("friction", "angle"), said.groups(), strict=True):
+        assert again["parameters"][name]["value"] == pytest.approx(float(value), abs=1e-6)
+
+
+def test_the_servers_of_the_tutorial_are_started_as_it_says(tutorial: str) -> None:
+    (options,) = re.findall(r'^make up ARGS="(.*)"$', tutorial, re.MULTILINE)
+    context = up.main.make_context("up", shlex.split(options))
+    assert set(context.params["without"]) <= {name for stage in processes.chosen(()) for name in stage}
+    targets = re.findall(r"^([a-z-]+):", (DOCS.parent / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(re.findall(r"^make ([a-z-]+)", tutorial, re.MULTILINE)) == {"setup", "up"} <= set(targets)
+    assert f"<http://127.0.0.1:{processes.port('prefect')}>" in tutorial
 
 
 NEW = re.compile(r"`((?:mechanics|engines|swarm|identification)/\S+\.py)`:$", re.MULTILINE)

@@ -11,6 +11,7 @@ from shoal.engines import compare as comparing
 from shoal.engines import get_engine, spot_checks
 from shoal.engines import sweep as sweeping
 from shoal.engines.gauss import GaussEngine
+from shoal.engines.verification import verified
 from shoal.identification import Estimate, Measurement, identify, load_problem, measure
 from shoal.pictures.answer import Answer
 from shoal.scene import Scene, load_scene
@@ -88,9 +89,9 @@ def with_motion(cell: Cell, estimate: Estimate) -> Fit:
 
 
 def simulated(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene, Trajectory]:
-    """A scene with its motion. Raises InputError."""
+    """A scene with its motion, verified as `shoal simulate` does it. Raises InputError."""
     wanted = load_scene(scene).with_values(values)
-    return wanted, get_engine(engine).simulate(wanted)
+    return wanted, verified(get_engine(engine), wanted)
 
 
 def compared(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -> comparing.Comparison:

@@ -26,6 +26,8 @@ def defaults(folder: Path) -> dict[str, str]:
         "DO_NOT_TRACK": "true",
         "PREFECT_HOME": str(folder / "prefect"),
         "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
+        # The other pages ask amplitude.com what to count of their visitors, whatever is set.
+        "PREFECT_SERVER_UI_V2_ENABLED": "false",
         "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
         # The log of a flow is in Prefect's database; a terminal shows progress and the answer.
         "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",

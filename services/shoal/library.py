@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from shoal.errors import InputError
+from shoal.expectation import question
 from shoal.identification import load_problem, measure
 from shoal.identification.problem import built_in_problems
 from shoal.identification.recording.reading import YAML, described, read
@@ -47,8 +48,14 @@ class Kind:
 
 
 def _check_scene(document: Path) -> None:
-    if _model(load_scene(str(document))).failed.any():
+    scene = load_scene(str(document))
+    if _model(scene).failed.any():
         raise InputError(f"{document.name}: initial: no start agrees with the joints and with what is stated")
+    for name in scene.expect:
+        try:
+            question(scene, name, document)
+        except InputError as error:
+            raise InputError(f"{document.name}: {error}") from None
 
 
 def _model(scene: Scene) -> Model:
@@ -78,8 +85,11 @@ def _check_problem(document: Path) -> None:
 KINDS = {
     kind.folder: kind
     for kind in (
-        Kind("scenes", "scene", _check_scene, "bodies", lambda name: _scene_named(name)),
         Kind("recordings", "recording", _check_recording, "path", references={("path",): ""}),
+        Kind(
+            *("scenes", "scene", _check_scene, "bodies", lambda name: _scene_named(name)),
+            references={("expect", "*", "path"): "recordings"},
+        ),
         Kind(
             *("problems", "problem", _check_problem, "parameters", lambda name: name in built_in_problems()),
             references={

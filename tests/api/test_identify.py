@@ -44,10 +44,13 @@ def ended(client: httpx.Client, job: str) -> Machine:
 def test_inline_problem_and_recording(
     gauss: httpx.Client, machine: Machine, problem: Machine, recording: dict[str, list[float]]
 ) -> None:
-    """From arrays to a parameter, without a file of the client's."""
-    answer = gauss.post(JOBS, json=body(machine, problem, "pendulum", recording))
+    """From arrays to a parameter, without a file of the client's; who asks twice with one key gets the same job."""
+    asked, key = body(machine, problem, "pendulum", recording), {"Idempotency-Key": "once"}
+    answer = gauss.post(JOBS, json=asked, headers=key)
     assert answer.status_code == 202
     job = answer.headers["location"]
+    assert gauss.post(JOBS, json=asked, headers=key).headers["location"] == job
+    assert gauss.post(JOBS, json={**asked, "seed": 1}, headers=key).status_code == 422
     assert ended(gauss, job)["status"] == "done"
     estimate = gauss.get(f"{job}/result").json()
     assert estimate["parameters"]["theta"]["value"] == pytest.approx(0.3, abs=1e-6)

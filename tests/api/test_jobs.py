@@ -50,6 +50,25 @@ def test_finished_jobs_are_bounded() -> None:
     assert asyncio.run(forgotten(Settings(keep_seconds=1e-9))) == [True, True, True]
 
 
+def test_a_request_that_is_sent_again_is_the_same_job() -> None:
+    """Also where there is no room for another; a key that was used for something else is refused."""
+
+    async def submit() -> None:
+        jobs = Jobs(Instant(), Settings(job_workers=1, job_queue=0))  # type: ignore[arg-type]
+        first = jobs.submit("identify", REQUEST, "a")
+        assert jobs.submit("identify", Identify(problem="paper-case-1"), "a") is first
+        with pytest.raises(Refusal, match="another request"):
+            jobs.submit("identify", Identify(problem="paper-case-2"), "a")
+        with pytest.raises(Refusal, match="jobs are running"):
+            jobs.submit("identify", REQUEST, "b")
+        await asyncio.sleep(0.01)
+        assert first.state == "done"
+        assert jobs.submit("identify", REQUEST, "a") is first
+        assert jobs.submit("identify", REQUEST) is not first
+
+    asyncio.run(submit())
+
+
 def test_too_many_jobs_are_refused() -> None:
     async def submit() -> None:
         jobs = Jobs(Instant(), Settings(job_workers=1, job_queue=1))  # type: ignore[arg-type]

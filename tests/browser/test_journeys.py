@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import problem_names
 from shoal.scene.load import scene_library
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from forms import choose
 
 pytestmark = pytest.mark.slow
 
@@ -25,19 +31,6 @@ THEIRS = (
 
 def of_ours(said: list[str]) -> list[str]:
     return [line for line in said if not line.endswith(THEIRS)]
-
-
-def choose(page: Any, shown: str, *wanted: str) -> list[str]:
-    """Click on options of one of Prefect's lists, found by what it shows, if anything; returns all it offers."""
-    lists = page.locator(".p-select-button__control").filter(has_not_text=re.compile(r"\S"))
-    (page.get_by_role("button", name=shown, exact=True) if shown else lists.first).focus()
-    page.keyboard.press("ArrowDown")
-    page.get_by_role("option").first.wait_for()
-    offered = [text.strip() for text in page.get_by_role("option").all_inner_texts()]
-    for name in wanted:
-        page.get_by_role("option", name=name, exact=True).click()
-    page.keyboard.press("Escape")
-    return offered
 
 
 def test_a_study_is_started_from_prefects_form_and_answers_there(desk: Any, visit: Callable[[], Any]) -> None:

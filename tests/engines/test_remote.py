@@ -129,6 +129,8 @@ def test_comes_again(url: str, first: int | None) -> None:
     engine = RemoteEngine(url, httpx.MockTransport(answer))
     assert engine.simulate(load_scene("single-pendulum"), [0.1]).ok
     assert len(asked) == 2
+    # By which the service knows that it is the same request.
+    assert asked[0].headers["Idempotency-Key"] == asked[1].headers["Idempotency-Key"]
 
 
 @pytest.mark.parametrize(

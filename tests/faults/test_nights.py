@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 
 import pytest
 from shoal_validation.nightly.hold import hold
+from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured
-from shoal_validation.nightly.plan import Line
 
 FIRST = datetime(2026, 12, 20, 2, tzinfo=UTC)
 """Over the end of a year."""

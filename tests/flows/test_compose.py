@@ -6,6 +6,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +152,12 @@ def test_secrets_come_from_files_and_every_volume_is_named() -> None:
         assert {source for source in mounted if not source.startswith("./")} <= set(COMPOSE["volumes"])
 
 
+def test_who_is_told_of_a_bad_night_is_one_setting() -> None:
+    """And what is told leads to a page that a browser on this machine opens: the server writes the link."""
+    assert SERVICES["deploy"]["environment"]["SHOAL_ALERT"] == "${SHOAL_ALERT:-}"
+    assert SERVICES["prefect"]["environment"]["PREFECT_UI_URL"] == SERVICES["worker"]["environment"]["PREFECT_UI_URL"]
+
+
 def test_profiles_are_those_of_make_up() -> None:
     profiles = {profile for service in SERVICES.values() for profile in service.get("profiles", [])}
     of_compose = {p: {name for name, s in SERVICES.items() if p in s.get("profiles", [])} for p in profiles}
@@ -162,7 +169,12 @@ def test_profiles_are_those_of_make_up() -> None:
 def test_servers_are_as_quiet_as_on_a_desk(tmp_path: Path) -> None:
     quiet = settings.defaults(tmp_path)
     stated = SERVICES["prefect"]["environment"]
-    for name in ("DO_NOT_TRACK", "PREFECT_SERVER_ANALYTICS_ENABLED", "MLFLOW_DISABLE_TELEMETRY"):
+    for name in (
+        "DO_NOT_TRACK",
+        "PREFECT_SERVER_ANALYTICS_ENABLED",
+        "PREFECT_SERVER_UI_V2_ENABLED",
+        "MLFLOW_DISABLE_TELEMETRY",
+    ):
         assert stated[name] == quiet[name]
 
 
@@ -198,6 +210,29 @@ def test_dockerfile_has_the_versions_of_the_project() -> None:
     assert re.search(r"^ARG PYTHON=3\.11\.\d+-slim", text, re.MULTILINE)
     users = re.findall(r"^USER (.+)", text, re.MULTILINE)
     assert users[-1] == SERVICES["worker"]["user"]
+
+
+def test_the_image_leaves_out_what_no_service_reads(tmp_path: Path) -> None:
+    """Headers, tests of others, and what a wheel holds twice for want of links; whoever opens a library finds it."""
+    files = {
+        "casadi/libipopt.so.3.14": b"code",
+        "casadi/libipopt.so": b"code",
+        "casadi/libother.so": b"other code",
+        "casadi/libuno.a": b"archive",
+        "casadi/include/casadi.hpp": b"header",
+        "pandas/core/tests/test_it.py": b"test",
+        "pandas/core/api.py": b"program",
+        "own/tests/kept.py": b"not of a package that is known",
+    }
+    for name, content in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    command = [sys.executable, str(ROOT / "deploy" / "slim.py"), str(tmp_path)]
+    subprocess.run(command, check=True, capture_output=True, timeout=60)
+    gone = {"casadi/libuno.a", "casadi/include/casadi.hpp", "pandas/core/tests/test_it.py"}
+    left = {path.relative_to(tmp_path).as_posix(): path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert left == {name: content for name, content in files.items() if name not in gone}
+    assert (tmp_path / "casadi/libipopt.so").is_symlink()
 
 
 def test_entrypoint_reads_the_password_from_its_file(tmp_path: Path) -> None:

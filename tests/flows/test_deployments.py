@@ -69,7 +69,7 @@ def test_forms_offer_every_scene_engine_and_method(flows: Any) -> None:
         ("design", {"data": "run", "duration": 2}, {"noise": -1}),
         ("compare", {"engines": ["gauss", "casadi"]}, {"engines": ["gauss"]}),
         ("sensitivity", {"vary": [{"path": "gravity", "low": 0, "high": 1, "count": 2}]}, {"vary": []}),
-        ("validation", {"only": "four-bar-2", "quick": True}, {"only": "guess"}),
+        ("validation", {"only": "library/arm", "quick": True}, {"quick": "perhaps"}),
     ],
 )
 def test_forms_take_what_is_right_and_no_more(

@@ -109,6 +109,8 @@ def test_forward_sweep_and_compare_are_logged() -> None:
     for result in (forward, sweep, compare):
         assert result.trusted
         assert _client().get_run(result.run_id).info.status == "FINISHED"
+    # A second run says how far the first may be off, as on the command line.
+    assert 0 < _client().get_run(forward.run_id).data.metrics["final/time_error"] < 1e-9
 
 
 def test_a_night_is_a_run_with_a_metric_per_line() -> None:

@@ -6,6 +6,7 @@ from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
 from shoal.pictures.signals import residuals
 from shoal_flows import jobs
+from shoal_flows.flows.tables import of_motion
 from shoal_flows.jobs import Fit
 
 
@@ -17,6 +18,15 @@ def test_fit_carries_the_motion_of_what_it_found(fits: list[Fit]) -> None:
     assert fit.motion.times[0] == 0
     assert fit.motion.times[-1] == fit.estimate.measurement.end
     assert np.allclose(fit.motion.marker("B")[-1], fit.estimate.predicted["recording"][-1], atol=1e-12)
+
+
+def test_a_motion_is_verified_and_one_that_a_second_run_contradicts_is_not_trusted() -> None:
+    coarse = {"solver.integrator": "rk4", "solver.step": 0.1, "solver.duration": 20.0, "solver.energy_tolerance": 0.5}
+    _, motion = jobs.simulated("single-pendulum", "gauss", coarse)
+    assert not motion.ok
+    assert motion.message.startswith("the time error is about ")
+    good = jobs.simulated("single-pendulum", "gauss", {})[1]
+    assert "estimated error at the markers: time " in of_motion(good)
 
 
 def test_sweep_covers_the_grid(sweep: Sweep) -> None:

@@ -50,15 +50,16 @@ def test_scatter_beyond_the_intervals_widens_that_of_the_slope() -> None:
 def machine() -> str:
     """A machine of thirty weeks, one of whose studies cannot be trusted."""
     client: Any = connect()
+    from mlflow.entities import Metric
+
     place, random = experiment(client, "Identification"), np.random.default_rng(5)
     for week in range(STUDIES):
         value = TRUE + SLOPE * week + NOISE * random.standard_normal() if week != 7 else 900.0
         verdict = "identified" if week != 7 else "not converged"
         tags = {"kind": "study", "machine": "old-press", "verdict": verdict, "mlflow.runName": f"week {week}"}
         run = client.create_run(place, start_time=int(1000 * (1.75e9 + WEEK * week)), tags=tags).info.run_id
-        for name, number in (("final/k", value), ("interval/k/lower", value - 1.6), ("interval/k/upper", value + 1.6)):
-            client.log_metric(run, name, number)
-        client.set_terminated(run)
+        numbers = {"final/k": value, "interval/k/lower": value - 1.6, "interval/k/upper": value + 1.6}
+        client.log_batch(run, [Metric(name, number, 0, 0) for name, number in numbers.items()])
     return "old-press"
 
 

@@ -18,9 +18,10 @@ from shoal.cli import main as shoal
 from shoal.errors import InputError
 from shoal_validation.nightly import history
 from shoal_validation.nightly import main as command
+from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured, motion
 from shoal_validation.nightly.page import headline, render
-from shoal_validation.nightly.plan import Line, plan
+from shoal_validation.nightly.plan import plan
 from shoal_validation.nightly.result import Night, Result, Verdict
 from shoal_validation.nightly.run import judged, run
 from shoal_validation.nightly.worker import Worker

@@ -7,12 +7,13 @@ from typing import Any
 
 from prefect import flow
 from shoal_validation.nightly.hold import hold
+from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.page import headline
-from shoal_validation.nightly.plan import Line, plan
+from shoal_validation.nightly.plan import plan
 from shoal_validation.nightly.result import Night
 
 from shoal_flows.flows.parameters import ALL, Only
-from shoal_flows.flows.shown import Bar, progress, show_result
+from shoal_flows.flows.shown import Bar, ended, progress, show_result
 from shoal_flows.flows.tables import table
 from shoal_flows.tracking.night import log_night
 
@@ -39,7 +40,7 @@ def nightly(only: Only = ALL, quick: bool = False) -> Validated:
     """Run what `shoal validate` runs, keep it beside the nights before, and log its lines.
 
     Args:
-        only: One problem, or all.
+        only: One problem or one scene of the library, or all.
         quick: A part that takes about a minute.
     """
     problem = None if only == ALL else only
@@ -48,8 +49,8 @@ def nightly(only: Only = ALL, quick: bool = False) -> Validated:
         held = hold(lines, quick=quick, only=problem, progress=_note(bar))
     night = held.night
     run_id = log_night(night, held.text)
-    show_result(headline(night), _table(night), run_id)
-    return Validated(night, run_id)
+    show_result(headline(night), f"{_changes(night)}{_table(night)}", run_id)
+    return ended(Validated(night, run_id), [line.complaint for line in night.lines if not line.verdict.fine])
 
 
 def _note(bar: Bar) -> Any:
@@ -57,6 +58,11 @@ def _note(bar: Bar) -> Any:
         bar.stand_at(done)
 
     return note
+
+
+def _changes(night: Night) -> str:
+    listed = "".join(f"- {change}\n" for change in night.changes)
+    return f"Since the night before:\n\n{listed}\n" if listed else ""
 
 
 def _table(night: Night) -> str:

@@ -48,7 +48,17 @@ Tolerance = Annotated[float, Field(gt=0)]
 Size = Annotated[float | None, Field(gt=0)]
 About = Literal["answer", "start"] | None
 ALL = "all"
-Only = Annotated[str, _one_of((ALL, *PROBLEMS, *IDENTIFICATION))]
+Only = Annotated[
+    str,
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string", "title": "name, also of a scene of the library"},
+                {"type": "string", "title": "built in", "enum": [ALL, *PROBLEMS, *IDENTIFICATION]},
+            ]
+        }
+    ),
+]
 
 
 class Axis(BaseModel):

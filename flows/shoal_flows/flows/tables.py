@@ -9,6 +9,7 @@ from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium
+from shoal.pictures.estimates import estimates
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory
 
@@ -20,7 +21,9 @@ def of_motion(motion: Trajectory) -> str:
     ends = [(name, *motion.marker(name)[-1]) for name in motion.markers]
     evidence = f"{motion.status[0]}; energy drift {motion.energy_drift[0]:.1e}, constraint drift "
     evidence += f"{motion.constraint_drift[0]:.1e}, {motion.steps} steps, {motion.wall_s:.3f} s"
-    return table(("marker", "x [m]", "y [m]"), ends) + f"\n\n{evidence}"
+    verification = motion.model.get("verification")
+    notes = [] if verification is None else list(estimates(verification))
+    return "\n\n".join([table(("marker", "x [m]", "y [m]"), ends), evidence, *notes])
 
 
 def of_comparison(comparison: Comparison) -> str:

@@ -46,6 +46,9 @@ def log_forward(scene: Scene, motion: Trajectory) -> str:
     name = f"{scene.name} · {motion.engine}"
     with open_run("Forward", name, description=scene.description, tags=tags) as run:
         log_motion_of(run, scene, motion)
+        for name, error in motion.model.get("verification", {}).items():
+            if name.endswith("_error") and error is not None:
+                run.metric(f"final/{name}", error)
         return run.run_id
 
 
@@ -78,7 +81,8 @@ def tip(scene: Scene) -> str:
 
 def log_motion_of(run: Run, scene: Scene, motion: Trajectory) -> None:
     """What was computed of a scene, and where its last marker went."""
-    made = {f"model.{name}": value for name, value in motion.model.items() if not name.startswith("initial")}
+    kept = (item for item in motion.model.items() if not item[0].startswith(("initial", "verification")))
+    made = {f"model.{name}": value for name, value in kept}
     run.params({**stated(scene), "engine": motion.engine, **made})
     run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
     x, y = motion.marker(tip(scene))[-1]

@@ -24,6 +24,8 @@ def log_night(night: Night, page: str) -> str:
                 run.metric(f"error/{name}", line.error)
             if line.seconds is not None:
                 run.metric(f"seconds/{name}", line.seconds)
+        if night.changes:
+            run.text("".join(f"{change}\n" for change in night.changes), "changes.txt")
         run.text(page, "index.html")
         run.text(json_text(night.to_json(), indent=1), "night.json")
         return run.run_id

@@ -20,9 +20,11 @@ State = Literal["queued", "running", "done", "failed", "cancelled"]
 
 @dataclass
 class Job:
-    """One computation. changed: set, and replaced, whenever something new is known."""
+    """One computation. changed: set, and replaced, whenever something new is known; key: of who asked for it."""
 
     operation: str
+    asked: Request
+    key: str | None = None
     id: str = field(default_factory=lambda: secrets.token_urlsafe(16))
     state: State = "queued"
     progress: dict[str, float | None] | None = None
@@ -74,14 +76,22 @@ class Jobs:
         self._jobs: dict[str, Job] = {}
         self._running: dict[str, asyncio.Task[None]] = {}
 
-    def submit(self, operation: str, request: Request) -> Job:
-        """Take a request that was checked. Raises Refusal if too many wait already."""
+    def submit(self, operation: str, request: Request, key: str | None = None) -> Job:
+        """Take a request that was checked. Raises Refusal if too many wait already.
+
+        key: of a client that may ask twice, because it does not know whether it was heard: the second time gives the
+        job of the first. Raises Refusal if that was another request.
+        """
         self._forget()
+        if key is not None and (same := next((job for job in self._jobs.values() if job.key == key), None)):
+            if (same.operation, same.asked) != (operation, request):
+                raise Refusal("input", "this key was sent with another request", "Idempotency-Key")
+            return same
         going = sum(job.ended is None for job in self._jobs.values())
         if going >= self._settings.job_workers + self._settings.job_queue:
             text = f"{going} jobs are running or waiting; come again"
             raise Refusal("busy", text, headers={"Retry-After": "10"})
-        job = Job(operation)
+        job = Job(operation, request, key)
         self._jobs[job.id] = job
         task = asyncio.create_task(self._run(job, (operation, request)))
         self._running[job.id] = task

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import AsyncIterator
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Depends, Path, Request, Response
+from fastapi import APIRouter, Depends, Header, Path, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from shoal.api.jobs import Jobs
@@ -60,6 +60,7 @@ async def _jobs(request: Request) -> Jobs:
 Ready = Depends(require_ready)
 Calls = Annotated[Pool, Depends(_calls)]
 AllJobs = Annotated[Jobs, Depends(_jobs)]
+Key = Annotated[str | None, Header(alias="Idempotency-Key", min_length=1, max_length=200)]
 JobId = Annotated[str, Path(max_length=64)]
 EntryKind = Annotated[str, Path(max_length=64)]
 EntryName = Annotated[str, Path(max_length=100)]
@@ -106,10 +107,12 @@ def _answering(name: str, kind: type[Operation]) -> None:
         answer = await calls.run("call", (name, asked), seconds, gone=request.is_disconnected)
         return Response(answer, media_type="application/json")
 
-    async def later(asked: Operation, request: Request, response: Response, calls: Calls, jobs: AllJobs) -> JobStatus:
+    async def later(
+        asked: Operation, request: Request, response: Response, calls: Calls, jobs: AllJobs, key: Key = None
+    ) -> JobStatus:
         seconds = request.app.state.settings.wall_seconds
         await calls.run("check", (name, asked), seconds, gone=request.is_disconnected)
-        job = jobs.submit(name, asked)
+        job = jobs.submit(name, asked, key)
         response.headers["Location"] = f"{JOBS}/{job.id}"
         return job.status
 
@@ -119,7 +122,10 @@ def _answering(name: str, kind: type[Operation]) -> None:
     about: dict[str, Any] = {"dependencies": [Ready], "responses": documented(*COMPUTING)}
     described: dict[str, Any] = {"summary": name.capitalize(), "description": inspect.cleandoc(kind.__doc__ or "")}
     v1.post(f"/{name}", response_model=kind.answer, **described, **about)(now)
-    checked = f"Checked, then computed in the background; `Location` says where to ask. The body is that of /v1/{name}."
+    checked = (
+        f"Checked, then computed in the background; `Location` says where to ask. The body is that of /v1/{name}. "
+        "The same request with the same `Idempotency-Key` is the same job."
+    )
     jobs.post(f"/{name}", status_code=202, summary=f"{name.capitalize()} as a job", description=checked, **about)(later)
     if name == "identify":
         earlier.post("", status_code=202, include_in_schema=False, **about)(later)

@@ -9,6 +9,7 @@ import base64
 import ipaddress
 import logging
 import os
+import secrets
 import weakref
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -103,8 +104,12 @@ class RemoteEngine:
 
     def ask(self, method: str, path: str, content: bytes | None = None) -> Any:
         """The answer to a request. Raises InputError where it is refused, ComputationError where there is none."""
+        headers = {"Content-Type": "application/json"}
+        if method == "POST":
+            # Whoever is not answered asks again, and may have been heard the first time.
+            headers["Idempotency-Key"] = secrets.token_urlsafe(16)
         try:
-            response = self._client.request(method, path, content=content, headers={"Content-Type": "application/json"})
+            response = self._client.request(method, path, content=content, headers=headers)
         except httpx.HTTPError as error:
             raise ComputationError(
                 f"engine: {self.name} does not answer: {str(error) or type(error).__name__}; "

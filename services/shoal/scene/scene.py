@@ -15,6 +15,7 @@ from shoal.errors import InputError
 from shoal.scene import joints as joint_types
 from shoal.scene.bodies import Body
 from shoal.scene.dimensions import check_dimensions, padded
+from shoal.scene.expect import Expectation, ExpectedValue
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
 from shoal.scene.loads import DistributedForce, Force, Load
 from shoal.scene.record import Angle, Record, Vector, Vector3, one_line
@@ -68,6 +69,8 @@ class Scene(Record):
 
     dimensions: 2, or 3 for one in space.
 
+    expect: what the nights of its library ask of it; no part of the machine, so that what is written of a scene,
+    compared by its fingerprint or made of it by `with_values` is without.
     Raises pydantic's ValidationError; `Scene.parse` and `with_values` raise `InputError` in one line.
     """
 
@@ -82,6 +85,7 @@ class Scene(Record):
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
     initial: dict[str, InitialState] = {}
     solver: Solver = Solver()
+    expect: Annotated[dict[Name, Expectation], Field(exclude=True)] = {}
 
     def __repr__(self) -> str:
         parts = [_counted("body", "bodies", self.bodies), _counted("joint", "joints", self.joints)]
@@ -108,6 +112,10 @@ class Scene(Record):
             if marker.body == GROUND:
                 raise ValueError(f"markers.{name}.body: a marker sits on a body, not on the ground")
             self._check_attachment(f"markers.{name}", marker)
+        for name, expected in self.expect.items():
+            if isinstance(expected, ExpectedValue) and expected.marker not in self.markers:
+                known = ", ".join(self.markers)
+                raise ValueError(f"expect.{name}.marker: no marker {expected.marker!r}; there are {known}")
         for name in self.initial:
             if name not in self.bodies:
                 raise ValueError(f"initial.{name}: no such body; the bodies are {', '.join(self.bodies)}")

@@ -10,8 +10,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from shoal.home import home
 
+from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.result import Night, Result, Verdict
 
 NIGHTS = 7
@@ -68,9 +70,22 @@ def track(key: tuple[str, str, str], nights: Iterable[Night]) -> list[Result]:
     return [line for night in nights for line in night.lines if line.key == key]
 
 
+def since_last(line: Line, points: Sequence[float], nights: Sequence[Night]) -> float:
+    """How far a motion went from that of the last night with the same version of its scene [m]; 0 where there is none.
+
+    points: of its markers, by instants and markers, x and y next to each other
+    """
+    key = line.problem, line.engine, line.method
+    for past in reversed(track(key, nights)):
+        if past.version == line.version and past.points is not None and len(past.points) == len(points):
+            return float(np.linalg.norm(np.reshape(np.subtract(points, past.points), (-1, 2)), axis=1).max())
+    return 0.0
+
+
 def compare(line: Result, nights: Sequence[Night]) -> Result:
     """The line with its usual values, and with its verdict if they speak against it."""
-    before = [past for past in track(line.key, nights) if past.verdict is not Verdict.FAILED][-NIGHTS:]
+    alike = [past for past in track(line.key, nights) if past.version == line.version]
+    before = [past for past in alike if past.verdict is not Verdict.FAILED][-NIGHTS:]
     errors = [past.error for past in before if past.error is not None]
     times = [past.seconds for past in before if past.seconds is not None]
     usual_error = statistics.median(errors) if errors else None

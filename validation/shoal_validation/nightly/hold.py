@@ -8,8 +8,8 @@ from datetime import datetime
 from pathlib import Path
 
 from shoal_validation.nightly import history
+from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.page import render
-from shoal_validation.nightly.plan import Line
 from shoal_validation.nightly.result import Night
 from shoal_validation.nightly.run import Progress, machine, run
 

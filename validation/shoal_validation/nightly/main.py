@@ -15,8 +15,9 @@ from rich.table import Table
 from shoal.home import prepare_kernel_cache
 
 from shoal_validation.nightly.hold import hold
+from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.page import headline, time_text
-from shoal_validation.nightly.plan import Line, plan
+from shoal_validation.nightly.plan import plan
 from shoal_validation.nightly.result import Night, Verdict
 from shoal_validation.nightly.run import Progress as Note
 
@@ -81,4 +82,6 @@ def _show(out: Console, night: Night, page: Path) -> None:
         table.add_row(problem, *counts, f"{max(parts):.3g}" if parts else "", time_text(longest))
     out.print(table)
     out.print(headline(night))
+    for number, change in enumerate(night.changes):
+        out.print(f"{'' if number else 'since the night before: '}{change}", soft_wrap=True, markup=False)
     out.print(f"page: {page}", soft_wrap=True)

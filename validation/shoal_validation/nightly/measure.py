@@ -25,12 +25,16 @@ LONG = 60.0
 
 @dataclass(frozen=True)
 class Measured:
-    """error: [m] or [rad], nan where there is no motion; seconds: median of whole calls; message: why it is not ok."""
+    """error: [m] or [rad], nan where there is no motion; seconds: median of whole calls; message: why it is not ok.
+
+    points: of the motion, for the next night to compare with, where nothing else says what is right [m]
+    """
 
     status: str
     error: float
     seconds: float
     message: str = ""
+    points: list[float] | None = None
 
 
 def motion(problem: str, engine: str, values: Mapping[str, object], verify: bool = False) -> Measured:
@@ -61,7 +65,7 @@ def angles(problem: str, method: str) -> Measured:
 
     wanted = load_problem(problem)
     data = measure(wanted, wanted.load_scene())
-    seconds, estimate = _timed(lambda: identify(wanted, method=method, measurement=data))
+    seconds, estimate = timed(lambda: identify(wanted, method=method, measurement=data))
     error = max(abs(estimate.parameters[name].value - true) for name, true in estimate.truth.items())
     status = str(Status.OK) if estimate.verdict.trusted else str(estimate.verdict)
     return Measured(status, float(error), seconds, estimate.message)
@@ -69,12 +73,12 @@ def angles(problem: str, method: str) -> Measured:
 
 def _motion(problem: str, call: Callable[[], Trajectory]) -> Measured:
     """A motion against the problem's reference."""
-    seconds, trajectory = _timed(call)
+    seconds, trajectory = timed(call)
     error = get_problem(problem).error(trajectory) if trajectory.ok else np.nan
     return Measured(str(trajectory.status[0]), float(error), seconds, trajectory.message)
 
 
-def _timed(call: Callable[[], T]) -> tuple[float, T]:
+def timed(call: Callable[[], T]) -> tuple[float, T]:
     """Median time of a call [s]; the first, which loads kernels and builds the model, counts only if it is long."""
     first, answer = undisturbed(call)
     taken = [first] if first > LONG else [undisturbed(call)[0]]

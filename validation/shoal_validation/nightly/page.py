@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from shoal_validation.nightly.chart import trend
 from shoal_validation.nightly.history import NIGHTS, track
+from shoal_validation.nightly.own import OWN
 from shoal_validation.nightly.result import Night, Result, Verdict, apart
 from shoal_validation.problems import PROBLEMS
 
@@ -53,12 +54,20 @@ def _group(name: str, night: Night, nights: Sequence[Night]) -> dict[str, Any]:
     known = PROBLEMS.get(name)
     return {
         "name": name,
-        "about": known.about if known else "both initial angles from the motion of the tip",
-        "reference": known.reference.source if known else "the angles of the data",
+        "about": known.about if known else _about(name),
+        "reference": known.reference.source if known else _reference(name),
         "lines": lines,
         "without": [line for line in lines if line["result"].verdict is Verdict.NOT_POSSIBLE],
         "trends": [line for line in lines if line["charts"]],
     }
+
+
+def _about(name: str) -> str:
+    return "a scene of the library" if name.startswith(OWN) else "both initial angles from the motion of the tip"
+
+
+def _reference(name: str) -> str:
+    return "what the scene expects" if name.startswith(OWN) else "the angles of the data"
 
 
 def _line(line: Result, nights: Sequence[Night]) -> dict[str, Any]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 from shoal.errors import InputError
 
+from shoal_validation.nightly import own
+from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured, angles, motion, selection
 from shoal_validation.nightly.methods import FLEXIBLE, RIGID, Method
 from shoal_validation.nightly.result import ROUND_OFF
@@ -23,37 +25,12 @@ IDENTIFICATION = {
 SEARCHES = ("least-squares", "iafsa")
 
 
-@dataclass(frozen=True)
-class Line:
-    """One line of the plan.
-
-    limit: largest error in `unit`, None where no answer is expected; reason: why; run: what the worker process calls;
-    source: the reference, None for that of the problem of this name; quick: whether a quick night has it;
-    noise: error below which a larger one than usual is no loss of accuracy
-    """
-
-    problem: str
-    engine: str
-    method: str
-    limit: float | None
-    reason: str
-    run: Callable[[], Measured] = field(repr=False)
-    source: str | None = None
-    unit: str = "m"
-    quick: bool = True
-    noise: float = ROUND_OFF
-
-    def reference(self) -> str:
-        """Who says what is right."""
-        return self.source or PROBLEMS[self.problem].reference.source
-
-
 def plan(only: str | None = None, quick: bool = False) -> list[Line]:
-    """The lines of a night, of one problem if so asked. Raises InputError."""
-    names = (*PROBLEMS, *IDENTIFICATION)
-    if only is not None and only not in names:
-        raise InputError(f"--only: no problem {only!r}; there are {', '.join(names)}")
-    lines = [*_motions(), *_identifications()]
+    """The lines of a night, of one problem or scene of the library if so asked. Raises InputError."""
+    lines = [*_motions(), *_identifications(), *own.lines()]
+    names = dict.fromkeys(line.problem for line in lines)
+    if only is not None and only not in names and (only := own.OWN + (asked := only)) not in names:
+        raise InputError(f"--only: no problem {asked!r}; there are {', '.join(names)}")
     return [line for line in lines if only in (None, line.problem) and (line.quick or not quick)]
 
 

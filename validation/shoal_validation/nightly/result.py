@@ -38,7 +38,8 @@ class Result:
 
     expected, found: in words; error, limit: in `unit`, None where there is none; seconds: median of whole calls;
     reason: why this limit; noise: error below which more than usual is no loss; usual_error, usual_seconds: medians of
-    the nights before, None on the first one.
+    the nights before, None on the first one; version: of a scene of the library, since which alone nights compare;
+    points: of a motion that the next night compares with [m].
     """
 
     problem: str
@@ -56,6 +57,8 @@ class Result:
     noise: float = ROUND_OFF
     usual_error: float | None = None
     usual_seconds: float | None = None
+    version: str = ""
+    points: list[float] | None = None
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -71,7 +74,10 @@ class Result:
 
 @dataclass(frozen=True)
 class Night:
-    """All lines of one run. started: UTC; machine: processor and cores, within which times compare."""
+    """All lines of one run.
+
+    started: UTC; machine: processor and cores, within which times compare; changes: since the night before, in words
+    """
 
     started: str
     machine: str
@@ -80,6 +86,7 @@ class Night:
     only: str | None
     wall_s: float
     lines: tuple[Result, ...]
+    changes: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -105,7 +112,7 @@ class Night:
         try:
             lines = tuple(Result(**{**line, "verdict": Verdict(line["verdict"])}) for line in data["lines"])
             known = ("started", "machine", "versions", "quick", "only", "wall_s")
-            return cls(**{name: data[name] for name in known}, lines=lines)
+            return cls(**{name: data[name] for name in known}, lines=lines, changes=tuple(data.get("changes", ())))
         except (KeyError, TypeError) as error:
             raise ValueError(f"a night with other fields: {error}") from None
 

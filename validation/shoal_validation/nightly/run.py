@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -12,9 +13,10 @@ from shoal.home import processor
 from shoal.trajectory import Status
 from shoal.versions import versions
 
-from shoal_validation.nightly.history import compare
+from shoal_validation.nightly.changes import changes
+from shoal_validation.nightly.history import compare, since_last
+from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured
-from shoal_validation.nightly.plan import Line
 from shoal_validation.nightly.result import Night, Result, Verdict, apart
 from shoal_validation.nightly.worker import Worker
 
@@ -42,15 +44,23 @@ def run(
     with Worker() as worker:
         for done, line in enumerate(lines):
             progress(done, line)
-            result = compare(judged(line, worker.measure(line.run, timeout)), before)
+            result = _found(line, worker, timeout, before)
             if result.verdict is Verdict.SLOWER:
                 # Others on the machine slow a run down, nothing speeds it up: the better of two tries counts.
-                again = compare(judged(line, worker.measure(line.run, timeout)), before)
-                result = min(result, again, key=_seconds)
+                result = min(result, _found(line, worker, timeout, before), key=_seconds)
             found.append(result)
     wall = time.perf_counter() - begin
     when = started.replace(tzinfo=None).isoformat(timespec="milliseconds")
-    return Night(when, machine(), versions(PACKAGES), quick, only, wall, tuple(found))
+    night = Night(when, machine(), versions(PACKAGES), quick, only, wall, tuple(found))
+    return replace(night, changes=changes(night, before))
+
+
+def _found(line: Line, worker: Worker, timeout: float, before: Sequence[Night]) -> Result:
+    """One line, measured and judged."""
+    measured = worker.measure(line.run, timeout)
+    if line.as_before and measured.points is not None:
+        measured = replace(measured, error=since_last(line, measured.points, before))
+    return compare(judged(line, measured), before)
 
 
 def judged(line: Line, measured: Measured) -> Result:
@@ -79,6 +89,8 @@ def judged(line: Line, measured: Measured) -> Result:
         verdict=verdict,
         reason=line.reason,
         noise=line.noise,
+        version=line.version,
+        points=measured.points,
     )
 
 

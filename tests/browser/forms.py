@@ -1,0 +1,19 @@
+"""Prefect's forms, as a visitor fills them in."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+
+def choose(page: Any, shown: str, *wanted: str) -> list[str]:
+    """Click on options of one of Prefect's lists, found by what it shows, if anything; returns all it offers."""
+    lists = page.locator(".p-select-button__control").filter(has_not_text=re.compile(r"\S"))
+    (page.get_by_role("button", name=shown, exact=True) if shown else lists.first).focus()
+    page.keyboard.press("ArrowDown")
+    page.get_by_role("option").first.wait_for()
+    offered = [text.strip() for text in page.get_by_role("option").all_inner_texts()]
+    for name in wanted:
+        page.get_by_role("option", name=name, exact=True).click()
+    page.keyboard.press("Escape")
+    return offered
