@@ -123,6 +123,9 @@ def uncertain(
     degree: int | None = None,
     count: int | None = None,
     most: int = 20_000,
+    limits: Sequence[str] = (),
+    limit_method: str = "auto",
+    limit_runs: int = 5_000,
     verify: bool = True,
     seed: int = 0,
     progress: Callable[[int], None] | None = None,
@@ -133,7 +136,9 @@ def uncertain(
     `--vary` takes; times: instants [s], else the scene's own; gap: between outer and attained bounds, as a share of the
     largest width, that must be reached; tolerance: error [m] of the model; correlations: of pairs of random parameters;
     degree, count: of a method that has one; most: runs that may be made; verify: estimate mesh and step errors of
-    extremal runs; progress: is told how many runs there are. Raises InputError, ComputationError.
+    extremal runs; limits: what must not happen, such as "B.y < -1.2"; limit_method: auto, form, importance, subset or
+    monte-carlo; limit_runs: for each of their probabilities; progress: is told how many runs there are. Raises
+    InputError, ComputationError.
     """
     from shoal.response import uncertain
 
@@ -149,6 +154,9 @@ def uncertain(
         degree=degree,
         count=count,
         most=most,
+        limits=limits,
+        limit_method=limit_method,
+        limit_runs=limit_runs,
         verify=verify,
         seed=seed,
         progress=progress,

@@ -15,6 +15,12 @@ def _methods() -> str:
     return f"One of {', '.join(METHODS)}."
 
 
+def _ways() -> str:
+    from shoal.response.limits.choice import WAYS
+
+    return f"Of a probability: one of {', '.join(WAYS)}."
+
+
 @click.command()
 @click.argument("scene")
 @click.option(
@@ -34,6 +40,11 @@ def _methods() -> str:
 @click.option("--runs", "most", type=click.IntRange(3), default=20_000, show_default=True, help="That may be made.")
 @click.option("--degree", type=click.IntRange(1, 40), help="Of a method that has one.")
 @click.option("--count", type=click.IntRange(1), help="Runs of a method that samples.")
+@click.option(
+    "--limit", "limits", multiple=True, metavar='"MARKER.QUANTITY < NUMBER"', help="What must not happen (repeatable)."
+)
+@click.option("--limit-method", cls=options.LateHelp, told=_ways, default="auto", show_default=True, metavar="NAME")
+@click.option("--limit-runs", type=click.IntRange(100), default=5_000, show_default=True, help="For each probability.")
 @options.engine
 @options.values
 @options.at
@@ -51,6 +62,9 @@ def uncertain(
     most: int,
     degree: int | None,
     count: int | None,
+    limits: tuple[str, ...],
+    limit_method: str,
+    limit_runs: int,
     engine: str,
     values: Values,
     times: Times,
@@ -62,7 +76,8 @@ def uncertain(
 ) -> None:
     """How SCENE may move if some of its fields are intervals or distributions.
 
-    Intervals give bounds that runs attain, distributions give means, deviations, quantiles and Sobol indices.
+    Intervals give bounds that runs attain, distributions give means, deviations, quantiles and Sobol indices. A limit
+    tells what must not happen: with intervals whether it can, with distributions how probable it is.
     """
     from shoal.pictures import files
     from shoal.response import uncertain
@@ -88,6 +103,9 @@ def uncertain(
             verify=verify,
             seed=seed,
             most=most,
+            limits=limits,
+            limit_method=limit_method,
+            limit_runs=limit_runs,
             progress=lambda runs: tell(f"{wanted.name}: {runs} runs"),
         )
     if out is not None:

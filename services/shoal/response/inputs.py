@@ -118,6 +118,16 @@ class Inputs:
         ]
         return np.stack(found, axis=1)
 
+    def standard(self, places: Array) -> Array:
+        """Germs at places of independent standard normal variables, both (runs, parameters)."""
+        found = [
+            places[:, k]
+            if self._standard(k) or isinstance(one.marginal, Normal)
+            else one.marginal.germ(inside(special.ndtr(places[:, k])))
+            for k, one in enumerate(self.parameters)
+        ]
+        return np.stack(found, axis=1)
+
     def sobol(self, count: int, seed: int, skip: int = 0) -> Array:
         """Quasi-random germs: Sobol's sequence, scrambled (Owen), after the first `skip`."""
         power = max(int(np.ceil(np.log2(max(skip + count, 1)))), 0)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,12 +26,13 @@ LEAST_TOLERANCE = 1e-14
 class Machine:
     """Call it with path -> values. Columns: instants, markers and quantities (x, y [m] and angle [rad]), in this order.
 
-    columns: their number along each of the three
+    columns: their number along each of the three; told: what is told of a motion instead, (lanes, columns)
     """
 
     scene: Scene
     times: Array
     engine: Engine
+    told: Callable[[Trajectory], Array] = field(default_factory=lambda: _columns)
 
     @property
     def columns(self) -> tuple[int, int, int]:
@@ -54,7 +55,7 @@ class Machine:
 
     def _some(self, values: Mapping[str, Array]) -> Answers:
         motion = self.engine.simulate_many(self.scene, values, self.times)
-        found, good = _columns(motion), _good(motion)
+        found, good = self.told(motion), _good(motion)
         why, repeated = motion.message, 0
         for finer in FINER:
             left = np.flatnonzero(~good)
@@ -67,7 +68,7 @@ class Machine:
             except InputError as error:
                 why = str(error)
                 break
-            found[left], good[left] = _columns(again), _good(again)
+            found[left], good[left] = self.told(again), _good(again)
             why = again.message
         return Answers(found, good, repeated, "" if good.all() else why)
 

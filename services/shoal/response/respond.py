@@ -21,6 +21,9 @@ from shoal.response.enclosure import Enclosure, enclosure
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.inputs import Correlations, Inputs, Parameter
+from shoal.response.limits import MOST as LIMIT_RUNS
+from shoal.response.limits import Judged, judge, limit
+from shoal.response.limits.judge import Reach
 from shoal.response.machine import QUANTITIES, Machine
 from shoal.response.methods import get_method
 from shoal.response.methods.bounds import HOPELESS
@@ -102,6 +105,9 @@ def uncertain(
     verify: bool = True,
     seed: int = 0,
     most: int = MOST,
+    limits: Sequence[str] = (),
+    limit_method: str = "auto",
+    limit_runs: int = LIMIT_RUNS,
     progress: Callable[[int], None] | None = None,
 ) -> Response:
     """How the markers of a scene may move if some of its fields are known as intervals or distributions only.
@@ -111,7 +117,8 @@ def uncertain(
     bounds, as a share of the largest width, that must be reached; correlations: of pairs of random parameters;
     degree, count: of a method that has one; tolerance: error [m] that the markers of the middle machine may have, for
     which the cheapest model is found; verify: estimate mesh and step errors of extremal runs; most: runs that may be
-    made; progress: is told how many there are. Raises InputError, ComputationError.
+    made; limits: what must not happen, such as "B.y < -1.2"; limit_method: one of `WAYS`; limit_runs: for each of them;
+    progress: is told how many runs there are. Raises InputError, ComputationError.
     """
     begin = time.perf_counter()
     wanted = load_scene(scene) if isinstance(scene, str) else scene
@@ -120,7 +127,7 @@ def uncertain(
     if inputs.random.any() and not inputs.random.all():
         one, other = (inputs.names[int(np.argmax(inputs.random == kind))] for kind in (True, False))
         raise InputError(f"vary: {one} has a distribution and {other} an interval; give both the one or the other")
-    when = sampling_times(wanted, times)
+    when, asked = sampling_times(wanted, times), [limit(text, wanted) for text in limits]
     if tolerance is not None:
         wanted = _modelled(wanted, inputs, tolerance, when, engine)
     machine = Machine(wanted, when, get_engine(engine))
@@ -143,7 +150,18 @@ def uncertain(
     if bounds is not None and math.isfinite(answer.horizon):
         bounds = _beyond(wanted, inputs, bounds, machine)
     mesh, step, rejected = _errors(machine, answer, seed) if verify else (None, None, "")
-    status, message = _status(answer, gap, rejected)
+    judged = [
+        judge(
+            *(one, machine, inputs, _reach(inputs, when, gap, seed, most)),
+            way=limit_method,
+            most=limit_runs,
+            seed=seed,
+            verify=verify,
+            progress=progress,
+        )
+        for one in asked
+    ]
+    status, message = _status(answer, gap, rejected, judged)
     return Response(
         status=status,
         message=message,
@@ -164,6 +182,7 @@ def uncertain(
         statistics=answer.statistics,
         mesh_error=mesh,
         step_error=step,
+        limits=tuple(judged),
     )
 
 
@@ -260,7 +279,22 @@ def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, 
     return mesh, step, ""
 
 
-def _status(answer: Answer, gap: float | None, rejected: str) -> tuple[str, str]:
+def _reach(inputs: Inputs, when: Array, gap: float | None, seed: int, most: int) -> Reach:
+    """Bounds of the margins of a model over time."""
+
+    def reach(model: Model) -> tuple[Array, Array, Array, int, int]:
+        answer = respond(
+            model, inputs, len(when), groups=np.zeros(len(when)), instants=when, gap=gap, seed=seed, most=most
+        )
+        bounds, runs = answer.bounds, answer.runs
+        assert bounds is not None
+        outer = np.where(when <= bounds.horizon, bounds.lower_outer, -math.inf)
+        return bounds.lower, outer, runs.germs[runs.values.argmin(axis=0)], runs.evaluations, runs.failed
+
+    return reach
+
+
+def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[Judged]) -> tuple[str, str]:
     """ok, or what speaks against believing the answer, and why."""
     runs, bounds = answer.runs, answer.bounds
     if runs.failed:
@@ -275,7 +309,8 @@ def _status(answer: Answer, gap: float | None, rejected: str) -> tuple[str, str]
     if bounds is not None and gap is not None and not bounds.gap <= gap:
         found = "is not known" if math.isnan(bounds.gap) else f"is {bounds.gap:.1e}"
         return "gap-not-reached", f"the gap between outer and attained bounds {found} of the width, asked for {gap:g}"
-    return "ok", ""
+    doubts = [one.doubt for one in judged if one.doubt]
+    return ("limit-in-doubt", "; ".join(doubts)) if doubts else ("ok", "")
 
 
 def _modelled(scene: Scene, inputs: Inputs, tolerance: float, times: Array, engine: str) -> Scene:

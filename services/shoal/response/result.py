@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from shoal.response.inputs import Inputs
+from shoal.response.limits import Judged
 from shoal.response.marginals import Interval
 from shoal.response.statistics import QUANTILES, Statistics
 from shoal.trajectory import Array, plain
@@ -38,7 +39,7 @@ class Response:
     status: ok, gap-not-reached, beyond-horizon, failed-runs or model-rejected; message: why it is not ok; why: what the
     method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds: None if a parameter is
     random; statistics: None if none is; columns are (instants, markers, quantities x, y, angle) in this order;
-    mesh_error, step_error: of extremal runs [m], None where not estimated
+    mesh_error, step_error: of extremal runs [m], None where not estimated; limits: of what must not happen
     """
 
     status: str
@@ -60,6 +61,7 @@ class Response:
     statistics: Statistics | None
     mesh_error: float | None
     step_error: float | None
+    limits: tuple[Judged, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -107,7 +109,7 @@ class Response:
             "statistics": {} if self.statistics is None else self._by_marker(self._statistics),
             "mesh_error": plain(self.mesh_error),
             "step_error": plain(self.step_error),
-            "limits": [],
+            "limits": [one.to_json() for one in self.limits],
         }
 
     def _parameters(self) -> dict[str, Any]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from shoal.mechanics.analysis.modes import Modes
     from shoal.mechanics.analysis.reactions import Reactions
     from shoal.response import Response
+    from shoal.response.limits import Judged
     from shoal.scene import Scene
     from shoal.selection import Selection
     from shoal.trajectory import Trajectory
@@ -115,6 +116,8 @@ def response_table(response: Response) -> None:
     screen.out.print(table)
     if response.statistics is not None:
         _shares(response)
+    for judged in response.limits:
+        _limit(judged)
     screen.say(f"status {response.status}; {response.evaluations} runs in {response.wall_s:.2f} s; {response.why}")
     if response.repeated or response.failed:
         screen.say(f"{response.repeated} runs were repeated with smaller steps, {response.failed} failed all the same")
@@ -128,6 +131,27 @@ def response_table(response: Response) -> None:
     told_of = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
     if told_of:
         screen.say(f"estimated errors of the runs that decide: {', '.join(told_of)}")
+
+
+def _limit(judged: Judged) -> None:
+    """What is told of a limit, and the values that show it."""
+    title, shown = f"limit {judged.limit.text}", judged.shown
+    if judged.passing is not None:
+        lower, upper = judged.passing.estimate.interval
+        screen.say(
+            f"{title}: is passed with probability {judged.passing.estimate.probability:.3g}, with 95 % confidence "
+            f"between {lower[-1]:.3g} and {upper[-1]:.3g}",
+            f"  by {judged.passing.why}; {judged.evaluations} runs",
+            style="bold",
+        )
+        how = "most probably with"
+    else:
+        says = {True: "is kept for all values", False: "is passed", None: "is kept by all runs, which proves nothing"}
+        screen.say(f"{title}: {says[judged.kept]}", style="bold")
+        how = "passed with" if judged.kept is False else "nearest with"
+    if shown is not None:
+        known = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
+        screen.say(f"  {how} {known}: margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s")
 
 
 def _shares(response: Response) -> None:
