@@ -126,6 +126,9 @@ def uncertain(
     limits: Sequence[str] = (),
     limit_method: str = "auto",
     limit_runs: int = 5_000,
+    allocate: bool = False,
+    costs: Mapping[str, float] | None = None,
+    target: float = 1e-3,
     verify: bool = True,
     seed: int = 0,
     progress: Callable[[int], None] | None = None,
@@ -137,8 +140,9 @@ def uncertain(
     largest width, that must be reached; tolerance: error [m] of the model; correlations: of pairs of random parameters;
     degree, count: of a method that has one; most: runs that may be made; verify: estimate mesh and step errors of
     extremal runs; limits: what must not happen, such as "B.y < -1.2"; limit_method: auto, form, importance, subset or
-    monte-carlo; limit_runs: for each of their probabilities; progress: is told how many runs there are. Raises
-    InputError, ComputationError.
+    monte-carlo; limit_runs: for each of their probabilities; allocate: look for the widest tolerances that keep the
+    limit, with `costs` (by path, else 1) of tightening each; target: probability of passing it that is allowed;
+    progress: is told how many runs there are. Raises InputError, ComputationError.
     """
     from shoal.response import uncertain
 
@@ -157,6 +161,9 @@ def uncertain(
         limits=limits,
         limit_method=limit_method,
         limit_runs=limit_runs,
+        allocate=allocate,
+        costs=costs,
+        target=target,
         verify=verify,
         seed=seed,
         progress=progress,

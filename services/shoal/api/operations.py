@@ -113,6 +113,7 @@ class Uncertain(OfScene):
     between outer and attained bounds, as a share of the width, to be reached; tolerance: error [m] of the model
     verify: estimate mesh and step errors of extremal runs; most: runs that may be made
     limits: what must not happen, such as "B.y < -1.2"; limit_method, limit_runs: for their probabilities
+    allocate: look for the widest tolerances that keep the limit, with `costs` by path and the `target` probability
     """
 
     follows: ClassVar[tuple[str, ...]] = ("runs",)
@@ -130,11 +131,14 @@ class Uncertain(OfScene):
     limits: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
     limit_method: BuiltIn = "auto"
     limit_runs: Annotated[int, Field(ge=100, le=20_000)] = 5_000
+    allocate: bool = False
+    costs: dict[Path, Positive] | None = None
+    target: Annotated[float, Field(gt=0, lt=0.5)] = 1e-3
 
     @property
     def runs(self) -> int:
-        """That may be made."""
-        return self.most + len(self.limits) * self.limit_runs
+        """That may be made, or nearly so."""
+        return self.most + (len(self.limits) + 4 * self.allocate) * self.limit_runs
 
 
 class AtRest(OfScene):

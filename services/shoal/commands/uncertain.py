@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
 from shoal.commands import options
 from shoal.commands.options import Out, Times, Values
 from shoal.errors import check_trusted
+
+if TYPE_CHECKING:
+    from shoal.response import Response
 
 
 def _methods() -> str:
@@ -45,6 +51,19 @@ def _ways() -> str:
 )
 @click.option("--limit-method", cls=options.LateHelp, told=_ways, default="auto", show_default=True, metavar="NAME")
 @click.option("--limit-runs", type=click.IntRange(100), default=5_000, show_default=True, help="For each probability.")
+@click.option("--allocate", is_flag=True, help="Look for the widest tolerances that keep the limit.")
+@click.option(
+    "--target", type=click.FloatRange(0, 0.5, True, True), default=1e-3, show_default=True, help="Of passing."
+)
+@click.option("--cost", "costs", multiple=True, metavar="PATH=COST", help="Of tightening one, else 1 (repeatable).")
+@click.option(
+    "--worst",
+    "worst_file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.yaml",
+    help="Write the scene that comes nearest to a limit, or goes furthest beyond, or attains a bound.",
+)
+@click.option("--worst-of", default="", metavar="LIMIT|BOUND", help="Which: a limit, or MARKER.QUANTITY.lower, .upper.")
 @options.engine
 @options.values
 @options.at
@@ -65,6 +84,11 @@ def uncertain(
     limits: tuple[str, ...],
     limit_method: str,
     limit_runs: int,
+    allocate: bool,
+    target: float,
+    costs: tuple[str, ...],
+    worst_file: Path | None,
+    worst_of: str,
     engine: str,
     values: Values,
     times: Times,
@@ -81,7 +105,7 @@ def uncertain(
     """
     from shoal.pictures import files
     from shoal.response import uncertain
-    from shoal.response.read import correlations, parameters
+    from shoal.response.read import correlations, parameters, prices
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
@@ -106,9 +130,25 @@ def uncertain(
             limits=limits,
             limit_method=limit_method,
             limit_runs=limit_runs,
+            allocate=allocate,
+            costs=prices(costs),
+            target=target,
             progress=lambda runs: tell(f"{wanted.name}: {runs} runs"),
         )
     if out is not None:
         files.response(response, out)
+    if worst_file is not None:
+        _save_worst(response, worst_file, worst_of)
     screen.show(response.to_json(), as_json, lambda: tables.response_table(response))
     check_trusted(response.ok, response.message)
+
+
+def _save_worst(response: Response, file: Path, of: str) -> None:
+    """One scene; those of several limits get numbers. Raises InputError, ComputationError."""
+    from shoal.response.worst import worst
+
+    cases = worst(response, of)
+    for k, case in enumerate(cases):
+        path = file if len(cases) == 1 else file.with_stem(f"{file.stem}-{k + 1}")
+        case.save(path)
+        click.echo(f"{path}: {case.scene.description}", err=True)

@@ -110,6 +110,14 @@ class Inputs:
         values = self.values(np.atleast_2d(germs))
         return np.stack([values[next(iter(one.factors))] for one in self.parameters], axis=1)
 
+    def at(self, named: Array) -> dict[str, float]:
+        """Path -> value where the parameters have these values, (parameters,), as the user states them."""
+        given = {}
+        for one, value in zip(self.parameters, named.tolist(), strict=True):
+            first = next(iter(one.factors.values()))
+            given.update({path: value * factor / first for path, factor in one.factors.items()})
+        return given
+
     def germs(self, x: Array) -> Array:
         """Germs at independent probabilities, both (runs, parameters)."""
         found = [

@@ -85,6 +85,20 @@ def correlations(pairs: Sequence[str]) -> Correlations | None:
     return found or None
 
 
+def prices(texts: Sequence[str]) -> dict[str, float]:
+    """PATH=COST texts. Raises InputError."""
+    found: dict[str, float] = {}
+    for text in texts:
+        name, _, cost = text.rpartition("=")
+        try:
+            found[name.strip()] = float(cost)
+        except ValueError:
+            name = ""
+        if not name:
+            raise InputError(f"cost: {text!r} is not PATH=COST, such as bodies.OA.length=2.5")
+    return found
+
+
 def _split(text: str) -> tuple[str, Any]:
     for sign in ("~", "="):
         name, found, known = text.partition(sign)

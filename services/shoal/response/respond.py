@@ -17,13 +17,22 @@ from shoal.engines.spot_checks import larger
 from shoal.engines.verification import verified
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import reach
+from shoal.response.allocation import (
+    TARGET,
+    Allocation,
+    Reached,
+    accepted,
+    costs_of,
+    of_distributions,
+    of_intervals,
+)
 from shoal.response.enclosure import Enclosure, enclosure
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.inputs import Correlations, Inputs, Parameter
 from shoal.response.limits import MOST as LIMIT_RUNS
-from shoal.response.limits import Judged, judge, limit
-from shoal.response.limits.judge import Reach
+from shoal.response.limits import Judged, Limit, judge, limit
+from shoal.response.limits.judge import Reach, watched
 from shoal.response.machine import QUANTITIES, Machine
 from shoal.response.methods import get_method
 from shoal.response.methods.bounds import HOPELESS
@@ -108,6 +117,9 @@ def uncertain(
     limits: Sequence[str] = (),
     limit_method: str = "auto",
     limit_runs: int = LIMIT_RUNS,
+    allocate: bool = False,
+    costs: Mapping[str, float] | None = None,
+    target: float = TARGET,
     progress: Callable[[int], None] | None = None,
 ) -> Response:
     """How the markers of a scene may move if some of its fields are known as intervals or distributions only.
@@ -118,7 +130,9 @@ def uncertain(
     degree, count: of a method that has one; tolerance: error [m] that the markers of the middle machine may have, for
     which the cheapest model is found; verify: estimate mesh and step errors of extremal runs; most: runs that may be
     made; limits: what must not happen, such as "B.y < -1.2"; limit_method: one of `WAYS`; limit_runs: for each of them;
-    progress: is told how many runs there are. Raises InputError, ComputationError.
+    allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of tightening each;
+    target: probability of passing it that is allowed; progress: is told how many runs there are. Raises
+    InputError, ComputationError.
     """
     begin = time.perf_counter()
     wanted = load_scene(scene) if isinstance(scene, str) else scene
@@ -127,6 +141,8 @@ def uncertain(
     if inputs.random.any() and not inputs.random.all():
         one, other = (inputs.names[int(np.argmax(inputs.random == kind))] for kind in (True, False))
         raise InputError(f"vary: {one} has a distribution and {other} an interval; give both the one or the other")
+    if allocate and len(limits) != 1:
+        raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")
     when, asked = sampling_times(wanted, times), [limit(text, wanted) for text in limits]
     if tolerance is not None:
         wanted = _modelled(wanted, inputs, tolerance, when, engine)
@@ -161,7 +177,10 @@ def uncertain(
         )
         for one in asked
     ]
+    allocation = _allocated(asked[0], machine, inputs, costs or {}, target, seed, most) if allocate else None
     status, message = _status(answer, gap, rejected, judged)
+    if status == "ok" and allocation is not None and not allocation.ok:
+        status, message = "allocation-not-met", allocation.message
     return Response(
         status=status,
         message=message,
@@ -182,7 +201,10 @@ def uncertain(
         statistics=answer.statistics,
         mesh_error=mesh,
         step_error=step,
+        stated=wanted,
+        engine=engine,
         limits=tuple(judged),
+        allocation=allocation,
     )
 
 
@@ -292,6 +314,23 @@ def _reach(inputs: Inputs, when: Array, gap: float | None, seed: int, most: int)
         return bounds.lower, outer, runs.germs[runs.values.argmin(axis=0)], runs.evaluations, runs.failed
 
     return reach
+
+
+def _allocated(
+    wanted: Limit, machine: Machine, inputs: Inputs, costs: Mapping[str, float], target: float, seed: int, most: int
+) -> Allocation:
+    """The cheapest tolerances that keep a limit."""
+    told, when = watched(machine, wanted), machine.times
+    prices, widest = costs_of(costs, inputs), accepted(machine.scene, inputs)
+    if inputs.random.all():
+        return of_distributions(wanted.text, told, inputs, target, prices, widest, seed)
+
+    def least(here: Inputs) -> Reached:
+        lower, outer, germs, evaluations, _ = _reach(here, when, None, seed, most)(told)
+        worst = int(lower.argmin())
+        return Reached(float(outer.min()), float(lower[worst]), germs[worst], evaluations)
+
+    return of_intervals(wanted.text, told, inputs, least, prices, widest)
 
 
 def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[Judged]) -> tuple[str, str]:

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from shoal.response.allocation import Allocation
 from shoal.response.inputs import Inputs
 from shoal.response.limits import Judged
 from shoal.response.marginals import Interval
 from shoal.response.statistics import QUANTILES, Statistics
+from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
 
@@ -39,7 +41,9 @@ class Response:
     status: ok, gap-not-reached, beyond-horizon, failed-runs or model-rejected; message: why it is not ok; why: what the
     method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds: None if a parameter is
     random; statistics: None if none is; columns are (instants, markers, quantities x, y, angle) in this order;
-    mesh_error, step_error: of extremal runs [m], None where not estimated; limits: of what must not happen
+    mesh_error, step_error: of extremal runs [m], None where not estimated; stated: the scene with its model in the
+    middle; engine: its name; limits: of what must not happen;
+    allocation: tolerances that keep the limit, where they were asked for
     """
 
     status: str
@@ -61,7 +65,10 @@ class Response:
     statistics: Statistics | None
     mesh_error: float | None
     step_error: float | None
+    stated: Scene
+    engine: str
     limits: tuple[Judged, ...] = ()
+    allocation: Allocation | None = None
 
     @property
     def ok(self) -> bool:
@@ -110,6 +117,7 @@ class Response:
             "mesh_error": plain(self.mesh_error),
             "step_error": plain(self.step_error),
             "limits": [one.to_json() for one in self.limits],
+            "allocation": None if self.allocation is None else self.allocation.to_json(),
         }
 
     def _parameters(self) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shoal.engines.contract import Engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.response.inputs import Inputs
@@ -16,7 +17,8 @@ from shoal.response.limits.limit import Limit
 from shoal.response.limits.margins import Margins
 from shoal.response.machine import Machine
 from shoal.response.runs import Model
-from shoal.trajectory import Array
+from shoal.scene import Scene
+from shoal.trajectory import Array, Trajectory
 
 MOST = 5_000
 """Runs for the probability of a limit unless another number is asked for."""
@@ -28,6 +30,14 @@ Reach = Callable[[Model], tuple[Array, Array, Array, int, int]]
 def watched(machine: Machine, limit: Limit) -> Machine:
     """The same machine, of which the margins of a limit are told."""
     return replace(machine, told=limit.margins)
+
+
+def _show(limit: Limit, machine: Machine, inputs: Inputs, germ: Array, verify: bool) -> Shown:
+    named = inputs.named(germ[None])[0]
+    if verify:
+        return show(limit, machine.scene, machine.times, machine.engine, inputs, named)
+    motion = machine.engine.simulate(machine.scene.with_values(inputs.at(named)), machine.times)
+    return _shown(limit, machine.times, inputs, named, motion)
 
 
 def judge(
@@ -53,7 +63,7 @@ def judge(
         passing = probability(margins, way, seed)
         shown = None
         if passing.points:
-            shown = show(limit, machine, inputs, inputs.standard(passing.points[0].place[None])[0], verify=verify)
+            shown = _show(limit, machine, inputs, inputs.standard(passing.points[0].place[None])[0], verify)
         nan = float("nan")
         return Judged(
             limit, way, inputs, times, passing, None, nan, nan, shown, margins.evaluations, margins.failed, margins.why
@@ -63,25 +73,26 @@ def judge(
     lower, outer, germs, evaluations, failed = reach(told)
     worst = int(lower.argmin())
     kept = False if lower[worst] < 0 else True if outer.min() >= 0 else None
-    shown = show(limit, machine, inputs, germs[worst], verify=verify)
+    shown = _show(limit, machine, inputs, germs[worst], verify)
     return Judged(
         *(limit, "bounds", inputs, times, None, kept, float(lower[worst]), float(outer.min())),
         *(shown, evaluations, failed, ""),
     )
 
 
-def show(limit: Limit, machine: Machine, inputs: Inputs, germ: Array, *, verify: bool) -> Shown:
-    """Run the machine at one germ once more, with care."""
-    values = {path: float(at[0]) for path, at in inputs.values(germ[None]).items()}
-    scene = machine.scene.with_values(values)
-    motion = verified(machine.engine, scene, machine.times) if verify else machine.engine.simulate(scene, machine.times)
+def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Inputs, named: Array) -> Shown:
+    """Run a scene once more, with care, with these values of the parameters, (parameters,). Raises InputError."""
+    return _shown(limit, times, inputs, named, verified(engine, scene.with_values(inputs.at(named)), times))
+
+
+def _shown(limit: Limit, times: Array, inputs: Inputs, named: Array, motion: Trajectory) -> Shown:
     margins = limit.margins(motion)[0]
     estimated = motion.model.get("verification", {})
     instant = int(np.argmin(margins))
     return Shown(
-        dict(zip(inputs.names, inputs.named(germ[None])[0].tolist(), strict=True)),
-        values,
-        float(machine.times[instant]),
+        dict(zip(inputs.names, named.tolist(), strict=True)),
+        inputs.at(named),
+        float(times[instant]),
         float(margins[instant]),
         str(motion.status[0]),
         motion.message,
