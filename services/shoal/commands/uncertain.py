@@ -71,7 +71,7 @@ def _ways() -> str:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @options.verify
 @options.as_json
-@options.out(".csv", ".json", ".png")
+@options.out(".html", ".nc", ".csv", ".json", ".png")
 def uncertain(
     scene: str,
     vary: tuple[str, ...],
