@@ -129,6 +129,8 @@ def uncertain(
     allocate: bool = False,
     costs: Mapping[str, float] | None = None,
     target: float = 1e-3,
+    checkpoint: Path | str | None = None,
+    time_limit: float | None = None,
     verify: bool = True,
     seed: int = 0,
     progress: Callable[[int], None] | None = None,
@@ -142,7 +144,8 @@ def uncertain(
     extremal runs; limits: what must not happen, such as "B.y < -1.2"; limit_method: auto, form, importance, subset or
     monte-carlo; limit_runs: for each of their probabilities; allocate: look for the widest tolerances that keep the
     limit, with `costs` (by path, else 1) of tightening each; target: probability of passing it that is allowed;
-    progress: is told how many runs there are. Raises InputError, ComputationError.
+    checkpoint: file that keeps the runs, from which the same study goes on; time_limit [s]: after which it ends with
+    what is known; progress: is told how many runs there are. Raises InputError, ComputationError.
     """
     from shoal.response import uncertain
 
@@ -164,6 +167,8 @@ def uncertain(
         allocate=allocate,
         costs=costs,
         target=target,
+        checkpoint=checkpoint,
+        time_limit=time_limit,
         verify=verify,
         seed=seed,
         progress=progress,

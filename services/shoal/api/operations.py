@@ -114,6 +114,7 @@ class Uncertain(OfScene):
     verify: estimate mesh and step errors of extremal runs; most: runs that may be made
     limits: what must not happen, such as "B.y < -1.2"; limit_method, limit_runs: for their probabilities
     allocate: look for the widest tolerances that keep the limit, with `costs` by path and the `target` probability
+    time_limit: in s, after which it ends with what is known
     """
 
     follows: ClassVar[tuple[str, ...]] = ("runs",)
@@ -134,6 +135,7 @@ class Uncertain(OfScene):
     allocate: bool = False
     costs: dict[Path, Positive] | None = None
     target: Annotated[float, Field(gt=0, lt=0.5)] = 1e-3
+    time_limit: Positive | None = None
 
     @property
     def runs(self) -> int:

@@ -64,6 +64,12 @@ def _ways() -> str:
     help="Write the scene that comes nearest to a limit, or goes furthest beyond, or attains a bound.",
 )
 @click.option("--worst-of", default="", metavar="LIMIT|BOUND", help="Which: a limit, or MARKER.QUANTITY.lower, .upper.")
+@click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="For all of it.")
+@click.option(
+    "--checkpoint",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Keep the runs in this file; where it exists, go on from it.",
+)
 @options.engine
 @options.values
 @options.at
@@ -89,6 +95,8 @@ def uncertain(
     costs: tuple[str, ...],
     worst_file: Path | None,
     worst_of: str,
+    time_limit: float | None,
+    checkpoint: Path | None,
     engine: str,
     values: Values,
     times: Times,
@@ -133,6 +141,8 @@ def uncertain(
             allocate=allocate,
             costs=prices(costs),
             target=target,
+            checkpoint=checkpoint,
+            time_limit=time_limit,
             progress=lambda runs: tell(f"{wanted.name}: {runs} runs"),
         )
     if out is not None:

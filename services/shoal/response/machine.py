@@ -10,6 +10,7 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.errors import InputError
 from shoal.response.inputs import BoolArray
+from shoal.response.kept import Keep
 from shoal.response.runs import Answers
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
@@ -26,13 +27,15 @@ LEAST_TOLERANCE = 1e-14
 class Machine:
     """Call it with path -> values. Columns: instants, markers and quantities (x, y [m] and angle [rad]), in this order.
 
-    columns: their number along each of the three; told: what is told of a motion instead, (lanes, columns)
+    columns: their number along each of the three; told: what is told of a motion instead, (lanes, columns);
+    keep: of the runs
     """
 
     scene: Scene
     times: Array
     engine: Engine
     told: Callable[[Trajectory], Array] = field(default_factory=lambda: _columns)
+    keep: Keep | None = None
 
     @property
     def columns(self) -> tuple[int, int, int]:
@@ -44,7 +47,7 @@ class Machine:
         count = len(next(iter(values.values())))
         chunk = max(64, CHUNK // int(np.prod(self.columns)))
         parts = [
-            self._some({path: lanes[k : k + chunk] for path, lanes in values.items()}) for k in range(0, count, chunk)
+            self._known({path: lanes[k : k + chunk] for path, lanes in values.items()}) for k in range(0, count, chunk)
         ]
         return Answers(
             np.concatenate([part.values for part in parts]),
@@ -52,6 +55,11 @@ class Machine:
             sum(part.repeated for part in parts),
             next((part.why for part in parts if part.why), ""),
         )
+
+    def _known(self, values: Mapping[str, Array]) -> Answers:
+        if self.keep is None:
+            return self._some(values)
+        return self.keep(repr(getattr(self.told, "__self__", "markers")), values, self._some)
 
     def _some(self, values: Mapping[str, Array]) -> Answers:
         motion = self.engine.simulate_many(self.scene, values, self.times)

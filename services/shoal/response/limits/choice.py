@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.response.kept import TimeIsUpError
 from shoal.response.limits.estimate import Estimate, weighted
 from shoal.response.limits.form import DesignPoint, design_points, distinct
 from shoal.response.limits.importance import Sample, adapted, around, sample
@@ -172,6 +173,8 @@ def probability(margins: Margins, way: str, seed: int) -> Passing:
     """Raises InputError, also where there are too few runs."""
     try:
         return get_way(way)(margins, seed)
+    except TimeIsUpError:
+        raise
     except TooManyRunsError:
         raise InputError(f"limit-runs: {way} needs more than the {margins.most} runs that it may make") from None
 
