@@ -9,6 +9,7 @@ import click
 
 from shoal.commands import options
 from shoal.commands.options import Out, Times, Values
+from shoal.commands.stated import stated
 from shoal.errors import check_trusted
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def _ways() -> str:
 
 
 @click.command()
-@click.argument("scene")
+@click.argument("scene", is_eager=True, callback=stated)
 @click.option(
     "--vary",
     "vary",
@@ -109,7 +110,8 @@ def uncertain(
     """How SCENE may move if some of its fields are intervals or distributions.
 
     Intervals give bounds that runs attain, distributions give means, deviations, quantiles and Sobol indices. A limit
-    tells what must not happen: with intervals whether it can, with distributions how probable it is.
+    tells what must not happen: with intervals whether it can, with distributions how probable it is. SCENE may be a
+    YAML `uncertain: {scene: ..., vary: ..., ...}` that states these options.
     """
     from shoal.pictures import files
     from shoal.response import uncertain
