@@ -28,8 +28,9 @@ def _force(tile, held, packed, t, z, zdot, f, power):
 def loads(coefficient: Array, factor: Array) -> Applied:
     """Fixed loads on rows 0, 1 and 1; loads at (0, 1) and (2, 3) that turn with (2, 3) and (4, 5)."""
     return Applied(
-        3, np.array([0, 1, 1]), np.ravel(coefficient), np.array([-1, 0, 1]),
+        (0, 0), 3, np.array([0, 1, 1]), np.ravel(coefficient), np.array([-1, 0, 1]),
         2, np.array([0, 1, 2, 3, 2, 3, 4, 5]), np.ravel(factor), np.array([1, -1]),
+        0, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -69,6 +70,11 @@ def test_lanes_are_what_they_are_alone() -> None:
 
 def test_nothing_from_no_loads() -> None:
     none, rows = np.zeros(0), np.zeros(0, dtype=np.int64)
-    found, power = force(SINGLE, Applied(0, rows, none, rows, 0, rows, none, rows), np.ones((6, 1)), np.ones((6, 1)))
+    found, power = force(
+        SINGLE,
+        Applied((0, 0), 0, rows, none, rows, 0, rows, none, rows, 0, rows, rows),
+        np.ones((6, 1)),
+        np.ones((6, 1)),
+    )
     assert not found.any()
     assert power[0] == pytest.approx(0.0)

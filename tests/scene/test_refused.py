@@ -49,7 +49,7 @@ GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": 
         pytest.param(("joints.A.damping", 1), "joints.A.damping", "Extra inputs", id="unknown-joint-field"),
         pytest.param(("bodies.OA.length", math.nan), "bodies.OA.length", "finite", id="nan"),
         pytest.param(("gravity", [0.0, math.inf]), "gravity.1", "finite", id="infinite-gravity"),
-        pytest.param(("gravity", [0.0]), "gravity.1", "required", id="one-component-of-gravity"),
+        pytest.param(("gravity", [0.0]), "gravity", "at least 2 items", id="one-component-of-gravity"),
         pytest.param(("bodies.OA.length", "long"), "bodies.OA.length", "number", id="text-for-a-number"),
         pytest.param(("bodies.OA.length", GONE), "bodies.OA.length", "required", id="missing-length"),
         pytest.param(

@@ -13,6 +13,7 @@ from shoal.scene.joints import places
 
 T = TypeVar("T")
 FEATURES = (
+    "machines in space",
     "point masses",
     "free bodies",
     "closed loops",
@@ -31,6 +32,8 @@ _LAWS = {"elastic": "nonlinear springs", "length": "varying distances"}
 
 def needs(scene: Scene) -> Iterator[tuple[str, str]]:
     """What a scene needs: the field that asks for it, and the kind or feature."""
+    if scene.dimensions == 3:
+        yield "dimensions", "machines in space"
     for name, body in scene.bodies.items():
         where = f"bodies.{name}"
         yield f"{where}.element", body.element

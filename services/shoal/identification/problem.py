@@ -13,6 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 from shoal.errors import InputError
 from shoal.identification.recording.source import Channel, EngineSource, FileSource, Source
 from shoal.scene import Scene, expression, load_scene
+from shoal.scene.dimensions import require_plane
 from shoal.scene.load import names, read_named
 from shoal.scene.record import Positive, Record, one_line
 from shoal.scene.scene import Name
@@ -150,6 +151,7 @@ class Problem(Record):
         """The scene to fit, with this problem's and the given values set, and every path checked. Raises InputError."""
         scene = load_scene(self.scene)
         scene = scene.with_values({**self.values, **(values or {})})
+        require_plane(scene, "identification is")
         for name, parameter in self.parameters.items():
             if parameter.path is None or parameter.of_measurement:
                 continue

@@ -16,8 +16,13 @@ class Applied(NamedTuple):
 
     fixed: coefficient * function(t) on one row each (a force [N] on a point's row, or whatever is dual to the
     row); coefficient: (fixed, lanes). following: four rows each, those of the point and of the direction d that
-    it turns with, and factor fx, fy [N], (2 * following, lanes): the force (fx + i fy) d/|d| * function(t).
+    it turns with, and factor fx, fy [N], (2 * following, lanes): the force (fx + i fy) d/|d| * function(t). In space
+    twelve rows, of the point and of the body's directors d, and three factors: the sum of f_k d_k. turning: in space,
+    a torque n * function(t) [N m] on a body, as n x d/2 on each of its directors; turned: twelve rows each, those of n
+    and of the directors. space: a tuple as long as vectors are.
     """
+
+    space: tuple[int, ...]
 
     fixed: int
     row: Index
@@ -27,6 +32,9 @@ class Applied(NamedTuple):
     rows: Index
     factor: Array
     following_function: Index
+    turning: int
+    turned: Index
+    turning_function: Index
 
 
 @njit(cache=True, error_model="numpy")
@@ -47,6 +55,9 @@ def add_force(
             load = loads.coefficient[number * width + lane] * strength
             f[row + lane] += load
             power[lane] -= load * zdot[row + lane]
+    if len(loads.space) == 3:
+        _add_spatial(tile, loads, functions, t, z, zdot, f, power)
+        return
     for number in range(loads.following):
         px, py = loads.rows[4 * number] * width, loads.rows[4 * number + 1] * width
         dx, dy = loads.rows[4 * number + 2] * width, loads.rows[4 * number + 3] * width
@@ -59,3 +70,34 @@ def add_force(
             f[px + lane] += fx * x - fy * y
             f[py + lane] += fx * y + fy * x
             power[lane] -= (fx * x - fy * y) * zdot[px + lane] + (fx * y + fy * x) * zdot[py + lane]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_spatial(
+    tile: Tile, loads: Applied, functions: Functions, t: float, z: Array, zdot: Array, f: Array, power: Array
+) -> None:
+    """Forces and torques that turn with bodies in space."""
+    width = len(tile)
+    for number in range(loads.following):
+        strength = _strength(functions, loads.following_function[number], t)
+        for k in range(3):
+            row = loads.rows[12 * number + k] * width
+            for j in range(3):
+                director = loads.rows[12 * number + 3 + 3 * j + k] * width
+                for lane in range(width):
+                    load = strength * loads.factor[(3 * number + j) * width + lane] * z[director + lane]
+                    f[row + lane] += load
+                    power[lane] -= load * zdot[row + lane]
+    for number in range(loads.turning):
+        strength = 0.5 * _strength(functions, loads.turning_function[number], t)
+        for j in range(3):
+            for k in range(3):
+                row = loads.turned[12 * number + 3 + 3 * j + k] * width
+                one, other = (k + 1) % 3, (k + 2) % 3
+                n1, n2 = loads.turned[12 * number + one] * width, loads.turned[12 * number + other] * width
+                d1 = loads.turned[12 * number + 3 + 3 * j + one] * width
+                d2 = loads.turned[12 * number + 3 + 3 * j + other] * width
+                for lane in range(width):
+                    load = strength * (z[n1 + lane] * z[d2 + lane] - z[n2 + lane] * z[d1 + lane])
+                    f[row + lane] += load
+                    power[lane] -= load * zdot[row + lane]

@@ -18,7 +18,8 @@ from shoal.mechanics.numerics.vector import add_product, clear, copy
 
 DISTANCE, ANGLE, PLACE = 0, 1, 2
 """Measures: |b - a| [m] of two points; the angle [rad] of the plane from direction a to direction b, over any number of
-turns; where point b lies relative to point a along direction d, (b - a).d/|d| [m]."""
+turns (in space: about an axis at right angles to both, d being a turned about it by 90 degrees); where point b lies
+relative to point a along direction d, (b - a).d/|d| [m]."""
 
 STIFFNESS, CUBIC, DAMPING, NATURAL, COULOMB, SPEED, AMPLITUDE = range(7)
 LAW = 7
@@ -70,8 +71,13 @@ def initial_memory(tile: Tile, forces: Forces, z: Array, intended: Array) -> Arr
     """
     d = len(forces.space)
     rows, at = forces.rows.reshape(-1, 3 * d), z.reshape(-1, len(tile))
-    first, second = ((at[rows[:, k]], at[rows[:, k + 1]]) for k in (0, d))
-    angle = np.asarray(plane.angle(second) - plane.angle(first))
+    first, second = (np.stack([at[rows[:, k]], at[rows[:, k + 1]]]) for k in (0, d))
+    if d == plane.DIMENSIONS:
+        angle = np.asarray(plane.angle(second) - plane.angle(first))
+    else:
+        ahead = at[rows[:, 2 * d : 3 * d]]
+        first, second = (at[rows[:, k : k + d]] for k in (0, d))
+        angle = np.arctan2(np.sum(ahead * second, axis=1), np.sum(first * second, axis=1))
     angle -= _TURN * np.rint(angle / _TURN)
     memory = angle + _TURN * np.rint((intended.reshape(angle.shape) - angle) / _TURN)
     return np.where(forces.kind[:, None] == ANGLE, memory, 0.0).ravel()
@@ -84,12 +90,67 @@ def _angle(ax, ay, bx, by, last):  # type: ignore[no-untyped-def]
     return last + (change - _TURN * np.floor(change / _TURN + 0.5))
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _turned(width: int, lane: int, w: Array) -> tuple[float, float]:
+    """In space, with a, b and d in w: b.a and b.d, which are r cos and r sin of the angle."""
+    x, y = 0.0, 0.0
+    for k in range(3):
+        b = w[(3 + k) * width + lane]
+        x += b * w[k * width + lane]
+        y += b * w[(6 + k) * width + lane]
+    return x, y
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _gradient_of_turn(width: int, lane: int, w: Array) -> None:
+    """In space: the gradient (x dy - y dx)/r^2 of the angle, into w."""
+    x, y = _turned(width, lane, w)
+    square = x * x + y * y
+    for k in range(3):
+        a, b, ahead = w[k * width + lane], w[(3 + k) * width + lane], w[(6 + k) * width + lane]
+        w[(9 + k) * width + lane] = -y * b / square
+        w[(12 + k) * width + lane] = (x * ahead - y * a) / square
+        w[(15 + k) * width + lane] = x * b / square
+
+
+@njit(cache=True, error_model="numpy")
+def _bend_turn(width: int, lane: int, elastic: float, w: Array, out: Array, base: int) -> None:
+    """In space: add F times the second derivatives of an angle to a block.
+
+    With x = a.b, y = d.b and g = atan2(y, x): g_xx = -g_yy = 2xy/r^4, g_xy = (y^2 - x^2)/r^4, times the derivatives of
+    x and y, and g_x, g_y where a or d meets b.
+    """
+    x, y = _turned(width, lane, w)
+    square = x * x + y * y
+    xx, xy = 2.0 * x * y / (square * square), (y * y - x * x) / (square * square)
+    for i in range(9):
+        for j in range(9):
+            # x depends on a by b and on b by a; y on b by d and on d by b.
+            xi = w[(3 + i) * width + lane] if i < 3 else w[(i - 3) * width + lane] if i < 6 else 0.0
+            xj = w[(3 + j) * width + lane] if j < 3 else w[(j - 3) * width + lane] if j < 6 else 0.0
+            yi = 0.0 if i < 3 else w[(i + 3) * width + lane] if i < 6 else w[(i - 3) * width + lane]
+            yj = 0.0 if j < 3 else w[(j + 3) * width + lane] if j < 6 else w[(j - 3) * width + lane]
+            value = xx * (xi * xj - yi * yj) + xy * (xi * yj + yi * xj)
+            if abs(i - j) == 3:
+                value += (-y if min(i, j) < 3 else x) / square
+            out[base + (9 * i + j) * width] += elastic * value
+
+
 @njit(cache=True, error_model="numpy")
 def remember(tile: Tile, forces: Forces, z: Array, memory: Array) -> None:
     """Follow the angles after a step of less than half a turn; memory: (elements, lanes). Pointers."""
     width, d = len(tile), len(forces.space)
     for number in range(forces.size):
-        if forces.kind[number] == ANGLE:
+        if forces.kind[number] == ANGLE and d == 3:
+            first = 9 * number
+            for lane in range(width):
+                slot, x, y = number * width + lane, 0.0, 0.0
+                for k in range(3):
+                    b = z[forces.rows[first + 3 + k] * width + lane]
+                    x += b * z[forces.rows[first + k] * width + lane]
+                    y += b * z[forces.rows[first + 6 + k] * width + lane]
+                memory[slot] = _angle(1.0, 0.0, x, y, memory[slot])
+        elif forces.kind[number] == ANGLE:
             first = side(forces) * number
             ax, ay = forces.rows[first] * width, forces.rows[first + 1] * width
             bx, by = forces.rows[first + d] * width, forces.rows[first + d + 1] * width
@@ -108,7 +169,9 @@ def _gradient(tile: Tile, forces: Forces, number: int, z: Array, w: Array) -> No
         clear(tile, w, rows + k)
     for lane in range(width):
         out, value = rows * width + lane, 0.0
-        if kind == ANGLE:
+        if kind == ANGLE and d == 3:
+            _gradient_of_turn(width, lane, w)
+        elif kind == ANGLE:
             ax, ay, bx, by = w[lane], w[width + lane], w[d * width + lane], w[(d + 1) * width + lane]
             a, b = 1.0 / (ax * ax + ay * ay), 1.0 / (bx * bx + by * by)
             w[out], w[out + width] = ay * a, -ax * a
@@ -145,7 +208,11 @@ def measure(tile: Tile, forces: Forces, number: int, z: Array, memory: Array, w:
         value = w[row + lane]
         if forces.kind[number] == ANGLE:
             last = memory[number * width + lane]
-            value = _angle(w[lane], w[width + lane], w[d * width + lane], w[(d + 1) * width + lane], last)
+            if d == 3:
+                x, y = _turned(width, lane, w)
+                value = _angle(1.0, 0.0, x, y, last)
+            else:
+                value = _angle(w[lane], w[width + lane], w[d * width + lane], w[(d + 1) * width + lane], last)
         w[row + lane] = value - forces.law[natural + lane]
 
 
@@ -255,7 +322,9 @@ def tangent(
                 for j in range(rows):
                     product = w[(rows + i) * width + lane] * w[(rows + j) * width + lane]
                     out[base + (rows * i + j) * width] = slope * product
-            if kind == ANGLE:
+            if kind == ANGLE and d == 3:
+                _bend_turn(width, lane, elastic, w, out, base)
+            elif kind == ANGLE:
                 # Of atan2(y, x): xy/r^4 [[2, .], [., -2]] and (y^2 - x^2)/r^4 off the diagonal.
                 for end in range(2):
                     vx, vy = w[end * d * width + lane], w[(end * d + 1) * width + lane]

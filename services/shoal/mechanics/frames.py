@@ -58,7 +58,7 @@ class RigidFrame:
     @property
     def vectors(self) -> list[Affine]:
         """The vectors that are its coordinates when it is free: in the plane the first director turns the second."""
-        return [self.origin, self.directors[0]]
+        return [self.origin, *(self.directors[:1] if len(self.directors) == plane.DIMENSIONS else self.directors)]
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class BeamFrame:
 
 def is_on_axis(place: Place) -> bool:
     """Whether a place of a rod has no offset from its axis."""
-    return not np.any(place[1])
+    return not any(np.any(offset) for offset in place[1:])
 
 
 Frame = PointFrame | RigidFrame | BeamFrame

@@ -142,13 +142,14 @@ _FAMILY_GATES: dict[str, Kernel] = {
 """Gates of one family of elements, and the types of their arguments after the tile and the family."""
 
 compilation.watch()
-_FOUND: dict[tuple[str, int, type], int] = {}
-_READY: dict[tuple[int, bool, tuple[bool, ...]], Gates] = {}
+_FOUND: dict[tuple[str, int, type, int], int] = {}
+_READY: dict[tuple[int, int, bool, tuple[bool, ...]], Gates] = {}
 
 
 def ready(tile: Tile, arrays: Arrays, room: Work) -> Arrays:
     """The same arrays with a home of their own and the gates that they have a use for."""
-    key = len(tile), arrays.constraints.size > 0, tuple(family.size > 0 for family in arrays.elements)
+    acting = tuple(family.size > 0 for family in arrays.elements)
+    key = len(tile), len(arrays.space), arrays.constraints.size > 0, acting
     if key not in _READY:
         wanted = _wanted(arrays)
         motion, energies, constrain, settle = (
@@ -187,7 +188,7 @@ def _kernel(name: str, tile: Tile, *parts: Any) -> Kernel:
 
 
 def _address(name: str, tile: Tile, *parts: Any) -> int:
-    key = name, len(tile), type(parts[0])
+    key = name, len(tile), type(parts[0]), len(getattr(parts[0], "space", ()))
     if key not in _FOUND:
         _FOUND[key] = gate.address(*_kernel(name, tile, *parts))
     return _FOUND[key]

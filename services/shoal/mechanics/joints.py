@@ -17,17 +17,22 @@ from shoal.scene import (
     GROUND,
     Attachment,
     Coupling,
+    Cylindrical,
     Distance,
     DrivenAngle,
     Function,
     Parallel,
     Perpendicular,
+    Planar,
     Revolute,
     Scene,
     Slider,
+    Spherical,
+    Universal,
     Weld,
 )
 from shoal.scene.joints import CoupledCoordinate
+from shoal.scene.record import Vector3
 
 
 @dataclass(frozen=True)
@@ -40,11 +45,14 @@ class Meet:
 
 @dataclass(frozen=True)
 class Along:
-    """The second place stays on a line through the first; direction: of the line in the first body's frame [rad]."""
+    """The second place stays on a line through the first; direction: of the line in the first body's frame [rad].
+
+    In space the direction may be an axis as it points at the start.
+    """
 
     first: Attachment
     second: Attachment
-    direction: Number
+    direction: Number | Vector3
 
     @property
     def is_fixed(self) -> bool:
@@ -98,7 +106,46 @@ class Sum:
     value: Function
 
 
+@dataclass(frozen=True)
+class Aligned:
+    """An axis of both bodies; None: the first body's x axis, parallel to the second's, whichever way that points."""
+
+    first: Attachment
+    second: Attachment
+    axis: Vector3 | None
+
+
+@dataclass(frozen=True)
+class Square:
+    """An axis of the first body stays at a right angle to one of the second; None: their x axes."""
+
+    first: Attachment
+    second: Attachment
+    axis: Vector3 | None
+    second_axis: Vector3 | None
+
+
+@dataclass(frozen=True)
+class InPlane:
+    """The second place stays in a plane through the first, normal to an axis of the first body."""
+
+    first: Attachment
+    second: Attachment
+    axis: Vector3
+
+
+@dataclass(frozen=True)
+class Hinged:
+    """The angle [rad] from the first body's direction to the second's about an axis of both follows a function."""
+
+    first: Attachment
+    second: Attachment
+    angle: Function
+    axis: Vector3
+
+
 Condition = Meet | Along | Apart | Turned | Sum
+"""What the plane knows; the others are of space."""
 
 
 def _slider(joint: Slider) -> list[Condition]:
@@ -118,11 +165,43 @@ CONDITIONS: dict[type, Callable[[Any], list[Condition]]] = {
 }
 
 
-def conditions(joint: Any) -> list[Condition]:
+def _spatial_slider(joint: Slider) -> list[Any]:
+    line = Along(joint.first, joint.second, joint.direction if joint.axis is None else joint.axis)
+    return [line, Turned(joint.first, joint.second)] if joint.rotation == "locked" else [line]
+
+
+def _planar(joint: Planar) -> list[Any]:
+    plane = InPlane(joint.first, joint.second, joint.axis)
+    if joint.rotation == "free":
+        return [plane]
+    if joint.rotation == "locked":
+        return [plane, Turned(joint.first, joint.second)]
+    return [plane, Aligned(joint.first, joint.second, joint.axis)]
+
+
+SPATIAL: dict[type, Callable[[Any], list[Any]]] = {
+    Revolute: lambda j: [Meet(j.first, j.second), Aligned(j.first, j.second, j.axis)],
+    Spherical: lambda j: [Meet(j.first, j.second)],
+    Universal: lambda j: [Meet(j.first, j.second), Square(j.first, j.second, j.axis, j.second_axis)],
+    Cylindrical: lambda j: [Along(j.first, j.second, j.axis), Aligned(j.first, j.second, j.axis)],
+    Planar: _planar,
+    Weld: CONDITIONS[Weld],
+    Slider: _spatial_slider,
+    Distance: CONDITIONS[Distance],
+    Parallel: lambda j: [Aligned(j.first, j.second, None)],
+    Perpendicular: lambda j: [Square(j.first, j.second, None, None)],
+    DrivenAngle: lambda j: [Hinged(j.first, j.second, j.angle, j.axis)],
+    Coupling: CONDITIONS[Coupling],
+}
+"""The conditions of every kind of joint in space, where axes point as they do at the start."""
+
+
+def conditions(joint: Any, dimensions: int = 2) -> list[Any]:
     """The conditions of a joint. Raises NotImplementedError for a kind that nobody told the mechanics of."""
-    if type(joint) not in CONDITIONS:
+    table = CONDITIONS if dimensions == 2 else SPATIAL
+    if type(joint) not in table:
         raise NotImplementedError(f"the mechanics knows no conditions of a joint of kind {joint.kind!r}")
-    return CONDITIONS[type(joint)](joint)
+    return table[type(joint)](joint)
 
 
 def unknown(condition: Any) -> NotImplementedError:
@@ -130,10 +209,10 @@ def unknown(condition: Any) -> NotImplementedError:
     return NotImplementedError(f"nobody says here what a condition {type(condition).__name__} does")
 
 
-def of_scene(scene: Scene) -> Iterator[tuple[str, Condition]]:
+def of_scene(scene: Scene) -> Iterator[tuple[str, Any]]:
     """The conditions of all joints, in the order of the scene, with the name of the joint."""
     for name, joint in scene.joints.items():
-        yield from ((name, condition) for condition in conditions(joint))
+        yield from ((name, condition) for condition in conditions(joint, scene.dimensions))
 
 
 def weld_of(conditions: list[Condition]) -> Turned | None:

@@ -16,6 +16,7 @@ from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
+from shoal.mechanics.assembly.space import start as spatial
 from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gates import Seek
@@ -195,6 +196,11 @@ class Machine:
     def _started(self, begun: Array) -> dict[str, Any]:
         """The start as it is used, what of it was stated otherwise, and joints whose forces are not unique."""
         scene, model = self.scene, self.model
+        if scene.dimensions == 3:
+            used = spatial.begun(model.frames, model.scene, *np.split(begun, 2))
+            redundant = spatial.redundant(scene, begun[: model.unknowns])
+            told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
+            return dict(plain(told))
         used = start.begun(model.frames, model.scene, *np.split(begun, 2))
         redundant = () if start.is_direct(scene) else redundant_joints(start.complete(scene).scene)
         told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}

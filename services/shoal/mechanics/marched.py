@@ -198,6 +198,8 @@ def told(
             near = np.inf
             for anchor in range(len(anchors)):
                 distance = np.hypot(x - anchors[anchor, 0, at], y - anchors[anchor, 1, at])
+                for i in range(2, d):
+                    distance = np.hypot(distance, record.samples[row + i * width] - anchors[anchor, i, at])
                 near = near if distance > near else distance
             farthest = _larger(farthest, near)
             for i in range(d):

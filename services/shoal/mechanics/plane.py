@@ -19,9 +19,9 @@ CROSS = QUARTER.T
 """The form u' CROSS w = u x w."""
 
 
-def vector(x: Number, y: Number) -> Array:
-    """The vector of two components, (2, lanes)."""
-    return np.stack(np.broadcast_arrays(np.atleast_1d(np.asarray(x, dtype=float)), np.asarray(y, dtype=float)))
+def vector(*components: Number) -> Array:
+    """The vector of these components, (d, lanes)."""
+    return np.stack(np.broadcast_arrays(*(np.atleast_1d(np.asarray(one, dtype=float)) for one in components)))
 
 
 def unit(angle: Number) -> Array:

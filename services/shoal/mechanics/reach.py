@@ -7,7 +7,8 @@ energy of a run bounds its reach.
 
 from __future__ import annotations
 
-from itertools import combinations
+from functools import reduce
+from itertools import combinations, zip_longest
 from typing import Any
 
 import numpy as np
@@ -57,8 +58,9 @@ def span(scene: Scene) -> float:
 def _widest(found: list[Any]) -> Array:
     """The largest distance between two of these places, () or (lanes,)."""
     longest = np.zeros(())
-    for (x, y), (other_x, other_y) in combinations(found, 2):
-        longest = np.maximum(longest, np.hypot(np.subtract(x, other_x), np.subtract(y, other_y)))
+    for one, other in combinations(found, 2):
+        away = (np.subtract(a, b) for a, b in zip_longest(one, other, fillvalue=0.0))
+        longest = np.maximum(longest, reduce(np.hypot, away))
     return longest
 
 
@@ -108,15 +110,15 @@ def anchors(scene: Scene) -> Array:
     """Places on the ground that joints hold, or its origin if there are none [m], (anchors, d, lanes or 1)."""
     sides = (side for tether in _tethers(scene) for side in (tether.first, tether.second))
     found = [plane.vector(*scene.location(side)) for side in sides if side.body == GROUND]
-    found = found or [plane.vector(*(0.0,) * plane.DIMENSIONS)]
+    found = found or [plane.vector(*(0.0,) * scene.dimensions)]
     lanes = max(place.shape[1] for place in found)
-    return np.stack([np.broadcast_to(place, (plane.DIMENSIONS, lanes)) for place in found])
+    return np.stack([np.broadcast_to(place, (scene.dimensions, lanes)) for place in found])
 
 
 def distance_to_ground(scene: Scene, points: Array) -> Array:
     """Distance of every marker to the nearest anchor on the ground [m], (samples, markers, lanes).
 
-    points: (samples, markers, 2, lanes).
+    points: (samples, markers, d, lanes).
     """
-    distances = [np.hypot(points[:, :, 0] - x, points[:, :, 1] - y) for x, y in anchors(scene)]
+    distances = [np.linalg.norm(points - anchor, axis=2) for anchor in anchors(scene)]
     return np.asarray(np.min(distances, axis=0))

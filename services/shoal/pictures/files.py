@@ -63,10 +63,10 @@ def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selectio
 
 
 def columns(motion: Trajectory, digits: Callable[[float], str]) -> str:
-    """Time [s], x and y [m] and angle [rad] of every marker of one lane, separated by commas; digits: a number's."""
+    """Time [s], place [m] and angle [rad] of every marker of one lane, separated by commas; digits: a number's."""
     names, table = ["t"], [motion.times]
     for name in motion.markers:
-        names += [f"{name}.x", f"{name}.y", f"{name}.angle"]
+        names += [*(f"{name}.{axis}" for axis in motion.axes), f"{name}.angle"]
         table += [*motion.marker(name).T, motion.angle(name)]
     rows = (",".join(map(digits, row)) for row in np.column_stack(table).tolist())
     return "\n".join([",".join(names), *rows, ""])

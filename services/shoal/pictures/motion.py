@@ -11,6 +11,7 @@ from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
 from shoal.pictures.outline import ground, outlined
 from shoal.scene import Scene
+from shoal.scene.dimensions import require_plane
 from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ class Motion:
 
 def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAMES) -> Motion:
     """The motion of a scene until a time [s], as far as it can be computed. Raises InputError, ComputationError."""
+    require_plane(scene, "moving pictures are")
     if until <= 0:
         raise InputError("out: a motion that is shown lasts longer than 0 s; choose later times with --at")
     traced, points = outlined(scene)

@@ -13,6 +13,7 @@ from shoal.response.inputs import BoolArray
 from shoal.response.kept import Keep
 from shoal.response.runs import Answers
 from shoal.scene import Scene
+from shoal.scene.dimensions import require_plane
 from shoal.trajectory import Array, Status, Trajectory
 
 CHUNK = 2_000_000
@@ -36,6 +37,9 @@ class Machine:
     engine: Engine
     told: Callable[[Trajectory], Array] = field(default_factory=lambda: _columns)
     keep: Keep | None = None
+
+    def __post_init__(self) -> None:
+        require_plane(self.scene, "bounds and statistics are")
 
     @property
     def columns(self) -> tuple[int, int, int]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from shoal.scene.record import NonNegative, Positive, Record, Vector
+from shoal.scene.record import NonNegative, Positive, Record, Vector, Vector3
 
 Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full"]
 Quadrature = Literal["full", "reduced"]
@@ -57,6 +57,7 @@ class Rod(Record):
     end_height: Positive | None = None
     end_width: Positive | None = None
     retardation: NonNegative = 0.0
+    torsion_constant: Positive | None = None
     rotary_inertia: bool = False
 
     @model_validator(mode="after")
@@ -191,18 +192,49 @@ class Rod(Record):
         return {"start": (0.0, 0.0), "centre": (middle.real, middle.imag), "end": (end.real, end.imag)}
 
 
+Principal = tuple[NonNegative, NonNegative, NonNegative]
+Matrix = tuple[Vector3, Vector3, Vector3]
+if TYPE_CHECKING:
+    Inertia = Any  # who computes in the plane has one number, or one a lane
+else:
+    Inertia = NonNegative | Principal | Matrix
+
+
 class RigidBody(Record):
     """A rigid body of any shape: mass [kg], inertia about the centre of mass [kg m^2], named points [m].
 
+    In space the inertia is a number (the same about every axis), three principal moments about the axes of the body's
+    frame, or a symmetric matrix in it.
     The point `start` is the origin of the body's frame unless `named_points` says otherwise.
     """
 
     kind: Literal["rigid-body"] = "rigid-body"
     mass: Positive
-    inertia: NonNegative
+    inertia: Inertia
     centre_of_mass: Vector = (0.0, 0.0)
     named_points: dict[str, Vector] = {}
     element: Literal["rigid"] = "rigid"
+
+    @model_validator(mode="after")
+    def _possible(self) -> RigidBody:
+        if isinstance(self.inertia, tuple):
+            matrix = np.array(self.inertia) if isinstance(self.inertia[0], tuple) else np.diag(self.inertia)
+            if np.max(np.abs(matrix - matrix.T)) > 1e-9 * np.max(np.abs(matrix)):
+                raise ValueError("inertia: the matrix is not symmetric")
+            a, b, c = np.linalg.eigvalsh(matrix)
+            if a < -1e-12 * c or a + b < c * (1 - 1e-9):
+                raise ValueError(
+                    f"inertia: no body has the principal moments {a:g}, {b:g}, {c:g} kg m^2; none is negative or "
+                    "larger than the sum of the others"
+                )
+        return self
+
+    @property
+    def inertia_matrix(self) -> Any:
+        """Inertia about the centre of mass in the body's frame [kg m^2], (3, 3), or (3, 3, lanes)."""
+        if not isinstance(self.inertia, tuple):
+            return np.multiply.outer(np.eye(3), self.inertia)
+        return np.array(self.inertia) if isinstance(self.inertia[0], tuple) else np.diag(self.inertia)
 
     @property
     def points(self) -> dict[str, Vector]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from shoal.scene.function import Function
-from shoal.scene.record import Angle, NonNegative, Positive, Record, Vector, kinds
+from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record, Vector, Vector3, kinds
 
 GROUND = "ground"
+Z: Vector3 = (0.0, 0.0, 1.0)
 
 
 class Attachment(Record):
@@ -27,6 +29,7 @@ class MovingPoint(Record):
 
     x: Function = Function(number=0.0)
     y: Function = Function(number=0.0)
+    z: Function = Function(number=0.0)
 
 
 class Tie(Record):
@@ -41,7 +44,8 @@ class Tie(Record):
 class Revolute(Tie):
     """Two places stay together; the bodies turn freely but for friction.
 
-    friction: viscous [N m s/rad]; coulomb: dry friction torque [N m], smoothed as tanh(rate / coulomb_speed).
+    axis: in space, that they turn about, as it points at the start. friction: viscous [N m s/rad]; coulomb: dry
+    friction torque [N m], smoothed as tanh(rate / coulomb_speed).
     """
 
     kind: Literal["revolute"] = "revolute"
@@ -49,6 +53,57 @@ class Revolute(Tie):
     friction: NonNegative = 0.0
     coulomb: NonNegative = 0.0
     coulomb_speed: Positive = 1e-2
+    axis: Axis = Z
+
+
+class Spherical(Tie):
+    """Two places stay together; the bodies turn freely about any axis. In space only."""
+
+    kind: Literal["spherical"] = "spherical"
+    turned: ClassVar[tuple[str, ...]] = ()
+
+
+class Universal(Tie):
+    """Two places stay together, and an axis of the first body stays at a right angle to one of the second.
+
+    axis, second_axis: of the first and of the second body, as they point at the start. In space only.
+    """
+
+    kind: Literal["universal"] = "universal"
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
+    axis: Axis
+    second_axis: Axis
+
+    @model_validator(mode="after")
+    def _square(self) -> Universal:
+        cosine = sum(a * b for a, b in zip(self.axis, self.second_axis, strict=True))
+        if abs(cosine) > 1e-6 * math.hypot(*self.axis) * math.hypot(*self.second_axis):
+            raise ValueError("second_axis: must be at a right angle to axis")
+        return self
+
+
+class Cylindrical(Tie):
+    """The second place moves on a line through the first along an axis, about which the bodies turn. In space only.
+
+    axis: as it points at the start.
+    """
+
+    kind: Literal["cylindrical"] = "cylindrical"
+    turned: ClassVar[tuple[str, ...]] = ("first", "second")
+    axis: Axis
+
+
+class Planar(Tie):
+    """The second place moves in a plane through the first, fixed to the first body. In space only.
+
+    axis: normal of the plane, as it points at the start. rotation: whether the second body may turn about that axis,
+    not at all, or freely (a point in a plane).
+    """
+
+    kind: Literal["planar"] = "planar"
+    turned: ClassVar[tuple[str, ...]] = ("first",)
+    axis: Axis
+    rotation: Literal["axis", "free", "locked"] = "axis"
 
 
 class Weld(Tie):
@@ -62,13 +117,15 @@ class Weld(Tie):
 class Slider(Tie):
     """The second place moves on a line through the first one, fixed to the first body.
 
-    direction: angle [rad] of the line in the first body's frame. rotation: whether the second body may turn against
-    the first. friction: viscous [N s/m]; coulomb [N], smoothed as tanh(speed / coulomb_speed).
+    direction: angle [rad] of the line in the first body's frame. axis: in space, the line itself, as it points at the
+    start, instead. rotation: whether the second body may turn against the first. friction: viscous [N s/m]; coulomb
+    [N], smoothed as tanh(speed / coulomb_speed).
     """
 
     kind: Literal["slider"] = "slider"
     turned: ClassVar[tuple[str, ...]] = ("first",)
     direction: Angle = 0.0
+    axis: Axis | None = None
     rotation: Literal["free", "locked"] = "free"
     friction: NonNegative = 0.0
     coulomb: NonNegative = 0.0
@@ -98,18 +155,22 @@ class Perpendicular(Tie):
 
 
 class DrivenAngle(Tie):
-    """The angle [rad] from the first body's direction to the second's is a function of time."""
+    """The angle [rad] from the first body's direction to the second's is a function of time.
+
+    axis: in space, that the angle is about, as it points at the start; it is the second body's as well.
+    """
 
     kind: Literal["driven-angle"] = "driven-angle"
     turned: ClassVar[tuple[str, ...]] = ("first", "second")
     angle: Function
+    axis: Axis = Z
 
 
 class CoupledCoordinate(Record):
     """A coordinate of a place, with its factor in a coupling."""
 
     at: Attachment
-    axis: Literal["x", "y"]
+    axis: Literal["x", "y", "z"]
     factor: float = 1.0
 
 
@@ -128,7 +189,18 @@ def _revolute_if_unsaid(data: Any) -> Any:
 
 Joint = Annotated[
     Annotated[
-        Revolute | Weld | Slider | Distance | Parallel | Perpendicular | DrivenAngle | Coupling,
+        Revolute
+        | Spherical
+        | Universal
+        | Cylindrical
+        | Planar
+        | Weld
+        | Slider
+        | Distance
+        | Parallel
+        | Perpendicular
+        | DrivenAngle
+        | Coupling,
         Field(discriminator="kind"),
     ],
     BeforeValidator(_revolute_if_unsaid),

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from shoal.scene.function import Function
-from shoal.scene.joints import Attachment
-from shoal.scene.record import NonNegative, Record, Vector, kinds
+from shoal.scene.joints import Attachment, Z
+from shoal.scene.record import Axis, NonNegative, Record, Vector, kinds
 
 
 class Elastic(Record):
@@ -39,10 +39,11 @@ class TorsionSpring(Elastic):
 
     stiffness [N m/rad], cubic [N m/rad^3], damping [N m s/rad]; angle: relative angle of rest [rad] (default: that of
     the start), counted over full turns; elastic: further elastic torque [N m], a function of the angle from rest [rad]
-    called `t`.
+    called `t`. axis: in space, that the angle is about, as it points at the start; a joint keeps it common to both.
     """
 
     kind: Literal["torsion-spring"] = "torsion-spring"
+    axis: Axis = Z
     angle: float | None = None
     elastic: Function | None = None
 
@@ -58,11 +59,16 @@ class Force(Record):
 
 
 class Torque(Record):
-    """A torque [N m] on a body, counter-clockwise, as a function of time; `reaction`: the body that takes it."""
+    """A torque [N m] on a body, counter-clockwise, as a function of time; `reaction`: the body that takes it.
+
+    axis: in space, that of the torque as it points at the start; it turns with the body that takes the torque, and is
+    fixed where the ground does.
+    """
 
     kind: Literal["torque"] = "torque"
     at: Attachment
     torque: Function
+    axis: Axis = Z
     reaction: Attachment | None = None
 
 

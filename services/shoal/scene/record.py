@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, get_args
+import re
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -25,7 +26,22 @@ def _plausible_angle(value: float) -> float:
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Angle = Annotated[float, AfterValidator(_plausible_angle)]
-Vector = tuple[float, float]
+if TYPE_CHECKING:
+    Vector = tuple[float, float]  # what computes in the plane unpacks two
+else:
+    Vector = Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
+"""Two components, in space three; where the third is left out it is zero."""
+Vector3 = tuple[float, float, float]
+
+
+def _pointing(value: Vector3) -> Vector3:
+    if not any(value):
+        raise ValueError("an axis needs a direction, found [0, 0, 0]")
+    return value
+
+
+Axis = Annotated[Vector3, AfterValidator(_pointing)]
+"""A direction in space, of any length."""
 
 
 def kinds(annotation: Any) -> tuple[str, ...]:
@@ -33,6 +49,10 @@ def kinds(annotation: Any) -> tuple[str, ...]:
     if isinstance(annotation, type) and issubclass(annotation, Record):
         return (annotation.model_fields["kind"].default,) if "kind" in annotation.model_fields else ()
     return tuple(kind for part in get_args(annotation) for kind in kinds(part))
+
+
+_MEMBER = re.compile(r"constrained-|tuple\[|float$|function-")
+"""How pydantic names a member of a union in a path."""
 
 
 def one_line(error: ValidationError, what: str, model: type[Record] | None = None) -> InputError:
@@ -43,7 +63,7 @@ def one_line(error: ValidationError, what: str, model: type[Record] | None = Non
     # Pydantic puts the kind that tells the members of a field apart into the path, after the member's name.
     if field and parts[2] in kinds(field.annotation):
         del parts[2]
-    path = ".".join(part for part in parts if part not in {"file", "engine"})
+    path = ".".join(part for part in parts if part not in {"file", "engine"} and not _MEMBER.match(part))
     message = first["msg"].removeprefix("Value error, ")
     others = error.error_count() - 1
     more = f" (and {others} more)" if others else ""

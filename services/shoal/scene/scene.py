@@ -14,16 +14,17 @@ from pydantic import Field, ValidationError, model_validator
 from shoal.errors import InputError
 from shoal.scene import joints as joint_types
 from shoal.scene.bodies import Body
+from shoal.scene.dimensions import check_dimensions, padded
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
 from shoal.scene.loads import DistributedForce, Force, Load
-from shoal.scene.record import Angle, Record, Vector, one_line
+from shoal.scene.record import Angle, Record, Vector, Vector3, one_line
 from shoal.scene.solver import Solver
 
 _FEW = 4
 """So many names are listed."""
-Quantity = Literal["angle", "rate", "position", "velocity"]
-POSES: tuple[Quantity, ...] = ("angle", "position")
-RATES: tuple[Quantity, ...] = ("rate", "velocity")
+Quantity = Literal["angle", "rate", "position", "velocity", "rotation", "spin"]
+POSES: tuple[Quantity, ...] = ("angle", "position", "rotation")
+RATES: tuple[Quantity, ...] = ("rate", "velocity", "spin")
 _SHAPES = ("length", "curvature", "named_points")
 """Fields of a body that place its joints."""
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
@@ -33,13 +34,17 @@ class InitialState(Record):
     """Absolute angle [rad], counter-clockwise from +X, and rate [rad/s] of a body at time zero.
 
     position [m] and velocity [m/s] are those of its frame's origin. What is None is not stated: it follows from what
-    is, and is zero where nothing tells it. guess: the quantities that may change where the joints demand it.
+    is, and is zero where nothing tells it. rotation, spin: in space, a rotation vector [rad] in place of the angle and
+    an angular velocity [rad/s] along the axes of the ground in place of the rate. guess: the quantities that may change
+    where the joints demand it.
     """
 
     angle: Angle | None = None
     rate: float | None = None
     position: Vector | None = None
     velocity: Vector | None = None
+    rotation: Vector3 | None = None
+    spin: Vector3 | None = None
     guess: tuple[Quantity, ...] = ()
 
     def stated(self, quantity: Quantity) -> bool:
@@ -54,16 +59,21 @@ class Begin(NamedTuple):
     rate: float
     position: Vector | None
     velocity: Vector
+    rotation: Vector3 | None = None
+    spin: Vector3 | None = None
 
 
 class Scene(Record):
-    """A planar machine in SI units: bodies, joints, loads, markers, initial state, gravity, solver settings.
+    """A machine in SI units: bodies, joints, loads, markers, initial state, gravity, solver settings.
+
+    dimensions: 2, or 3 for one in space.
 
     Raises pydantic's ValidationError; `Scene.parse` and `with_values` raise `InputError` in one line.
     """
 
     name: str
     description: str = ""
+    dimensions: Literal[2, 3] = 2
     gravity: Vector = (0.0, -9.81)
     bodies: Annotated[dict[Name, Body], Field(min_length=1)]
     joints: dict[Name, Joint] = {}
@@ -102,6 +112,7 @@ class Scene(Record):
             if name not in self.bodies:
                 raise ValueError(f"initial.{name}: no such body; the bodies are {', '.join(self.bodies)}")
         self._check_directions()
+        check_dimensions(self)
         placed = self._placed()
         loose = [name for name in self.bodies if name not in placed]
         if loose:
@@ -129,8 +140,8 @@ class Scene(Record):
                 f"there are {', '.join(body.points)}"
             )
         if body.element != "rigid" and not isinstance(attachment.point, str):
-            x, y = attachment.point
-            if (y != 0 and body.element != "ancf-full") or not 0 <= x <= body.length:
+            x, y = attachment.point[:2]
+            if any(attachment.point[2:]) or (y != 0 and body.element != "ancf-full") or not 0 <= x <= body.length:
                 raise ValueError(
                     f"{where}.point: [{x:g}, {y:g}] is not on the axis of {attachment.body}; "
                     f"use [s, 0] with 0 <= s <= {body.length:g}"
@@ -179,13 +190,13 @@ class Scene(Record):
         except ValidationError as error:
             raise one_line(error, source, cls) from None
 
-    def location(self, attachment: Attachment) -> Vector:
-        """Coordinates [m] of an attachment in its body's (or the ground's) frame; on a flexible rod (s, y)."""
+    def location(self, attachment: Attachment) -> Any:
+        """Coordinates [m] of an attachment in its body's (or the ground's) frame, (d,); on a flexible rod (s, y)."""
         if attachment.body == GROUND and isinstance(attachment.point, str):
-            return (0.0, 0.0)
+            return padded((), self.dimensions)
         if isinstance(attachment.point, str):
-            return self.bodies[attachment.body].points[attachment.point]
-        return attachment.point
+            return padded(self.bodies[attachment.body].points[attachment.point], self.dimensions)
+        return padded(attachment.point, self.dimensions)
 
     def start(self, body: str) -> Begin:
         """Initial state of `body`; at angle zero and at rest where the scene says nothing."""
@@ -193,8 +204,10 @@ class Scene(Record):
         return Begin(
             0.0 if stated.angle is None else stated.angle,
             0.0 if stated.rate is None else stated.rate,
-            stated.position,
-            (0.0, 0.0) if stated.velocity is None else stated.velocity,
+            None if stated.position is None else padded(stated.position, self.dimensions),
+            padded((0.0, 0.0) if stated.velocity is None else stated.velocity, self.dimensions),
+            stated.rotation,
+            stated.spin,
         )
 
     def with_values(self, values: Mapping[str, Any]) -> Scene:

@@ -38,11 +38,12 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
     if selection is not None:
         selection_table(selection)
     table = screen.table(
-        f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s", "marker", "x [m]", "y [m]"
+        f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s",
+        "marker",
+        *(f"{axis} [m]" for axis in trajectory.axes),
     )
     for name in trajectory.markers:
-        x, y = trajectory.marker(name)[-1]
-        table.add_row(name, f"{x:z.9f}", f"{y:z.9f}")
+        table.add_row(name, *(f"{part:z.9f}" for part in trajectory.marker(name)[-1]))
     screen.out.print(table)
     verification = trajectory.model.get("verification")
     unknown = verification is not None and trajectory.ok and verification["time_error"] is None

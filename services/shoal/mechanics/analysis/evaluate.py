@@ -27,6 +27,7 @@ from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile
 from shoal.mechanics.tangent import damping_at, stiffness_at, tangent_tile
 from shoal.scene import Scene
+from shoal.scene.dimensions import require_plane
 
 Sparse = scipy.sparse.csr_array
 _LANE = slice(0, 1)
@@ -146,6 +147,7 @@ class Evaluator:
     @classmethod
     def of(cls, scene: Scene, *, horizon: float = 0.0) -> Evaluator:
         """The evaluator of a scene; horizon [s]: latest time that will be asked for. Raises InputError."""
+        require_plane(scene, "statics, modes, reactions and section forces are")
         return cls(build(scene, horizon=horizon))
 
     @property

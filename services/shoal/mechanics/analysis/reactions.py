@@ -236,6 +236,7 @@ def _of_condition(bodies: FreeBodies, name: str, condition: Condition, at: Array
         none = np.zeros(plane.DIMENSIONS)
         return [_Component(name, "torque", _turning(bodies, condition, at), none, True)]
     if isinstance(condition, Along):
+        assert not isinstance(condition.direction, tuple)
         e, _, across = _sliding(bodies, condition.first, condition.second, condition.direction, at)
         return [_Component(name, "normal", across, plane.quarter(e), False)]
     if not isinstance(condition, Meet | Apart):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shoal.mechanics import fitting, functions, plane
+from shoal.mechanics import fitting, functions
 from shoal.mechanics.assembly import terms
 from shoal.mechanics.assembly.loads import Loads, naming
 from shoal.mechanics.assembly.masses import Masses
@@ -57,7 +57,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     ]
     return Model(
         scene=scene,
-        dimensions=plane.DIMENSIONS,
+        dimensions=scene.dimensions,
         failed=placement.failed,
         frames=placement.frames,
         lanes=lanes,

@@ -66,7 +66,7 @@ class Placement:
     def direction(self, scene: Scene, at: Attachment) -> Affine:
         """The direction of the body at an attachment; that of the ground is +X."""
         if at.body == GROUND:
-            return fixed(plane.vector(1.0, 0.0))
+            return fixed(np.eye(scene.dimensions)[0][:, None])
         return self.frames[at.body].direction(scene.location(at))
 
     def gap(self, scene: Scene, condition: Along | Apart) -> Affine:

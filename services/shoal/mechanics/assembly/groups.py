@@ -42,7 +42,7 @@ class JointPoint:
 def place_of(scene: Scene, attachment: Attachment) -> tuple[str, Place]:
     """The body (or ground, or moving point of the ground) and the place in its frame [m]."""
     if attachment.body == GROUND and isinstance(attachment.point, str):
-        return moving(attachment.point), (0.0,) * plane.DIMENSIONS
+        return moving(attachment.point), (0.0,) * scene.dimensions
     return attachment.body, scene.location(attachment)
 
 
@@ -58,7 +58,7 @@ def joint_points(scene: Scene) -> list[JointPoint]:
         if isinstance(condition, Meet):
             _merge(groups, JointPoint(name, [place_of(scene, side) for side in (condition.first, condition.second)]))
         elif isinstance(condition, Along) and condition.is_fixed:
-            line = name, plane.vector(*scene.location(condition.first)), plane.vector(*plane.unit(condition.direction))
+            line = name, plane.vector(*scene.location(condition.first)), _direction(scene, condition)
             _merge(groups, JointPoint(name, [place_of(scene, condition.second)], line=line))
     for group in groups:
         bodies = [body for body, _ in group.places]
@@ -69,6 +69,14 @@ def joint_points(scene: Scene) -> list[JointPoint]:
         if grounded:
             group.where = fixed(plane.vector(*grounded[0]))
     return groups
+
+
+def _direction(scene: Scene, line: Along) -> Array:
+    """The unit direction of a line on the ground, (d, lanes)."""
+    if isinstance(line.direction, tuple):
+        axis = plane.vector(*line.direction)
+        return np.asarray(axis / np.sqrt(sum(axis**2)))
+    return plane.vector(*plane.unit(line.direction), *(0.0,) * (scene.dimensions - plane.DIMENSIONS))
 
 
 def _merge(groups: list[JointPoint], new: JointPoint) -> None:
@@ -94,10 +102,11 @@ class Orientations:
 
     of: dict[str, tuple[str, Array]] = field(default_factory=dict)
     directors: dict[str, tuple[Affine, ...]] = field(default_factory=dict)
+    dimensions: int = plane.DIMENSIONS
 
     def root(self, body: str) -> tuple[str, Array]:
         """Root and relative rotation of a body; a body by itself is its own root."""
-        return self.of.get(body, (body, np.eye(plane.DIMENSIONS)[..., None]))
+        return self.of.get(body, (body, np.eye(self.dimensions)[..., None]))
 
     def of_body(self, body: str) -> tuple[Affine, ...]:
         """The directors of a body whose root has them."""

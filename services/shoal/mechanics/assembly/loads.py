@@ -16,6 +16,8 @@ from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.rows import Rows
+from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
+from shoal.mechanics.assembly.space.holding import direction, hinge, line_of
 from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
 from shoal.mechanics.frames import BeamFrame, RigidFrame
@@ -36,6 +38,8 @@ from shoal.scene import (
     Torque,
     TorsionSpring,
 )
+from shoal.scene.dimensions import padded
+from shoal.scene.record import Vector3
 
 
 @contextmanager
@@ -60,6 +64,7 @@ class Loads:
         self.angles: list[Number] = []
         self.fixed: list[tuple[int, Number, int]] = []
         self.following: list[tuple[list[int], Number, int]] = []
+        self.turning: list[tuple[list[int], int]] = []
         for name, joint in scene.joints.items():
             if isinstance(joint, Revolute | Slider) and (np.any(joint.friction) or np.any(joint.coulomb)):
                 self._friction(name, joint)
@@ -71,21 +76,47 @@ class Loads:
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
         law = [0.0, 0.0, joint.friction, 0.0, joint.coulomb, joint.coulomb_speed, 0.0]
         if isinstance(joint, Revolute):
-            self._angle(name, joint.first, joint.second, law)
+            self._angle(name, joint.first, joint.second, law, joint.axis)
             return
-        line = self.placement.direction(self.scene, joint.first).turned(plane.rotation(joint.direction))
+        if isinstance(self.placement, SpatialPlacement):
+            line = line_of(self.placement, joint.first.body, joint.direction if joint.axis is None else joint.axis)
+        else:
+            line = self.placement.direction(self.scene, joint.first).turned(plane.rotation(joint.direction))
         ends = [self.placement.point(self.scene, side) for side in (joint.first, joint.second)]
         self._measure(name, PLACE, [*ends, line], law, 0.0)
 
     def _torsion_spring(self, name: str, load: TorsionSpring) -> None:
-        rest = self._turn(load.first, load.second) if load.angle is None else load.angle
+        rest = self._rest(load) if load.angle is None else load.angle
         law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0]
-        self._angle(name, load.first, load.second, law, elastic=load.elastic)
+        self._angle(name, load.first, load.second, law, load.axis, elastic=load.elastic)
+
+    def _rest(self, load: TorsionSpring) -> Number:
+        """The angle at the start."""
+        if not isinstance(self.placement, SpatialPlacement):
+            return self._turn(load.first, load.second)
+        a, b, ahead = hinge(self.scene, self.placement, load.first, load.second, load.axis)
+        first, second, third = (self.placement.start_of(one)[0] for one in (a, b, ahead))
+        return np.arctan2(sum(third * second), sum(first * second))
 
     def _torque(self, name: str, load: Torque) -> None:
+        if isinstance(self.placement, SpatialPlacement):
+            self._turn_body(name, load, self.placement)
+            return
         law = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]
         base = load.reaction or Attachment(body=GROUND, point=(0.0, 0.0))
-        self._angle(name, base, load.at, law, drive=load.torque)
+        self._angle(name, base, load.at, law, load.axis, drive=load.torque)
+
+    def _turn_body(self, name: str, load: Torque, placement: SpatialPlacement) -> None:
+        """A torque in space about an axis of the body that takes it, or of the ground."""
+        holder = GROUND if load.reaction is None else load.reaction.body
+        axis = direction(placement, holder, load.axis)
+        number = self._function(f"loads.{name}.torque", load.torque)
+        for body, sense in ((load.at.body, 1.0), (holder, -1.0)):
+            if body != GROUND:
+                frame = placement.frames[body]
+                if not isinstance(frame, RigidFrame):
+                    raise InputError(f"loads.{name}: in space a torque acts on rigid bodies, and {body} is none")
+                self.turning.append((self.rows.of_all([axis * sense, *frame.directors]), number))
 
     def _function(self, field: str, f: Function) -> int:
         """Number of a function of time; -1 for the constant 1."""
@@ -133,6 +164,7 @@ class Loads:
         first: Attachment,
         second: Attachment,
         law: list[Number],
+        axis: Vector3,
         *,
         elastic: Function | None = None,
         drive: Function | None = None,
@@ -140,8 +172,14 @@ class Loads:
         for side in (first, second):
             if side.body != GROUND and isinstance(self.scene.bodies[side.body], PointMass):
                 raise InputError(f"{name}: {side.body} is a point mass, which has no angle")
-        directions = [self.placement.direction(self.scene, side) for side in (first, second)]
-        self._measure(name, ANGLE, directions, law, self._turn(first, second), elastic=elastic, drive=drive)
+        if isinstance(self.placement, SpatialPlacement):
+            directions = list(hinge(self.scene, self.placement, first, second, axis))
+            a, b, ahead = (self.placement.start_of(one)[0] for one in directions)
+            turn: Number = np.arctan2(sum(ahead * b), sum(a * b))
+        else:
+            directions = [self.placement.direction(self.scene, side) for side in (first, second)]
+            turn = self._turn(first, second)
+        self._measure(name, ANGLE, directions, law, turn, elastic=elastic, drive=drive)
 
     def _spring(self, name: str, load: Spring) -> None:
         ends = [self.placement.point(self.scene, side) for side in (load.first, load.second)]
@@ -155,11 +193,17 @@ class Loads:
     def _force(self, name: str, load: Force) -> None:
         point = self.placement.point(self.scene, load.at)
         number = self._function(f"loads.{name}.scale", load.scale)
+        force = padded(load.force, self.scene.dimensions)
         if load.follows:
-            direction = self.placement.direction(self.scene, load.at)
-            self.following.append((self.rows.of_all([point, direction]), load.force, number))
+            turning = [self.placement.direction(self.scene, load.at)]
+            if self.scene.dimensions == 3:
+                frame = self.placement.frames[load.at.body]
+                if not isinstance(frame, RigidFrame):
+                    raise InputError(f"loads.{name}.follows: in space a force turns with rigid bodies only")
+                turning = list(frame.directors)
+            self.following.append((self.rows.of_all([point, *turning]), force, number))
         else:
-            self._fix(point, load.force, number)
+            self._fix(point, force, number)
 
     def _fix(self, vector: Affine, force: tuple[Number, ...], number: int) -> None:
         """A force on a vector; number: of the function of time that scales it."""
@@ -175,24 +219,23 @@ class Loads:
         else:
             assert isinstance(frame, RigidFrame)
             nodes, weights = np.polynomial.legendre.leggauss(24)
-            loads = [
-                (frame.point(rod_axis(rod, (x + 1) / 2 * rod.length)), w / 2 * rod.length)
-                for x, w in zip(nodes, weights, strict=True)
-            ]
+            axis = (padded(rod_axis(rod, (x + 1) / 2 * rod.length), self.scene.dimensions) for x in nodes)
+            loads = [(frame.point(place), w / 2 * rod.length) for place, w in zip(axis, weights, strict=True)]
         for vector, size in loads:
-            self._fix(vector, tuple(part * size for part in load.force), number)
+            self._fix(vector, tuple(part * size for part in padded(load.force, self.scene.dimensions)), number)
 
     def forces(self) -> Forces:
         """Springs, dampers, friction and torques as arrays."""
         table, energy, drive = np.array(self.numbers, dtype=np.int64).reshape(-1, 3).T.copy()
         rows = index(self.places).ravel()
-        space = (0,) * plane.DIMENSIONS
+        space = (0,) * self.scene.dimensions
         return Forces(space, len(self.kinds), index(self.kinds), rows, table, energy, drive, stacked(self.laws))
 
     def applied(self) -> Applied:
         """Applied loads as arrays."""
         factors = [part for _, value, _ in self.following for part in value]
         return Applied(
+            (0,) * self.scene.dimensions,
             len(self.fixed),
             index([row for row, _, _ in self.fixed]),
             stacked([part for _, part, _ in self.fixed]),
@@ -201,6 +244,9 @@ class Loads:
             index([rows for rows, _, _ in self.following]).ravel(),
             stacked(factors),
             index([number for _, _, number in self.following]),
+            len(self.turning),
+            index([rows for rows, _ in self.turning]).ravel(),
+            index([number for _, number in self.turning]),
         )
 
 

@@ -16,6 +16,7 @@ from shoal.mechanics.elements.families import Collected
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Number
 from shoal.scene import PointMass, RigidBody, Rod, Scene
+from shoal.scene.dimensions import padded
 
 Entries = dict[tuple[int, int], Number]
 
@@ -28,7 +29,7 @@ class Masses:
 
     def __init__(self, scene: Scene, placement: Placement, rows: Rows) -> None:
         self.scene, self.placement, self.rows = scene, placement, rows
-        self.gravity = plane.vector(*scene.gravity)
+        self.gravity = plane.vector(*padded(scene.gravity, scene.dimensions))
         self.mass: Entries = {}
         self.stretching: Entries = {}
         self.weight: list[Number] = [0.0] * len(placement.positions)
@@ -51,6 +52,9 @@ class Masses:
         else:
             assert isinstance(frame, RigidFrame)
             assert not isinstance(body, PointMass)
+            if len(frame.directors) == 3:
+                self._add_solid(body, frame)
+                return
             x, y = body.centre_of_mass
             mx, my = body.mass * x, body.mass * y
             # Of the moments of second order the plane knows the sum only, as its directors turn together.
@@ -58,6 +62,16 @@ class Masses:
             vectors = [frame.origin, *frame.directors]
             _add(self.mass, vectors, [[body.mass, mx, my], [mx, inertia, 0.0], [my, 0.0, 0.0]])
             self._add_load(vectors, [body.mass, mx, my])
+
+    def _add_solid(self, body: Rod | RigidBody, frame: RigidFrame) -> None:
+        """A rigid body in space, by its first and second moments along its directors."""
+        mass, moments = body.mass, second_moments(body)
+        x = padded(body.centre_of_mass, 3)
+        rows = ([mass * x[k], *(moments[k][j] + mass * x[k] * x[j] for j in range(3))] for k in range(3))
+        matrix = [[mass, *(mass * one for one in x)], *rows]
+        vectors = [frame.origin, *frame.directors]
+        _add(self.mass, vectors, matrix)
+        self._add_load(vectors, matrix[0])
 
     def _add_rod(self, name: str, rod: Rod, frame: BeamFrame) -> None:
         element = ELEMENTS[rod.element]
@@ -89,6 +103,30 @@ class Masses:
     def owners(self) -> tuple[tuple[str, ...], ...]:
         """The body of every element, by family."""
         return tuple(tuple(found.owners) for found in self.families.values())
+
+
+THINNEST = 1e-11
+"""Of the largest second moment: less has none of them, so that every director has inertia."""
+
+
+def second_moments(body: Rod | RigidBody) -> list[list[Number]]:
+    """The integral of x_i x_j dm about the centre of mass along the axes of a body in space [kg m^2].
+
+    J = tr(I)/2 - I of the inertia I. A rod has those of its section, which the plane does not: there, without rotary
+    inertia, their sum with that along the axis is the plane's.
+    """
+    if isinstance(body, Rod):
+        across, wide = body.mass * body.height**2 / 12, body.mass * body.width**2 / 12
+        along = body.inertia - across
+        matrix = [[along, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, wide]]
+    else:
+        inertia = body.inertia_matrix
+        half = sum(inertia[k][k] for k in range(3)) / 2
+        matrix = [[half * (i == j) - inertia[i][j] for j in range(3)] for i in range(3)]
+    trace = sum(matrix[k][k] for k in range(3))
+    for k in range(3):
+        matrix[k][k] = np.maximum(matrix[k][k], THINNEST * trace)
+    return matrix
 
 
 def _add(entries: Entries, vectors: list[Affine], matrix: list[list[Number]]) -> None:

@@ -26,8 +26,9 @@ from shoal.mechanics.assembly.groups import (
     transposed,
 )
 from shoal.mechanics.assembly.holding import hold
-from shoal.mechanics.assembly.pose import Pose, arm
+from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
 from shoal.mechanics.assembly.rods import place_rod
+from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.frames import Place, PointFrame, RigidFrame
 from shoal.mechanics.joints import Along
 from shoal.mechanics.numerics.tile import Array
@@ -37,6 +38,8 @@ from shoal.scene import GROUND, Function, PointMass, Rod, Scene
 
 def place(scene: Scene) -> Placement:
     """Give every body its coordinates and initial state, and state what they must satisfy. Raises InputError."""
+    if scene.dimensions == 3:
+        return place_started(scene)
     stated = scene
     scene, failed = started(scene)
     result = Placement(scene, failed)
@@ -71,7 +74,7 @@ def place(scene: Scene) -> Placement:
 
 def _place_driver(name: str, x: Function, y: Function, points: list[JointPoint], result: Placement) -> None:
     """A moving point of the ground is a vector that constraints drive."""
-    begin = np.array([_value_and_rate(x), _value_and_rate(y)])
+    begin = np.array([value_and_rate(x), value_and_rate(y)])
     vector = result.new_vector(begin[:, :1], begin[:, 1:])
     result.drivers[moving(name)] = vector
     result.terms.vanish(f"{GROUND}.{name}", vector, (x.through("neg"), y.through("neg")))
@@ -80,12 +83,6 @@ def _place_driver(name: str, x: Function, y: Function, points: list[JointPoint],
             if point.where is not None:
                 raise InputError(f"joints.{point.name}: joins the moving point {name} to a fixed one")
             point.where = vector
-
-
-def _value_and_rate(f: Function) -> tuple[float, float]:
-    h = 1e-6
-    before, now, after = (float(v) for v in f(np.array([0.0, h, 2 * h])))
-    return before, (4 * now - 3 * before - after) / (2 * h)
 
 
 def _next(scene: Scene, waiting: list[str], touching: dict[str, list[JointPoint]], result: Placement) -> str:

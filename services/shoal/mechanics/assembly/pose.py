@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from shoal.mechanics.numerics.tile import Array, Number
+from shoal.scene import Function
 
 
 @dataclass(frozen=True)
@@ -32,3 +35,10 @@ def arm(directors: Array, place: tuple[Number, ...]) -> Array:
     """The way from a body's origin to a place in its frame [m], (d, lanes)."""
     total: Array = sum(director * part for director, part in zip(directors, place, strict=True))
     return total
+
+
+def value_and_rate(f: Function) -> tuple[float, float]:
+    """A function of time and its slope at time zero."""
+    h = 1e-6
+    before, now, after = (float(v) for v in f(np.array([0.0, h, 2 * h])))
+    return before, (4 * now - 3 * before - after) / (2 * h)

@@ -71,14 +71,36 @@ def _choose(tile, space):  # type: ignore[no-untyped-def]
     return lambda tile, space: wide
 
 
+def _divides(space: tuple[int, ...]) -> bool:
+    """Whether vectors of the processor hold whole vectors of the space."""
+    return len(EIGHT) % len(space) == 0
+
+
+@overload(_divides)
+def _choose_divides(space):  # type: ignore[no-untyped-def]
+    whole = len(EIGHT) % space.count == 0
+    return lambda space: whole
+
+
+def _group(space: tuple[int, ...]) -> tuple[int, ...]:
+    """The space if vectors of the processor hold whole vectors of it, else what is never used."""
+    return space if _divides(space) else (0,)
+
+
+@overload(_group)
+def _choose_group(space):  # type: ignore[no-untyped-def]
+    group = (0,) * (space.count if len(EIGHT) % space.count == 0 else 1)
+    return lambda space: group
+
+
 @njit(cache=True, error_model="numpy", forceinline=True)
 def solve(tile: Tile, space: tuple[int, ...], alike: Alike, w: Array, x: Array) -> None:
     """Replace the right-hand side in x by the solution; w: room for twice the rows of the inverse. Pointers."""
-    if len(tile) == 1 and alike.pattern.size <= FEW:
+    if len(tile) == 1 and alike.pattern.size <= FEW and (alike.components == 1 or _divides(space)):
         if alike.components == 1:
             _multiply_inverse((0,), alike, w, x)
         else:
-            _multiply_inverse(space, alike, w, x)
+            _multiply_inverse(_group(space), alike, w, x)
     elif alike.components == 1:
         sparse.solve_alike(tile, alike.pattern, alike.factor, x, 0)
     else:

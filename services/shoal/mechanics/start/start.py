@@ -27,7 +27,14 @@ _MANY = 40
 """Statements up to which those that contradict each other are sought."""
 ROUND_OFF = 1e-9
 """Changes below this, relative to the value, 1 rad or the size of the machine, are not spoken of."""
-_UNITS: dict[Quantity, str] = {"angle": "rad", "position": "m", "rate": "rad/s", "velocity": "m/s"}
+_UNITS: dict[Quantity, str] = {
+    "angle": "rad",
+    "position": "m",
+    "rate": "rad/s",
+    "velocity": "m/s",
+    "rotation": "rad",
+    "spin": "rad/s",
+}
 
 
 class Start(NamedTuple):
@@ -80,7 +87,12 @@ def complete(scene: Scene) -> Start:
 
 
 def gives_numbers(scene: Scene) -> bool:
-    """Whether joints or loads take a number of theirs (an angle, a length, a side) from the start."""
+    """Whether joints or loads take a number of theirs (an angle, a length, a side) from the start.
+
+    In space they take their axes from it.
+    """
+    if scene.dimensions == 3:
+        return True
     kept = any(
         (isinstance(one, Turned) and one.angle is None) or (isinstance(one, Apart) and one.length is None)
         for _, one in of_scene(scene)
@@ -92,8 +104,8 @@ def gives_numbers(scene: Scene) -> bool:
 
 
 def is_direct(scene: Scene) -> bool:
-    """Whether the walk along the joints keeps every statement: open chains of revolute joints."""
-    if scene.ground_points:
+    """Whether the walk along the joints keeps every statement: open chains of revolute joints in the plane."""
+    if scene.ground_points or scene.dimensions == 3:
         return False
     group = {name: name for name in (GROUND, *scene.bodies)}
     for _, condition in of_scene(scene):
@@ -225,9 +237,9 @@ def changes(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict
     for name, start in scene.initial.items():
         for quantity, unit in _UNITS.items():
             stated, now = getattr(start, quantity), getattr(used[name], quantity)
-            if stated is None:
+            if stated is None or now is None:
                 continue
-            off = float(np.max(np.abs(np.subtract(now, stated))))
+            off = float(max(abs(a - b) for a, b in zip(np.atleast_1d(now), np.atleast_1d(stated), strict=False)))
             scale = max(float(np.max(np.abs(stated))), size if unit.startswith("m") else 1.0)
             if off > ROUND_OFF * scale:
                 found.setdefault(name, {})[quantity] = {"stated": stated, "used": now, "unit": unit}

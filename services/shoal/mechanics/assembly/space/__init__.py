@@ -1,0 +1,1 @@
+"""Scene -> coordinates in space."""

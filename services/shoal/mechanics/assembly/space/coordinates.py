@@ -1,0 +1,23 @@
+"""The unknowns of a machine in space, and what its joints share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.groups import joint_points
+from shoal.mechanics.assembly.space.attitudes import Attitudes
+from shoal.mechanics.assembly.space.axes import joint_axes
+from shoal.scene import Scene
+
+
+class SpatialPlacement(Placement):
+    """A placement in space, which knows the attitudes that the scene states, and whom they hold."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene, np.zeros(1, dtype=bool))
+        self.attitudes = Attitudes(scene)
+        self.points = joint_points(scene)
+        self.axes = joint_axes(scene, self.attitudes)
+        self.chosen: set[tuple[str, int]] = set()
+        """Bodies, and which joint points tell how they are turned."""

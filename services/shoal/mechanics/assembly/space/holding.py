@@ -1,0 +1,107 @@
+"""What sharing could not express of the joints in space, as constraints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics import joints
+from shoal.mechanics import rotation as turns
+from shoal.mechanics.affine import Affine, combined, fixed
+from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
+from shoal.mechanics.joints import Aligned, Along, Apart, Hinged, InPlane, Meet, Square, Sum, Turned
+from shoal.mechanics.numerics.tile import Array
+from shoal.scene import GROUND, Attachment, Scene
+
+
+def hold(scene: Scene, result: SpatialPlacement) -> None:
+    """What sharing could not express of the joints' conditions."""
+    for name, condition in joints.of_scene(scene):
+        if isinstance(condition, Meet | Turned | Aligned):
+            continue  # shared, or constraints where loops close
+        _keep(scene, name, condition, result)
+
+
+def direction(result: SpatialPlacement, body: str, axis: Any) -> Affine:
+    """The unit vector of a rigid body or the ground that points along an axis at the start; None: its x axis."""
+    image = result.attitudes.image(body, axis)
+    return of_image(result, body, image)
+
+
+def of_image(result: SpatialPlacement, body: str, image: Any) -> Affine:
+    """The vector of a rigid body or the ground that its own frame has so."""
+    if body == GROUND:
+        return fixed(image)
+    return combined(result.attitudes.kept.of_body(body), tuple(image))
+
+
+def hinge(
+    scene: Scene, result: SpatialPlacement, first: Attachment, second: Attachment, axis: Any
+) -> tuple[Affine, Affine, Affine]:
+    """Directions at right angles to an axis: of the first body, of the second, and the first's turned by 90 degrees.
+
+    Both are images of the bodies' x axes, or of another where that is along the axis.
+    """
+    found = []
+    for side in (first, second):
+        image = result.attitudes.image(side.body, axis)
+        along = np.eye(3)[0 if np.all(np.abs(image[0]) < 0.9) else 1][:, None]
+        flat = turns.unit(along - image * np.sum(image * along, axis=0))
+        found.append((side.body, image, flat))
+    (body, image, flat), (other, _, there) = found
+    ahead = turns.cross(image, flat)
+    return of_image(result, body, flat), of_image(result, other, there), of_image(result, body, ahead)
+
+
+def _keep(scene: Scene, name: str, condition: Any, result: SpatialPlacement) -> None:
+    terms = result.terms
+    if isinstance(condition, Along):
+        if not condition.is_fixed:
+            body = condition.first.body
+            _require_rigid(scene, name, body)
+            for normal in turns.across(_line(result, body, condition.direction)):
+                terms.dot(name, of_image(result, body, normal), result.gap(scene, condition), 1)
+    elif isinstance(condition, InPlane):
+        gap = result.point(scene, condition.second) - result.point(scene, condition.first)
+        terms.dot(name, direction(result, condition.first.body, condition.axis), gap, 1)
+    elif isinstance(condition, Square):
+        one = direction(result, condition.first.body, condition.axis)
+        terms.dot(name, one, direction(result, condition.second.body, condition.second_axis), 0)
+    elif isinstance(condition, Hinged):
+        a, b, ahead = hinge(scene, result, condition.first, condition.second, condition.axis)
+        terms.dot(name, a, b, 0, drive=condition.angle.through("cos", "neg"))
+        terms.dot(name, ahead, b, 0, drive=condition.angle.through("sin", "neg"))
+    elif isinstance(condition, Apart):
+        gap = result.gap(scene, condition)
+        if condition.length is None:
+            terms.dot(name, gap, gap, 2, -sum(result.start_of(gap)[0] ** 2))
+        else:
+            terms.dot(name, gap, gap, 2, drive=condition.length.through("square", "neg"))
+    elif isinstance(condition, Sum):
+        axes = np.eye(3)
+        total = fixed(np.zeros((3, 1)))
+        for term in condition.terms:
+            onto_first = np.outer(axes[0], term.factor * axes["xyz".index(term.axis)])
+            total = total + result.point(scene, term.at).turned(onto_first)
+        terms.dot(name, fixed(axes[0][:, None]), total, 1, drive=condition.value.through("neg"))
+    else:
+        raise joints.unknown(condition)
+
+
+def _line(result: SpatialPlacement, body: str, along: Any) -> Array:
+    """The unit vector of a line in a body's frame: of an axis at the start, or at an angle in the frame."""
+    if isinstance(along, tuple):
+        return result.attitudes.image(body, along)
+    return turns.about_z(along)[:, 0]
+
+
+def line_of(result: SpatialPlacement, body: str, along: Any) -> Affine:
+    """The direction of a line that a body holds."""
+    return of_image(result, body, _line(result, body, along))
+
+
+def _require_rigid(scene: Scene, name: str, body: str) -> None:
+    if body != GROUND and scene.bodies[body].element != "rigid":
+        raise InputError(f"joints.{name}.first.body: {body} is flexible; in space a line is held by a rigid body")

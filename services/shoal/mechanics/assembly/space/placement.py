@@ -1,0 +1,304 @@
+"""Scene -> coordinates in space: bodies by shared points and axes, with a constant mass matrix (natural coordinates).
+
+Bodies are placed one after the other from the ground. A rigid body takes its three directors from what it shares with
+its joints: ways between joint points and joint axes that exist already, then those that it makes for its neighbours,
+then vectors of its own; that their products stay is stated as constraints. A body whose axis rests on the ground has
+two numbers for its direction, as in the plane. What sharing cannot express becomes a constraint.
+Garcia de Jalon and Bayo, Kinematic and dynamic simulation of multibody systems, 1994.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics import joints
+from shoal.mechanics import rotation as turns
+from shoal.mechanics.affine import Affine, combined, fixed
+from shoal.mechanics.assembly.groups import JointPoint, moving, rotated, transposed
+from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
+from shoal.mechanics.assembly.space.axes import JointAxis
+from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
+from shoal.mechanics.assembly.space.holding import hold
+from shoal.mechanics.frames import Place, PointFrame, RigidFrame
+from shoal.mechanics.joints import Along, InPlane
+from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.plane import vector
+from shoal.scene import GROUND, Function, PointMass, Rod, Scene
+
+APART = 0.3
+"""Sine of the angle between a vector and the span of those chosen before it, from which it is chosen too."""
+
+
+def place_in_space(scene: Scene) -> SpatialPlacement:
+    """Give every body its coordinates and a state that joints need not agree with yet. Raises InputError."""
+    result = SpatialPlacement(scene)
+    for name, path in scene.ground_points.items():
+        _place_driver(name, (path.x, path.y, path.z), result)
+    touching = {name: [point for point in result.points if point.touches(name)] for name in scene.bodies}
+    waiting = list(scene.bodies)
+    while waiting:
+        name = _next(scene, waiting, touching, result)
+        waiting.remove(name)
+        pose = _pose(scene, name, touching[name], result)
+        result.poses[name] = pose
+        body = scene.bodies[name]
+        if isinstance(body, PointMass):
+            _place_point(name, touching[name], pose, result)
+        elif isinstance(body, Rod) and body.element != "rigid":
+            raise InputError(f"bodies.{name}.element: flexible rods are for planar scenes yet; use element: rigid")
+        else:
+            _place_rigid(name, touching[name], pose, result)
+    for point in result.points:
+        if point.line and not point.on_line and point.where is not None:
+            joint, base, direction = point.line
+            for normal in turns.across(direction):
+                result.terms.dot(joint, fixed(normal), point.where - fixed(base), 1)
+    hold(scene, result)
+    return result
+
+
+def _place_driver(name: str, path: tuple[Function, ...], result: SpatialPlacement) -> None:
+    begin = np.array([value_and_rate(f) for f in path])
+    vector_of_point = result.new_vector(begin[:, :1], begin[:, 1:])
+    result.drivers[moving(name)] = vector_of_point
+    result.terms.vanish(f"{GROUND}.{name}", vector_of_point, tuple(f.through("neg") for f in path))
+    for point in result.points:
+        if point.touches(moving(name)):
+            if point.where is not None:
+                raise InputError(f"joints.{point.name}: joins the moving point {name} to a fixed one")
+            point.where = vector_of_point
+
+
+def _next(scene: Scene, waiting: list[str], touching: dict[str, list[JointPoint]], result: SpatialPlacement) -> str:
+    """The next body whose place is known: by a joint point, by its own field, by a line."""
+    known: list[Callable[[str], bool]] = [
+        lambda name: any(point.where is not None for point in touching[name]),
+        lambda name: scene.start(name).position is not None,
+        lambda name: any(point.line for point in touching[name]),
+        lambda name: any(
+            isinstance(guide, Along | InPlane) and guide.second.body == name and guide.first.body in result.frames
+            for _, guide in joints.of_scene(scene)
+        ),
+    ]
+    for is_known in known:
+        for name in waiting:
+            if is_known(name):
+                return name
+    return waiting[0]
+
+
+def _pose(scene: Scene, name: str, mine: list[JointPoint], result: SpatialPlacement) -> Pose:
+    rotation, spin = result.attitudes.rotation(name), result.attitudes.spin(name)
+    directors = rotation.transpose(1, 0, 2)
+    turning = np.stack([turns.cross(spin, director) for director in directors])
+    start = scene.start(name)
+    known = [point for point in mine if point.where is not None]
+    p: Place = (0.0, 0.0, 0.0)
+    if known:
+        assert known[0].where is not None
+        position, velocity = result.start_of(known[0].where)
+        p = known[0].local(name)
+    elif start.position is not None:
+        position, velocity = vector(*start.position), vector(*start.velocity)
+    elif lines := [point for point in mine if point.line]:
+        assert lines[0].line is not None
+        position, p = lines[0].line[1], lines[0].local(name)
+        velocity = 0.0 * position
+    else:
+        position, velocity, p = _rail(scene, name, result)
+    return Pose(position - arm(directors, p), directors, velocity - arm(turning, p), turning)
+
+
+def _rail(scene: Scene, name: str, result: SpatialPlacement) -> tuple[Array, Array, Place]:
+    """Initial place and velocity of the base point of a line or plane that moves with a body, and the body's place."""
+    for _, guide in joints.of_scene(scene):
+        if isinstance(guide, Along | InPlane) and guide.second.body == name and guide.first.body in result.frames:
+            return *result.start_of(result.point(scene, guide.first)), scene.location(guide.second)
+    return np.zeros((3, 1)), np.zeros((3, 1)), (0.0, 0.0, 0.0)
+
+
+def _place_point(name: str, mine: list[JointPoint], pose: Pose, result: SpatialPlacement) -> None:
+    for point in mine[:1]:
+        point.where = point.where or result.make(point, pose.position, pose.velocity)
+    origin = mine[0].where if mine else result.new_vector(pose.position, pose.velocity)
+    assert origin is not None
+    result.frames[name] = PointFrame(name, origin)
+
+
+def _place_rigid(name: str, mine: list[JointPoint], pose: Pose, result: SpatialPlacement) -> None:
+    kept = result.attitudes.kept
+    root, relative = kept.root(name)
+    axes = [axis for axis in result.axes if axis.touches(name)]
+    anchor = min(mine, key=lambda point: (point.where is None, point.line is None), default=None)
+    p: Place = (0.0, 0.0, 0.0) if anchor is None else anchor.local(name)
+    if anchor is None:
+        where = result.new_vector(pose.position, pose.velocity)
+    else:
+        where = anchor.where or result.make(anchor, pose.point(p), pose.point_velocity(p))
+    others = [point for point in mine if point is not anchor]
+    if root not in kept.directors:
+        hinge = next((axis for axis in axes if axis.where is not None and not axis.where.terms), None)
+        body = _Rigid(name, pose, where, p, result)
+        own = body.free(axes, others) if hinge is None else body.hinged(hinge, others)
+        kept.directors[root] = rotated(own, transposed(relative))
+    directors = kept.of_body(name)
+    frame = RigidFrame(where - combined(directors, p), directors)
+    result.frames[name] = frame
+    for point in others:
+        if (name, id(point)) not in result.chosen:
+            result.share(point, frame.point(point.local(name)))
+    for axis in axes:
+        image = axis.local(name)
+        if axis.where is None:
+            axis.where = combined(directors, tuple(image))
+        elif name not in axis.holders and not (root == GROUND and not axis.where.terms):
+            for normal in turns.across(image):
+                result.terms.dot(axis.name, combined(directors, tuple(normal)), axis.where, 0)
+        axis.holders.add(name)
+
+
+class _Rigid:
+    """The directors of one body from vectors that it shares or makes."""
+
+    def __init__(self, name: str, pose: Pose, where: Affine, p: Place, result: SpatialPlacement) -> None:
+        self.name, self.pose, self.where, self.result = name, pose, where, result
+        self.p = vector(*p)
+
+    def _away(self, point: JointPoint) -> Array:
+        """The way from the anchor to another place in the body's frame [m], (3, lanes)."""
+        return vector(*point.local(self.name)) - self.p
+
+    def hinged(self, axis: JointAxis, others: list[JointPoint]) -> tuple[Affine, ...]:
+        """Of a body that turns about an axis at rest: one direction at a right angle to it tells them all."""
+        name, result = self.name, self.result
+        assert axis.where is not None
+        normal, image = axis.where.constant, axis.local(name)
+        axis.holders.add(name)
+        onto = normal[:, None] * normal[None]
+        quarter = turns.skew(normal)
+        level = not _moves(self.where.turned(onto))
+        for point in sorted(others, key=lambda point: point.where is None):
+            away = self._away(point)
+            height = np.sum(away * image, axis=0)
+            flat = away - image * height
+            width = np.sqrt(np.sum(flat**2, axis=0))
+            if np.any(width < 1e-6 * np.sqrt(np.sum(away**2, axis=0)) + 1e-300):
+                continue
+            place = tuple(point.local(name))
+            if point.where is None:
+                if not level or point.line is not None:
+                    continue
+                base = normal * np.sum(normal * self.pose.point(place), axis=0)
+                rest = self.pose.point(place) - base
+                one, other = turns.across(normal)
+                speed = self.pose.point_velocity(place)
+                point.where = fixed(base) + result.new_along(0.0 * one, one, rest, speed)
+                point.where = point.where + result.new_along(0.0 * other, other, rest, speed)
+            gap = point.where - self.where
+            risen = gap.turned(onto)
+            if _moves(risen):
+                result.terms.dot(name, fixed(normal), gap, 1, -height)
+            result.chosen.add((name, id(point)))
+            first_image = flat / width
+            first = (gap - risen) * (1.0 / width)
+            break
+        else:
+            first_image, _ = turns.across(image)
+            start, rate = arm(self.pose.directors, tuple(first_image)), arm(self.pose.turning, tuple(first_image))
+            one, other = turns.across(normal)
+            first = result.new_along(0.0 * one, one, start, rate) + result.new_along(0.0 * other, other, start, rate)
+        if first.terms:
+            result.terms.dot(name, first, first, 0, -1.0)
+        basis = [first, first.turned(quarter), fixed(normal)]
+        images = np.stack([first_image, turns.cross(image, first_image), image])
+        return tuple(combined(tuple(basis), tuple(images[:, k])) for k in range(3))
+
+    def free(self, axes: list[JointAxis], others: list[JointPoint]) -> tuple[Affine, ...]:
+        """Of any other body: three vectors whose products are kept."""
+        name, result = self.name, self.result
+        chosen: list[_Chosen] = []
+        for known in (True, False):
+            for axis in axes:
+                image = axis.local(name)
+                if (axis.where is not None) == known and _independent(image, chosen):
+                    if axis.where is None:
+                        axis.where = self._new(image)
+                        result.terms.dot(name, axis.where, axis.where, 0, -1.0)
+                    chosen.append(_Chosen(image, axis.where, 0, axis))
+            for point in others:
+                away = self._away(point)
+                if (point.where is not None) == known and point.line is None and _independent(away, chosen):
+                    if point.where is None:
+                        at = point.local(name)
+                        point.where = result.make(point, self.pose.point(at), self.pose.point_velocity(at))
+                    result.chosen.add((name, id(point)))
+                    chosen.append(_Chosen(away, point.where - self.where, 1, None))
+        while len(chosen) < 3:
+            image = _completing([one.image for one in chosen])
+            chosen.append(_Chosen(image, self._new(image), 0, None))
+        for one, other in combinations_with_replacement(chosen, 2):
+            if not (_is_kept(one, other) or not (one.where.terms or other.where.terms)):
+                product = np.sum(one.image * other.image, axis=0)
+                result.terms.dot(name, one.where, other.where, one.lengths + other.lengths, -product)
+        for one in chosen:
+            if one.axis is not None:
+                one.axis.holders.add(name)
+        weights = np.linalg.inv(np.stack([one.image for one in chosen], 1).transpose(2, 0, 1)).transpose(1, 2, 0)
+        vectors = tuple(one.where for one in chosen)
+        return tuple(combined(vectors, tuple(weights[:, k])) for k in range(3))
+
+    def _new(self, image: Array) -> Affine:
+        """A vector of its own for a direction of the body."""
+        return self.result.new_vector(arm(self.pose.directors, tuple(image)), arm(self.pose.turning, tuple(image)))
+
+
+def _moves(vector: Affine) -> bool:
+    """Whether a vector depends on the coordinates by more than round-off."""
+    return any(np.max(np.abs(coefficient)) > 1e-12 for coefficient in vector.terms.values())
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """A vector that tells how a body is turned; image: in the body's frame; lengths: the power of a length it has."""
+
+    image: Array
+    where: Affine
+    lengths: int
+    axis: JointAxis | None
+
+
+def _independent(image: Array, chosen: list[_Chosen]) -> bool:
+    """Whether a vector is far enough from the span of those chosen, which are fewer than three."""
+    size = np.sqrt(np.sum(image**2, axis=0))
+    if len(chosen) == 3 or np.any(size == 0.0):
+        return False
+    rest = image / size
+    span: list[Array] = []
+    for one in chosen:
+        direction = one.image
+        for known in span:
+            direction = direction - known * np.sum(known * direction, axis=0)
+        span.append(turns.unit(direction))
+        rest = rest - span[-1] * np.sum(span[-1] * rest, axis=0)
+    return bool(np.all(np.sum(rest**2, axis=0) > APART**2))
+
+
+def _is_kept(one: _Chosen, other: _Chosen) -> bool:
+    """Whether a product of axes is kept already: their length by who made them, their angle by a body that has both."""
+    if one.axis is None or other.axis is None:
+        return False
+    return one.axis is other.axis or bool(one.axis.holders & other.axis.holders)
+
+
+def _completing(images: list[Array]) -> Array:
+    """A unit vector at right angles to one or two vectors, or any, (3, lanes)."""
+    if not images:
+        return vector(1.0, 0.0, 0.0)
+    if len(images) == 1:
+        return turns.across(turns.unit(images[0]))[0]
+    return turns.unit(turns.cross(images[0], images[1]))

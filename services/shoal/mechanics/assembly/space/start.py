@@ -1,0 +1,335 @@
+"""The start in space: the stated poses and rates, moved as little as the joints demand.
+
+What is stated is kept exactly if it can be; what is not stated follows from it. Unlike in the plane the search is made
+in the coordinates themselves: poses by Gauss and Newton's method, rates of least kinetic energy of the change.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics import reach
+from shoal.mechanics import rotation as turns
+from shoal.mechanics.affine import Affine
+from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
+from shoal.mechanics.assembly.space.placement import place_in_space
+from shoal.mechanics.assembly.terms import Term
+from shoal.mechanics.frames import Frame, PointFrame, RigidFrame
+from shoal.mechanics.numerics.tile import Array, Flags, stacked
+from shoal.scene import InitialState, Scene
+from shoal.scene.joints import places
+from shoal.scene.scene import Quantity
+
+CLOSED = 1e-11
+"""A joint that gapes by less, relative to the size of the machine, is closed."""
+ROUNDING = 1e-4
+"""Stated values may miss by so much, relative to the size of the machine or in rad, and are then corrected."""
+ITERATIONS = 60
+ATTEMPTS = 16
+DEPENDENT = 1e-9
+"""Singular values below this, relative to the largest, are of rows that depend on others."""
+
+
+def place_started(scene: Scene) -> SpatialPlacement:
+    """The placement of a scene with a start that agrees with its joints. Raises InputError where there is none."""
+    placement = place_in_space(scene)
+    closing = _Closing(scene, placement)
+    closing.run()
+    return placement
+
+
+class _Stated(NamedTuple):
+    """A component of a stated vector as a row of the coordinates, (unknowns,), and its value."""
+
+    row: Array
+    value: float
+    quantity: Quantity
+    body: str
+    firm: bool
+
+
+class _Closing:
+    """Coordinates and rates that meet the constraints of a placement, from those it has."""
+
+    def __init__(self, scene: Scene, placement: SpatialPlacement) -> None:
+        self.scene, self.placement = scene, placement
+        self.terms = placement.terms.held
+        self.q, self.v = stacked(placement.positions), stacked(placement.velocities)
+        self.size = float(reach.span(scene))
+        self.scale = np.array([self.size**term.lengths for term in self.terms])
+        lanes = max(self.q.shape[1], self.v.shape[1], *(len(np.atleast_1d(one)) for one in self.residual(self.q)), 1)
+        self.q, self.v = (np.repeat(x, lanes // x.shape[1], 1) for x in (self.q, self.v))
+        self.lanes = lanes
+
+    def run(self) -> None:
+        """Close, and put the result into the placement. Raises InputError if a scene without lanes has no start."""
+        failed = np.zeros(self.lanes, dtype=bool)
+        off = np.max(np.abs(self.residual(self.q)) / self.scale[:, None], axis=0, initial=0.0)
+        for lane in range(self.lanes):
+            if off[min(lane, len(off) - 1)] > CLOSED or not self._keeps(lane):
+                failed[lane] |= not self._close(lane)
+        for moving in np.flatnonzero(~failed):
+            failed[moving] |= not self._move(int(moving))
+        self.placement.positions, self.placement.velocities = list(self.q), list(self.v)
+        self.placement.failed = failed
+
+    def residual(self, q: Array) -> Array:
+        """The constraints at time zero, (constraints, lanes)."""
+        found = [_value(term, q) for term in self.terms]
+        lanes = max((len(one) for one in found), default=1)
+        return np.stack([np.broadcast_to(one, lanes) for one in found]) if found else np.zeros((0, lanes))
+
+    def jacobian(self, q: Array, lane: int) -> Array:
+        """Their derivatives by the coordinates of a lane, (constraints, unknowns)."""
+        found = np.zeros((len(self.terms), len(q)))
+        for row, term in enumerate(self.terms):
+            u, w = (_at(vector, q, lane) for vector in (term.u, term.w))
+            for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
+                for unknown, coefficient in vector.terms.items():
+                    found[row, unknown] += _lane(coefficient, lane) @ other
+        return found
+
+    def _keeps(self, lane: int) -> bool:
+        """Whether the poses are those that are stated."""
+        away = (abs(one.row @ self.q[:, lane] - one.value) for one in self._rows(_POSES, lane))
+        return all(off <= CLOSED * max(self.size, 1.0) for off in away)
+
+    def _close(self, lane: int) -> bool:
+        stated = [one for one in self._rows(_POSES, lane) if one.firm]
+        begin = self.q[:, lane].copy()
+        rng = np.random.default_rng(0)
+        for attempt in range(ATTEMPTS):
+            shaken = 0.05 * 1.3**attempt * rng.normal(size=len(begin)) if attempt else 0.0
+            found = self._newton(begin + shaken, lane, stated)
+            if found is not None and not self._flipped(found, lane):
+                self.q[:, lane] = found
+                return True
+        if self.lanes > 1:
+            return False
+        found = self._newton(begin, lane, [])
+        if found is None:
+            off = np.abs(self.residual(begin[:, None])[:, 0]) / self.scale
+            raise InputError(
+                f"joints.{self._name(int(np.argmax(off)))}: cannot be assembled; no poses near the stated ones close it"
+            )
+        return self._corrected(found, stated)
+
+    def _corrected(self, q: Array, stated: list[_Stated]) -> bool:
+        """Whether the stated poses miss by rounding only. Raises InputError if they do not."""
+        off = [abs(float(one.row @ q) - one.value) / self._unit(one.quantity) for one in stated]
+        if max(off, default=0.0) > ROUNDING:
+            worst = stated[int(np.argmax(off))]
+            unit = "m" if worst.quantity == "position" else "rad"
+            raise InputError(
+                f"initial.{worst.body}.{worst.quantity}: contradicts the joints and what else is stated of the start, "
+                f"by {max(off) * self._unit(worst.quantity):.3g} {unit}; leave it out and it follows from the rest"
+            )
+        self.q[:, 0] = q
+        return True
+
+    def _unit(self, quantity: Quantity) -> float:
+        return self.size if quantity == "position" else 1.0
+
+    def _newton(self, q: Array, lane: int, stated: list[_Stated]) -> Array | None:
+        held = np.array([one.row for one in stated]).reshape(-1, len(q))
+        wanted = np.array([one.value for one in stated])
+        small = CLOSED * self.scale
+        for _ in range(ITERATIONS):
+            gap = np.array([_value_of(term, q, lane) for term in self.terms])
+            away = held @ q - wanted
+            if np.all(np.abs(gap) <= small) and np.all(np.abs(away) <= CLOSED * max(self.size, 1.0)):
+                return q
+            rows = np.vstack([self.jacobian(q, lane) / self.scale[:, None], held])
+            move = np.linalg.lstsq(rows, -np.concatenate([gap / self.scale, away]), DEPENDENT)[0]
+            longest = float(np.max(np.abs(move), initial=0.0))
+            q = q + move * min(1.0, 0.5 * max(self.size, 1.0) / (longest + 1e-300))
+            if not np.all(np.isfinite(q)):
+                return None
+        return None
+
+    def _flipped(self, q: Array, lane: int) -> bool:
+        """Whether a body has become its own mirror image."""
+        for frame in self.placement.frames.values():
+            if isinstance(frame, RigidFrame):
+                directors = np.array([_at(one, q, lane) for one in frame.directors])
+                if np.linalg.det(directors) < 0:
+                    return True
+        return False
+
+    def _rows(self, quantities: tuple[Quantity, ...], lane: int) -> list[_Stated]:
+        """What is stated of these quantities."""
+        found = []
+        count = len(self.q)
+        for body, start in self.scene.initial.items():
+            frame = self.placement.frames[body]
+            for quantity in quantities:
+                if (value := getattr(start, quantity)) is None:
+                    continue
+                for vector, target in self._targets(body, frame, quantity, value, lane):
+                    for k in range(3):
+                        row = np.zeros(count)
+                        for unknown, coefficient in vector.terms.items():
+                            row[unknown] += _lane(coefficient, lane)[k]
+                        wanted = target[k] - _lane(vector.constant, lane)[k] * (quantity in _POSES)
+                        found.append(_Stated(row, float(wanted), quantity, body, quantity not in start.guess))
+        return found
+
+    def _targets(
+        self, body: str, frame: Frame, quantity: Quantity, value: Any, lane: int
+    ) -> list[tuple[Affine, Array]]:
+        origin = frame.point((0.0, 0.0, 0.0))
+        if quantity in ("position", "velocity"):
+            stated = [float(np.atleast_1d(part)[min(lane, np.size(part) - 1)]) for part in value]
+            return [(origin, np.array([*stated, 0.0][:3]))]
+        if isinstance(frame, PointFrame) or not isinstance(frame, RigidFrame):
+            return []
+        if quantity in ("angle", "rotation"):
+            rotation = self.placement.attitudes.rotation(body)
+            return [(one, _lane(rotation[:, k], lane)) for k, one in enumerate(frame.directors)]
+        spin = _lane(self.placement.attitudes.spin(body), lane)
+        return [(one, np.cross(spin, _at(one, self.q, lane))) for one in frame.directors]
+
+    def _move(self, lane: int) -> bool:
+        """Rates that meet the constraints and what is stated; false if there are none."""
+        q, v = self.q[:, lane], self.v[:, lane].copy()
+        slope = self.jacobian(self.q, lane) / self.scale[:, None] if len(self.terms) else np.zeros((0, len(q)))
+        driven = np.array([_drive_rate(term) for term in self.terms]) / self.scale
+        stated = [one for one in self._rows(("velocity", "spin", "rate"), lane) if one.firm]
+        pace = max(1.0, float(np.max(np.abs(v), initial=0.0)))
+        kept = all(abs(one.row @ v - one.value) <= CLOSED * pace for one in stated)
+        if kept and np.all(np.abs(slope @ v + driven) <= CLOSED * pace):
+            return True
+        held = np.array([one.row for one in stated]).reshape(-1, len(q))
+        wanted = np.array([one.value for one in stated])
+        rows, right = np.vstack([slope, held]), np.concatenate([-driven, wanted])
+        root = np.linalg.cholesky(self._mass(lane))
+        move = np.linalg.lstsq(np.linalg.solve(root, rows.T).T, right - rows @ v, DEPENDENT)[0]
+        v = v + np.linalg.solve(root.T, move)
+        left = rows @ v - right
+        worst = int(np.argmax(np.abs(left))) if left.size else 0
+        if left.size and abs(left[worst]) > ROUNDING * pace:
+            if self.lanes > 1:
+                return False
+            if worst < len(self.terms) and not stated:
+                raise InputError(f"joints.{self._name(worst)}: cannot begin to move as it is driven")
+            off = np.abs(left[len(self.terms) :])
+            guilty = stated[int(np.argmax(off))]
+            raise InputError(
+                f"initial.{guilty.body}.{guilty.quantity}: contradicts the joints and the other rates, by "
+                f"{off.max():.3g}; leave it out and it follows from the rest"
+            )
+        if left.size and abs(left[worst]) > 1e-9 * pace:  # digits of stated rates: the joints come first
+            slope_root = np.linalg.solve(root, slope.T).T
+            v = v - np.linalg.solve(root.T, np.linalg.lstsq(slope_root, slope @ v + driven, DEPENDENT)[0])
+        self.v[:, lane] = v
+        return True
+
+    def _mass(self, lane: int) -> Array:
+        from shoal.mechanics.assembly.masses import Masses
+        from shoal.mechanics.assembly.rows import Rows
+
+        count = len(self.q)
+        matrix = np.zeros((count, count))
+        for (i, j), value in Masses(self.scene, self.placement, Rows(count)).mass.items():
+            matrix[i, j] = matrix[j, i] = _lane(np.atleast_1d(value)[None], lane)[0]
+        return matrix
+
+    def _name(self, row: int) -> str:
+        return self.terms[row].name
+
+
+_POSES: tuple[Quantity, ...] = ("position", "rotation", "angle")
+
+
+def _lane(rows: Array, lane: int) -> Array:
+    """A column of (rows, lanes) or (rows, 1)."""
+    return np.asarray(rows[:, lane if rows.shape[1] > 1 else 0])
+
+
+def _at(vector: Affine, q: Array, lane: int) -> Array:
+    """A vector at the coordinates (unknowns,) or (unknowns, lanes) of a lane, (3,)."""
+    column = q if q.ndim == 1 else _lane(q, lane)
+    total = _lane(vector.constant, lane)
+    for unknown, coefficient in vector.terms.items():
+        total = total + _lane(coefficient, lane) * column[unknown]
+    return total
+
+
+def _all(vector: Affine, q: Array) -> Array:
+    """A vector in all lanes, (3, lanes)."""
+    total = vector.constant
+    for unknown, coefficient in vector.terms.items():
+        total = total + coefficient * q[unknown]
+    return total
+
+
+def _value(term: Term, q: Array) -> Array:
+    """A constraint at time zero in all lanes, (lanes,)."""
+    u, w = _all(term.u, q), _all(term.w, q)
+    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
+    return np.atleast_1d(np.sum(u * (term.form @ w), axis=0) + term.constant + drive)
+
+
+def _value_of(term: Term, q: Array, lane: int) -> float:
+    """A constraint at time zero at the coordinates (unknowns,) of a lane."""
+    constant = np.atleast_1d(term.constant)
+    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
+    u, w = _at(term.u, q, lane), _at(term.w, q, lane)
+    return float(u @ term.form @ w + constant[min(lane, constant.size - 1)] + drive)
+
+
+def _drive_rate(term: Term) -> float:
+    """The rate of a constraint's function of time at time zero."""
+    if term.drive is None:
+        return 0.0
+    h = 1e-5
+    before, now, after = (float(x) for x in term.drive(np.array([0.0, h, 2 * h])))
+    return (4 * now - 3 * before - after) / (2 * h)
+
+
+def begun(frames: dict[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
+    """The state of every body at the coordinates q and rates v of a machine, each (unknowns,)."""
+    found = {}
+    for name, frame in frames.items():
+        place = frame.point((0.0, 0.0, 0.0))
+        turn: list[float] = [0.0, 0.0, 0.0]
+        spin: list[float] = [0.0, 0.0, 0.0]
+        if isinstance(frame, RigidFrame):
+            directors = np.array([one.at(q) for one in frame.directors])
+            turning = np.array([one.rate(v) for one in frame.directors])
+            turn = turns.vector_of(directors.T).tolist()
+            spin = (0.5 * np.sum(np.cross(directors, turning), axis=0)).tolist()
+        found[name] = InitialState.model_construct(
+            angle=None,
+            rate=None,
+            position=tuple(place.at(q).tolist()),
+            velocity=tuple(place.rate(v).tolist()),
+            rotation=(turn[0], turn[1], turn[2]),
+            spin=(spin[0], spin[1], spin[2]),
+            guess=(),
+        )
+    return found
+
+
+def redundant(scene: Scene, q: Array) -> tuple[str, ...]:
+    """Joints that hold what others hold already at these coordinates, (unknowns,): they share a dependent row."""
+    placement = place_in_space(scene)
+    closing = _Closing(scene, placement)
+    slope = closing.jacobian(q[:, None], 0)
+    slope = slope / (np.linalg.norm(slope, axis=1, keepdims=True) + 1e-300)
+    if not len(slope):
+        return ()
+    left, size, _ = np.linalg.svd(slope)
+    share = np.linalg.norm(left[:, int(np.sum(size > 1e-7)) :], axis=1)
+    guilty = {term.name for term, part in zip(closing.terms, share, strict=True) if part > 1e-3}
+    return tuple(
+        name
+        for name, joint in placement.scene.joints.items()
+        if name in guilty or guilty & {side.body for side in places(joint)}
+    )
+
+
+__all__: list[str] = ["Flags", "begun", "place_started", "redundant"]

@@ -1,0 +1,73 @@
+"""What a scene in the plane cannot say, and what one in space leaves out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from shoal.errors import InputError
+from shoal.scene.record import Record
+
+SPATIAL_KINDS = ("spherical", "universal", "cylindrical", "planar")
+_Z = (0.0, 0.0, 1.0)
+
+
+def padded(vector: Any, dimensions: int) -> Any:
+    """The components of a vector, with zeros for those left out."""
+    return (*vector, *(0.0,) * (dimensions - len(vector)))
+
+
+def check_dimensions(scene: Any) -> None:
+    """Raises ValueError where a planar scene says what is of space only, or one of space what is of the plane only."""
+    if scene.dimensions == 2:
+        for name, joint in scene.joints.items():
+            if joint.kind in SPATIAL_KINDS:
+                raise ValueError(f"joints.{name}.kind: {joint.kind} is a joint in space; say dimensions: 3")
+        _check_plane(scene, "")
+        return
+    for name, start in scene.initial.items():
+        for one, other in (("angle", "rotation"), ("rate", "spin")):
+            if getattr(start, one) is not None and getattr(start, other) is not None:
+                raise ValueError(f"initial.{name}.{other}: {one} is stated as well; state one of them")
+    for name, body in scene.bodies.items():
+        if body.kind == "rod" and body.element == "ancf-full":
+            raise ValueError(f"bodies.{name}.element: ancf-full is for the plane; use ancf-cable or ancf-quintic")
+        if body.kind == "rod" and body.curvature:
+            raise ValueError(f"bodies.{name}.curvature: curved rods are for the plane; leave dimensions: 3 out")
+
+
+def _check_plane(part: Any, path: str) -> None:
+    """Raises ValueError for the first field below `path` that is of space only."""
+    if isinstance(part, Record):
+        for name in part.model_fields_set:
+            value, where = getattr(part, name), f"{path}.{name}".lstrip(".")
+            if _is_spatial(name, value):
+                raise ValueError(f"{where}: this is for scenes in space; say dimensions: 3")
+            _check_plane(value, where)
+    elif isinstance(part, dict):
+        for name, value in part.items():
+            _check_plane(value, f"{path}.{name}")
+    elif isinstance(part, tuple) and part and isinstance(part[0], Record):
+        for number, value in enumerate(part):
+            _check_plane(value, f"{path}.{number}")
+    elif isinstance(part, tuple) and len(part) == 3 and _VECTORS & set(path.split(".")[-2:]):
+        raise ValueError(f"{path}: has three components; say dimensions: 3, or leave one out")
+
+
+def _is_spatial(name: str, value: Any) -> bool:
+    """Whether a field says what nothing in the plane has."""
+    if name == "axis":
+        return value is not None and value not in (_Z, "x", "y")
+    if name == "z":
+        return getattr(value, "number", None) != 0.0
+    if name == "inertia":
+        return isinstance(value, tuple)
+    return name in ("rotation", "spin", "torsion_constant") and not isinstance(value, str | None)
+
+
+_VECTORS = {"gravity", "position", "velocity", "point", "force", "centre_of_mass", "named_points"}
+
+
+def require_plane(scene: Any, what: str) -> None:
+    """Raises InputError for a scene in space where something (with its verb) is for planar ones only."""
+    if scene.dimensions != 2:
+        raise InputError(f"dimensions: {what} for planar scenes only; {scene.name} is one in space")
