@@ -123,6 +123,14 @@ def uncertain(
     degree: int | None = None,
     count: int | None = None,
     most: int = 20_000,
+    limits: Sequence[str] = (),
+    limit_method: str = "auto",
+    limit_runs: int = 5_000,
+    allocate: bool = False,
+    costs: Mapping[str, float] | None = None,
+    target: float = 1e-3,
+    checkpoint: Path | str | None = None,
+    time_limit: float | None = None,
     verify: bool = True,
     seed: int = 0,
     progress: Callable[[int], None] | None = None,
@@ -133,7 +141,11 @@ def uncertain(
     `--vary` takes; times: instants [s], else the scene's own; gap: between outer and attained bounds, as a share of the
     largest width, that must be reached; tolerance: error [m] of the model; correlations: of pairs of random parameters;
     degree, count: of a method that has one; most: runs that may be made; verify: estimate mesh and step errors of
-    extremal runs; progress: is told how many runs there are. Raises InputError, ComputationError.
+    extremal runs; limits: what must not happen, such as "B.y < -1.2"; limit_method: auto, form, importance, subset or
+    monte-carlo; limit_runs: for each of their probabilities; allocate: look for the widest tolerances that keep the
+    limit, with `costs` (by path, else 1) of tightening each; target: probability of passing it that is allowed;
+    checkpoint: file that keeps the runs, from which the same study goes on; time_limit [s]: after which it ends with
+    what is known; progress: is told how many runs there are. Raises InputError, ComputationError.
     """
     from shoal.response import uncertain
 
@@ -149,6 +161,14 @@ def uncertain(
         degree=degree,
         count=count,
         most=most,
+        limits=limits,
+        limit_method=limit_method,
+        limit_runs=limit_runs,
+        allocate=allocate,
+        costs=costs,
+        target=target,
+        checkpoint=checkpoint,
+        time_limit=time_limit,
         verify=verify,
         seed=seed,
         progress=progress,

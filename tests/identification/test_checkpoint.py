@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from shoal.errors import InputError
 from shoal.identification import Estimate, Verdict, identify
-from shoal.identification.checkpoint import Memory
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
+from shoal.memory import Memory
 from shoal_validation.inverse_precision.cases import rigid_problem, textbook
 
 METHOD = "iafsa-unseeded"

@@ -112,6 +112,9 @@ class Uncertain(OfScene):
     vary: path -> [low, high], or a text such as "normal(1, 0.01)"; times: instants [s], else the scene's own; gap:
     between outer and attained bounds, as a share of the width, to be reached; tolerance: error [m] of the model
     verify: estimate mesh and step errors of extremal runs; most: runs that may be made
+    limits: what must not happen, such as "B.y < -1.2"; limit_method, limit_runs: for their probabilities
+    allocate: look for the widest tolerances that keep the limit, with `costs` by path and the `target` probability
+    time_limit: in s, after which it ends with what is known
     """
 
     follows: ClassVar[tuple[str, ...]] = ("runs",)
@@ -126,11 +129,18 @@ class Uncertain(OfScene):
     degree: Annotated[int, Field(ge=1, le=40)] | None = None
     count: Annotated[int, Field(ge=1)] | None = None
     most: Annotated[int, Field(ge=3, le=20_000)] = 2_000
+    limits: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
+    limit_method: BuiltIn = "auto"
+    limit_runs: Annotated[int, Field(ge=100, le=20_000)] = 5_000
+    allocate: bool = False
+    costs: dict[Path, Positive] | None = None
+    target: Annotated[float, Field(gt=0, lt=0.5)] = 1e-3
+    time_limit: Positive | None = None
 
     @property
     def runs(self) -> int:
-        """That may be made."""
-        return self.most
+        """That may be made, or nearly so."""
+        return self.most + (len(self.limits) + 4 * self.allocate) * self.limit_runs
 
 
 class AtRest(OfScene):

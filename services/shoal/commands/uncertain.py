@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
 from shoal.commands import options
 from shoal.commands.options import Out, Times, Values
+from shoal.commands.stated import stated
 from shoal.errors import check_trusted
+
+if TYPE_CHECKING:
+    from shoal.response import Response
 
 
 def _methods() -> str:
@@ -15,8 +22,14 @@ def _methods() -> str:
     return f"One of {', '.join(METHODS)}."
 
 
+def _ways() -> str:
+    from shoal.response.limits.choice import WAYS
+
+    return f"Of a probability: one of {', '.join(WAYS)}."
+
+
 @click.command()
-@click.argument("scene")
+@click.argument("scene", is_eager=True, callback=stated)
 @click.option(
     "--vary",
     "vary",
@@ -34,6 +47,30 @@ def _methods() -> str:
 @click.option("--runs", "most", type=click.IntRange(3), default=20_000, show_default=True, help="That may be made.")
 @click.option("--degree", type=click.IntRange(1, 40), help="Of a method that has one.")
 @click.option("--count", type=click.IntRange(1), help="Runs of a method that samples.")
+@click.option(
+    "--limit", "limits", multiple=True, metavar='"MARKER.QUANTITY < NUMBER"', help="What must not happen (repeatable)."
+)
+@click.option("--limit-method", cls=options.LateHelp, told=_ways, default="auto", show_default=True, metavar="NAME")
+@click.option("--limit-runs", type=click.IntRange(100), default=5_000, show_default=True, help="For each probability.")
+@click.option("--allocate", is_flag=True, help="Look for the widest tolerances that keep the limit.")
+@click.option(
+    "--target", type=click.FloatRange(0, 0.5, True, True), default=1e-3, show_default=True, help="Of passing."
+)
+@click.option("--cost", "costs", multiple=True, metavar="PATH=COST", help="Of tightening one, else 1 (repeatable).")
+@click.option(
+    "--worst",
+    "worst_file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.yaml",
+    help="Write the scene that comes nearest to a limit, or goes furthest beyond, or attains a bound.",
+)
+@click.option("--worst-of", default="", metavar="LIMIT|BOUND", help="Which: a limit, or MARKER.QUANTITY.lower, .upper.")
+@click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="For all of it.")
+@click.option(
+    "--checkpoint",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Keep the runs in this file; where it exists, go on from it.",
+)
 @options.engine
 @options.values
 @options.at
@@ -41,7 +78,7 @@ def _methods() -> str:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @options.verify
 @options.as_json
-@options.out(".csv", ".json", ".png")
+@options.out(".html", ".nc", ".csv", ".json", ".png")
 def uncertain(
     scene: str,
     vary: tuple[str, ...],
@@ -51,6 +88,16 @@ def uncertain(
     most: int,
     degree: int | None,
     count: int | None,
+    limits: tuple[str, ...],
+    limit_method: str,
+    limit_runs: int,
+    allocate: bool,
+    target: float,
+    costs: tuple[str, ...],
+    worst_file: Path | None,
+    worst_of: str,
+    time_limit: float | None,
+    checkpoint: Path | None,
     engine: str,
     values: Values,
     times: Times,
@@ -62,11 +109,13 @@ def uncertain(
 ) -> None:
     """How SCENE may move if some of its fields are intervals or distributions.
 
-    Intervals give bounds that runs attain, distributions give means, deviations, quantiles and Sobol indices.
+    Intervals give bounds that runs attain, distributions give means, deviations, quantiles and Sobol indices. A limit
+    tells what must not happen: with intervals whether it can, with distributions how probable it is. SCENE may be a
+    YAML `uncertain: {scene: ..., vary: ..., ...}` that states these options.
     """
     from shoal.pictures import files
     from shoal.response import uncertain
-    from shoal.response.read import correlations, parameters
+    from shoal.response.read import correlations, parameters, prices
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
@@ -88,9 +137,30 @@ def uncertain(
             verify=verify,
             seed=seed,
             most=most,
+            limits=limits,
+            limit_method=limit_method,
+            limit_runs=limit_runs,
+            allocate=allocate,
+            costs=prices(costs),
+            target=target,
+            checkpoint=checkpoint,
+            time_limit=time_limit,
             progress=lambda runs: tell(f"{wanted.name}: {runs} runs"),
         )
     if out is not None:
         files.response(response, out)
+    if worst_file is not None:
+        _save_worst(response, worst_file, worst_of)
     screen.show(response.to_json(), as_json, lambda: tables.response_table(response))
     check_trusted(response.ok, response.message)
+
+
+def _save_worst(response: Response, file: Path, of: str) -> None:
+    """One scene; those of several limits get numbers. Raises InputError, ComputationError."""
+    from shoal.response.worst import worst
+
+    cases = worst(response, of)
+    for k, case in enumerate(cases):
+        path = file if len(cases) == 1 else file.with_stem(f"{file.stem}-{k + 1}")
+        case.save(path)
+        click.echo(f"{path}: {case.scene.description}", err=True)

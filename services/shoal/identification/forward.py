@@ -14,7 +14,6 @@ import numpy.typing as npt
 from shoal.engines import get_engine
 from shoal.engines.contract import Engine
 from shoal.errors import InputError
-from shoal.identification.checkpoint import Memory
 from shoal.identification.deadline import Deadline, TimeIsUp
 from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization
@@ -23,6 +22,7 @@ from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.observation import Camera, observe
 from shoal.identification.recording.rows import Rows
 from shoal.mechanics.numerics.tile import WIDE
+from shoal.memory import Memory
 from shoal.scene import Scene
 from shoal.swarm import EvaluationCounter
 from shoal.trajectory import Array, Status, Trajectory

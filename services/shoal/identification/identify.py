@@ -14,7 +14,6 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification.adapt import Stage, Stopped, coarse_to_fine
-from shoal.identification.checkpoint import Memory
 from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
@@ -27,6 +26,7 @@ from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.plausible import check_constant
 from shoal.identification.recording.source import EngineSource
+from shoal.memory import Memory
 from shoal.versions import versions
 
 Watch = Callable[[int, float, float, int], None]

@@ -128,7 +128,7 @@ def rows(result: Sweep) -> str:
 
 
 def response(found: Response, path: Path) -> None:
-    """Bounds or statistics of every marker over time, or those of the last marker as a picture."""
+    """A page, bounds or statistics of every marker over time, or those of the last marker as a picture."""
 
     def table() -> str:
         header, rows = found.table()
@@ -140,7 +140,15 @@ def response(found: Response, path: Path) -> None:
 
         return png(response(found, found.markers[-1]))
 
-    save(path, {".csv": table, ".json": _json(found), ".png": drawn})
+    def page() -> str:
+        from shoal.pictures.uncertainty import uncertainty
+
+        return uncertainty(found)
+
+    def netcdf() -> bytes:
+        return bytes(found.to_xarray().to_netcdf(engine="scipy"))
+
+    save(path, {".csv": table, ".json": _json(found), ".png": drawn, ".html": page, ".nc": netcdf})
 
 
 def comparison(result: Comparison, path: Path) -> None:

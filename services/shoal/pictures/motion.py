@@ -27,6 +27,7 @@ class Motion:
     name: of the recording or scene; ground: fixed places [m], (places, 2)
     outlines: points of each body [m], (frames, points, 2); markers: of the model [m], (frames, 2)
     measured: places [m], (frames, 2), nan where none was measured near that time; directions: measured angles [rad]
+    behind: outlines of another machine that is drawn below [m], (frames, points, 2)
     """
 
     name: str
@@ -36,6 +37,7 @@ class Motion:
     markers: dict[str, Array]
     measured: dict[str, Array] = field(default_factory=dict)
     directions: dict[str, Array] = field(default_factory=dict)
+    behind: dict[str, Array] = field(default_factory=dict)
 
     @property
     def span(self) -> float:
@@ -45,8 +47,8 @@ class Motion:
     @property
     def box(self) -> tuple[Array, Array]:
         """Lower left and upper right corner [m] of all that is shown, (2,) each."""
-        shown = [np.reshape(x, (-1, 2)) for x in (*self.outlines.values(), *self.measured.values(), self.ground)]
-        every = np.concatenate(shown)
+        moving = (*self.outlines.values(), *self.behind.values(), *self.measured.values())
+        every = np.concatenate([np.reshape(x, (-1, 2)) for x in (*moving, self.ground)])
         return np.nanmin(every, axis=0), np.nanmax(every, axis=0)
 
     @property
@@ -116,6 +118,7 @@ def plain_motion(found: Motion) -> dict[str, Any]:
         "times": np.round(found.times, 6).tolist(),
         "box": [*low.tolist(), *high.tolist()],
         "ground": plain(found.ground),
+        "behind": {name: plain(np.round(x, digits)) for name, x in found.behind.items()},
         "outlines": {name: plain(np.round(x, digits)) for name, x in found.outlines.items()},
         "markers": {name: plain(np.round(x, digits)) for name, x in found.markers.items()},
         "measured": {name: plain(np.round(x, digits)) for name, x in found.measured.items()},

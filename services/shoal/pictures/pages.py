@@ -43,6 +43,8 @@ def animation(found: Motion, what: str) -> dict[str, Any]:
     shown = [f"{what} (blue) with its markers (red)"]
     if found.measured:
         shown.append("the measured places (black circles)")
+    if found.behind:
+        shown.append("the machine as it is stated (grey)")
     if found.directions:
         shown.append("the measured directions (orange)")
     over = " over " + " and ".join(shown[1:]) if shown[1:] else ""

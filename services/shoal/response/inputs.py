@@ -110,10 +110,28 @@ class Inputs:
         values = self.values(np.atleast_2d(germs))
         return np.stack([values[next(iter(one.factors))] for one in self.parameters], axis=1)
 
+    def at(self, named: Array) -> dict[str, float]:
+        """Path -> value where the parameters have these values, (parameters,), as the user states them."""
+        given = {}
+        for one, value in zip(self.parameters, named.tolist(), strict=True):
+            first = next(iter(one.factors.values()))
+            given.update({path: value * factor / first for path, factor in one.factors.items()})
+        return given
+
     def germs(self, x: Array) -> Array:
         """Germs at independent probabilities, both (runs, parameters)."""
         found = [
             special.ndtri(x[:, k]) if self._standard(k) else one.marginal.germ(x[:, k])
+            for k, one in enumerate(self.parameters)
+        ]
+        return np.stack(found, axis=1)
+
+    def standard(self, places: Array) -> Array:
+        """Germs at places of independent standard normal variables, both (runs, parameters)."""
+        found = [
+            places[:, k]
+            if self._standard(k) or isinstance(one.marginal, Normal)
+            else one.marginal.germ(inside(special.ndtr(places[:, k])))
             for k, one in enumerate(self.parameters)
         ]
         return np.stack(found, axis=1)

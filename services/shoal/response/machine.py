@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.errors import InputError
 from shoal.response.inputs import BoolArray
+from shoal.response.kept import Keep
 from shoal.response.runs import Answers
 from shoal.scene import Scene
 from shoal.scene.dimensions import require_plane
@@ -27,12 +28,15 @@ LEAST_TOLERANCE = 1e-14
 class Machine:
     """Call it with path -> values. Columns: instants, markers and quantities (x, y [m] and angle [rad]), in this order.
 
-    columns: their number along each of the three
+    columns: their number along each of the three; told: what is told of a motion instead, (lanes, columns);
+    keep: of the runs
     """
 
     scene: Scene
     times: Array
     engine: Engine
+    told: Callable[[Trajectory], Array] = field(default_factory=lambda: _columns)
+    keep: Keep | None = None
 
     def __post_init__(self) -> None:
         require_plane(self.scene, "bounds and statistics are")
@@ -47,7 +51,7 @@ class Machine:
         count = len(next(iter(values.values())))
         chunk = max(64, CHUNK // int(np.prod(self.columns)))
         parts = [
-            self._some({path: lanes[k : k + chunk] for path, lanes in values.items()}) for k in range(0, count, chunk)
+            self._known({path: lanes[k : k + chunk] for path, lanes in values.items()}) for k in range(0, count, chunk)
         ]
         return Answers(
             np.concatenate([part.values for part in parts]),
@@ -56,9 +60,14 @@ class Machine:
             next((part.why for part in parts if part.why), ""),
         )
 
+    def _known(self, values: Mapping[str, Array]) -> Answers:
+        if self.keep is None:
+            return self._some(values)
+        return self.keep(repr(getattr(self.told, "__self__", "markers")), values, self._some)
+
     def _some(self, values: Mapping[str, Array]) -> Answers:
         motion = self.engine.simulate_many(self.scene, values, self.times)
-        found, good = _columns(motion), _good(motion)
+        found, good = self.told(motion), _good(motion)
         why, repeated = motion.message, 0
         for finer in FINER:
             left = np.flatnonzero(~good)
@@ -71,7 +80,7 @@ class Machine:
             except InputError as error:
                 why = str(error)
                 break
-            found[left], good[left] = _columns(again), _good(again)
+            found[left], good[left] = self.told(again), _good(again)
             why = again.message
         return Answers(found, good, repeated, "" if good.all() else why)
 

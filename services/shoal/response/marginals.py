@@ -7,7 +7,7 @@ and Nowak, Reliability Engineering and System Safety 106, 2012).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -158,3 +158,45 @@ class Empirical:
         """The observation."""
         mean, deviation = self._scale
         return np.asarray(mean + deviation * s)
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """A distribution drawn together, or apart, about its median."""
+
+    marginal: Marginal
+    factor: float
+    random = True
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return f"{self.marginal.text} scaled by {self.factor:g}"
+
+    @property
+    def basis(self) -> Recurrence:
+        """That of the distribution."""
+        return self.marginal.basis
+
+    def germ(self, x: Array) -> Array:
+        """That of the distribution."""
+        return self.marginal.germ(x)
+
+    def value(self, s: Array) -> Array:
+        """The value."""
+        median = self.marginal.value(self.marginal.germ(np.array([0.5])))
+        return np.asarray(median + self.factor * (self.marginal.value(s) - median))
+
+
+def scaled(marginal: Marginal, factor: float) -> Marginal:
+    """An interval or a distribution with its width, or that of the logarithm, multiplied about its middle."""
+    if isinstance(marginal, Interval):
+        middle, half = 0.5 * (marginal.low + marginal.high), 0.5 * (marginal.high - marginal.low) * factor
+        low, high = middle - half, middle + half
+        kind = "uniform({:g},{:g})" if marginal.random else "{:g}:{:g}"
+        return replace(marginal, low=low, high=high, text=kind.format(low, high))
+    if isinstance(marginal, Normal):
+        name = "the logarithm normal" if marginal.logarithmic else "normal"
+        deviation = marginal.deviation * factor
+        return replace(marginal, deviation=deviation, text=f"{name}({marginal.mean:g},{deviation:g})")
+    return Scaled(marginal, factor)

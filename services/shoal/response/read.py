@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy import stats
@@ -14,7 +14,9 @@ from scipy import stats
 from shoal.errors import InputError
 from shoal.response.inputs import Correlations, Parameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
+from shoal.response.salib import from_salib, is_problem
 from shoal.scene import Scene
+from shoal.trajectory import Array
 
 FORM = "PATH=LOW:HIGH or PATH~normal(MEAN,SD)"
 _CALL = re.compile(r"^\s*([a-z-]+)\s*\((.*)\)\s*$")
@@ -65,6 +67,8 @@ DISTRIBUTIONS: dict[str, tuple[Callable[..., Marginal], str]] = {
 
 def parameters(vary: Mapping[str, Any] | Sequence[str | Parameter], scene: Scene) -> tuple[Parameter, ...]:
     """The uncertain parameters of a scene, each of which it accepts at its ends. Raises InputError."""
+    if is_problem(vary):
+        vary = from_salib(cast(Mapping[str, Any], vary))
     if isinstance(vary, Mapping):
         return tuple(_parameter(name, known, scene) for name, known in vary.items())
     return tuple(one if isinstance(one, Parameter) else _parameter(*_split(one), scene) for one in vary)
@@ -83,6 +87,20 @@ def correlations(pairs: Sequence[str]) -> Correlations | None:
         if not comma:
             raise InputError(f"correlate: {text!r} is not PATH,PATH=VALUE, such as bodies.A.length,bodies.B.length=0.8")
     return found or None
+
+
+def prices(texts: Sequence[str]) -> dict[str, float]:
+    """PATH=COST texts. Raises InputError."""
+    found: dict[str, float] = {}
+    for text in texts:
+        name, _, cost = text.rpartition("=")
+        try:
+            found[name.strip()] = float(cost)
+        except ValueError:
+            name = ""
+        if not name:
+            raise InputError(f"cost: {text!r} is not PATH=COST, such as bodies.OA.length=2.5")
+    return found
 
 
 def _split(text: str) -> tuple[str, Any]:
@@ -130,6 +148,10 @@ def _nominal(path: str, scene: Scene) -> float:
 def _marginal(name: str, known: Any, nominal: float) -> Marginal:
     if isinstance(known, str):
         return _distribution(name, known)
+    if hasattr(known, "germ") and hasattr(known, "basis"):
+        return cast(Marginal, known)
+    if hasattr(known, "computeQuantile"):
+        return Frozen(_OpenTurns(name, known), str(known))
     if hasattr(known, "ppf"):
         return Frozen(known, str(getattr(getattr(known, "dist", known), "name", known)))
     if isinstance(known, Sequence) and len(known) == 2:
@@ -138,6 +160,28 @@ def _marginal(name: str, known: Any, nominal: float) -> Marginal:
             raise InputError(f"vary: {name}={low:g}:{high:g}: LOW must be below HIGH")
         return Interval(low, high, f"{low:g}:{high:g}")
     raise InputError(f"vary: {name}: {known!r} is neither (low, high) nor a distribution")
+
+
+class _OpenTurns:
+    """A distribution of OpenTURNS, by what those of scipy answer. Raises InputError."""
+
+    def __init__(self, name: str, distribution: Any) -> None:
+        if distribution.getDimension() != 1:
+            raise InputError(f"vary: {name}: needs a distribution of one variable, found {distribution}")
+        self._distribution = distribution
+
+    def ppf(self, x: Array) -> Array:
+        """Quantiles at probabilities x."""
+        found = [self._distribution.computeQuantile(float(p))[0] for p in np.ravel(x)]
+        return np.reshape(found, np.shape(x))
+
+    def mean(self) -> float:
+        """The mean."""
+        return float(self._distribution.getMean()[0])
+
+    def std(self) -> float:
+        """The standard deviation."""
+        return float(self._distribution.getStandardDeviation()[0])
 
 
 def _number(name: str, end: Any, nominal: float) -> float:

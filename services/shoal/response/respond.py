@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +19,24 @@ from shoal.engines.spot_checks import larger
 from shoal.engines.verification import verified
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import reach
+from shoal.memory import Memory
+from shoal.response.allocation import (
+    TARGET,
+    Allocation,
+    Reached,
+    accepted,
+    costs_of,
+    of_distributions,
+    of_intervals,
+)
 from shoal.response.enclosure import Enclosure, enclosure
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.inputs import Correlations, Inputs, Parameter
+from shoal.response.kept import Keep, TimeIsUpError
+from shoal.response.limits import MOST as LIMIT_RUNS
+from shoal.response.limits import Judged, Limit, judge, limit
+from shoal.response.limits.judge import Reach, watched
 from shoal.response.machine import QUANTITIES, Machine
 from shoal.response.methods import get_method
 from shoal.response.methods.bounds import HOPELESS
@@ -31,6 +47,7 @@ from shoal.response.statistics import Statistics, either, masked, of_expansion, 
 from shoal.response.study import Found, Study
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
+from shoal.versions import versions
 
 MOST = 20_000
 """Runs that a study may make unless another limit is asked for."""
@@ -78,10 +95,15 @@ def respond(
     study = Study(runs, group, when, seed, gap, degree, count)
     try:
         found = get_method(method)(study)
+    except TimeIsUpError:
+        found = _broken_off(runs)
     except TooManyRunsError:
         raise InputError(f"runs: method {method} needs more than the {most} runs that it may make") from None
     random = inputs.random
-    bounds = None if random.any() else _bounds(study, found)
+    try:
+        bounds = None if random.any() else _bounds(study, found)
+    except TimeIsUpError:
+        bounds = _bounds(study, _broken_off(runs))
     statistics = _statistics(study, found) if random.all() else None
     return Answer(found, runs, bounds, statistics)
 
@@ -102,6 +124,14 @@ def uncertain(
     verify: bool = True,
     seed: int = 0,
     most: int = MOST,
+    limits: Sequence[str] = (),
+    limit_method: str = "auto",
+    limit_runs: int = LIMIT_RUNS,
+    allocate: bool = False,
+    costs: Mapping[str, float] | None = None,
+    target: float = TARGET,
+    checkpoint: Path | str | None = None,
+    time_limit: float | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Response:
     """How the markers of a scene may move if some of its fields are known as intervals or distributions only.
@@ -111,39 +141,70 @@ def uncertain(
     bounds, as a share of the largest width, that must be reached; correlations: of pairs of random parameters;
     degree, count: of a method that has one; tolerance: error [m] that the markers of the middle machine may have, for
     which the cheapest model is found; verify: estimate mesh and step errors of extremal runs; most: runs that may be
-    made; progress: is told how many there are. Raises InputError, ComputationError.
+    made; limits: what must not happen, such as "B.y < -1.2"; limit_method: one of `WAYS`; limit_runs: for each of them;
+    allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of tightening each;
+    target: probability of passing it that is allowed; checkpoint: file that keeps the runs, from which the
+    same study goes on; time_limit [s]: after which it ends with what is known; progress: is told how many runs there
+    are. Raises InputError, ComputationError.
     """
     begin = time.perf_counter()
+    end = None if time_limit is None else time.monotonic() + time_limit
     wanted = load_scene(scene) if isinstance(scene, str) else scene
     wanted = wanted.with_values(values) if values else wanted
     inputs = Inputs(parameters(vary, wanted), correlations)
     if inputs.random.any() and not inputs.random.all():
         one, other = (inputs.names[int(np.argmax(inputs.random == kind))] for kind in (True, False))
         raise InputError(f"vary: {one} has a distribution and {other} an interval; give both the one or the other")
-    when = sampling_times(wanted, times)
+    if allocate and len(limits) != 1:
+        raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")
+    when, asked = sampling_times(wanted, times), [limit(text, wanted) for text in limits]
     if tolerance is not None:
         wanted = _modelled(wanted, inputs, tolerance, when, engine)
-    machine = Machine(wanted, when, get_engine(engine))
+    keep = _keep(wanted, when, engine, checkpoint, end)
+    machine = Machine(wanted, when, get_engine(engine), keep=keep)
     count_t, count_m, count_q = machine.columns
-    answer = respond(
-        machine,
-        inputs,
-        count_t * count_m * count_q,
-        method=method,
-        groups=np.tile(np.arange(count_m * count_q), count_t),
-        instants=np.repeat(when, count_m * count_q),
-        gap=gap,
-        degree=degree,
-        count=count,
-        seed=seed,
-        most=most,
-        progress=progress,
-    )
+    try:
+        answer = respond(
+            machine,
+            inputs,
+            count_t * count_m * count_q,
+            method=method,
+            groups=np.tile(np.arange(count_m * count_q), count_t),
+            instants=np.repeat(when, count_m * count_q),
+            gap=gap,
+            degree=degree,
+            count=count,
+            seed=seed,
+            most=most,
+            progress=progress,
+        )
+    except TimeIsUpError:
+        raise ComputationError("time-limit: it was over before the first runs were made") from None
     bounds = answer.bounds
     if bounds is not None and math.isfinite(answer.horizon):
         bounds = _beyond(wanted, inputs, bounds, machine)
-    mesh, step, rejected = _errors(machine, answer, seed) if verify else (None, None, "")
-    status, message = _status(answer, gap, rejected)
+    mesh, step, rejected = _errors(machine, answer, seed) if verify and not keep.over else (None, None, "")
+    judged, allocation = list[Judged](), None
+    try:
+        for passed in asked:
+            bounded = _reach(inputs, when, gap, seed, most)
+            how = dict[str, Any](way=limit_method, most=limit_runs, seed=seed, verify=verify, progress=progress)
+            judged.append(judge(passed, machine, inputs, bounded, **how))
+        if allocate:
+            allocation = _allocated(asked[0], machine, inputs, costs or {}, target, seed, most)
+    except TimeIsUpError:
+        pass
+    finally:
+        keep.close()
+    status, message = _status(answer, gap, rejected, judged)
+    if keep.over:
+        missing = [one.text for one in asked[len(judged) :]]
+        status, message = (
+            "time-limit",
+            f"the {time_limit:g} s were over" + (f"; nothing is known of {', '.join(missing)}" if missing else ""),
+        )
+    if status == "ok" and allocation is not None and not allocation.ok:
+        status, message = "allocation-not-met", allocation.message
     return Response(
         status=status,
         message=message,
@@ -164,7 +225,18 @@ def uncertain(
         statistics=answer.statistics,
         mesh_error=mesh,
         step_error=step,
+        stated=wanted,
+        engine=engine,
+        limits=tuple(judged),
+        allocation=allocation,
     )
+
+
+def _broken_off(runs: Runs) -> Found:
+    """What is known when the time is up. Raises TimeIsUpError if that is nothing."""
+    if runs.evaluations == 0:
+        raise TimeIsUpError
+    return Found(f"{runs.evaluations} runs, until the time was up")
 
 
 def _bounds(study: Study, found: Found) -> Bounds:
@@ -260,7 +332,47 @@ def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, 
     return mesh, step, ""
 
 
-def _status(answer: Answer, gap: float | None, rejected: str) -> tuple[str, str]:
+def _keep(scene: Scene, times: Array, engine: str, checkpoint: Path | str | None, end: float | None) -> Keep:
+    """Raises InputError."""
+    if checkpoint is None:
+        return Keep(None, end)
+    study = repr((scene.fingerprint, times.tolist(), engine, versions(("shoal",))))
+    return Keep(Memory(Path(checkpoint), hashlib.sha1(study.encode()).hexdigest(), "study"), end)
+
+
+def _reach(inputs: Inputs, when: Array, gap: float | None, seed: int, most: int) -> Reach:
+    """Bounds of the margins of a model over time."""
+
+    def reach(model: Model) -> tuple[Array, Array, Array, int, int]:
+        answer = respond(
+            model, inputs, len(when), groups=np.zeros(len(when)), instants=when, gap=gap, seed=seed, most=most
+        )
+        bounds, runs = answer.bounds, answer.runs
+        assert bounds is not None
+        outer = np.where(when <= bounds.horizon, bounds.lower_outer, -math.inf)
+        return bounds.lower, outer, runs.germs[runs.values.argmin(axis=0)], runs.evaluations, runs.failed
+
+    return reach
+
+
+def _allocated(
+    wanted: Limit, machine: Machine, inputs: Inputs, costs: Mapping[str, float], target: float, seed: int, most: int
+) -> Allocation:
+    """The cheapest tolerances that keep a limit."""
+    told, when = watched(machine, wanted), machine.times
+    prices, widest = costs_of(costs, inputs), accepted(machine.scene, inputs)
+    if inputs.random.all():
+        return of_distributions(wanted.text, told, inputs, target, prices, widest, seed)
+
+    def least(here: Inputs) -> Reached:
+        lower, outer, germs, evaluations, _ = _reach(here, when, None, seed, most)(told)
+        worst = int(lower.argmin())
+        return Reached(float(outer.min()), float(lower[worst]), germs[worst], evaluations)
+
+    return of_intervals(wanted.text, told, inputs, least, prices, widest)
+
+
+def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[Judged]) -> tuple[str, str]:
     """ok, or what speaks against believing the answer, and why."""
     runs, bounds = answer.runs, answer.bounds
     if runs.failed:
@@ -275,7 +387,8 @@ def _status(answer: Answer, gap: float | None, rejected: str) -> tuple[str, str]
     if bounds is not None and gap is not None and not bounds.gap <= gap:
         found = "is not known" if math.isnan(bounds.gap) else f"is {bounds.gap:.1e}"
         return "gap-not-reached", f"the gap between outer and attained bounds {found} of the width, asked for {gap:g}"
-    return "ok", ""
+    doubts = [one.doubt for one in judged if one.doubt]
+    return ("limit-in-doubt", "; ".join(doubts)) if doubts else ("ok", "")
 
 
 def _modelled(scene: Scene, inputs: Inputs, tolerance: float, times: Array, engine: str) -> Scene:

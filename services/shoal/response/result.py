@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shoal.errors import InputError
+from shoal.response.allocation import Allocation
 from shoal.response.inputs import Inputs
+from shoal.response.limits import Judged
 from shoal.response.marginals import Interval
 from shoal.response.statistics import QUANTILES, Statistics
+from shoal.scene import Scene
 from shoal.trajectory import Array, plain
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -38,7 +45,9 @@ class Response:
     status: ok, gap-not-reached, beyond-horizon, failed-runs or model-rejected; message: why it is not ok; why: what the
     method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds: None if a parameter is
     random; statistics: None if none is; columns are (instants, markers, quantities x, y, angle) in this order;
-    mesh_error, step_error: of extremal runs [m], None where not estimated
+    mesh_error, step_error: of extremal runs [m], None where not estimated; stated: the scene with its model in the
+    middle; engine: its name; limits: of what must not happen;
+    allocation: tolerances that keep the limit, where they were asked for
     """
 
     status: str
@@ -60,6 +69,10 @@ class Response:
     statistics: Statistics | None
     mesh_error: float | None
     step_error: float | None
+    stated: Scene
+    engine: str
+    limits: tuple[Judged, ...] = ()
+    allocation: Allocation | None = None
 
     @property
     def ok(self) -> bool:
@@ -87,6 +100,48 @@ class Response:
                 columns += [self.column(marker, quantity, of) for of in told.values()]
         return header, np.column_stack(columns)
 
+    def to_xarray(self) -> xr.Dataset:
+        """Bounds, or statistics, over time [s], marker and axis (x, y [m] and angle [rad]). Raises InputError.
+
+        lower, upper over bound (attained, outer); argument_lower, argument_upper over parameter; mean, std, quantiles
+        over quantile; first and total Sobol indices over parameter.
+        """
+        try:
+            import xarray as xr
+        except ModuleNotFoundError:
+            raise InputError("xarray is not installed; install shoal with its extra 'notebook'") from None
+        shape = len(self.times), len(self.markers), len(self.quantities)
+        base = ("time", "marker", "axis")
+        variables: dict[str, tuple[tuple[str, ...], Array]] = {}
+
+        def put(name: str, of: Array, *more: str) -> None:
+            """of: (..., columns)."""
+            whole = of.reshape(*of.shape[:-1], *shape)
+            variables[name] = (*base, *more), np.moveaxis(whole, 0, -1) if more else whole
+
+        coordinates: dict[str, Any] = {
+            "time": ("time", self.times, {"units": "s"}),
+            "marker": list(self.markers),
+            "axis": list(self.quantities),
+            "parameter": self.inputs.names,
+        }
+        if self.bounds is not None:
+            coordinates["bound"] = ["attained", "outer"]
+            put("lower", np.stack([self.bounds.lower, self.bounds.lower_outer]), "bound")
+            put("upper", np.stack([self.bounds.upper, self.bounds.upper_outer]), "bound")
+            put("argument_lower", self.bounds.at_lower.T, "parameter")
+            put("argument_upper", self.bounds.at_upper.T, "parameter")
+        if self.statistics is not None:
+            coordinates["quantile"] = np.array(QUANTILES)
+            put("mean", self.statistics.mean)
+            put("std", self.statistics.std)
+            put("quantiles", self.statistics.quantiles, "quantile")
+            put("first", self.statistics.first, "parameter")
+            put("total", self.statistics.total, "parameter")
+        about = {"scene": self.scene, "status": self.status, "method": self.method, "why": self.why}
+        numbers = {"horizon": self.horizon, "evaluations": self.evaluations, "seed": self.seed}
+        return xr.Dataset(variables, coordinates, {**about, **numbers})
+
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal uncertain --json` prints."""
         return {
@@ -107,7 +162,8 @@ class Response:
             "statistics": {} if self.statistics is None else self._by_marker(self._statistics),
             "mesh_error": plain(self.mesh_error),
             "step_error": plain(self.step_error),
-            "limits": [],
+            "limits": [one.to_json() for one in self.limits],
+            "allocation": None if self.allocation is None else self.allocation.to_json(),
         }
 
     def _parameters(self) -> dict[str, Any]:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from shoal.mechanics.analysis.modes import Modes
     from shoal.mechanics.analysis.reactions import Reactions
     from shoal.response import Response
+    from shoal.response.allocation import Allocation
+    from shoal.response.limits import Judged
     from shoal.scene import Scene
     from shoal.selection import Selection
     from shoal.trajectory import Trajectory
@@ -116,6 +118,10 @@ def response_table(response: Response) -> None:
     screen.out.print(table)
     if response.statistics is not None:
         _shares(response)
+    for judged in response.limits:
+        _limit(judged)
+    if response.allocation is not None:
+        _allocation(response.allocation)
     screen.say(f"status {response.status}; {response.evaluations} runs in {response.wall_s:.2f} s; {response.why}")
     if response.repeated or response.failed:
         screen.say(f"{response.repeated} runs were repeated with smaller steps, {response.failed} failed all the same")
@@ -129,6 +135,42 @@ def response_table(response: Response) -> None:
     told_of = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
     if told_of:
         screen.say(f"estimated errors of the runs that decide: {', '.join(told_of)}")
+
+
+def _limit(judged: Judged) -> None:
+    """What is told of a limit, and the values that show it."""
+    title, shown = f"limit {judged.limit.text}", judged.shown
+    if judged.passing is not None:
+        lower, upper = judged.passing.estimate.interval
+        screen.say(
+            f"{title}: is passed with probability {judged.passing.estimate.probability:.3g}, with 95 % confidence "
+            f"between {lower[-1]:.3g} and {upper[-1]:.3g}",
+            f"  by {judged.passing.why}; {judged.evaluations} runs",
+            style="bold",
+        )
+        how = "most probably with"
+    else:
+        says = {True: "is kept for all values", False: "is passed", None: "is kept by all runs, which proves nothing"}
+        screen.say(f"{title}: {says[judged.kept]}", style="bold")
+        how = "passed with" if judged.kept is False else "nearest with"
+    if shown is not None:
+        known = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
+        screen.say(f"  {how} {known}: margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s")
+
+
+def _allocation(found: Allocation) -> None:
+    """Tolerances that keep the limit, and what tightening the stated ones does."""
+    told = found.to_json()
+    table = screen.table(f"tolerances that keep {found.limit}", "", "stated", "found", "factor", "effect of 1 %")
+    for name, one in told["parameters"].items():
+        numbers = one["tolerance_stated"], one["tolerance"], one["factor"], one["effect_of_one_per_cent"]
+        table.add_row(escape(name), *(f"{x:.3g}" for x in numbers))
+    screen.out.print(table)
+    what = "probability" if found.inputs.random.all() else "least margin"
+    screen.say(
+        f"{what} {found.stated:.3g} with the stated tolerances, {found.confirmed:.3g} with those found, which cost "
+        f"{found.cost:.3g} times as much; to tighten first: {told['tighten_first']}; {found.evaluations} runs"
+    )
 
 
 def _shares(response: Response) -> None:

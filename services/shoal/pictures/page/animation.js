@@ -67,6 +67,7 @@ function animate(figure) {
       context.fillRect(p[0] - 5, p[1] - 5, 10, 10);
     }
     for (const path of Object.values(run.markers)) line(path.slice(0, frame + 1).map(to), "#F0B48C", 1.5);
+    for (const outline of Object.values(run.behind)) line(outline[frame].map(to), "#A0A0A0", 3);
     for (const outline of Object.values(run.outlines)) {
       line(outline[frame].map(to), BLUE, 4);
       for (const end of [outline[frame][0], outline[frame].at(-1)]) circle(to(end), 4, BLUE, true);

@@ -20,18 +20,18 @@ _HEAD = struct.Struct("<20sII")
 
 
 class Memory:
-    """Residuals of batches of points, kept in a file that only grows; what a crash cut off at its end is dropped.
+    """Answers of a model to batches of points, in a file that only grows; what a crash cut off at its end is dropped.
 
     Methods are deterministic, so replaying one from its seed asks for the same batches in the same order; those that
-    are known cost nothing. fingerprint: of everything that residuals depend on.
+    are known cost nothing. fingerprint: of everything that they depend on.
     """
 
-    def __init__(self, path: Path, fingerprint: str) -> None:
+    def __init__(self, path: Path, fingerprint: str, of: str = "identification") -> None:
         """Open or begin the file.
 
-        Raises InputError if it is damaged, belongs to another identification or cannot be written.
+        of: what it is of, in words. Raises InputError if it is damaged, belongs to another one or cannot be written.
         """
-        self.path = path
+        self.path, self._of = path, of
         self.recalled = 0
         self._known: dict[bytes, Array] = {}
         begin = _MAGIC + fingerprint.encode() + b"\n"
@@ -75,7 +75,7 @@ class Memory:
         if begin.startswith(data):
             return 0
         if not data.startswith(begin):
-            raise InputError(f"checkpoint: {self.path} is that of another identification; name another file")
+            raise InputError(f"checkpoint: {self.path} is that of another {self._of}; name another file")
         place = len(begin)
         while place + _HEAD.size <= len(data):
             key, size, checksum = _HEAD.unpack_from(data, place)
@@ -91,5 +91,5 @@ class Memory:
 
 
 def _key(model: object, points: Array) -> bytes:
-    """Of a batch; model: what tells the models of one identification apart, by its `repr`."""
+    """Of a batch; model: what tells the models of one study apart, by its `repr`."""
     return hashlib.sha1(repr((model, points.shape)).encode() + points.tobytes()).digest()

@@ -1,0 +1,164 @@
+"""A study of uncertain parameters as one page that needs nothing else: answer, worst case in motion, charts, limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.errors import ComputationError, InputError
+from shoal.pictures.drawn import Drawn
+from shoal.pictures.gaps import gaps
+from shoal.pictures.indices import indices
+from shoal.pictures.motion import scene_motion
+from shoal.pictures.numbers import length
+from shoal.pictures.pages import animation, render, software
+from shoal.pictures.probability import probability
+from shoal.pictures.response import response
+from shoal.response import Response
+from shoal.response.limits import Judged
+from shoal.response.worst import Worst, worst
+
+MARKERS, CASES = 4, 3
+"""So many markers and worst cases are shown."""
+
+
+def uncertainty(found: Response) -> str:
+    """The page as HTML without a reference to anything outside."""
+    cases = _cases(found)
+    return render(
+        "uncertainty.html.j2",
+        title=f"{found.scene}: uncertain parameters",
+        trusted=found.ok,
+        lead=_lead(found),
+        parameters=_parameters(found),
+        limits=[_limit(one) for one in found.limits],
+        motions=[_over_nominal(found, case) for case in cases],
+        cases=[_case(case) for case in cases],
+        pictures=[one.embedded() for one in _pictures(found)],
+        passages=[_passage(one).embedded() for one in found.limits if one.passing is not None],
+        allocation=_allocation(found),
+        remarks=_remarks(found),
+        provenance=_provenance(found),
+    )
+
+
+def _lead(found: Response) -> str:
+    if not found.ok:
+        return f"Not to be believed as it stands ({found.status}): {found.message}."
+    told = found.bounds.upper - found.bounds.lower if found.bounds is not None else None
+    if told is not None:
+        widest = max(
+            (float(found.column(marker, axis, told).max()), marker) for marker in found.markers for axis in ("x", "y")
+        )
+        return f"Places of {widest[1]} differ by up to {length(widest[0])}; runs attain the bounds."
+    assert found.statistics is not None
+    spread = max(
+        (float(found.column(marker, axis, found.statistics.std).max()), marker)
+        for marker in found.markers
+        for axis in ("x", "y")
+    )
+    return f"{spread[1]} scatters with a standard deviation of up to {length(spread[0])}."
+
+
+def _parameters(found: Response) -> list[list[str]]:
+    return [[one.name, one.marginal.text or "a distribution"] for one in found.inputs.parameters]
+
+
+def _limit(one: Judged) -> list[str]:
+    shown = one.shown
+    how = "–" if shown is None else ", ".join(f"{name} = {value:.5g}" for name, value in shown.parameters.items())
+    if one.passing is None:
+        says = {True: "kept", False: "passed", None: "not decided"}[one.kept]
+        return [one.limit.text, says, f"{one.margin:.3g} {one.limit.unit}", how]
+    lower, upper = one.passing.estimate.interval
+    chance = one.passing.estimate.probability
+    return [one.limit.text, f"{chance:.3g}", f"{lower[-1]:.3g} to {upper[-1]:.3g}", how]
+
+
+def _cases(found: Response) -> list[Worst]:
+    """Those that can be shown."""
+    try:
+        return worst(found)[:CASES]
+    except InputError:
+        return []
+
+
+def _over_nominal(found: Response, case: Worst) -> dict[str, Any]:
+    engine, until = get_engine(found.engine), float(found.times[-1])
+    try:
+        moving, nominal = (scene_motion(scene, engine, until) for scene in (case.scene, found.stated))
+    except (ComputationError, InputError):
+        return {}
+    frames = min(len(moving.times), len(nominal.times))
+    shown = replace(
+        moving,
+        name=case.of,
+        times=moving.times[:frames],
+        outlines={name: path[:frames] for name, path in moving.outlines.items()},
+        markers={name: path[:frames] for name, path in moving.markers.items()},
+        behind={name: path[:frames] for name, path in nominal.outlines.items()},
+    )
+    return animation(shown, f"Worst case of {case.of}")
+
+
+def _case(case: Worst) -> list[str]:
+    shown = case.shown
+    values = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
+    errors = f"{length(shown.mesh_error)}, {length(shown.step_error)}"
+    return [case.of, values, f"{shown.margin:.4g}", f"{shown.time:.4g}", errors]
+
+
+def _pictures(found: Response) -> list[Drawn]:
+    drawn = []
+    what = "The band that runs attain, with outer bounds" if found.bounds is not None else "Mean and quantiles"
+    for marker in found.markers[-MARKERS:]:
+        alt = f"{what} of {marker} over time."
+        drawn.append(Drawn(f"response-{marker}", response(found, marker), alt, f"{what} of {marker}."))
+    last = found.markers[-1]
+    if found.bounds is not None:
+        words = (
+            "Outer bounds lie a gap beyond what runs attain; mesh and step errors are those of the runs that decide."
+        )
+        drawn.append(Drawn("gaps", gaps(found, last), f"Widths, gaps and errors of {last} over time.", words))
+    if found.statistics is not None and not np.isnan(found.statistics.total).all():
+        words = "The share of the variance that goes with a parameter, alone and with others."
+        drawn.append(Drawn("indices", indices(found, last), f"Total Sobol indices of {last} over time.", words))
+    return drawn
+
+
+def _passage(one: Judged) -> Drawn:
+    words = "The probability that the limit has been passed by each instant."
+    return Drawn(f"passage-{one.limit.text}", probability(one), f"{words[:-1]}: {one.limit.text}.", words)
+
+
+def _allocation(found: Response) -> list[list[str]]:
+    if found.allocation is None:
+        return []
+    told = found.allocation.to_json()["parameters"]
+    keys = "tolerance_stated", "tolerance", "factor", "effect_of_one_per_cent"
+    return [[name, *(f"{one[key]:.3g}" for key in keys)] for name, one in told.items()]
+
+
+def _remarks(found: Response) -> list[str]:
+    remarks = [f"{one.limit.text}: {one.passing.why}." for one in found.limits if one.passing is not None]
+    if found.repeated or found.failed:
+        remarks.append(f"{found.repeated} runs were repeated with smaller steps; {found.failed} failed all the same.")
+    if found.bounds is not None and found.horizon < found.times[-1]:
+        remarks.append(f"Bounds hold until {found.horizon:.4g} s.")
+    return remarks
+
+
+def _provenance(found: Response) -> list[tuple[str, str]]:
+    errors = f"mesh {length(found.mesh_error)}, step {length(found.step_error)}"
+    return [
+        ("method", f"{found.method}: {found.why}"),
+        ("effort", f"{found.evaluations} runs, {sum(one.evaluations for one in found.limits)} more for limits"),
+        ("errors", f"{errors}, of the runs that decide"),
+        ("engine", found.engine),
+        ("seed", str(found.seed)),
+        ("scene", found.stated.fingerprint),
+        ("versions", software()),
+    ]

@@ -1,0 +1,325 @@
+"""How wide tolerances may be so that a limit is kept, and which one to tighten for most effect.
+
+A tolerance is the half width of an interval, or the deviation of a distribution. Costs grow with its reciprocal (Chase
+and Greenwood, Design issues in mechanical tolerance analysis, Manufacturing Review 1, 1988). What keeps the limit is
+looked up with the model, replaced by its first-order form in the tolerances, for which the cheapest ones are known, and
+looked up there again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import optimize, special
+
+from shoal.errors import ComputationError, InputError
+from shoal.response.inputs import Inputs, Parameter
+from shoal.response.limits.choice import probability
+from shoal.response.limits.form import design_points
+from shoal.response.limits.margins import Margins
+from shoal.response.marginals import scaled
+from shoal.response.runs import Model, Runs
+from shoal.scene import Scene
+from shoal.trajectory import Array, plain
+
+WIDEST, TIGHTEST = 3.0, 1e-3
+"""Factors on the tolerances that are stated, beyond which none is looked at."""
+ROUNDS = 15
+SETTLED = 5e-3
+"""Relative change of all factors at which the search ends."""
+MANY = 100_000
+"""Runs of all rounds together."""
+STEP = 0.02
+"""Of central differences, as a share of a tolerance that is stated."""
+TARGET = 1e-3
+"""Probability of passing a limit, where none is stated."""
+Least = Callable[[Inputs], "Reached"]
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Of intervals: the least margin that may be, by outer bounds, and by a run; the germ of that run."""
+
+    outer: float
+    attained: float
+    germ: Array
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Allocation:
+    """The cheapest tolerances that keep a limit.
+
+    factors: on those that are stated, (parameters,); effects: of tightening each by one per cent: by how much the least
+    margin grows, or by which share the probability falls, (parameters,); confirmed: the least margin, or the
+    probability, with the new ones; target: what it had to be; cost: of the new ones over that of the stated ones
+    """
+
+    limit: str
+    inputs: Inputs
+    factors: Array
+    effects: Array
+    stated: float
+    confirmed: float
+    target: float
+    cost: float
+    evaluations: int
+    message: str
+
+    @property
+    def ok(self) -> bool:
+        """Whether a confirming study keeps the limit."""
+        return not self.message
+
+    @property
+    def allocated(self) -> Inputs:
+        """The parameters with the new tolerances."""
+        return with_factors(self.inputs, self.factors)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        random = bool(self.inputs.random.all())
+        told = "probability" if random else "margin"
+        return dict(
+            plain(
+                {
+                    "limit": self.limit,
+                    "status": "ok" if self.ok else "not-met",
+                    "message": self.message,
+                    f"{told}_stated": self.stated,
+                    f"{told}_allocated": self.confirmed,
+                    "target": self.target,
+                    "cost": self.cost,
+                    "evaluations": self.evaluations,
+                    "tighten_first": self.inputs.names[int(np.argmax(self.effects))],
+                    "parameters": {
+                        one.name: {
+                            "factor": float(factor),
+                            "tolerance_stated": tolerance(old),
+                            "tolerance": tolerance(one),
+                            "effect_of_one_per_cent": float(effect),
+                        }
+                        for one, old, factor, effect in zip(
+                            self.allocated.parameters,
+                            self.inputs.parameters,
+                            self.factors,
+                            self.effects,
+                            strict=True,
+                        )
+                    },
+                }
+            )
+        )
+
+
+def tolerance(one: Parameter) -> float:
+    """Half the width of an interval, the deviation of a distribution by its quartiles."""
+    if not one.marginal.random:
+        low, high = one.marginal.value(np.array([-1.0, 1.0]))
+        return float(0.5 * (high - low))
+    low, high = one.marginal.value(one.marginal.germ(special.ndtr(np.array([-1.0, 1.0]))))
+    return float(0.5 * (high - low))
+
+
+def with_factors(inputs: Inputs, factors: Array) -> Inputs:
+    """Parameters with their tolerances multiplied about their middle values."""
+    pairs = zip(inputs.parameters, factors, strict=True)
+    return replace(inputs, parameters=tuple(replace(one, marginal=scaled(one.marginal, float(f))) for one, f in pairs))
+
+
+def cheapest(weights: Array, costs: Array, room: float, power: int, most: Array) -> Array:
+    """The factors s, least sum(costs / s), with sum((weights s)^power) = room and TIGHTEST <= s <= most.
+
+    By the multiplier of the constraint, s = (costs / (power * multiplier * weights^power))^(1 / (power + 1)). A weight
+    that is not positive does not limit its factor.
+    """
+    weight = np.maximum(weights, 0.0) ** power
+
+    def factors(logarithm: float) -> Array:
+        pull = power * math.exp(logarithm) * weight
+        free = np.divide(costs, pull, out=np.full(len(costs), np.inf), where=pull > 0) ** (1 / (power + 1))
+        return np.asarray(np.clip(free, TIGHTEST, most))
+
+    def beyond(logarithm: float) -> float:
+        return float(weight @ factors(logarithm) ** power) - room
+
+    if beyond(-700.0) <= 0:
+        return factors(-700.0)
+    if beyond(700.0) >= 0:
+        return factors(700.0)
+    return factors(float(optimize.brentq(beyond, -700.0, 700.0, xtol=1e-12)))
+
+
+def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: Array, most: Array) -> Allocation:
+    """So that no values within the tolerances pass the limit: the outer bound of the least margin stays at zero.
+
+    model: margins over time. Raises ComputationError if the middle values pass it.
+    """
+    factors, evaluations, message = np.ones(len(inputs)), 0, ""
+    stated, effects = math.nan, np.zeros(len(inputs))
+    cuts: dict[tuple[float, ...], tuple[Array, float]] = {}
+    for round_ in range(ROUNDS):
+        here = with_factors(inputs, factors)
+        reached = least(here)
+        pull, runs = _pull(model, here, reached.germ, factors)
+        evaluations += reached.evaluations + runs
+        if round_ == 0:
+            stated, effects = reached.attained, 0.01 * pull
+        # A margin is taken for linear in the tolerances; each corner of the box has its own.
+        room = reached.outer + float(pull @ factors)
+        cuts[tuple(np.sign(np.round(reached.germ, 3)))] = pull, room
+        fresh = _within(list(cuts.values()), costs, most)
+        if room <= 0:
+            raise ComputationError(f"allocate: limit {text} is passed by the middle values, whatever the tolerances")
+        settled = np.max(np.abs(fresh / factors - 1)) < SETTLED
+        factors = fresh
+        if settled:
+            break
+    confirmed, factors, more = _shrunk(factors, lambda s: _outer(least, with_factors(inputs, s)))
+    if confirmed < 0:
+        message = "no tolerances were found that keep the limit"
+    cost = float(costs @ (1 / factors) / costs.sum())
+    return Allocation(text, inputs, factors, effects, stated, confirmed, 0.0, cost, evaluations + more, message)
+
+
+def _within(cuts: list[tuple[Array, float]], costs: Array, most: Array) -> Array:
+    """The cheapest factors within all cuts, pull @ factors <= room."""
+    alone = [cheapest(pull, costs, room, 1, most) for pull, room in cuts]
+    if len(alone) == 1:
+        return alone[0]
+    pulls, rooms = np.array([pull for pull, _ in cuts]), np.array([room for _, room in cuts])
+    found: Any = optimize.minimize(  # type: ignore[call-overload]
+        lambda s: float(costs @ (1 / s)),
+        np.min(alone, axis=0),
+        jac=lambda s: -costs / s**2,
+        method="SLSQP",
+        bounds=[(TIGHTEST, float(top)) for top in most],
+        constraints=optimize.LinearConstraint(pulls, -np.inf, rooms),
+    )
+    return np.asarray(found.x if found.success else np.min(alone, axis=0))
+
+
+def _outer(least: Least, inputs: Inputs) -> tuple[float, int]:
+    reached = least(inputs)
+    return reached.outer, reached.evaluations
+
+
+def _shrunk(factors: Array, look: Callable[[Array], tuple[float, int]]) -> tuple[float, Array, int]:
+    """All factors smaller by the same share, until the look confirms them."""
+    evaluations = 0
+    for share in (1.0, 0.999, 0.99, 0.97, 0.9, 0.75, 0.5):
+        found, runs = look(np.maximum(share * factors, TIGHTEST))
+        evaluations += runs
+        if found >= 0:
+            break
+    return found, np.maximum(share * factors, TIGHTEST), evaluations
+
+
+def _pull(model: Model, inputs: Inputs, germ: Array, factors: Array) -> tuple[Array, int]:
+    """By how much the margin falls at the worst place where each tolerance grows, per factor, (parameters,), and runs.
+
+    The worst place moves outwards with the tolerance: d margin / d germ * germ / factor.
+    """
+    runs = Runs(model, inputs, 2 * len(germ) + 1)
+    away = STEP * np.eye(len(germ))
+    runs.all(np.concatenate([germ[None], germ + away, germ - away]))
+    values = runs.values
+    if len(values) < 2 * len(germ) + 1:
+        raise ComputationError(f"allocate: runs beside the worst one failed: {runs.why}")
+    instant = int(values[0].argmin())
+    up, down = values[1 : 1 + len(germ), instant], values[1 + len(germ) :, instant]
+    return np.asarray(-(up - down) / (2 * STEP) * germ / factors), len(values)
+
+
+def of_distributions(
+    text: str, model: Model, inputs: Inputs, target: float, costs: Array, most: Array, seed: int
+) -> Allocation:
+    """So that the limit is passed with a probability of at most `target`. Raises InputError, ComputationError.
+
+    In each round FORM tells the share of each deviation in 1 / beta^2, and a probability by `auto` corrects beta.
+    """
+    factors, spent = np.ones(len(inputs)), 0
+    stated, effects = math.nan, np.zeros(len(inputs))
+    wanted = -float(special.ndtri(target))
+    aim = wanted
+    found = math.nan
+    for round_ in range(ROUNDS):
+        margins = Margins(model, with_factors(inputs, factors), MANY)
+        points = design_points(margins, np.zeros((1, len(inputs))))
+        spent += margins.evaluations
+        if not points or not points[0].converged:
+            # So far off that it is not found: the widest tolerances come nearest to it.
+            if np.all(factors == most):
+                break
+            factors = most.copy()
+            continue
+        point = points[0]
+        if point.beta <= 0:
+            raise ComputationError(f"allocate: limit {text} is passed by the middle values, whatever the tolerances")
+        weights = np.abs(point.normal) / (point.beta * factors)
+        if round_ == 0:
+            # d ln P / d ln s = beta alpha^2 phi(beta) / Phi(-beta)
+            hazard = math.exp(-0.5 * point.beta**2) / (math.sqrt(2 * math.pi) * special.ndtr(-point.beta))
+            effects = 0.01 * point.beta * point.normal**2 * hazard
+            stated, runs = _chance(model, inputs, seed)
+            spent += runs
+        fresh = cheapest(weights, costs, 1 / aim**2, 2, most)
+        settled = np.max(np.abs(fresh / factors - 1)) < SETTLED
+        factors = fresh
+        if not settled:
+            continue
+        found, runs = _chance(model, with_factors(inputs, factors), seed)
+        spent += runs
+        if found <= target:
+            break
+        aim += wanted + float(special.ndtri(found)) + 0.01
+    if math.isnan(found) or found > target:
+        found, runs = _chance(model, with_factors(inputs, factors), seed)
+        spent += runs
+    if math.isnan(stated):
+        stated, runs = _chance(model, inputs, seed)
+        spent += runs
+    message = "" if found <= target else f"the probability is {found:.2e} with the tolerances that were found"
+    cost = float(costs @ (1 / factors) / costs.sum())
+    return Allocation(text, inputs, factors, effects, stated, found, target, cost, spent, message)
+
+
+def _chance(model: Model, inputs: Inputs, seed: int) -> tuple[float, int]:
+    margins = Margins(model, inputs, 5000)
+    return probability(margins, "auto", seed).estimate.probability, margins.evaluations
+
+
+def costs_of(texts: Mapping[str, float], inputs: Inputs) -> Array:
+    """One for every parameter but those that are stated, (parameters,). Raises InputError."""
+    for name, cost in texts.items():
+        if name not in inputs.names:
+            raise InputError(f"cost: {name!r} is not varied; there are {', '.join(inputs.names)}")
+        if not cost > 0 or not math.isfinite(cost):
+            raise InputError(f"cost: {name}={cost:g}: costs are positive")
+    return np.array([float(texts.get(name, 1.0)) for name in inputs.names])
+
+
+def accepted(scene: Scene, inputs: Inputs) -> Array:
+    """Up to which factors the scene accepts the ends of each tolerance by itself, at most `WIDEST`, (parameters,)."""
+    found = []
+    for one in inputs.parameters:
+        most = WIDEST
+        while most > 1 and not _accepts(scene, one, most):
+            most = max(1.0, most - 0.25)
+        found.append(most)
+    return np.array(found)
+
+
+def _accepts(scene: Scene, one: Parameter, factor: float) -> bool:
+    marginal = scaled(one.marginal, factor)
+    ends = np.array([-1.0, 1.0]) if not marginal.random else marginal.germ(np.array([1e-12, 1 - 1e-12]))
+    try:
+        for value in marginal.value(ends):
+            scene.with_values({path: float(value) * share for path, share in one.factors.items()})
+    except InputError:
+        return False
+    return True

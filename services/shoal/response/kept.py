@@ -1,0 +1,53 @@
+"""What a study holds on to: runs that outlive it in a file, and the time that it may take."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.memory import Memory
+from shoal.response.runs import Answers, TooManyRunsError
+from shoal.trajectory import Array
+
+
+class TimeIsUpError(TooManyRunsError):
+    """The study has used up its time."""
+
+
+@dataclass
+class Keep:
+    """memory: of the runs, None if they are not kept; end: by the monotonic clock [s], None if there is none; over:
+    whether a run was refused because of it
+    """
+
+    memory: Memory | None = None
+    end: float | None = None
+    over: bool = False
+
+    def close(self) -> None:
+        """Close the file, if there is one."""
+        if self.memory is not None:
+            self.memory.close()
+
+    def __call__(
+        self, label: str, values: Mapping[str, Array], run: Callable[[Mapping[str, Array]], Answers]
+    ) -> Answers:
+        """What is known of these runs, else what making them tells. label: of what is told. Raises TimeIsUpError."""
+        points = np.stack(list(values.values()))
+        known = None if self.memory is None else self.memory.recall(label, points)
+        if known is not None:
+            good = known[:-1, -1] == 1.0
+            why = "" if good.all() else "they failed before the study was broken off"
+            return Answers(known[:-1, :-1].copy(), good, int(known[-1, -1]), why)
+        if self.end is not None and time.monotonic() > self.end:
+            self.over = True
+            raise TimeIsUpError
+        found = run(values)
+        if self.memory is not None:
+            last = np.zeros((1, found.values.shape[1] + 1))
+            last[0, -1] = found.repeated
+            self.memory.keep(label, points, np.concatenate([np.column_stack([found.values, found.good]), last]))
+        return found

@@ -1,0 +1,7 @@
+"""What must not happen to a machine: how probable it is, or whether it can, and the run that shows it."""
+
+from shoal.response.limits.judge import MOST, judge
+from shoal.response.limits.judged import Judged, Shown
+from shoal.response.limits.limit import Limit, limit
+
+__all__ = ["MOST", "Judged", "Limit", "Shown", "judge", "limit"]

@@ -1,0 +1,79 @@
+"""A probability over time, with what it is worth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.response.extremes import IntArray
+from shoal.trajectory import Array
+
+CONFIDENCE = 1.959963984540054
+"""Standard deviations that hold 95 % of a normal variable."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The probability that a limit is passed at some instant up to each.
+
+    passed: (instants,); deviation: of its logarithm, (instants,), infinite where no run has passed; unseen: a
+    probability that the runs may have missed altogether; failed: probability of the runs that failed; between: share
+    of the probability that more instants would add, nan where it is not known; why: in words
+    """
+
+    passed: Array
+    deviation: Array
+    why: str
+    unseen: float = 0.0
+    failed: float = 0.0
+    between: float = math.nan
+
+    @property
+    def probability(self) -> float:
+        """Over all instants."""
+        return float(self.passed[-1])
+
+    @property
+    def coefficient(self) -> float:
+        """Standard deviation over mean."""
+        return float(self.deviation[-1])
+
+    @property
+    def interval(self) -> tuple[Array, Array]:
+        """Bounds that hold with 95 % confidence, (instants,) each: of a lognormal variable."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            lower = np.where(self.passed > 0, self.passed * np.exp(-CONFIDENCE * self.deviation), 0.0)
+            upper = np.where(self.passed > 0, self.passed * np.exp(CONFIDENCE * self.deviation), self.unseen)
+        return lower, np.minimum(upper + self.failed, 1.0)
+
+
+def first_passages(margins: Array) -> IntArray:
+    """Index of the first instant beyond the limit, the number of instants where there is none, (runs,)."""
+    beyond = margins < 0
+    return np.asarray(np.where(beyond.any(axis=1), beyond.argmax(axis=1), margins.shape[1]))
+
+
+def weighted(margins: Array, weights: Array, why: str) -> Estimate:
+    """From independent runs with weights (those of plain ones are 1)."""
+    count, instants = margins.shape
+    first = first_passages(margins)
+    beyond = first < instants
+    passed = np.cumsum(np.bincount(first[beyond], weights[beyond], instants)) / count
+    squares = np.cumsum(np.bincount(first[beyond], weights[beyond] ** 2, instants)) / count
+    variance = np.maximum(squares - passed**2, 0.0) / max(count - 1, 1)
+    deviation = np.divide(np.sqrt(variance), passed, out=np.full(instants, np.inf), where=passed > 0)
+    lost = float(weights[np.isnan(margins).any(axis=1)].sum() / count)
+    # No event in n runs: less than 3.7 / n with 97.5 % confidence.
+    unseen = 1 - 0.025 ** (1 / count)
+    return Estimate(passed, deviation, why, unseen, lost, _between(margins, weights))
+
+
+def _between(margins: Array, weights: Array) -> float:
+    """From what every second instant leaves out: the depth that is missed falls with the square of the spacing."""
+    sparse = margins[:, ::-2]
+    whole = weights[(margins < 0).any(axis=1)].sum()
+    if not whole > 0 or margins.shape[1] < 3:
+        return math.nan
+    return float(1 - weights[(sparse < 0).any(axis=1)].sum() / whole) / 3

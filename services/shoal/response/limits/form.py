@@ -1,0 +1,145 @@
+"""Where a limit is most probably passed: the nearest places to the origin of the standard normal space (FORM).
+
+Hasofer and Lind 1974, Rackwitz and Fiessler 1978, with the line search of Zhang and Der Kiureghian, Two improved
+algorithms for reliability analysis, 1995. All starts go side by side. Over time the limit is that of a series system:
+the instant that decides is looked up at every place.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from shoal.response.inputs import BoolArray
+from shoal.response.limits.margins import FAR, Margins, least
+from shoal.response.runs import TooManyRunsError
+from shoal.trajectory import Array
+
+STEP = 0.01
+"""Of central differences, in standard deviations."""
+ITERATIONS = 30
+SHARES = 1.0, 0.5, 0.25, 0.1, 0.03
+"""Of a step; all are tried. Where the limit is more curved than the sphere, whole steps go to and fro for ever."""
+ON, STRAIGHT = 1e-4, 1e-3
+"""A design point lies on the limit within this distance and straight above its origin within that one."""
+NEAR = 0.1
+"""A search that ends farther from the limit has not found it."""
+APART = 0.3
+"""Design points that are nearer to each other are one."""
+NEGLIGIBLE = 1e-4
+"""A design point with less than this share of the density of the nearest one does not count."""
+
+
+@dataclass(frozen=True)
+class DesignPoint:
+    """Where a limit is most probably passed, of all places around.
+
+    place: in the standard normal space, (parameters,); normal: the unit vector of steepest descent of the margin there;
+    slope: by how much the margin falls per standard deviation; beta: distance [standard deviations], negative if the
+    origin is beyond the limit; instant: that decides, its index; converged: to the accuracy that is asked for
+    """
+
+    place: Array
+    normal: Array
+    slope: float
+    beta: float
+    instant: int
+    converged: bool
+
+    @property
+    def probability(self) -> float:
+        """Of the half space beyond its tangent: the first-order estimate."""
+        return float(special.ndtr(-self.beta))
+
+
+def design_points(margins: Margins, starts: Array) -> list[DesignPoint]:
+    """From these starts, (starts, parameters); the nearest first, each once. Raises InputError."""
+    u = starts.copy()
+    rows = margins(u)
+    g = least(rows)
+    slopes = np.zeros_like(u)
+    straight = np.zeros(len(u), dtype=bool)
+    active = np.isfinite(g)
+    try:
+        for _ in range(ITERATIONS):
+            moving = np.flatnonzero(active & ~straight)
+            if not moving.size:
+                break
+            slopes[moving] = _gradients(margins, u[moving], rows[moving])
+            size = np.linalg.norm(slopes[moving], axis=1)
+            # Where nothing changes the margin there is nowhere to go.
+            active[moving[~(size > 0)]] = False
+            moving = moving[size > 0]
+            straight[moving] = _converged(u[moving], g[moving], slopes[moving])
+            moving = moving[~straight[moving]]
+            if moving.size:
+                u[moving], g[moving], rows[moving] = _step(margins, u[moving], g[moving], slopes[moving])
+                active &= np.isfinite(g)
+            _meet(u, active)
+    except TooManyRunsError:
+        pass
+    reached = active & np.any(slopes, axis=1) & (g <= NEAR * np.linalg.norm(slopes, axis=1))
+    return distinct([_point(u[k], slopes[k], rows[k], bool(straight[k])) for k in np.flatnonzero(reached)])
+
+
+def _gradients(margins: Margins, u: Array, rows: Array) -> Array:
+    """Of the margin at the instant that decides, by central differences, (places, parameters); 0 where one failed."""
+    count, parameters = u.shape
+    away = STEP * np.eye(parameters)
+    beside = np.concatenate([u[:, None] + away, u[:, None] - away], axis=1)
+    found = margins(beside.reshape(-1, parameters)).reshape(count, 2, parameters, -1)
+    instant = rows.argmin(axis=1)
+    at = np.take_along_axis(found, instant[:, None, None, None], axis=3)[..., 0]
+    return np.nan_to_num((at[:, 0] - at[:, 1]) / (2 * STEP))
+
+
+def _converged(u: Array, g: Array, slope: Array) -> BoolArray:
+    size = np.linalg.norm(slope, axis=1)
+    normal = -slope / size[:, None]
+    along = np.sum(u * normal, axis=1)
+    aside = np.linalg.norm(u - along[:, None] * normal, axis=1)
+    return np.asarray((np.abs(g) <= ON * size) & (aside <= STRAIGHT * np.maximum(1.0, np.abs(along))))
+
+
+def _step(margins: Margins, u: Array, g: Array, slope: Array) -> tuple[Array, Array, Array]:
+    """Towards the nearest place of the tangent, as far as the merit |u|^2 / 2 + c |g| is least."""
+    square = np.sum(slope**2, axis=1)
+    wanted = ((np.sum(slope * u, axis=1) - g) / square)[:, None] * slope
+    far = np.linalg.norm(wanted, axis=1)
+    wanted *= np.minimum(1.0, FAR / np.maximum(far, 1e-300))[:, None]
+    penalty = 2 * np.maximum(np.linalg.norm(u, axis=1), np.linalg.norm(wanted, axis=1)) / np.sqrt(square) + 1e-12
+    tried = u[:, None] + np.array(SHARES)[:, None] * (wanted - u)[:, None]
+    found = margins(tried.reshape(-1, u.shape[1])).reshape(*tried.shape[:2], -1)
+    value = least(found.reshape(-1, found.shape[2])).reshape(tried.shape[:2])
+    best = np.argmin(0.5 * np.sum(tried**2, axis=2) + penalty[:, None] * np.abs(value), axis=1)
+    each = np.arange(len(u))
+    return tried[each, best], value[each, best], found[each, best]
+
+
+def _meet(u: Array, active: BoolArray) -> None:
+    """Searches that come together go on as one."""
+    going = np.flatnonzero(active)
+    for k, one in enumerate(going):
+        beside = np.linalg.norm(u[going[:k]] - u[one], axis=1) < APART
+        active[one] = not np.any(beside & active[going[:k]])
+
+
+def _point(u: Array, slope: Array, row: Array, converged: bool) -> DesignPoint:
+    size = float(np.linalg.norm(slope))
+    normal = -slope / size
+    return DesignPoint(u.copy(), normal, size, float(u @ normal), int(row.argmin()), converged)
+
+
+def distinct(found: list[DesignPoint]) -> list[DesignPoint]:
+    """Each once: the converged ones that matter, the nearest first; if there are none, the others."""
+    chosen: list[DesignPoint] = []
+    wanted = [point for point in found if point.converged] or found
+    for point in sorted(wanted, key=lambda point: abs(point.beta)):
+        nearest = chosen[0] if chosen else point
+        matters = 0.5 * (point.beta**2 - nearest.beta**2) < -math.log(NEGLIGIBLE)
+        if matters and all(np.linalg.norm(point.place - other.place) > APART for other in chosen):
+            chosen.append(point)
+    return chosen

@@ -1,0 +1,101 @@
+"""Whether a limit of a machine is kept, or how probable it is to be passed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from shoal.engines.contract import Engine
+from shoal.engines.verification import verified
+from shoal.errors import InputError
+from shoal.response.inputs import Inputs
+from shoal.response.limits.choice import get_way, probability
+from shoal.response.limits.judged import Judged, Shown
+from shoal.response.limits.limit import Limit
+from shoal.response.limits.margins import Margins
+from shoal.response.machine import Machine
+from shoal.response.runs import Model
+from shoal.scene import Scene
+from shoal.trajectory import Array, Trajectory
+
+MOST = 5_000
+"""Runs for the probability of a limit unless another number is asked for."""
+Reach = Callable[[Model], tuple[Array, Array, Array, int, int]]
+"""Of the margins of a model over time: the least that runs attain, that may be, (instants,); the germs of the former,
+(instants, parameters); runs made, and how many failed."""
+
+
+def watched(machine: Machine, limit: Limit) -> Machine:
+    """The same machine, of which the margins of a limit are told."""
+    return replace(machine, told=limit.margins)
+
+
+def _show(limit: Limit, machine: Machine, inputs: Inputs, germ: Array, verify: bool) -> Shown:
+    named = inputs.named(germ[None])[0]
+    if verify:
+        return show(limit, machine.scene, machine.times, machine.engine, inputs, named)
+    motion = machine.engine.simulate(machine.scene.with_values(inputs.at(named)), machine.times)
+    return _shown(limit, machine.times, inputs, named, motion)
+
+
+def judge(
+    limit: Limit,
+    machine: Machine,
+    inputs: Inputs,
+    reach: Reach,
+    *,
+    way: str = "auto",
+    most: int = MOST,
+    seed: int = 0,
+    verify: bool = True,
+    progress: Callable[[int], None] | None = None,
+) -> Judged:
+    """By probability where all parameters are random, by bounds of the margin where all are intervals.
+
+    reach: bounds a model; way: one of `WAYS`; most: runs for a probability. Raises InputError, ComputationError.
+    """
+    get_way(way)
+    told, times = watched(machine, limit), machine.times
+    if inputs.random.all():
+        margins = Margins(told, inputs, most, progress)
+        passing = probability(margins, way, seed)
+        shown = None
+        if passing.points:
+            shown = _show(limit, machine, inputs, inputs.standard(passing.points[0].place[None])[0], verify)
+        nan = float("nan")
+        return Judged(
+            limit, way, inputs, times, passing, None, nan, nan, shown, margins.evaluations, margins.failed, margins.why
+        )
+    if inputs.random.any():
+        raise InputError(f"limit: {limit.text}: needs all parameters to be intervals, or all to be random")
+    lower, outer, germs, evaluations, failed = reach(told)
+    worst = int(lower.argmin())
+    kept = False if lower[worst] < 0 else True if outer.min() >= 0 else None
+    shown = _show(limit, machine, inputs, germs[worst], verify)
+    return Judged(
+        *(limit, "bounds", inputs, times, None, kept, float(lower[worst]), float(outer.min())),
+        *(shown, evaluations, failed, ""),
+    )
+
+
+def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Inputs, named: Array) -> Shown:
+    """Run a scene once more, with care, with these values of the parameters, (parameters,). Raises InputError."""
+    return _shown(limit, times, inputs, named, verified(engine, scene.with_values(inputs.at(named)), times))
+
+
+def _shown(limit: Limit, times: Array, inputs: Inputs, named: Array, motion: Trajectory) -> Shown:
+    margins = limit.margins(motion)[0]
+    estimated = motion.model.get("verification", {})
+    instant = int(np.argmin(margins))
+    return Shown(
+        dict(zip(inputs.names, named.tolist(), strict=True)),
+        inputs.at(named),
+        float(times[instant]),
+        float(margins[instant]),
+        str(motion.status[0]),
+        motion.message,
+        estimated.get("mesh_error"),
+        estimated.get("time_error"),
+    )

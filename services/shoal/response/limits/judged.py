@@ -1,0 +1,125 @@
+"""What is told of a limit: how probable it is to be passed, or whether it is kept, and the run that shows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from shoal.response.inputs import Inputs
+from shoal.response.limits.choice import Passing
+from shoal.response.limits.limit import Limit
+from shoal.trajectory import Array, plain
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A run that shows how a limit is passed, or how close to it the machine comes, made again and verified.
+
+    parameters: name -> value; values: path -> value; time [s]: of the least margin; margin: there; status: of the run;
+    mesh_error, step_error [m]: estimated
+    """
+
+    parameters: dict[str, float]
+    values: dict[str, float]
+    time: float
+    margin: float
+    status: str
+    message: str
+    mesh_error: float | None
+    step_error: float | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return dict(plain(vars(self)))
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Of one limit.
+
+    way: that was asked for; times [s]; passing: of random parameters, else None; kept: of intervals, whether no values
+    pass it, None where that is not decided; margin, outer: the least that a run attains, and that any may have, nan
+    where not known; shown: the most probable way to pass it, or the run with the least margin; evaluations, failed:
+    runs made for it alone; reason: why the first of these failed
+    """
+
+    limit: Limit
+    way: str
+    inputs: Inputs
+    times: Array
+    passing: Passing | None
+    kept: bool | None
+    margin: float
+    outer: float
+    shown: Shown | None
+    evaluations: int
+    failed: int
+    reason: str
+
+    @property
+    def doubt(self) -> str:
+        """Why it should not be believed, empty if it may be."""
+        found = self.passing.doubt if self.passing is not None else ""
+        if self.passing is None and self.kept is None:
+            found = "no run passes it, and the outer bounds do not show that none does"
+        if not found and self.failed:
+            found = f"{self.failed} of {self.evaluations} runs failed even with smaller steps: {self.reason}"
+        if not found and self.shown is not None and self.shown.status != "ok":
+            found = f"the run that shows it is not borne out: {self.shown.message}"
+        return f"limit {self.limit.text}: {found}" if found else ""
+
+    def to_json(self) -> dict[str, Any]:
+        """An entry of `limits` in what `shoal uncertain --json` prints."""
+        found: dict[str, Any] = {"limit": self.limit.text, "unit": self.limit.unit, "method": self.way}
+        if self.passing is not None:
+            found |= self._probability(self.passing)
+        else:
+            found |= {"kept": self.kept, "margin": self.margin, "margin_outer": self.outer}
+        found |= {"evaluations": self.evaluations, "failed": self.failed, "doubt": self.doubt}
+        return dict(plain({**found, "shown_by": None if self.shown is None else self.shown.to_json()}))
+
+    def _probability(self, passing: Passing) -> dict[str, Any]:
+        estimate = passing.estimate
+        lower, upper = estimate.interval
+        points = [
+            {
+                "parameters": self._named(point.place),
+                "beta": point.beta,
+                "probability": point.probability,
+                "t": self.times[point.instant] if point.instant >= 0 else None,
+                "sensitivity": dict(zip(self.inputs.names, (point.normal**2).tolist(), strict=True)),
+                "converged": point.converged,
+            }
+            for point in passing.points
+        ]
+        return {
+            "probability": estimate.probability,
+            "lower": lower[-1],
+            "upper": upper[-1],
+            "confidence": 0.95,
+            "coefficient_of_variation": estimate.coefficient,
+            "between_instants": estimate.between,
+            "beta": float(-special.ndtri(estimate.probability)),
+            "why": passing.why,
+            "design_points": points,
+            "first_passage": {"t": self.times, "probability": estimate.passed, "lower": lower, "upper": upper},
+            "probability_with_mesh_error": self._moved(passing),
+        }
+
+    def _named(self, place: Array) -> dict[str, float]:
+        found = self.inputs.named(self.inputs.standard(place[None]))[0]
+        return dict(zip(self.inputs.names, found.tolist(), strict=True))
+
+    def _moved(self, passing: Passing) -> list[float] | None:
+        """Between which two the probability lies if the mesh moves the margin by its error, to first order."""
+        if self.limit.unit != "m" or self.shown is None or self.shown.mesh_error is None or not passing.points:
+            return None
+        point, chance = passing.points[0], passing.estimate.probability
+        if not chance > 0 or not point.converged:
+            return None
+        off = self.shown.mesh_error / point.slope
+        ends = special.ndtr(-point.beta + np.array([-off, off])) / special.ndtr(-point.beta)
+        return [float(end) for end in np.minimum(chance * ends, 1.0)]

@@ -1,0 +1,92 @@
+"""The worst case as a scene of its own: of a limit, or of a bound of a marker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.errors import InputError
+from shoal.response.limits import Shown
+from shoal.response.limits.judge import show
+from shoal.response.limits.limit import Limit
+from shoal.response.result import Response
+from shoal.scene import Scene
+from shoal.scene.edited import as_yaml
+from shoal.whole import whole
+
+SIDES = "lower", "upper"
+
+
+@dataclass(frozen=True)
+class Worst:
+    """of: the limit, or MARKER.QUANTITY.lower or .upper; scene: with the values that lead there; shown: its run."""
+
+    of: str
+    scene: Scene
+    shown: Shown
+
+    def save(self, path: Path) -> None:
+        """As YAML. Raises ComputationError."""
+        with whole(path) as part:
+            part.write_text(as_yaml(self.scene.model_dump(mode="json", exclude_unset=True)))
+
+
+def worst(found: Response, of: str = "") -> list[Worst]:
+    """Of one limit or bound, else of every limit, else of the widest bound. Raises InputError.
+
+    The runs of limits have been verified as the study was asked to; that of a bound is verified here.
+    """
+    cases = {one.limit.text: one.shown for one in found.limits if one.shown is not None}
+    if of in cases:
+        return [_case(found, of, cases[of])]
+    if of or not found.limits:
+        of, shown = _bound(found, of or _widest(found))
+        return [_case(found, of, shown)]
+    if not cases:
+        raise InputError("worst: no run comes near a limit, so that there is no worst case of one")
+    return [_case(found, text, shown) for text, shown in cases.items()]
+
+
+def _case(found: Response, of: str, shown: Shown) -> Worst:
+    if shown.status != "ok":
+        raise InputError(f"worst: the run of {of} is not borne out: {shown.message}")
+    scene = found.stated.with_values(shown.values)
+    about = f"Worst case of {of} for {found.scene}: {shown.margin:.4g} at {shown.time:g} s."
+    return Worst(of, scene.model_copy(update={"name": f"{found.scene}-worst", "description": about}), shown)
+
+
+def _widest(found: Response) -> str:
+    if found.bounds is None:
+        raise InputError("worst: distributions have no worst case but that of a limit; state one with --limit")
+    width = found.bounds.upper - found.bounds.lower
+    sizes = {
+        (marker, quantity): float(found.column(marker, quantity, width).max())
+        for marker in found.markers
+        for quantity in ("x", "y")
+    }
+    marker, quantity = max(sizes, key=lambda key: sizes[key])
+    return f"{marker}.{quantity}.lower"
+
+
+def _bound(found: Response, of: str) -> tuple[str, Shown]:
+    """The run that attains a bound, where that lies farthest out."""
+    marker, _, rest = of.rpartition(".")[0].rpartition(".")
+    side = of.rpartition(".")[2]
+    if found.bounds is None or side not in SIDES or marker not in found.markers or rest not in found.quantities:
+        limits = ", ".join(one.limit.text for one in found.limits)
+        raise InputError(
+            f"worst: {of!r} is neither a limit of the study ({limits or 'there are none'}) nor, of intervals, "
+            "MARKER.QUANTITY.lower or .upper"
+        )
+    above = side == "upper"
+    bound = found.column(marker, rest, getattr(found.bounds, side))
+    arguments = found.column(marker, rest, (found.bounds.at_upper if above else found.bounds.at_lower).T).T
+    instant = int(np.argmax(bound) if above else np.argmin(bound))
+    # The margin to a bound of zero is the quantity itself, with its sign.
+    limit = Limit(of, marker, rest, above, 0.0)
+    shown = show(limit, found.stated, found.times, get_engine(found.engine), found.inputs, arguments[instant])
+    value = -shown.margin if above else shown.margin
+    return of, Shown(**{**vars(shown), "margin": value})

@@ -1,0 +1,151 @@
+"""Tolerances that keep a limit, against closed forms; the worst case as a scene."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy import optimize, stats
+from shoal.cli import main
+from shoal.engines import get_engine
+from shoal.errors import ComputationError, InputError
+from shoal.response import uncertain
+from shoal.response.allocation import cheapest, with_factors
+from shoal.response.inputs import Inputs, Parameter
+from shoal.response.marginals import Frozen, Interval, Normal, Scaled, Uniform
+from shoal.response.worst import worst
+from shoal.scene import Scene, load_scene
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from thrown import ALONG, THROWN, UP
+
+HEIGHT = "initial.P.position.1"
+
+
+def test_the_cheapest_factors_of_planes() -> None:
+    """Sum(c / s) under sum(b s) = 1 and under sum((b s)^2) = 1, by a general optimiser."""
+    weights, costs, most = np.array([0.5, 1.0, 2.0, 0.0]), np.array([1.0, 2.0, 1.0, 1.0]), np.full(4, 3.0)
+    for power in (1, 2):
+        found = cheapest(weights, costs, 1.0, power, most)
+        other = optimize.minimize(
+            lambda s: float(costs @ (1 / s)),
+            np.full(4, 0.2),
+            bounds=[(1e-3, 3.0)] * 4,
+            constraints={"type": "ineq", "fun": lambda s, power=power: 1 - np.sum((weights * s) ** power)},
+            options={"ftol": 1e-12},
+        )
+        assert found == pytest.approx(other.x, rel=1e-3)
+        assert np.sum((weights * found) ** power) == pytest.approx(1.0)
+
+
+def test_tolerances_of_intervals() -> None:
+    """A body thrown from -t to t m with 5 - u to 5 + u m/s stays below 1.5 m: t + (5 + u)^2 / 20 = 1.5."""
+    found = uncertain(
+        Scene.parse(THROWN),
+        {UP: (4.8, 5.2), HEIGHT: (-0.2, 0.2), ALONG: (1.9, 2.1)},
+        limits=["P.y > 1.5"],
+        allocate=True,
+        costs={UP: 2.0},
+        verify=False,
+    )
+    assert found.ok
+    allocation = found.allocation
+    assert allocation is not None
+    best = optimize.minimize_scalar(
+        lambda s: 2 / s + 0.2 / (1.5 - (5 + 0.2 * s) ** 2 / 20), bounds=(0.1, 2.0), method="bounded"
+    )
+    assert allocation.factors == pytest.approx([best.x, (1.5 - (5 + 0.2 * best.x) ** 2 / 20) / 0.2, 3.0], rel=2e-2)
+    assert 0 <= allocation.confirmed < 1e-3
+    assert allocation.effects[1] == pytest.approx(0.01 * 0.2)
+    assert allocation.to_json()["tighten_first"] == HEIGHT
+    again = uncertain(
+        Scene.parse(THROWN),
+        list(allocation.allocated.parameters),
+        limits=["P.y > 1.5"],
+        method="vertices",
+        verify=False,
+    )
+    assert again.limits[0].kept
+
+
+def test_deviations_of_distributions() -> None:
+    """The probability that was asked for is kept, and FORM's effects are those of the closed form."""
+    target = 1e-4
+    found = uncertain(
+        Scene.parse(THROWN),
+        {UP: "normal(5,0.2)", HEIGHT: "normal(0,0.1)"},
+        limits=["P.y > 1.75"],
+        allocate=True,
+        target=target,
+        verify=False,
+        count=32,
+        method="sobol",
+    )
+    allocation = found.allocation
+    assert allocation is not None
+    assert found.ok
+
+    def passed(factors: np.ndarray) -> float:
+        heights = np.linspace(-8, 8, 20001)
+        speed = np.sqrt(20 * np.maximum(1.75 - 0.1 * factors[1] * heights, 0.0))
+        beyond = stats.norm.pdf(heights) * stats.norm.sf((speed - 5) / (0.2 * factors[0]))
+        return float(np.sum(beyond) * (heights[1] - heights[0]))
+
+    assert passed(allocation.factors) == pytest.approx(target, rel=0.1)
+    assert allocation.stated == pytest.approx(passed(np.ones(2)), rel=0.1)
+    for k in range(2):
+        tight = np.ones(2)
+        tight[k] = 0.99
+        assert allocation.effects[k] == pytest.approx(1 - passed(tight) / passed(np.ones(2)), rel=0.15)
+
+
+def test_what_cannot_be_allocated_is_refused() -> None:
+    scene, vary = Scene.parse(THROWN), {UP: (4.8, 5.2)}
+    with pytest.raises(ComputationError, match="middle values"):
+        uncertain(scene, vary, limits=["P.y > 1.0"], allocate=True, verify=False)
+    with pytest.raises(InputError, match="needs one limit"):
+        uncertain(scene, vary, allocate=True, verify=False)
+    with pytest.raises(InputError, match="cost: 'x' is not varied"):
+        uncertain(scene, vary, limits=["P.y > 2"], allocate=True, costs={"x": 1.0}, verify=False)
+
+
+@pytest.mark.parametrize(
+    "marginal", [Interval(1.0, 3.0), Uniform(1.0, 3.0), Normal(2.0, 0.3), Frozen(stats.norm(2.0, 0.5))]
+)
+def test_scaled_tolerances(marginal: Interval | Normal | Frozen) -> None:
+    """Half the width about the same middle."""
+    inputs = Inputs((Parameter("x", marginal, {"x": 1.0}),))
+    half = with_factors(inputs, np.array([0.5])).parameters[0].marginal
+    assert isinstance(half, Scaled) is isinstance(marginal, Frozen)
+    x = np.array([0.1, 0.5, 0.9])
+    assert half.value(half.germ(x)) - 2 == pytest.approx(0.5 * (marginal.value(marginal.germ(x)) - 2))
+
+
+def test_the_worst_case_as_a_scene(tmp_path: Path) -> None:
+    """Its own run passes the limit by what the study says, or attains the bound."""
+    found = uncertain(Scene.parse(THROWN), {UP: (4.7, 5.3), ALONG: (1.7, 2.3)}, limits=["P.y > 1.3", "P.speed > 9"])
+    one, other = worst(found)
+    assert (one.of, other.of) == ("P.y > 1.3", "P.speed > 9")
+    file = tmp_path / "worst.yaml"
+    one.save(file)
+    motion = get_engine("gauss").simulate(load_scene(str(file)))
+    assert motion.marker("P")[:, 1].max() == pytest.approx(1.3 - one.shown.margin, abs=1e-12)
+    assert one.shown.margin == pytest.approx(1.3 - 5.3**2 / 20, abs=1e-3)
+    (bound,) = worst(found, "P.x.upper")
+    assert bound.shown.margin == pytest.approx(2.3)
+    assert bound.scene.value(ALONG) == pytest.approx(2.3)
+    with pytest.raises(InputError, match="neither a limit of the study"):
+        worst(found, "P.z.upper")
+
+
+def test_the_command_writes_the_worst_case(tmp_path: Path) -> None:
+    file = tmp_path / "worst.yaml"
+    words = ["uncertain", "single-pendulum", "--vary", "initial.OA.angle=-1.3:-1.2", "--at", "0.5,1,1.5", "--json"]
+    run = CliRunner().invoke(main, [*words, "--worst", str(file), "--worst-of", "A.y.upper", "--no-verify"])
+    assert run.exit_code == 0, run.output
+    assert math.isclose(load_scene(str(file)).value("initial.OA.angle"), -1.2)

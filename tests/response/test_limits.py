@@ -1,0 +1,272 @@
+"""Probabilities of passing a limit, against closed forms and quadrature."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy import integrate, stats
+from shoal.cli import main
+from shoal.errors import InputError
+from shoal.response import uncertain
+from shoal.response.inputs import Inputs, Parameter
+from shoal.response.limits.choice import WAYS, Passing, probability
+from shoal.response.limits.form import design_points
+from shoal.response.limits.limit import limit
+from shoal.response.limits.margins import Margins
+from shoal.response.marginals import Frozen, Normal, Uniform
+from shoal.response.read import parameters
+from shoal.response.runs import Answers
+from shoal.scene import Scene, load_scene
+from shoal.trajectory import Array
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from thrown import ALONG, THROWN, UP
+
+Function = Callable[[Array], Array]
+MOST = 5000
+
+
+def margins(function: Function, count: int) -> Margins:
+    """function: standard normal places, (runs, parameters), to margins, (runs,) or (runs, instants)."""
+    names = [f"x{k}" for k in range(count)]
+
+    def model(values: dict[str, Array]) -> Answers:
+        found = function(np.stack([values[name] for name in names], axis=1))
+        found = found if found.ndim == 2 else found[:, None]
+        return Answers(found, np.ones(len(found), dtype=bool))
+
+    return Margins(model, Inputs(tuple(Parameter(name, Normal(0.0, 1.0), {name: 1.0}) for name in names)), MOST)  # type: ignore[arg-type]
+
+
+def plane(beta: float, count: int) -> tuple[Function, float]:
+    return lambda x: beta - x.sum(axis=1) / math.sqrt(count), float(stats.norm.sf(beta))
+
+
+def paraboloid(beta: float, curved: float, count: int) -> tuple[Function, float]:
+    """P = E Phi(-(beta + curved r^2)), r^2 of chi-squared distribution."""
+
+    def chance(r: float) -> float:
+        return float(stats.chi2.pdf(r, count - 1) * stats.norm.sf(beta + curved * r))
+
+    edges = [1.0, 5.0, 20.0, abs(beta / curved)]
+    exact = integrate.quad(chance, 0, 200, limit=800, points=edges)[0]
+    return lambda x: beta - x[:, 0] + curved * (x[:, 1:] ** 2).sum(axis=1), exact
+
+
+def branches(c: float) -> tuple[Function, float]:
+    """Waarts' series system of four branches, with four design points, each as an instant of its own."""
+
+    def four(x: Array) -> Array:
+        s, t = (x[:, 0] - x[:, 1]) / math.sqrt(2), (x[:, 0] + x[:, 1]) / math.sqrt(2)
+        return np.stack([c + 0.2 * s**2 - t, c + 0.2 * s**2 + t, s + (c + 4) / 2, (c + 4) / 2 - s], axis=1)
+
+    def kept(s: float) -> float:
+        return float(stats.norm.pdf(s) * 2 * stats.norm.sf(c + 0.2 * s * s))
+
+    inside = integrate.quad(kept, -(c + 4) / 2, (c + 4) / 2, epsabs=1e-16)[0]
+    return four, inside + 2 * float(stats.norm.sf((c + 4) / 2))
+
+
+def two(one: float, other: float, count: int) -> tuple[Function, float]:
+    exact = 1 - stats.norm.cdf(one) * stats.norm.cdf(other)
+    return lambda x: np.minimum(one - x[:, 0], other + x[:, 1]), float(exact)
+
+
+STATES: dict[str, tuple[tuple[Function, float], int]] = {
+    "a plane, 1e-3": (plane(3.09, 2), 2),
+    "a plane, 1e-5, eight parameters": (plane(4.26, 8), 8),
+    "a plane, 1e-7": (plane(5.2, 2), 2),
+    "curved away": (paraboloid(4.5, 0.3, 4), 4),
+    "curved towards": (paraboloid(4.0, -0.1, 3), 3),
+    "two sides": ((lambda x: 4 - np.abs(x[:, 0]), 2 * float(stats.norm.sf(4))), 2),
+    "two unequal design points": (two(3.5, 4.0, 4), 4),
+    "four branches": (branches(3.0), 2),
+    "four branches, 7e-6": (branches(5.0), 2),
+}
+
+
+def repeated(state: str, way: str, times: int) -> tuple[float, Array]:
+    """Share of the repetitions whose interval holds the exact probability, and estimates over it."""
+    (function, exact), count = STATES[state]
+    found: list[Passing] = []
+    for seed in range(times):
+        run = margins(function, count)
+        found.append(probability(run, way, seed))
+        assert run.evaluations <= MOST
+    intervals = [one.estimate.interval for one in found]
+    held = np.mean([lower[-1] <= exact <= upper[-1] for lower, upper in intervals])
+    return float(held), np.array([one.estimate.probability for one in found]) / exact
+
+
+@pytest.mark.parametrize("state", ["a plane, 1e-7", "curved away", "two unequal design points", "four branches"])
+def test_probabilities_of_closed_forms(state: str) -> None:
+    held, ratio = repeated(state, "auto", 40)
+    assert held >= 0.9
+    assert ratio.mean() == pytest.approx(1.0, abs=0.02)
+    assert np.mean(np.abs(ratio - 1) < 0.1) >= 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("state", STATES)
+def test_intervals_hold_as_often_as_they_say(state: str) -> None:
+    """95 % of 200 repetitions, within what 200 of them can tell."""
+    held, ratio = repeated(state, "auto", 200)
+    assert 0.92 <= held <= 0.98
+    assert ratio.mean() == pytest.approx(1.0, abs=0.02)
+    assert np.mean(np.abs(ratio - 1) < 0.1) >= (0.85 if state == "curved towards" else 0.95)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("state", STATES)
+def test_subset_simulation_holds_as_often_as_it_says(state: str) -> None:
+    held, ratio = repeated(state, "subset", 100)
+    assert held >= 0.92
+    assert ratio.mean() == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_plain_half_space_by_every_way() -> None:
+    """Phi(-2.5): FORM to the last digits, the others within their intervals."""
+    for way in WAYS:
+        function, exact = plane(2.5, 3)
+        found = probability(margins(function, 3), way, 1)
+        if way == "form":
+            assert found.estimate.probability == pytest.approx(exact, rel=1e-6)
+        else:
+            lower, upper = found.estimate.interval
+            assert lower[-1] <= exact <= upper[-1], way
+
+
+def test_design_points_of_a_limit_more_curved_than_the_sphere() -> None:
+    """Where HL-RF alone goes to and fro: 5 + 0.2 s^2 = t, nearest at (0, 5)."""
+    run = margins(lambda x: 5 + 0.2 * x[:, 0] ** 2 - x[:, 1], 2)
+    (found,) = design_points(run, np.array([[1.0, 5.5], [-2.0, 6.0]]))
+    assert found.converged
+    assert found.beta == pytest.approx(5.0, abs=1e-3)
+    assert found.place == pytest.approx([0.0, 5.0], abs=1e-2)
+
+
+def test_a_limit_that_is_never_passed() -> None:
+    found = probability(margins(lambda x: 1 + x[:, 0] ** 2, 2), "auto", 0)
+    lower, upper = found.estimate.interval
+    assert found.estimate.probability == 0.0
+    assert 0 <= lower[-1] < upper[-1] < 1e-3
+    assert "none has passed" in found.why
+
+
+def test_failed_runs_widen_the_interval() -> None:
+    run = margins(lambda x: 2.0 - x[:, 0], 1)
+    healthy = run.model
+
+    def sick(values: dict[str, Array]) -> Answers:
+        told = healthy(values)
+        return Answers(told.values, values["x0"] < 2.5, 0, "too far")
+
+    run.model = sick  # type: ignore[assignment]
+    found = probability(run, "monte-carlo", 0)
+    assert run.failed > 0
+    assert found.estimate.interval[1][-1] > stats.norm.sf(2.0)
+
+
+def test_other_distributions_are_brought_to_normal_ones() -> None:
+    """x uniform, y exponential: P(x + y > 12), x in [0, 1], mean of y 1, is (e - 1) exp(-12)."""
+    pair = Parameter("x", Uniform(0.0, 1.0), {"x": 1.0}), Parameter("y", Frozen(stats.expon()), {"y": 1.0})
+
+    def model(values: dict[str, Array]) -> Answers:
+        return Answers(12 - values["x"][:, None] - values["y"][:, None], np.ones(len(values["x"]), dtype=bool))
+
+    found = probability(Margins(model, Inputs(pair), MOST), "auto", 0)  # type: ignore[arg-type]
+    assert found.estimate.probability == pytest.approx((math.e - 1) * math.exp(-12), rel=0.1)
+
+
+def test_a_thrown_body() -> None:
+    """P(v^2 / 20 > h), v normal, and the distribution of the first passage: both in closed form."""
+    height = 2.0
+    found = uncertain(
+        Scene.parse(THROWN), [f"{UP}~normal(5,0.3)", f"{ALONG}~normal(2,0.3)"], limits=[f"P.y > {height}"]
+    )
+    assert found.ok
+    (told,) = found.to_json()["limits"]
+    exact = stats.norm.sf((math.sqrt(20 * height) - 5) / 0.3)
+    assert told["probability"] == pytest.approx(exact, rel=0.1)
+    assert told["lower"] <= exact <= told["upper"]
+    assert told["evaluations"] <= 5000
+    passage = told["first_passage"]
+    times = np.minimum(np.array(passage["t"][20:]), math.sqrt(2 * height / 10))
+    expected = stats.norm.sf((height / times + 5 * times - 5) / 0.3)
+    assert np.mean((np.array(passage["lower"][20:]) <= expected) & (expected <= passage["upper"][20:])) > 0.85
+    (point,) = told["design_points"]
+    assert point["parameters"][UP] == pytest.approx(math.sqrt(20 * height), rel=1e-3)
+    assert point["sensitivity"][ALONG] == pytest.approx(0.0, abs=1e-6)
+    assert told["shown_by"]["margin"] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "passed"), [("P.y > 1.3", True), ("P.y > 1.5", False), ("P.speed > 5.7", True), ("P.vy < -5.9", False)]
+)
+def test_limits_of_intervals(text: str, passed: bool) -> None:
+    """Heights up to 5.3^2 / 20 = 1.4045; speeds up to sqrt(28.09 + 5.29); falling at most at 10 - 4.7."""
+    found = uncertain(Scene.parse(THROWN), {UP: (4.7, 5.3), ALONG: (1.7, 2.3)}, limits=[text])
+    (judged,) = found.limits
+    assert judged.kept is not passed
+    shown = judged.shown
+    assert shown is not None
+    assert (shown.margin < 0) is passed
+    if text != "P.speed > 5.7":  # attained at the start of the fast one and at the end of the slow one
+        assert shown.parameters[UP] == pytest.approx(4.7 if text.startswith("P.vy") else 5.3)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("P.y", "is not"),
+        ("P.y < low", "no finite number"),
+        ("Q.y < 1", "no marker 'Q'"),
+        ("P.force < 1", "no quantity 'force'"),
+        ("abs(P.y < 1", "is not"),
+    ],
+)
+def test_wrong_limits_are_named(text: str, names: str) -> None:
+    with pytest.raises(InputError, match=names):
+        limit(text, Scene.parse(THROWN))
+
+
+def test_the_command_tells_of_limits() -> None:
+    words = ["uncertain", "single-pendulum", "--vary", "initial.OA.angle=-1.3:-1.2", "--at", "0.5,1,1.5", "--json"]
+    run = CliRunner().invoke(main, [*words, "--limit", "A.y > -0.95", "--limit", "abs(A.angle) > 4"])
+    assert run.exit_code == 0, run.output
+    one, other = json.loads(run.stdout)["limits"]
+    assert one["kept"] is False
+    assert other["kept"] is True
+    wrong = CliRunner().invoke(main, [*words, "--limit", "A.y > -0.95", "--limit-method", "luck", "--seed", "1"])
+    assert wrong.exit_code == 2
+    assert "there are auto, form" in wrong.output
+
+
+@pytest.mark.slow
+def test_a_double_pendulum_against_plain_sampling() -> None:
+    """First passage over all instants: importance sampling within the intervals of 20 000 plain runs."""
+    scene = load_scene("rigid-double-pendulum")
+    vary = [f"initial.{body}.angle~normal({mean},0.02)" for body, mean in (("OA", 0.785), ("AB", 0.524))]
+    vary.append("bodies.AB.length~normal(2,0.02)")
+    known, text = parameters(vary, scene), "B.speed > 14.5"
+    auto, plain = (
+        uncertain(
+            scene, known, limits=[text], limit_method=way, limit_runs=runs, method="sobol", count=64, verify=False
+        )
+        .limits[0]
+        .passing
+        for way, runs in (("auto", 5000), ("monte-carlo", 20_000))
+    )
+    assert auto is not None
+    assert plain is not None
+    lower, upper = auto.estimate.interval
+    low, high = plain.estimate.interval
+    assert max(lower[-1], low[-1]) <= min(upper[-1], high[-1])

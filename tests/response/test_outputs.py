@@ -1,0 +1,76 @@
+"""Files of a study: one page that needs nothing else, NetCDF."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shoal.pictures import files
+from shoal.response import Response, uncertain
+from shoal.scene import Scene
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from thrown import ALONG, THROWN, UP
+
+HEIGHT = "initial.P.position.1"
+
+
+@pytest.fixture(scope="module")
+def intervals() -> Response:
+    return uncertain(Scene.parse(THROWN), {UP: (4.7, 5.3), ALONG: (1.7, 2.3)}, [0.25, 0.5, 0.75], limits=["P.y > 1.3"])
+
+
+@pytest.fixture(scope="module")
+def distributions() -> Response:
+    return uncertain(
+        Scene.parse(THROWN),
+        {UP: "normal(5,0.2)", HEIGHT: "normal(0,0.1)"},
+        [0.25, 0.5, 0.75],
+        limits=["P.y > 1.75"],
+        limit_runs=1000,
+    )
+
+
+def test_the_page_of_intervals(intervals: Response, tmp_path: Path) -> None:
+    """Worst case in motion over the stated machine, bounds, gaps, the limit with the run that passes it."""
+    files.response(intervals, tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text()
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    assert "https://" not in page
+    data = page.split('<script type="application/json">')[1].split("</script>")[0]
+    moving = json.loads(data)
+    assert moving["name"] == "P.y &gt; 1.3" or moving["name"] == "P.y > 1.3"
+    assert set(moving["behind"]) == set(moving["outlines"]) == {"P"}
+    assert moving["behind"] != moving["outlines"]
+    assert "Widths, gaps and errors" in page
+    assert "passed" in page
+
+
+def test_the_page_of_distributions(distributions: Response, tmp_path: Path) -> None:
+    files.response(distributions, tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text()
+    assert "95 % interval" in page
+    assert "Total Sobol indices" in page
+    assert "passed by each instant" in page
+
+
+def test_netcdf(intervals: Response, distributions: Response, tmp_path: Path) -> None:
+    """The same numbers by name, as another reader finds them."""
+    xr = pytest.importorskip("xarray")
+    for found in (intervals, distributions):
+        files.response(found, tmp_path / "study.nc")
+        with xr.open_dataset(tmp_path / "study.nc") as data:
+            assert list(data["axis"].values) == ["x", "y", "angle"]
+            assert list(data["parameter"].values) == found.inputs.names
+            if found.bounds is not None:
+                upper = data["upper"].sel(marker="P", axis="y", bound="attained").values
+                assert np.array_equal(upper, found.column("P", "y", found.bounds.upper))
+                assert data["argument_upper"].sel(marker="P", axis="y", parameter=UP).values == pytest.approx(5.3)
+            else:
+                assert found.statistics is not None
+                median = data["quantiles"].sel(marker="P", axis="y", quantile=0.5).values
+                assert np.array_equal(median, found.column("P", "y", found.statistics.quantiles)[3])
