@@ -17,7 +17,7 @@ from shoal.engines.spot_checks import larger
 from shoal.engines.verification import verified
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import reach
-from shoal.response.enclosure import Enclosure, enclosure
+from shoal.response.enclosure import Enclosure, enclosure, foretold
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.inputs import Correlations, Inputs, Parameter
@@ -34,6 +34,8 @@ from shoal.trajectory import Array
 
 MOST = 20_000
 """Runs that a study may make unless another limit is asked for."""
+STARTS = 8
+"""Searches for the extremes of a surrogate of cycles."""
 CHECKED = 6
 """Extremal runs, or drawn ones, that are looked at by more careful runs."""
 
@@ -67,6 +69,7 @@ def respond(
     seed: int = 0,
     most: int = MOST,
     progress: Callable[[int], None] | None = None,
+    over_time: Callable[[Array], Model] | None = None,
 ) -> Answer:
     """Bounds or statistics of any function of named values; see `Study`.
 
@@ -75,7 +78,7 @@ def respond(
     runs = Runs(model, inputs, most, progress)
     group = np.arange(columns) if groups is None else np.asarray(groups, dtype=np.int64)
     when = np.zeros(columns) if instants is None else instants
-    study = Study(runs, group, when, seed, gap, degree, count)
+    study = Study(runs, group, when, seed, gap, degree, count, over_time)
     try:
         found = get_method(method)(study)
     except TooManyRunsError:
@@ -138,6 +141,7 @@ def uncertain(
         seed=seed,
         most=most,
         progress=progress,
+        over_time=lambda instants: replace(machine, times=instants),
     )
     bounds = answer.bounds
     if bounds is not None and math.isfinite(answer.horizon):
@@ -170,26 +174,31 @@ def uncertain(
 def _bounds(study: Study, found: Found) -> Bounds:
     """Attained bounds of all runs, after the extremal points of the surrogate are run, and outer ones by its error."""
     runs, error, surrogate = study.runs, found.error, found.surrogate
-    foretold = None
+    named = None
     if surrogate is not None:
-        foretold = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed)
+        # Over many cycles there are many extremes.
+        starts = STARTS if found.foretold else 1
+        named = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed, starts)
         if error is None:
-            error = _confirmed(study, surrogate, foretold)
+            error = _confirmed(study, surrogate, named)
     values, germs = runs.values, runs.germs
+    at_lower, at_upper = germs[values.argmin(axis=0)], germs[values.argmax(axis=0)]
     lower, upper = values.min(axis=0), values.max(axis=0)
     unknown = np.full(len(lower), np.nan)
     told = Enclosure(lower, upper, unknown, unknown, unknown)
-    if surrogate is not None and foretold is not None and error is not None:
-        told = enclosure(study, surrogate, foretold, error)
+    if surrogate is not None and named is not None and error is not None:
+        told = (foretold if found.foretold else enclosure)(study, surrogate, named, error)
+        at_lower = np.where((told.lower < lower)[:, None], named.at_lower, at_lower)
+        at_upper = np.where((told.upper > upper)[:, None], named.at_upper, at_upper)
     end = _horizon(study, told.gap)
     within = told.gap[study.instants <= end]
     return Bounds(
-        lower,
-        upper,
+        told.lower,
+        told.upper,
         told.lower_outer,
         told.upper_outer,
-        study.inputs.named(germs[values.argmin(axis=0)]),
-        study.inputs.named(germs[values.argmax(axis=0)]),
+        study.inputs.named(at_lower),
+        study.inputs.named(at_upper),
         float(within.max()) if within.size else math.nan,
         end,
     )

@@ -15,7 +15,8 @@ from shoal.trajectory import Array, plain
 
 @dataclass(frozen=True)
 class Bounds:
-    """Of every column. lower, upper: attained by runs; lower_outer, upper_outer: no run is expected beyond, nan where
+    """Of every column. lower, upper: attained by runs or, at long times, by runs at the arguments named, to within the
+    error of the surrogate of cycles; lower_outer, upper_outer: no run is expected beyond, nan where
     the method cannot tell, (columns,); at_lower, at_upper: values of the parameters there, (columns, parameters);
     gap: the largest distance between both as a share of the width within the horizon, nan where it is not known;
     horizon: the last instant up to which they meet [s], infinite if they always do
