@@ -16,7 +16,9 @@ from shoal.response.methods.torus import Torus
 from shoal.response.study import Found, Study
 
 TOO_COARSE = 0.05
-"""An expansion that is off by more than this share of the standard deviation gives way to sampling."""
+"""An expansion that is off by more than this share of the standard deviation gives way to the runs themselves."""
+NO_SHARES = 0.15
+"""Beyond this one so do its Sobol indices, which are off by its square: more runs are made for them."""
 SAMPLED = 8192
 CYCLES = 6
 """As few are followed at single instants."""
@@ -37,8 +39,11 @@ def auto(study: Study) -> Found:
     coarse = off > TOO_COARSE
     if not coarse.any():
         return found
+    about = f"{found.why} is off by up to {off.max():.2g} of the standard deviation"
+    if off.max() <= NO_SHARES:
+        return replace(found, why=f"{about}; where it is, these runs tell, and it tells the shares only", coarse=coarse)
     sampled = sampling.of_distributions(study, SAMPLED)
-    why = f"{found.why} is off by up to {off.max():.1g} of the standard deviation; where it is, {sampled.why} tell"
+    why = f"{about}; where it is, {sampled.why} tell"
     return Found(why, found.surrogate, found.error, sampled.indices, coarse)
 
 
