@@ -31,7 +31,8 @@ HELD_OUT = 5
 def hyperbolic(parameters: int, degree: int) -> Terms:
     """Terms whose degrees k have (sum of k^q)^(1/q) of at most `degree`."""
     terms = total_degree(parameters, degree)
-    return terms[(terms.astype(float) ** NORM).sum(axis=1) <= degree**NORM + 1e-9]
+    kept: Terms = terms[(terms.astype(float) ** NORM).sum(axis=1) <= degree**NORM + 1e-9]
+    return kept
 
 
 def sparse(inputs: Inputs, germs: Array, values: Array, terms: Terms, columns: IntArray) -> Expansion:

@@ -6,6 +6,7 @@ from shoal.errors import InputError
 from shoal.response.methods.auto import auto
 from shoal.response.methods.chaos import chaos
 from shoal.response.methods.chebyshev import chebyshev
+from shoal.response.methods.kriging import kriging
 from shoal.response.methods.legendre import legendre
 from shoal.response.methods.rbf import rbf
 from shoal.response.methods.rs_ht import rs_ht
@@ -29,6 +30,7 @@ METHODS: dict[str, Method] = {
     "legendre": legendre,
     "chaos": chaos,
     "rbf": rbf,
+    "kriging": kriging,
     "time-warp": time_warp,
     "torus": torus,
     "rs-ht": rs_ht,
