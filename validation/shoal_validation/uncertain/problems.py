@@ -115,6 +115,5 @@ PROBLEMS = (
     Problem("two frequencies, 100 s", 2, (50.0, 100.0), _two),
     Problem("peak inside", 2, (1.0,), _peak, continuous=False),
     Problem("four springs, 8 s", 4, (2.0, 8.0), _sum, separable=True),
-    Problem("eight springs, 4 s", 8, (2.0, 4.0), _sum, separable=True),
     Problem("logistic map, 20 times", 1, (4.0, 8.0, 20.0), _logistic, continuous=False),
 )
