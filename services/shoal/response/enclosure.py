@@ -14,11 +14,9 @@ import numpy as np
 
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, Surrogate, places
-from shoal.response.study import Study
+from shoal.response.study import SAFETY, Study
 from shoal.trajectory import Array
 
-SAFETY = 3.0
-"""The error that was seen is taken so many times."""
 DEGREE = 6
 """Of surrogates that are no polynomials."""
 
@@ -61,6 +59,20 @@ def enclosure(study: Study, surrogate: Surrogate, found: Extremes, error: Array)
     beyond = np.maximum(lower - low, high - upper)
     gap = np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0)
     return Enclosure(lower, upper, low, high, gap)
+
+
+def foretold(study: Study, _: Surrogate, found: Extremes, error: Array) -> Enclosure:
+    """Bounds on both sides of what a surrogate foretells: what the runs at its extremes attain at least, and at most.
+
+    error: of the surrogate at runs that it had not seen, (columns,). Inner bounds take the place of attained ones.
+    """
+    values, margin = study.runs.values, SAFETY * error
+    lower = np.minimum(values.min(axis=0), found.lower + margin)
+    upper = np.maximum(values.max(axis=0), found.upper - margin)
+    low, high = np.minimum(lower, found.lower - margin), np.maximum(upper, found.upper + margin)
+    width = study.largest(np.maximum(upper - lower, 0.0), values)
+    beyond = np.maximum(lower - low, high - upper)
+    return Enclosure(lower, upper, low, high, np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0))
 
 
 def _away(wanted: Array, germs: Array, slope: float) -> Array:

@@ -18,7 +18,7 @@ MOST_CORNERS = 10
 """Parameters up to which all corners are looked at."""
 GRID = {1: 1001, 2: 41, 3: 15, 4: 7}
 """Places along each axis of the grid, by the number of parameters."""
-STEPS = 0.25, 0.1, 0.04, 0.015, 0.005, 0.001
+STEPS = 0.25, 0.1, 0.04, 0.015, 0.005, 0.001, 0.0002
 """Of the search along each axis from the best place that was scanned."""
 
 
@@ -49,26 +49,33 @@ def corners(parameters: int) -> Array:
     return np.array(list(product((-1.0, 1.0), repeat=parameters)))
 
 
-def extremes(surrogate: Surrogate, parameters: int, columns: int, seed: int = 0) -> Extremes:
-    """The extremes over [-1, 1]^p: scanned, then sought along each axis by parabolas."""
-    looked_at = places(parameters, seed)
-    best = [np.full(columns, np.inf), np.full(columns, np.inf)]
-    at = [np.zeros((columns, parameters)), np.zeros((columns, parameters))]
+def extremes(surrogate: Surrogate, parameters: int, columns: int, seed: int = 0, starts: int = 1) -> Extremes:
+    """The extremes over [-1, 1]^p: scanned, then sought along each axis by parabolas.
+
+    starts: how many places are sought from, the best of as many shares of what is scanned; more scanned with more
+    """
+    best = [np.full((starts, columns), np.inf), np.full((starts, columns), np.inf)]
+    at = [np.zeros((starts, columns, parameters)), np.zeros((starts, columns, parameters))]
     block = max(1, 4_000_000 // max(columns, 1))
     every = np.arange(columns)
-    for k in range(0, len(looked_at), block):
-        some = looked_at[k : k + block]
-        found = surrogate(some)
-        for side, sign in enumerate((1.0, -1.0)):
-            least = np.argmin(sign * found, axis=0)
-            value = sign * found[least, every]
-            better = value < best[side]
-            best[side][better], at[side][better] = value[better], some[least][better]
+    for start in range(starts):
+        looked_at = places(parameters, seed + start)
+        for k in range(0, len(looked_at), block):
+            some = looked_at[k : k + block]
+            found = surrogate(some)
+            for side, sign in enumerate((1.0, -1.0)):
+                least = np.argmin(sign * found, axis=0)
+                value = sign * found[least, every]
+                better = value < best[side][start]
+                best[side][start, better], at[side][start, better] = value[better], some[least][better]
     for side, sign in enumerate((1.0, -1.0)):
+        value, place = best[side].reshape(-1), at[side].reshape(-1, parameters)
         for step in STEPS:
             for axis in range(parameters):
-                _along(surrogate, sign, axis, step, best[side], at[side], every)
-    return Extremes(best[0], -best[1], at[0], at[1])
+                _along(surrogate, sign, axis, step, value, place, np.tile(every, starts))
+    first = [np.argmin(one, axis=0) for one in best]
+    lower, upper = (one[k, every] for one, k in zip(best, first, strict=True))
+    return Extremes(lower, -upper, *(one[k, every] for one, k in zip(at, first, strict=True)))
 
 
 def _along(surrogate: Surrogate, sign: float, axis: int, step: float, best: Array, at: Array, every: IntArray) -> None:

@@ -7,6 +7,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from shoal.response.allocation import (
     of_distributions,
     of_intervals,
 )
-from shoal.response.enclosure import Enclosure, enclosure
+from shoal.response.enclosure import Enclosure, enclosure, foretold
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.inputs import Correlations, Inputs, Parameter
@@ -51,6 +52,10 @@ from shoal.versions import versions
 
 MOST = 20_000
 """Runs that a study may make unless another limit is asked for."""
+DRAWN = 93
+"""Random runs between whose extremes 95 % of all lie with 95 % confidence: 1 - 0.95^n - n 0.05 0.95^(n-1) >= 0.95."""
+STARTS = 8
+"""Searches for the extremes of a surrogate of cycles."""
 CHECKED = 6
 """Extremal runs, or drawn ones, that are looked at by more careful runs."""
 
@@ -84,6 +89,7 @@ def respond(
     seed: int = 0,
     most: int = MOST,
     progress: Callable[[int], None] | None = None,
+    over_time: Callable[[Array], Model] | None = None,
 ) -> Answer:
     """Bounds or statistics of any function of named values; see `Study`.
 
@@ -92,7 +98,7 @@ def respond(
     runs = Runs(model, inputs, most, progress)
     group = np.arange(columns) if groups is None else np.asarray(groups, dtype=np.int64)
     when = np.zeros(columns) if instants is None else instants
-    study = Study(runs, group, when, seed, gap, degree, count)
+    study = Study(runs, group, when, seed, gap, degree, count, over_time)
     try:
         found = get_method(method)(study)
     except TimeIsUpError:
@@ -104,6 +110,9 @@ def respond(
         bounds = None if random.any() else _bounds(study, found)
     except TimeIsUpError:
         bounds = _bounds(study, _broken_off(runs))
+    if bounds is not None and math.isfinite(bounds.horizon) and runs.left >= DRAWN:
+        with suppress(TimeIsUpError):
+            bounds = _likely(study, bounds)
     statistics = _statistics(study, found) if random.all() else None
     return Answer(found, runs, bounds, statistics)
 
@@ -177,6 +186,7 @@ def uncertain(
             seed=seed,
             most=most,
             progress=progress,
+            over_time=lambda instants: replace(machine, times=instants, keep=None),
         )
     except TimeIsUpError:
         raise ComputationError("time-limit: it was over before the first runs were made") from None
@@ -242,28 +252,58 @@ def _broken_off(runs: Runs) -> Found:
 def _bounds(study: Study, found: Found) -> Bounds:
     """Attained bounds of all runs, after the extremal points of the surrogate are run, and outer ones by its error."""
     runs, error, surrogate = study.runs, found.error, found.surrogate
-    foretold = None
+    named = None
     if surrogate is not None:
-        foretold = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed)
+        # Over many cycles there are many extremes.
+        starts = STARTS if found.foretold else 1
+        named = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed, starts)
         if error is None:
-            error = _confirmed(study, surrogate, foretold)
+            error = _confirmed(study, surrogate, named)
     values, germs = runs.values, runs.germs
+    at_lower, at_upper = germs[values.argmin(axis=0)], germs[values.argmax(axis=0)]
     lower, upper = values.min(axis=0), values.max(axis=0)
     unknown = np.full(len(lower), np.nan)
     told = Enclosure(lower, upper, unknown, unknown, unknown)
-    if surrogate is not None and foretold is not None and error is not None:
-        told = enclosure(study, surrogate, foretold, error)
+    if surrogate is not None and named is not None and error is not None:
+        told = (foretold if found.foretold else enclosure)(study, surrogate, named, error)
+        at_lower = np.where((told.lower < lower)[:, None], named.at_lower, at_lower)
+        at_upper = np.where((told.upper > upper)[:, None], named.at_upper, at_upper)
     end = _horizon(study, told.gap)
     within = told.gap[study.instants <= end]
     return Bounds(
-        lower,
-        upper,
+        told.lower,
+        told.upper,
         told.lower_outer,
         told.upper_outer,
-        study.inputs.named(germs[values.argmin(axis=0)]),
-        study.inputs.named(germs[values.argmax(axis=0)]),
+        study.inputs.named(at_lower),
+        study.inputs.named(at_upper),
         float(within.max()) if within.size else math.nan,
         end,
+    )
+
+
+def _likely(study: Study, bounds: Bounds) -> Bounds:
+    """Beyond the horizon: between the least and the largest of 93 random runs lie, with 95 % confidence, 95 % of all.
+
+    Whatever the distribution of the answers (Wilks, Determination of sample sizes for setting tolerance limits, Annals
+    of Mathematical Statistics 12, 1941); the intervals are taken as evenly likely.
+    """
+    runs, made, failed = study.runs, len(study.runs.germs), study.runs.failed
+    runs.all(study.inputs.drawn(DRAWN, study.seed + 1))
+    if runs.failed > failed:
+        return bounds
+    drawn, germs = runs.values[made:], study.inputs.named(runs.germs[made:])
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
+    lower, upper = low < bounds.lower, high > bounds.upper
+    return replace(
+        bounds,
+        lower=np.where(lower, low, bounds.lower),
+        upper=np.where(upper, high, bounds.upper),
+        lower_outer=np.fmin(bounds.lower_outer, low),
+        upper_outer=np.fmax(bounds.upper_outer, high),
+        at_lower=np.where(lower[:, None], germs[drawn.argmin(axis=0)], bounds.at_lower),
+        at_upper=np.where(upper[:, None], germs[drawn.argmax(axis=0)], bounds.at_upper),
+        likely=np.stack([low, high]),
     )
 
 
@@ -283,6 +323,8 @@ def _statistics(study: Study, found: Found) -> Statistics:
     told = sampled = of_runs(runs.values, found.indices, len(study.inputs))
     if isinstance(found.surrogate, Expansion):
         told = of_expansion(found.surrogate, study.inputs, found.error, runs.evaluations, study.seed)
+        if found.indices is None:
+            sampled = replace(sampled, first=told.first, total=told.total)
         told = told if found.coarse is None else either(found.coarse, sampled, told)
     return masked(told, study.largest(np.nan_to_num(told.std), runs.values))
 
@@ -382,13 +424,18 @@ def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[J
     if math.isfinite(answer.horizon):
         return "beyond-horizon", (
             f"bounds hold until {answer.horizon:g} s; beyond, small changes of the parameters change everything, and "
-            "what is told is what runs attained and how far the machine reaches"
+            "what is told is what runs attained, how far the machine reaches, and, if every value is as likely as "
+            f"another, where with 95 % confidence 95 % of all runs lie ({DRAWN} random runs)"
         )
     if bounds is not None and gap is not None and not bounds.gap <= gap:
         found = "is not known" if math.isnan(bounds.gap) else f"is {bounds.gap:.1e}"
         return "gap-not-reached", f"the gap between outer and attained bounds {found} of the width, asked for {gap:g}"
     doubts = [one.doubt for one in judged if one.doubt]
-    return ("limit-in-doubt", "; ".join(doubts)) if doubts else ("ok", "")
+    if doubts:
+        return "limit-in-doubt", "; ".join(doubts)
+    if bounds is not None and math.isnan(bounds.gap):
+        return "ok", "bounds are what runs attained; this method cannot tell how far beyond them others lie"
+    return "ok", ""
 
 
 def _modelled(scene: Scene, inputs: Inputs, tolerance: float, times: Array, engine: str) -> Scene:

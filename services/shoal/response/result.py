@@ -22,10 +22,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Of every column. lower, upper: attained by runs; lower_outer, upper_outer: no run is expected beyond, nan where
+    """Of every column. lower, upper: attained by runs or, at long times, by runs at the arguments named, to within the
+    error of the surrogate of cycles; lower_outer, upper_outer: no run is expected beyond, nan where
     the method cannot tell, (columns,); at_lower, at_upper: values of the parameters there, (columns, parameters);
     gap: the largest distance between both as a share of the width within the horizon, nan where it is not known;
-    horizon: the last instant up to which they meet [s], infinite if they always do
+    horizon: the last instant up to which they meet [s], infinite if they always do; likely: where, with 95 %
+    confidence, 95 % of all runs lie if each value of the parameters is as likely as another, (2, columns), None within
+    the horizon
     """
 
     lower: Array
@@ -36,6 +39,7 @@ class Bounds:
     at_upper: Array
     gap: float
     horizon: float
+    likely: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -190,6 +194,7 @@ class Response:
             **{name: at(getattr(found, name)) for name in ("lower", "upper", "lower_outer", "upper_outer")},
             "argument_lower": plain(self.column(marker, quantity, found.at_lower.T).T),
             "argument_upper": plain(self.column(marker, quantity, found.at_upper.T).T),
+            **({} if found.likely is None else {"lower_95": at(found.likely[0]), "upper_95": at(found.likely[1])}),
         }
 
     def _statistics(self, marker: str, quantity: str) -> dict[str, Any]:

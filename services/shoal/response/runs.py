@@ -68,7 +68,10 @@ class Runs:
             return 0
         if self.evaluations + len(fresh) > self.most:
             raise TooManyRunsError
-        answers = self.model(self.inputs.values(fresh))
+        return self.keep(fresh, self.model(self.inputs.values(fresh)))
+
+    def keep(self, fresh: Array, answers: Answers) -> int:
+        """Keep runs that were made at these germs; how many they are. Raises InputError, ComputationError."""
         if answers.values.shape[0] != len(fresh):
             raise InputError(f"model: needs one answer a run, found {answers.values.shape[0]} for {len(fresh)}")
         self._germs.append(fresh)

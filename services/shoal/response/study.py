@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -11,13 +12,15 @@ from shoal.errors import InputError
 from shoal.response.extremes import IntArray, Surrogate
 from shoal.response.inputs import BoolArray, Inputs
 from shoal.response.polynomials import size
-from shoal.response.runs import Runs
+from shoal.response.runs import Model, Runs
 from shoal.trajectory import Array
 
 FINE_GAP = 1e-6
 """The gap that is aimed at where none is asked for: a share of the width."""
 ROUNDING = 1e-11
 """A spread below this share of the answers is none."""
+SAFETY = 3.0
+"""An error that was seen is taken so many times."""
 FAIR_GAP = 2e-2
 """The gap that is good enough, where none is asked for, once many runs are made."""
 
@@ -29,7 +32,8 @@ class Study:
     gap: how far outer bounds may lie from attained ones, as a share of the largest width of their group, None: as
     little as a fair number of runs gives; degree, count: of a method that has one, None: its own choice; groups: of
     every column, which of them have one width (a marker's coordinate at all instants), (columns,); instants: of every
-    column [s], (columns,)
+    column [s], (columns,); over_time: the same model at other instants, (samples,), with columns (samples, signals),
+    where there is one; then the columns of the study are (instants, signals) too
     """
 
     runs: Runs
@@ -39,6 +43,12 @@ class Study:
     gap: float | None = None
     degree: int | None = None
     count: int | None = None
+    over_time: Callable[[Array], Model] | None = None
+
+    @cached_property
+    def when(self) -> Array:
+        """The different instants [s]."""
+        return np.unique(self.instants)
 
     @property
     def inputs(self) -> Inputs:
@@ -89,6 +99,8 @@ class Found:
     error: Array | None = None
     indices: Array | None = None
     coarse: BoolArray | None = None
+    foretold: bool = False
+    share: float = 0.0
 
 
 Method = Callable[[Study], Found]

@@ -6,11 +6,16 @@ from shoal.errors import InputError
 from shoal.response.methods.auto import auto
 from shoal.response.methods.chaos import chaos
 from shoal.response.methods.chebyshev import chebyshev
+from shoal.response.methods.kriging import kriging
 from shoal.response.methods.legendre import legendre
 from shoal.response.methods.rbf import rbf
+from shoal.response.methods.rs_ht import rs_ht
+from shoal.response.methods.rs_lmd import rs_lmd
 from shoal.response.methods.sampling import monte_carlo, sobol
 from shoal.response.methods.scan import scan
 from shoal.response.methods.taylor import taylor
+from shoal.response.methods.time_warp import time_warp
+from shoal.response.methods.torus import torus
 from shoal.response.methods.vertices import vertices
 from shoal.response.study import Method
 
@@ -25,6 +30,11 @@ METHODS: dict[str, Method] = {
     "legendre": legendre,
     "chaos": chaos,
     "rbf": rbf,
+    "kriging": kriging,
+    "time-warp": time_warp,
+    "torus": torus,
+    "rs-ht": rs_ht,
+    "rs-lmd": rs_lmd,
 }
 
 

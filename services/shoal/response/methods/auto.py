@@ -1,21 +1,37 @@
-"""The choice of a method: bounds by a polynomial whose extremal points are run, statistics by polynomial chaos."""
+"""The choice of a method: bounds by a polynomial whose extremal points are run, statistics by polynomial chaos.
+
+At long times, where runs with different periods are out of phase, bounds are by surrogates of cycles instead.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from shoal.response.course import UnsuitableError, watch
 from shoal.response.expansion import Expansion
-from shoal.response.methods import chaos, sampling
+from shoal.response.methods import chaos, long_time, sampling
 from shoal.response.methods.bounds import bounds
+from shoal.response.methods.time_warp import TimeWarp
+from shoal.response.methods.torus import Torus
 from shoal.response.study import Found, Study
 
 TOO_COARSE = 0.05
-"""An expansion that is off by more than this share of the standard deviation gives way to sampling."""
+"""An expansion that is off by more than this share of the standard deviation gives way to the runs themselves."""
+NO_SHARES = 0.15
+"""Beyond this one so do its Sobol indices, which are off by its square: more runs are made for them."""
 SAMPLED = 8192
+CYCLES = 6
+"""As few are followed at single instants."""
+OUT_OF_PHASE = 1.0
+"""A phase that spreads further than this to either side [rad] takes polynomials of too high a degree."""
+UNEVEN = 0.02
+"""Cycles that differ more from the next are of more than one frequency."""
 
 
 def auto(study: Study) -> Found:
-    """Intervals: `bounds`. Distributions: chaos or, where that does not converge, quasi-random runs."""
+    """Intervals: `bounds`, `time-warp` or `torus`. Distributions: chaos or else quasi-random runs."""
     if not study.inputs.random.any():
-        return bounds(study)
+        return _intervals(study)
     study.random_only("auto")
     found = chaos.grown(study, study.count or chaos.RUNS)
     assert isinstance(found.surrogate, Expansion)
@@ -23,6 +39,31 @@ def auto(study: Study) -> Found:
     coarse = off > TOO_COARSE
     if not coarse.any():
         return found
+    about = f"{found.why} is off by up to {off.max():.2g} of the standard deviation"
+    if off.max() <= NO_SHARES:
+        return replace(found, why=f"{about}; where it is, these runs tell, and it tells the shares only", coarse=coarse)
     sampled = sampling.of_distributions(study, SAMPLED)
-    why = f"{found.why} is off by up to {off.max():.1g} of the standard deviation; where it is, {sampled.why} tell"
+    why = f"{about}; where it is, {sampled.why} tell"
     return Found(why, found.surrogate, found.error, sampled.indices, coarse)
+
+
+def _intervals(study: Study) -> Found:
+    if study.over_time is None or study.when[-1] <= 0:
+        return bounds(study)
+    tried = ""
+    try:
+        seen = watch(study, long_time.STRETCHES[0])
+        spread = seen.spread() if seen.turns > 2 * CYCLES else 0.0
+        if spread <= OUT_OF_PHASE:
+            return bounds(study)
+        about = f"the phase spreads by {spread:.2g} rad to either side"
+        for kind in (TimeWarp, Torus) if seen.uneven < UNEVEN else (Torus, TimeWarp):
+            try:
+                found = long_time.grown(study, kind, seen)
+                return replace(found, why=f"{about}: {found.why}{tried}")
+            except UnsuitableError as error:
+                tried += f"; {error}"
+    except UnsuitableError:
+        return bounds(study)
+    found = bounds(study)
+    return replace(found, why=f"{found.why} (although {about}{tried})")

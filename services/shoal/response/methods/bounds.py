@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.response.design import box_design
 from shoal.response.enclosure import enclosure
 from shoal.response.expansion import Expansion, fit
 from shoal.response.extremes import Extremes, extremes
@@ -76,9 +77,8 @@ def _next(study: Study, degree: int) -> int:
         raise TooManyRunsError
     missing = math.ceil(SHARE * size(parameters, wanted)) - made
     if missing > 0:
-        # Denser towards the faces of the box, where polynomials need runs.
-        skip = study.runs.evaluations
-        study.runs(np.sin(0.5 * np.pi * study.inputs.sobol(missing, study.seed, skip)))
+        terms = total_degree(parameters, wanted)
+        study.runs(box_design(study.inputs, study.runs.germs, terms, missing, study.seed + wanted))
     return wanted
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from shoal.response.expansion import Expansion, fit
 from shoal.response.polynomials import size, total_degree
+from shoal.response.sparse import hyperbolic, sparse
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 
@@ -24,10 +25,15 @@ RUNS = 300
 """That are made unless the expansion is coarse by then."""
 CONVERGED = 1e-4
 """Error at runs that are left out of a fit, as a share of the standard deviation, that is good enough."""
-COARSE = 1e-2
+COARSE = 3e-2
 """Above this share, more runs are made: so many times."""
 MORE = 5
 HIGHEST = 20
+CANDIDATES = 4
+"""Terms for every run that a sparse expansion chooses from."""
+MOST_CANDIDATES = 1200
+MANY = 3
+"""Parameters from which on an expansion with all terms is dear."""
 WORSE = 2
 """Degrees in a row that made it worse, after which no higher one is tried."""
 
@@ -52,13 +58,16 @@ def grown(study: Study, fair: int) -> Found:
         runs(inputs.sobol(count - made, study.seed, made))
         made = count
         found = _best(study)
+        if made >= min(fair, made + runs.left) and not study.degree and len(inputs) >= MANY:
+            found = _sparser(study, found)
         off = share(study, found)
-        most = MORE * fair if off > COARSE else fair
+        most = MORE * fair if off > COARSE and made >= fair else fair
         if off < CONVERGED or made >= most or not runs.left:
             break
         count = 2 * made
-    degree = int(found.terms.sum(axis=1).max())
-    return Found(f"polynomial chaos of degree {degree} fitted to {runs.evaluations} runs", found, found.left_out)
+    used = found.terms[np.any(found.coefficients != 0, axis=1)]
+    degree, kind = int(used.sum(axis=1).max(initial=0)), "sparse " if len(found.terms) > len(runs.germs) else ""
+    return Found(f"{kind}polynomial chaos of degree {degree} fitted to {runs.evaluations} runs", found, found.left_out)
 
 
 def _best(study: Study) -> Expansion:
@@ -75,6 +84,30 @@ def _best(study: Study) -> Expansion:
             break
     assert best is not None
     return best
+
+
+def _sparser(study: Study, full: Expansion) -> Expansion:
+    """In every column the full expansion, or a sparse one of more terms where that foretells left-out runs better."""
+    runs, inputs, parameters = study.runs, study.inputs, len(study.inputs)
+    degree = int(full.terms.sum(axis=1).max())
+    most = min(CANDIDATES * len(runs.germs), MOST_CANDIDATES)
+    while degree < HIGHEST and len(hyperbolic(parameters, degree + 1)) <= most:
+        degree += 1
+    terms = np.unique(np.vstack([full.terms, hyperbolic(parameters, degree)]), axis=0)
+    terms = terms[np.argsort(terms.sum(axis=1), kind="stable")]
+    if len(terms) == len(full.terms):
+        return full
+    found = sparse(inputs, runs.germs, runs.values, terms, np.flatnonzero(shares(study, full) > CONVERGED))
+    kept = np.array([np.flatnonzero((terms == term).all(axis=1))[0] for term in full.terms])
+    same = np.zeros_like(found.coefficients)
+    same[kept] = full.coefficients
+    better = found.left_out < full.left_out
+    return Expansion(
+        inputs,
+        terms,
+        np.where(better, found.coefficients, same),
+        np.where(better, found.left_out, full.left_out),
+    )
 
 
 def share(study: Study, found: Expansion) -> float:

@@ -1,0 +1,123 @@
+"""Time warp: the instants of turning points, and the course between them, as polynomials of the parameters.
+
+At equal instants runs with different periods drift apart, and no polynomial of moderate degree tells one from another.
+At equal phase they remain alike however long it lasts (Le Maitre, Mathelin, Knio and Hussaini, Asynchronous time
+integration for polynomial chaos expansion of uncertain periodic dynamics, Discrete and Continuous Dynamical Systems 28,
+2010; Mai and Sudret, Surrogate models for oscillatory systems using sparse polynomial chaos expansions and stochastic
+time warping, SIAM/ASA Journal on Uncertainty Quantification 5, 2017). For one dominant frequency.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.response.course import UnsuitableError, Watch, spline, turning_points
+from shoal.response.expansion import fit
+from shoal.response.extremes import IntArray
+from shoal.response.inputs import Inputs
+from shoal.response.methods.long_time import TooSlowError, at_every_instant, stated
+from shoal.response.polynomials import Terms
+from shoal.response.study import Found, Study
+from shoal.trajectory import Array
+
+NODES = 20
+"""Places between two turning points: a polynomial of one degree less tells the course there."""
+MOST = 40_000_000
+"""Numbers that a surrogate may consist of."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """One run. turns: 0 and the instants of turning points [s], (turns + 1,); course: between them as coefficients of
+    Chebyshev polynomials, (turns, NODES, signals)
+    """
+
+    turns: Array
+    course: Array
+
+
+@dataclass(frozen=True)
+class Warped:
+    """A surrogate by way of the phase.
+
+    turns: coefficients, (terms, turns + 1); course: coefficients, (turns, NODES * terms, signals); instants [s]
+    """
+
+    inputs: Inputs
+    terms: Terms
+    turns: Array
+    course: Array
+    instants: Array
+
+    def __call__(self, germs: Array) -> Array:
+        """(places, columns)."""
+        basis = self.inputs.basis(germs, self.terms)
+        turns = basis @ self.turns
+        return at_every_instant(len(germs), len(self.instants), lambda at: self._at(basis, turns, at))
+
+    def each(self, germs: Array, columns: IntArray) -> Array:
+        """One column at each place, (places,)."""
+        signals = self.course.shape[2]
+        basis = self.inputs.basis(germs, self.terms)
+        told = self._at(basis, basis @ self.turns, columns // signals)
+        return np.asarray(told[np.arange(len(germs)), columns % signals])
+
+    def _at(self, basis: Array, turns: Array, at: IntArray) -> Array:
+        """At one instant each, (places, signals)."""
+        count, last = turns.shape[0], turns.shape[1] - 1
+        when, rows = self.instants[at], np.arange(count)
+        # One search in all rows: each is shifted beyond the one before.
+        shift = 2 * (np.abs(turns).max() + self.instants[-1]) * rows
+        turn = np.searchsorted((turns + shift[:, None]).ravel(), when + shift, side="right") - 1 - rows * (last + 1)
+        turn = np.clip(turn, 0, last - 1)
+        begin, end = turns[rows, turn], turns[rows, turn + 1]
+        phase = 2 * (when - begin) / (end - begin) - 1
+        within = np.polynomial.chebyshev.chebvander(phase, NODES - 1)
+        told = np.empty((count, self.course.shape[2]))
+        order = np.argsort(turn, kind="stable")
+        for some in np.split(order, np.flatnonzero(np.diff(turn[order])) + 1):
+            products = (within[some, :, None] * basis[some, None, :]).reshape(len(some), -1)
+            told[some] = products @ self.course[turn[some[0]]]
+        return told
+
+
+@dataclass(frozen=True)
+class TimeWarp:
+    """See `LongTime`."""
+
+    watch: Watch
+    name = "time warp"
+
+    def of(self, course: Array) -> Cycles:
+        """The cycles of one run."""
+        whole = spline(self.watch.times, course)
+        turns = turning_points(self.watch.times, spline(self.watch.times, course[:, self.watch.signal]))
+        turns = np.concatenate([[0.0], turns])
+        x = np.cos((np.arange(NODES) + 0.5) * np.pi / NODES)
+        at = turns[:-1, None] + np.diff(turns)[:, None] * 0.5 * (1 + x)
+        to_coefficients = np.linalg.inv(np.polynomial.chebyshev.chebvander(x, NODES - 1))
+        return Cycles(turns, np.einsum("ij,kjs->kis", to_coefficients, whole(at)))
+
+    def surrogate(self, study: Study, germs: Array, runs: list[Cycles], terms: Terms) -> Warped:
+        """Raises UnsuitableError, TooSlowError."""
+        turns = min(len(run.turns) for run in runs) - 1
+        if turns * len(terms) * runs[0].course[0].size > MOST:
+            raise UnsuitableError(f"{turns} turning points are too many")
+        if min(run.turns[turns] for run in runs) <= study.when[-1]:
+            raise TooSlowError
+        told = np.concatenate(
+            [np.concatenate([run.turns[: turns + 1], run.course[:turns].ravel()])[None] for run in runs]
+        )
+        found = fit(study.inputs, germs, told, terms).coefficients
+        shape = len(terms), turns, NODES, runs[0].course.shape[2]
+        course = np.moveaxis(found[:, turns + 1 :].reshape(shape), 0, 2)
+        return Warped(
+            study.inputs, terms, found[:, : turns + 1], course.reshape(turns, NODES * len(terms), -1), study.when
+        )
+
+
+def time_warp(study: Study) -> Found:
+    """Raises InputError, also where the motion has no cycles that all runs share."""
+    return stated(study, TimeWarp, "time-warp")

@@ -1,0 +1,184 @@
+"""Bounds after many cycles, against motions in closed form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+from shoal.errors import InputError
+from shoal.response import respond, uncertain
+from shoal.response.inputs import Inputs, Parameter
+from shoal.response.marginals import Interval
+from shoal.response.respond import Answer
+from shoal.response.runs import Answers, Model
+from shoal.scene import Scene
+from shoal.trajectory import Array
+
+PENDULUM = {
+    "name": "pendulum",
+    "gravity": [0.0, -9.81 / 0.98],
+    "bodies": {
+        "OA": {
+            "kind": "rigid-body",
+            "mass": 1.0,
+            "inertia": 0.0,
+            "centre_of_mass": [1.0, 0.0],
+            "named_points": {"end": [1.0, 0.0]},
+        }
+    },
+    "joints": {
+        "O": {
+            "kind": "revolute",
+            "first": {"body": "ground", "point": [0, 0]},
+            "second": {"body": "OA", "point": "start"},
+        }
+    },
+    "markers": {"A": {"body": "OA", "point": "end"}},
+    "initial": {"OA": {"angle": 1.0 - np.pi / 2}},
+    "solver": {"duration": 1000.0, "samples": 10, "integrator": "dop853", "relative_tolerance": 1e-13},
+}
+"""Swings as one of length 0.98 (1 + inertia) m."""
+Motion = Callable[[Array, Array], Array]
+"""Places in the box, (runs, parameters, 1), and instants [s] to answers, (runs, instants)."""
+
+
+def pendulum(u: Array, times: Array) -> Array:
+    """Angle [rad] of a pendulum of 1 m +-2 % released from 1 rad: Jacobi's elliptic functions."""
+    k = math.sin(0.5)
+    sine = ellipj(ellipk(k * k) + np.sqrt(9.81 / (1 + 0.02 * u[:, 0])) * times, k * k)[0]
+    return np.asarray(2 * np.arcsin(k * sine))
+
+
+def rod(u: Array, times: Array) -> Array:
+    """First axial mode of a rod with Kelvin-Voigt damping (frequency 10 rad/s +-2 %, ratio 0.002 +-20 %)."""
+    frequency, ratio = 10 * np.sqrt(1 + 0.04 * u[:, 0]), 0.002 * (1 + 0.2 * u[:, 1])
+    return np.asarray(np.exp(-ratio * frequency * times) * np.cos(frequency * np.sqrt(1 - ratio**2) * times))
+
+
+def two(u: Array, times: Array) -> Array:
+    """Two frequencies without a common measure, and the waves that a curve makes of them."""
+    one, other = 3.1 * (1 + 0.01 * u[:, 0]) * times, 7.7 * (1 - 0.01 * u[:, -1]) * times
+    return np.asarray(np.sin(0.3 * np.cos(one) + (0.2 + 0.01 * u[:, 0]) * np.cos(other)))
+
+
+def three(u: Array, times: Array) -> Array:
+    """More frequencies than a torus has."""
+    return np.asarray(two(u, times) + 0.5 * np.sin(np.cos(4.711 * (1 + 0.01 * u[:, 0]) * times) + 1))
+
+
+def asked(motion: Motion, parameters: int, times: Array, method: str = "auto", **options: float) -> Answer:
+    def at(instants: Array) -> Model:
+        def model(values: dict[str, Array]) -> Answers:
+            u = np.stack([values[f"u{k}"] for k in range(parameters)], axis=1)[:, :, None]
+            return Answers(motion(u, instants), np.ones(len(u), dtype=bool))
+
+        return model
+
+    known = tuple(Parameter(f"u{k}", Interval(-1.0, 1.0), {f"u{k}": 1.0}) for k in range(parameters))
+    one = np.zeros(len(times), dtype=int)
+    count = len(times)
+    return respond(at(times), Inputs(known), count, method=method, groups=one, instants=times, over_time=at, **options)
+
+
+def exact(motion: Motion, parameters: int, times: Array) -> tuple[Array, Array]:
+    """Bounds by a grid, which lie inside the true ones by its width squared."""
+    places = np.linspace(-1, 1, {1: 400_001, 2: 1001}[parameters])
+    u = np.stack([axis.ravel() for axis in np.meshgrid(*[places] * parameters)], axis=1)[:, :, None]
+    found = np.array([(y.min(), y.max()) for y in (motion(u, np.array([at])) for at in times)])
+    return found[:, 0], found[:, 1]
+
+
+@pytest.mark.parametrize("method", ["auto", "time-warp", "torus"])
+def test_a_pendulum_for_a_thousand_seconds(method: str) -> None:
+    """Within 1e-7 rad with nine runs, where polynomials at single instants need hundreds."""
+    times = np.array([10.0, 100.0, 500.0, 999.0, 1000.0])
+    answer = asked(pendulum, 1, times, method)
+    lower, upper = exact(pendulum, 1, times)
+    assert answer.bounds is not None
+    within = 1e-7 if method != "torus" else 1e-6
+    for found, true in (
+        (answer.bounds.lower, lower),
+        (answer.bounds.lower_outer, lower),
+        (answer.bounds.upper, upper),
+        (answer.bounds.upper_outer, upper),
+    ):
+        assert np.abs(found - true).max() < within
+    assert np.all(answer.bounds.lower_outer <= lower)
+    assert np.all(answer.bounds.upper_outer >= upper)
+    assert answer.runs.evaluations <= 9
+    assert method != "auto" or "time warp" in answer.found.why
+
+
+@pytest.mark.parametrize(
+    ("motion", "end", "within", "runs", "how"),
+    [
+        (rod, 200.0, 1e-6, 40, "time warp"),
+        pytest.param(two, 100.0, 1e-6, 25, "torus", marks=pytest.mark.slow),
+    ],
+)
+def test_two_parameters(motion: Motion, end: float, within: float, runs: int, how: str) -> None:
+    times = np.array([0.4 * end, end])
+    answer = asked(motion, 2, times)
+    lower, upper = exact(motion, 2, times)
+    assert answer.bounds is not None
+    assert how in answer.found.why
+    assert answer.runs.evaluations <= runs
+    assert answer.bounds.gap <= within
+    grid = 2e-4
+    assert np.all(answer.bounds.lower_outer <= lower)
+    assert np.all(answer.bounds.upper_outer >= upper)
+    assert np.all(answer.bounds.lower >= lower - grid)
+    assert np.all(answer.bounds.upper <= upper + grid)
+
+
+def test_named_runs_attain_the_bounds() -> None:
+    """To within the error that is told, at instants that no run was made for."""
+    times = np.linspace(0, 300.0, 6)[1:]
+    answer = asked(pendulum, 1, times)
+    assert answer.bounds is not None
+    for at, bound, outer, sign in (
+        (answer.bounds.at_lower, answer.bounds.lower, answer.bounds.lower_outer, 1),
+        (answer.bounds.at_upper, answer.bounds.upper, answer.bounds.upper_outer, -1),
+    ):
+        run = np.array([pendulum(u[None, :, None], np.array([t]))[0, 0] for u, t in zip(at, times, strict=True)])
+        assert np.all(sign * (run - bound) <= 1e-12)
+        assert np.all(sign * (run - outer) >= -1e-12)
+
+
+def test_what_no_method_of_cycles_suits_is_refused() -> None:
+    """By name; `auto` goes on without them, and says what it found."""
+    times = np.array([60.0])
+    for method in ("time-warp", "torus"):
+        with pytest.raises(InputError, match=f"method: {method}"):
+            asked(three, 1, times, method)
+    answer = asked(three, 1, times)
+    assert answer.bounds is not None
+    lower, upper = exact(three, 1, times)
+    assert np.all(answer.bounds.lower_outer <= lower)
+    assert np.all(answer.bounds.upper_outer >= upper)
+    assert "torus" not in answer.found.why.split("(")[0]
+
+
+def test_methods_of_cycles_need_a_course() -> None:
+    model = Answers(np.zeros((1, 1)), np.ones(1, dtype=bool))
+    known = Inputs((Parameter("u", Interval(0.0, 1.0), {"u": 1.0}),))
+    with pytest.raises(InputError, match="at its instants only"):
+        respond(lambda _: model, known, 1, method="torus")
+
+
+@pytest.mark.slow
+def test_a_machine_for_a_thousand_seconds() -> None:
+    """The pendulum of the engine, with an inertia that makes it 0.98 to 1.02 m long."""
+    scene = Scene.parse(PENDULUM)
+    times = np.array([500.0, 1000.0])
+    found = uncertain(scene, {"bodies.OA.inertia": (0.0, 1.02 / 0.98 - 1)}, times, verify=False)
+    assert found.ok
+    assert found.bounds is not None
+    lower, upper = exact(pendulum, 1, times)
+    angles = [found.column("A", "angle", of) + math.pi / 2 for of in (found.bounds.lower, found.bounds.upper)]
+    assert np.abs(angles[0] - lower).max() < 1e-7
+    assert np.abs(angles[1] - upper).max() < 1e-7
+    assert found.evaluations <= 9

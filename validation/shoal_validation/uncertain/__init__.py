@@ -1,0 +1,1 @@
+"""Methods for uncertain parameters against bounds in closed form: accuracy by runs, and who errs in silence."""
