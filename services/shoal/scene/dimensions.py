@@ -24,6 +24,7 @@ def check_dimensions(scene: Any) -> None:
                 raise ValueError(f"joints.{name}.kind: {joint.kind} is a joint in space; say dimensions: 3")
         _check_plane(scene, "")
         return
+    flat = is_flat(scene)
     for name, start in scene.initial.items():
         for one, other in (("angle", "rotation"), ("rate", "spin")):
             if getattr(start, one) is not None and getattr(start, other) is not None:
@@ -31,6 +32,12 @@ def check_dimensions(scene: Any) -> None:
     for name, body in scene.bodies.items():
         if body.kind == "rod" and body.element == "ancf-full":
             raise ValueError(f"bodies.{name}.element: ancf-full is for the plane; use ancf-cable or ancf-quintic")
+        flexible = body.kind == "rod" and body.element != "rigid"
+        if flexible and not flat and (body.height, body.end_height) != (body.width, body.end_width):
+            raise ValueError(
+                f"bodies.{name}.width: {body.element} bends alike about both axes of its section; beyond the plane "
+                "z = 0 its width must be its height"
+            )
         if body.kind == "rod" and body.curvature:
             raise ValueError(f"bodies.{name}.curvature: curved rods are for the plane; leave dimensions: 3 out")
 
@@ -65,6 +72,25 @@ def _is_spatial(name: str, value: Any) -> bool:
 
 
 _VECTORS = {"gravity", "position", "velocity", "point", "force", "centre_of_mass", "named_points"}
+
+
+def is_flat(scene: Any) -> bool:
+    """Whether nothing that a scene in space states leads out of the plane z = 0."""
+    return _is_flat(scene, "") and not any(joint.kind in SPATIAL_KINDS for joint in scene.joints.values())
+
+
+def _is_flat(part: Any, path: str) -> bool:
+    if isinstance(part, Record):
+        named = ((name, getattr(part, name), f"{path}.{name}") for name in part.model_fields_set)
+        return all(
+            (name == "inertia" or not _is_spatial(name, value)) and _is_flat(value, at) for name, value, at in named
+        )
+    if isinstance(part, dict):
+        return all(_is_flat(value, f"{path}.{name}") for name, value in part.items())
+    if isinstance(part, tuple) and part and isinstance(part[0], Record):
+        return all(_is_flat(value, path) for value in part)
+    is_vector = isinstance(part, tuple) and len(part) == 3 and bool(_VECTORS & set(path.split(".")[-2:]))
+    return not (is_vector and part[2] != 0)
 
 
 def require_plane(scene: Any, what: str) -> None:

@@ -11,7 +11,7 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.rows import Rows
-from shoal.mechanics.elements import ELEMENTS, FAMILIES
+from shoal.mechanics.elements import ELEMENTS, FAMILIES, SPATIAL, SPATIAL_FAMILIES
 from shoal.mechanics.elements.families import Collected
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Number
@@ -33,7 +33,7 @@ class Masses:
         self.mass: Entries = {}
         self.stretching: Entries = {}
         self.weight: list[Number] = [0.0] * len(placement.positions)
-        self.families = {kind: Collected() for kind in FAMILIES}
+        self.families = {kind: Collected() for kind in (FAMILIES if scene.dimensions == 2 else SPATIAL_FAMILIES)}
         for name, body in scene.bodies.items():
             self._add(name, body)
         for vector in placement.drivers.values():
@@ -74,7 +74,7 @@ class Masses:
         self._add_load(vectors, matrix[0])
 
     def _add_rod(self, name: str, rod: Rod, frame: BeamFrame) -> None:
-        element = ELEMENTS[rod.element]
+        element = (ELEMENTS if self.scene.dimensions == 2 else SPATIAL)[rod.element]
         length = frame.element_length * np.ones(1) if np.ndim(frame.element_length) else frame.element_length
         for number in range(rod.elements):
             height, width = rod.section((number + 0.5) / rod.elements)
@@ -86,7 +86,10 @@ class Masses:
             nodal: list[Any] = []
             for node in (number, number + 1):
                 s = rod.length * node / rod.elements
-                nodal += [plane.vector(*rod_axis(rod, s)), *element.nodal_vectors(rod, s)]
+                nodal += [
+                    plane.vector(*padded(rod_axis(rod, s), self.scene.dimensions)),
+                    *element.nodal_vectors(rod, s),
+                ]
             part = element.part(rod, height, width, length, nodal)
             self.families[element.family].add(name, self.rows.of_all(vectors), part)
 

@@ -55,6 +55,10 @@ class Terms:
         """u . w + constant + drive(t) = 0, measured in m to the power of `lengths`."""
         self.held.append(Term(name, u, w, np.eye(len(u.constant)), constant, drive, lengths))
 
+    def form(self, name: str, u: Affine, w: Affine, form: Array, lengths: int) -> None:
+        """u' form w = 0, measured in m to the power of `lengths`; form: (d, d)."""
+        self.held.append(Term(name, u, w, form, 0.0, None, lengths))
+
     def cross(self, name: str, u: Affine, w: Affine, lengths: int, drive: Composed | None = None) -> None:
         """u x w + drive(t) = 0 of two vectors of the plane, measured in m to the power of `lengths`."""
         self.held.append(Term(name, u, w, plane.CROSS, 0.0, drive, lengths))

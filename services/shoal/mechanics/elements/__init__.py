@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shoal.mechanics.elements import ancf_full, cubic, quintic
+from shoal.mechanics.elements import ancf_full, cubic, director, quintic, spatial_cubic, spatial_quintic
 from shoal.mechanics.elements.element import Element
 
 ELEMENTS: dict[str, Element] = {
@@ -11,5 +11,15 @@ ELEMENTS: dict[str, Element] = {
     "ancf-full": ancf_full.ELEMENT,
 }
 
+SPATIAL: dict[str, Element] = {
+    "ancf-cable": spatial_cubic.ELEMENT,
+    "ancf-quintic": spatial_quintic.ELEMENT,
+    "director-rod": director.ELEMENT,
+}
+"""The elements of scenes in space."""
+
 FAMILIES: tuple[type, ...] = tuple(dict.fromkeys(element.family for element in ELEMENTS.values()))
-"""The types of the kernels' arrays, in the order in which a model holds them."""
+"""The types of the kernels' arrays, in the order in which a model of the plane holds them."""
+
+SPATIAL_FAMILIES: tuple[type, ...] = tuple(dict.fromkeys(element.family for element in SPATIAL.values()))
+"""The same in space."""

@@ -72,7 +72,7 @@ def _dot(ax, ay, bx, by, cx, cy, dx, dy, ex, ey, fx, fy):  # type: ignore[no-unt
 
 
 @njit(error_model="numpy", forceinline=True)
-def _at_both(x, a0, a1, a2, a3, a4):  # type: ignore[no-untyped-def]
+def at_both(x, a0, a1, a2, a3, a4):  # type: ignore[no-untyped-def]
     """A polynomial of xi at +xi and at -xi."""
     square = x * x
     even, odd = a0 + square * a2 + (square * square) * a4, x * (a1 + square * a3)
@@ -120,8 +120,8 @@ def _force(
     n1, n2, n3, n4, m0, m1, m2 = none, none, none, none, none, none, none
     for g in range(pairs):
         x, square = axial[g, 0], axial[g, 0] * axial[g, 0]
-        here, there = _at_both(x, s0, s1, s2, s3, s4)
-        rate, other = _at_both(x, p0, p1, p2, p3, p4)
+        here, there = at_both(x, s0, s1, s2, s3, s4)
+        rate, other = at_both(x, p0, p1, p2, p3, p4)
         relaxed = reference(tile, curved, family, number, lane, 2 * int(axial[g, 3]), 1.0)
         first, power_first = stretch(damped, 1.0 / root(here), rate, relaxed, ea * axial[g, 1], eta)
         relaxed = reference(tile, curved, family, number, lane, 2 * int(axial[g, 2]), 1.0)
@@ -139,10 +139,10 @@ def _force(
         n0, lost = n0 - 2.0 * m0 * turn, lost + more
     for g in range(last):
         x, square = bending[g, 0], bending[g, 0] * bending[g, 0]
-        here, there = _at_both(x, s0, s1, s2, s3, s4)
-        rate, other = _at_both(x, p0, p1, p2, p3, p4)
-        k, k_there = _at_both(x, k0, k1, k2, none, none)
-        turning, twisting = _at_both(x, l0, l1, l2, none, none)
+        here, there = at_both(x, s0, s1, s2, s3, s4)
+        rate, other = at_both(x, p0, p1, p2, p3, p4)
+        k, k_there = at_both(x, k0, k1, k2, none, none)
+        turning, twisting = at_both(x, l0, l1, l2, none, none)
         at = 2 * (points + int(bending[g, 3]))
         straight = reference(tile, curved, family, number, lane, at, 1.0)
         angle = reference(tile, curved, family, number, lane, at + 1, 0.0)

@@ -23,7 +23,8 @@ class Element:
     left of the axis. mass, weight: (density, height, width, length) -> consistent mass on the nodal vectors and load of
     a unit acceleration. part: (rod, height, width, length, nodal vectors at rest) -> one element for its kernel.
     stretching: (axial stiffness EA [N], length) -> stiffness against stretching on the nodal vectors, the same for
-    every direction, if the element has one.
+    every direction, if the element has one. products: what its nodes need held, (i, j, value) for the dot product of
+    the i-th and the j-th of a node's vectors besides its position. In space vectors have three components.
     """
 
     family: type
@@ -36,3 +37,4 @@ class Element:
     clamped: int = 0
     normal: bool = False
     stretching: Callable[[Number, Number], list[list[Number]]] | None = None
+    products: tuple[tuple[int, int, float], ...] = ()

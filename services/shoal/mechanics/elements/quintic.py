@@ -54,27 +54,28 @@ _FOUR_POINTS, _FIVE_POINTS = (np.column_stack([x, weights / 2]) for x, weights i
 
 
 @njit(error_model="numpy", forceinline=True)
-def _component(tile, family, number, lane, inverse, length, k, z):  # type: ignore[no-untyped-def]
-    """c0 to c4 in one direction, 0 or 1."""
-    r1 = coordinate(tile, family, number, lane, ROWS, k, z)
-    p1 = coordinate(tile, family, number, lane, ROWS, 2 + k, z)
-    k1 = coordinate(tile, family, number, lane, ROWS, 4 + k, z)
-    r2 = coordinate(tile, family, number, lane, ROWS, 6 + k, z)
-    p2 = coordinate(tile, family, number, lane, ROWS, 8 + k, z)
-    k2 = coordinate(tile, family, number, lane, ROWS, 10 + k, z)
-    d, k1, k2 = (r2 - r1) * inverse, k1 * length, k2 * length
+def component(tile, family, number, lane, side, inverse, length, k, z):  # type: ignore[no-untyped-def]
+    """c0 to c4 in one direction, 0 or 1 of an element with 12 rows, 0 to 2 of one with 18."""
+    d = side // beam.QUINTIC
+    r1 = coordinate(tile, family, number, lane, side, k, z)
+    p1 = coordinate(tile, family, number, lane, side, d + k, z)
+    k1 = coordinate(tile, family, number, lane, side, 2 * d + k, z)
+    r2 = coordinate(tile, family, number, lane, side, 3 * d + k, z)
+    p2 = coordinate(tile, family, number, lane, side, 4 * d + k, z)
+    k2 = coordinate(tile, family, number, lane, side, 5 * d + k, z)
+    chord, k1, k2 = (r2 - r1) * inverse, k1 * length, k2 * length
     s, a, u, b = p1 + p2, k1 - k2, p2 - p1, k1 + k2
     return (
-        _EVEN[0, 0] * d + _EVEN[0, 1] * s + _EVEN[0, 2] * a,
+        _EVEN[0, 0] * chord + _EVEN[0, 1] * s + _EVEN[0, 2] * a,
         _ODD[0, 0] * u + _ODD[0, 1] * b,
-        _EVEN[1, 0] * d + _EVEN[1, 1] * s + _EVEN[1, 2] * a,
+        _EVEN[1, 0] * chord + _EVEN[1, 1] * s + _EVEN[1, 2] * a,
         _ODD[1, 0] * u + _ODD[1, 1] * b,
-        _EVEN[2, 0] * d + _EVEN[2, 1] * s + _EVEN[2, 2] * a,
+        _EVEN[2, 0] * chord + _EVEN[2, 1] * s + _EVEN[2, 2] * a,
     )
 
 
 @njit(error_model="numpy", forceinline=True)
-def _at_both(x, c):  # type: ignore[no-untyped-def]
+def at_both(x, c):  # type: ignore[no-untyped-def]
     """r' and L r'' at +xi and at -xi, in one direction."""
     c0, c1, c2, c3, c4 = c
     x2 = x * x
@@ -95,7 +96,7 @@ def _point(damped, px, py, cx, cy, ux, uy, vx, vy, inverse, angle, axial, bendin
 
 
 @njit(error_model="numpy", forceinline=True)
-def _collect(x, g, other, h, beyond, sums):  # type: ignore[no-untyped-def]
+def collect(x, g, other, h, beyond, sums):  # type: ignore[no-untyped-def]
     """Add the derivatives by c0 to c4 of a pair of points in one direction: g by r', h by L r'' at +xi and at -xi."""
     s0, s1, s2, s3, s4 = sums
     even, odd, up, down = g + other, x * (g - other), h + beyond, x * (h - beyond)
@@ -110,7 +111,7 @@ def _collect(x, g, other, h, beyond, sums):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy", forceinline=True)
-def _nodal(inverse, length, sums):  # type: ignore[no-untyped-def]
+def nodal(inverse, length, sums):  # type: ignore[no-untyped-def]
     """The force in one direction on r1, r1', r1'', r2, r2', r2''."""
     s0, s1, s2, s3, s4 = sums
     d = (_EVEN[0, 0] * s0 + _EVEN[1, 0] * s2 + _EVEN[2, 0] * s4) * inverse
@@ -142,20 +143,20 @@ def _force(
     ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
     length, none = 1.0 / inverse, spread(EIGHT, 0.0)
     eta, lost, still = none, none, (none, none, none, none, none)
-    x = _component(tile, family, number, lane, inverse, length, 0, z)
-    y = _component(tile, family, number, lane, inverse, length, 1, z)
+    x = component(tile, family, number, lane, ROWS, inverse, length, 0, z)
+    y = component(tile, family, number, lane, ROWS, inverse, length, 1, z)
     dx, dy, sx, sy = still, still, still, still
     if damped:
         eta = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 3)
-        dx = _component(tile, family, number, lane, inverse, length, 0, zdot)
-        dy = _component(tile, family, number, lane, inverse, length, 1, zdot)
+        dx = component(tile, family, number, lane, ROWS, inverse, length, 0, zdot)
+        dy = component(tile, family, number, lane, ROWS, inverse, length, 1, zdot)
     last = pairs.shape[0] - 1
     for g in range(last):
         xi, weight = pairs[g, 0], pairs[g, 1]
-        px, qx, cx, ex = _at_both(xi, x)
-        py, qy, cy, ey = _at_both(xi, y)
-        ux, tx, vx, wx = _at_both(xi, dx)
-        uy, ty, vy, wy = _at_both(xi, dy)
+        px, qx, cx, ex = at_both(xi, x)
+        py, qy, cy, ey = at_both(xi, y)
+        ux, tx, vx, wx = at_both(xi, dx)
+        uy, ty, vy, wy = at_both(xi, dy)
         straight = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 3]), 1.0)
         angle = reference(tile, curved, family, number, lane, 2 * int(pairs[g, 3]) + 1, 0.0)
         gx, gy, hx, hy, one = _point(
@@ -166,7 +167,7 @@ def _force(
         ix, iy, jx, jy, two = _point(
             damped, qx, qy, ex, ey, tx, ty, wx, wy, straight, angle, ea * weight, ei * weight, eta
         )
-        sx, sy = _collect(xi, gx, ix, hx, jx, sx), _collect(xi, gy, iy, hy, jy, sy)
+        sx, sy = collect(xi, gx, ix, hx, jx, sx), collect(xi, gy, iy, hy, jy, sy)
         lost = lost + (one + two)
     if pairs[last, 1] != 0.0:
         weight = pairs[last, 1]
@@ -180,8 +181,8 @@ def _force(
         sx = (sx[0] + gx, sx[1] + 2.0 * hx, sx[2], sx[3], sx[4])
         sy = (sy[0] + gy, sy[1] + 2.0 * hy, sy[2], sy[3], sy[4])
         lost = lost + one
-    a, b, c, d, e, h = _nodal(inverse, length, sx)
-    i, j, k, m, n, o = _nodal(inverse, length, sy)
+    a, b, c, d, e, h = nodal(inverse, length, sx)
+    i, j, k, m, n, o = nodal(inverse, length, sy)
     add_rows(tile, family, number, lane, count, w, f, (a, i, b, j, c, k, d, m, e, n, h, o))
     if damped:
         add_sum(tile, lane, count, w, power, lost)
@@ -217,11 +218,11 @@ def _add_energy(tile, points, family, number, count, lane, z, w, energy):  # typ
     ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
     ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
     length, total = 1.0 / inverse, spread(EIGHT, 0.0)
-    x = _component(tile, family, number, lane, inverse, length, 0, z)
-    y = _component(tile, family, number, lane, inverse, length, 1, z)
+    x = component(tile, family, number, lane, ROWS, inverse, length, 0, z)
+    y = component(tile, family, number, lane, ROWS, inverse, length, 1, z)
     for g in range(points.shape[0]):
-        px, _, cx, _ = _at_both(points[g, 0], x)
-        py, _, cy, _ = _at_both(points[g, 0], y)
+        px, _, cx, _ = at_both(points[g, 0], x)
+        py, _, cy, _ = at_both(points[g, 0], y)
         square, relaxed = px * px + py * py, rest(tile, family, number, lane, 2 * g)
         strain = root(square) * relaxed - 1.0
         angle = (px * cy - py * cx) / square - rest(tile, family, number, lane, 2 * g + 1)

@@ -11,6 +11,7 @@ from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
+from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.joints import Aligned, Along, Apart, Hinged, InPlane, Meet, Square, Sum, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import GROUND, Attachment, Scene
@@ -34,6 +35,8 @@ def of_image(result: SpatialPlacement, body: str, image: Any) -> Affine:
     """The vector of a rigid body or the ground that its own frame has so."""
     if body == GROUND:
         return fixed(image)
+    if not isinstance(result.frames[body], RigidFrame):
+        raise InputError(f"{body} is flexible; in space only a rigid body holds an axis, a line or an angle")
     return combined(result.attitudes.kept.of_body(body), tuple(image))
 
 
@@ -52,7 +55,11 @@ def hinge(
         found.append((side.body, image, flat))
     (body, image, flat), (other, _, there) = found
     ahead = turns.cross(image, flat)
-    return of_image(result, body, flat), of_image(result, other, there), of_image(result, body, ahead)
+    if isinstance(result.frames.get(other), BeamFrame):
+        towards = result.direction(scene, second)
+    else:
+        towards = of_image(result, other, there)
+    return of_image(result, body, flat), towards, of_image(result, body, ahead)
 
 
 def _keep(scene: Scene, name: str, condition: Any, result: SpatialPlacement) -> None:

@@ -19,13 +19,14 @@ from shoal.errors import InputError
 from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
-from shoal.mechanics.assembly.groups import JointPoint, moving, rotated, transposed
+from shoal.mechanics.assembly.groups import JointPoint, is_stiff, moving, rotated, transposed
 from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.holding import hold
+from shoal.mechanics.assembly.space.rods import hold_rod, place_rod
 from shoal.mechanics.frames import Place, PointFrame, RigidFrame
-from shoal.mechanics.joints import Along, InPlane
+from shoal.mechanics.joints import Aligned, Along, InPlane, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.plane import vector
 from shoal.scene import GROUND, Function, PointMass, Rod, Scene
@@ -50,7 +51,7 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
         if isinstance(body, PointMass):
             _place_point(name, touching[name], pose, result)
         elif isinstance(body, Rod) and body.element != "rigid":
-            raise InputError(f"bodies.{name}.element: flexible rods are for planar scenes yet; use element: rigid")
+            place_rod(name, body, touching[name], pose, result)
         else:
             _place_rigid(name, touching[name], pose, result)
     for point in result.points:
@@ -59,6 +60,11 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
             for normal in turns.across(direction):
                 result.terms.dot(joint, fixed(normal), point.where - fixed(base), 1)
     hold(scene, result)
+    for joint, condition in joints.of_scene(scene):
+        if isinstance(condition, Aligned | Turned) and not all(
+            is_stiff(scene, side.body) for side in (condition.first, condition.second)
+        ):
+            hold_rod(scene, joint, condition, result)
     return result
 
 

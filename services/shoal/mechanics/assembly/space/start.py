@@ -17,7 +17,7 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.placement import place_in_space
 from shoal.mechanics.assembly.terms import Term
-from shoal.mechanics.frames import Frame, PointFrame, RigidFrame
+from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, Flags, stacked
 from shoal.scene import InitialState, Scene
 from shoal.scene.joints import places
@@ -27,6 +27,8 @@ CLOSED = 1e-11
 """A joint that gapes by less, relative to the size of the machine, is closed."""
 ROUNDING = 1e-4
 """Stated values may miss by so much, relative to the size of the machine or in rad, and are then corrected."""
+STRAIN = 1e-6
+"""Nodes of a flexible rod that closing the joints would move by more, relative to the size of the machine, are not."""
 ITERATIONS = 60
 ATTEMPTS = 16
 DEPENDENT = 1e-9
@@ -105,6 +107,7 @@ class _Closing:
             shaken = 0.05 * 1.3**attempt * rng.normal(size=len(begin)) if attempt else 0.0
             found = self._newton(begin + shaken, lane, stated)
             if found is not None and not self._flipped(found, lane):
+                self._check_strain(begin, found, lane)
                 self.q[:, lane] = found
                 return True
         if self.lanes > 1:
@@ -127,8 +130,20 @@ class _Closing:
                 f"initial.{worst.body}.{worst.quantity}: contradicts the joints and what else is stated of the start, "
                 f"by {max(off) * self._unit(worst.quantity):.3g} {unit}; leave it out and it follows from the rest"
             )
+        self._check_strain(self.q[:, 0], q, 0)
         self.q[:, 0] = q
         return True
+
+    def _check_strain(self, before: Array, after: Array, lane: int) -> None:
+        """Raises InputError where closing the joints would bend or stretch a rod, which starts unstrained."""
+        for name, frame in self.placement.frames.items():
+            if isinstance(frame, BeamFrame):
+                moved = (np.max(np.abs(_at(one, before, lane) - _at(one, after, lane))) for one in frame.vectors)
+                if max(moved) > STRAIN * max(self.size, 1.0):
+                    raise InputError(
+                        f"initial.{name}: the joints hold {name} where the unstrained rod would not start; state a "
+                        "start that agrees with them"
+                    )
 
     def _unit(self, quantity: Quantity) -> float:
         return self.size if quantity == "position" else 1.0
@@ -291,12 +306,12 @@ def _drive_rate(term: Term) -> float:
 
 
 def begun(frames: dict[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
-    """The state of every body at the coordinates q and rates v of a machine, each (unknowns,)."""
+    """State of every body at the coordinates q and rates v of a machine, each (unknowns,); rods have no attitude."""
     found = {}
     for name, frame in frames.items():
         place = frame.point((0.0, 0.0, 0.0))
-        turn: list[float] = [0.0, 0.0, 0.0]
-        spin: list[float] = [0.0, 0.0, 0.0]
+        turn: list[float] | None = None
+        spin: list[float] | None = None
         if isinstance(frame, RigidFrame):
             directors = np.array([one.at(q) for one in frame.directors])
             turning = np.array([one.rate(v) for one in frame.directors])
@@ -307,8 +322,8 @@ def begun(frames: dict[str, Frame], scene: Scene, q: Array, v: Array) -> dict[st
             rate=None,
             position=tuple(place.at(q).tolist()),
             velocity=tuple(place.rate(v).tolist()),
-            rotation=(turn[0], turn[1], turn[2]),
-            spin=(spin[0], spin[1], spin[2]),
+            rotation=None if turn is None else (turn[0], turn[1], turn[2]),
+            spin=None if spin is None else (spin[0], spin[1], spin[2]),
             guess=(),
         )
     return found
