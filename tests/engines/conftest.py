@@ -353,7 +353,21 @@ CASES = [
     ),
 ]
 
+SPATIAL = Scene.parse({
+    "name": "spatial", "dimensions": 3, "gravity": [0.0, 0.0, -9.81],
+    "bodies": {name: {"kind": "rigid-body", "mass": 1.0, "inertia": [0.1, 0.2, 0.25],
+                      "named_points": {"e": [0.3, 0.1, 0.2]}} for name in "ABCD"},
+    "joints": {
+        "S": {"kind": "spherical", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "A"}},
+        "U": {"kind": "universal", "first": {"body": "A", "point": "e"}, "second": {"body": "B"}, "axis": [1, 0, 0],
+              "second_axis": [0, 1, 0]},
+        "C": {"kind": "cylindrical", "first": {"body": "B", "point": "e"}, "second": {"body": "C"}, "axis": [1, 1, 0]},
+        "P": {"kind": "planar", "first": {"body": "C", "point": "e"}, "second": {"body": "D"}, "axis": [0, 1, 1]},
+    },
+    "markers": {"d": {"body": "D", "point": "e"}},
+})  # fmt: skip
 ONLY_NATIVE = [
+    SPATIAL,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
     pair(

@@ -264,6 +264,7 @@ def test_shooting_finds_a_rate_and_keeps_the_bounds() -> None:
     assert bounded.values[0] <= 0.5
 
 
+@pytest.mark.slow
 def test_shooting_into_data_of_a_finer_mesh_is_biased() -> None:
     # Mesh error, not time error: 2/4 elements with full quadrature fit 4/8 elements about a degree off.
     measured = CasadiEngine(tolerance=1e-9).simulate(_flexible(refinement=2), TIMES).marker("B")

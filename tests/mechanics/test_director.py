@@ -108,6 +108,7 @@ def test_an_arc_has_the_stiffness_of_the_side_it_bends_to(roll: float) -> None:
     assert _evaluate(np.array(nodes), at_rest)[0] < 1e-5 * expected
 
 
+@pytest.mark.slow
 def test_lanes_equal_singles() -> None:
     width = len(WIDE)
     states = np.array([_state(seed) for seed in range(width)])

@@ -203,6 +203,7 @@ def test_damping_loses_what_its_force_takes_and_nothing_in_a_rigid_motion(case: 
     assert abs(lost[0]) < 1e-20 * EA * LENGTH
 
 
+@pytest.mark.slow
 @every
 def test_lanes_and_neighbours_equal_singles(case: str) -> None:
     width, vectors = len(WIDE), CASES[case][3]

@@ -148,6 +148,7 @@ def test_named_runs_attain_the_bounds() -> None:
         assert np.all(sign * (run - outer) >= -1e-12)
 
 
+@pytest.mark.slow
 def test_what_no_method_of_cycles_suits_is_refused() -> None:
     """By name; `auto` goes on without them, and says what it found."""
     times = np.array([60.0])

@@ -66,7 +66,7 @@ def test_no_method_attains_what_is_not_there(method: str) -> None:
         assert np.all(found.upper_outer >= OSCILLATES[:, 1] - 1e-8)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 12))])
 def test_no_random_run_lies_beyond_the_outer_bounds(seed: int) -> None:
     """Random smooth functions of one to four intervals, with maxima inside, at faces and at corners."""
     random = np.random.default_rng(seed)
@@ -130,7 +130,7 @@ def test_indices_of_ishigamis_function() -> None:
     assert answer.statistics.total[0, 0] == pytest.approx(0.55758886, abs=1e-4)
 
 
-@pytest.mark.parametrize(("method", "count"), [("sobol", 12288), ("auto", None)])
+@pytest.mark.parametrize(("method", "count"), [("sobol", 12288), pytest.param("auto", None, marks=pytest.mark.slow)])
 def test_indices_where_polynomials_fail(method: str, count: int | None) -> None:
     """Sobol's g-function has kinks; sampling takes over. V_i = 1 / (3 (1 + a_i)^2)."""
     weights = np.array([0.0, 1.0, 4.5, 9.0])

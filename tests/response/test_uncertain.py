@@ -73,6 +73,7 @@ def test_bounds_are_attained() -> None:
         )
 
 
+@pytest.mark.slow
 def test_beyond_the_horizon_nothing_is_claimed() -> None:
     """A double pendulum that turns over: bounds until some instant, beyond it the reach; exit status 3."""
     found = uncertain("rigid-double-pendulum", BOX, np.linspace(0.5, 12.0, 24), verify=False)
