@@ -67,6 +67,7 @@ def test_every_native_method_finds_the_angles(method: str) -> None:
     assert estimate.history[0][-1] == estimate.evaluations
 
 
+@pytest.mark.slow
 def test_the_published_swarm_comes_near_and_says_what_it_cost() -> None:
     estimate = run("paper-case-1", "afsa", seed=1)
     assert estimate.evaluations > 4000

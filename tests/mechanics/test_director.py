@@ -60,6 +60,7 @@ def _turned(seed: int) -> Any:
     return turn * np.linalg.det(turn)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_force_and_stiffness_are_derivatives_and_turn_with_the_rod(seed: int) -> None:
     z, h, turn = _state(seed), 1e-6, _turned(seed)

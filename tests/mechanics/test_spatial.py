@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -52,8 +53,17 @@ PLANE: dict[str, tuple[Family, int]] = {
     "quintic, five": (quintic.Quintics, quintic.FIVE),
     "quintic, five, damped": (quintic.Quintics, quintic.FIVE_DAMPED),
 }
-every = pytest.mark.parametrize("case", list(CASES))
-damped = pytest.mark.parametrize("case", [case for case in CASES if "damped" in case])
+
+
+def cases(wanted: Callable[[str], bool] = lambda case: True) -> Any:
+    """Of these cases; the kernels of the quintic take half a minute to compile."""
+    chosen = filter(wanted, CASES)
+    return pytest.mark.parametrize(
+        "case", [pytest.param(case, marks=[pytest.mark.slow] * case.startswith("quintic")) for case in chosen]
+    )
+
+
+every, damped = cases(), cases(lambda case: "damped" in case)
 
 
 @njit(cache=True)
@@ -227,7 +237,7 @@ def test_lanes_and_neighbours_equal_singles(case: str) -> None:
         np.testing.assert_allclose(found.reshape(expected.shape), expected, atol=1e-13 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if "reduced" not in case])
+@cases(lambda case: "reduced" not in case)
 def test_a_helix_has_its_energy_of_bending(case: str) -> None:
     """EI k^2/2 for each metre, of curvature k = a/(a^2 + b^2): the closer, the less an element turns."""
     errors = []

@@ -166,7 +166,7 @@ def model_of(stated: Problem) -> ForwardModel:
     return ForwardModel(stated, stated.load_scene(), get_engine("gauss"), textbook(stated))
 
 
-@pytest.mark.parametrize("noise", [1e-3, None])
+@pytest.mark.parametrize("noise", [pytest.param(1e-3, marks=pytest.mark.slow), None])
 def test_a_false_minimum_is_left(noise: float | None) -> None:
     """A descent from far away ends where the motion is another one; a refit for a suspect finds the way out."""
     model = model_of(problem(noise))
