@@ -142,3 +142,18 @@ def test_a_rod_that_joints_would_bend_at_the_start_is_refused() -> None:
     )
     with pytest.raises(InputError, match=r"initial\.OA: .* unstrained rod would"):
         simulate(held, np.array([0.1]))
+
+
+@pytest.mark.slow
+def test_lanes_of_rods_in_space_equal_singles() -> None:
+    """Spins and lengths side by side; the kernels for lanes take a while to compile."""
+    machine = pendulum().with_values({"bodies.OA.elements": 2, "bodies.AB.elements": 4, "solver.step": 1e-4})
+    values = {
+        "initial.OA.spin.1": np.array([2.0, 1.0, 0.5, 0.0, 1.5]),
+        "bodies.AB.length": np.array([2.0, 1.9, 2.1, 2.0, 2.0]),
+    }
+    found = simulate(machine, np.array([0.3]), values)
+    assert found.ok
+    for lane in range(5):
+        alone = simulate(machine.with_values({path: x[lane] for path, x in values.items()}), np.array([0.3]))
+        assert found.points[..., lane] == pytest.approx(alone.points[..., 0], abs=1e-12)

@@ -63,8 +63,9 @@ def place_rod(name: str, rod: Rod, mine: list[JointPoint], pose: Pose, result: S
 def _check_fit(name: str, rod: Rod, planned: Array, point: JointPoint, result: SpatialPlacement) -> None:
     """Raises InputError if a joint holds a rod somewhere else than where it would start unstrained."""
     assert point.where is not None
-    away = np.max(np.sqrt(np.sum((result.start_of(point.where)[0] - planned) ** 2, axis=0)))
-    if away > 1e-6 * rod.length:
+    apart = np.sqrt(np.sum((result.start_of(point.where)[0] - planned) ** 2, axis=0))
+    away = np.max(apart)
+    if np.any(apart > 1e-6 * rod.length):
         raise InputError(
             f"initial.{name}: joint {point.name} holds {name} {away:.3g} m away from where the unstrained rod would "
             "start"
