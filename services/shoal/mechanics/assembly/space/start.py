@@ -18,7 +18,7 @@ from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.placement import place_in_space
 from shoal.mechanics.assembly.terms import Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
-from shoal.mechanics.numerics.tile import Array, Flags, stacked
+from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.scene import InitialState, Scene
 from shoal.scene.joints import places
 from shoal.scene.scene import Quantity
@@ -345,6 +345,3 @@ def redundant(scene: Scene, q: Array) -> tuple[str, ...]:
         for name, joint in placement.scene.joints.items()
         if name in guilty or guilty & {side.body for side in places(joint)}
     )
-
-
-__all__: list[str] = ["Flags", "begun", "place_started", "redundant"]
