@@ -25,6 +25,7 @@ from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, c
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Coupling, Revolute, Scene, Slider
+from shoal.scene.dimensions import require_plane
 from shoal.scene.joints import places
 from shoal.trajectory import plain
 
@@ -100,6 +101,7 @@ class _Component(NamedTuple):
 
 def reactions(scene: Scene, times: Sequence[float] = (0.0,)) -> list[Reactions]:
     """Reactions in the motion of a scene at requested times [s]. Raises InputError, ComputationError."""
+    require_plane(scene, "reactions are")
     evaluator, found = states(scene, times)
     bodies = FreeBodies(evaluator, max(times))
     result = []
