@@ -366,8 +366,16 @@ SPATIAL = Scene.parse({
     },
     "markers": {"d": {"body": "D", "point": "e"}},
 })  # fmt: skip
+DIRECTOR = Scene.parse({
+    "name": "director", "dimensions": 3, "gravity": [0.0, 0.0, -9.81],
+    "bodies": {"A": {"kind": "rod", "length": 1.0, "height": 0.03, "width": 0.02, "density": 5540.0,
+                     "youngs_modulus": 2e8, "element": "director-rod", "elements": 2}},
+    "joints": {"W": {"kind": "weld", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "A"}}},
+    "markers": {"e": {"body": "A", "point": "end"}},
+})  # fmt: skip
 ONLY_NATIVE = [
     SPATIAL,
+    DIRECTOR,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
     pair(
