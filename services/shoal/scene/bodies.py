@@ -42,6 +42,7 @@ class Rod(Record):
     E (strain + retardation * strain rate). In space `director-rod` bends about both axes of its section and twists;
     `torsion_constant` [m^4] overrides that of the rectangle, `side_curvature` [1/m, ...] bends the unstrained axis
     towards its local z axis and `twist` [rad/m, ...] turns its sections, both polynomials over the arc length.
+    `director`: the axis of the section that its nodes carry, by default the one that a joint can share.
     """
 
     kind: Literal["rod"] = "rod"
@@ -62,6 +63,7 @@ class Rod(Record):
     end_width: Positive | None = None
     retardation: NonNegative = 0.0
     torsion_constant: Positive | None = None
+    director: Literal["y", "z"] | None = None
     rotary_inertia: bool = False
 
     @model_validator(mode="after")
@@ -82,8 +84,8 @@ class Rod(Record):
         if self.quadrature != "full" and self.element != "ancf-cable":
             raise ValueError(f"quadrature: {self.element} has its own; {self.quadrature} is for ancf-cable")
         if self.element != "director-rod":
-            ignored = [name for name in ("side_curvature", "twist") if getattr(self, name)]
-            ignored += ["torsion_constant"] if self.torsion_constant is not None else []
+            fields = ("side_curvature", "twist", "torsion_constant", "director")
+            ignored = [name for name in fields if getattr(self, name)]
             if ignored:
                 raise ValueError(f"{ignored[0]}: {self.element} has none; it is for element: director-rod, in space")
         if self.law != "plane-stress" and self.element != "ancf-full":

@@ -73,7 +73,7 @@ def _is_spatial(name: str, value: Any) -> bool:
         return getattr(value, "number", None) != 0.0
     if name == "inertia":
         return isinstance(value, tuple)
-    if name in ("side_curvature", "twist"):
+    if name in ("side_curvature", "twist", "director"):
         return bool(value)
     return name in ("rotation", "spin", "torsion_constant") and not isinstance(value, str | None)
 

@@ -28,7 +28,8 @@ class Held(StrEnum):
 class Equilibrium:
     """A state of rest, and the evidence for it.
 
-    balanced: whether the forces balance, stably or not. q: coordinates; multipliers: lambda, Q = C_q' lambda.
+    scene: as it was given. balanced: whether the forces balance, stably or not. q: coordinates; multipliers: lambda,
+    Q = C_q' lambda.
     markers: names; points [m], (markers, d); angles [rad], counted over full turns from the start, in
     space of the direction's shadow in the plane z = 0, (markers,).
     energy: strain, gravity, applied [J]; strain_energy: of every flexible body [J]. residual: unbalanced force

@@ -17,7 +17,7 @@ from shoal.mechanics import plane
 from shoal.mechanics.analysis.balance import Balance, Found, zero_level
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.evaluate import Evaluator, points
-from shoal.mechanics.analysis.reactions import Reactions, reactions_of
+from shoal.mechanics.analysis.reactions import reactions_of
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.placement import place
@@ -52,7 +52,7 @@ class _Search:
     """One search for an equilibrium."""
 
     def __init__(self, scene: Scene, evaluator: Evaluator, time: float) -> None:
-        self.placement = place(scene)
+        self.stated, self.placement = scene, place(scene)
         scene = self.placement.scene
         self.scene, self.evaluator, self.time = scene, evaluator, time
         unknowns = evaluator.model.unknowns
@@ -135,8 +135,9 @@ class _Search:
         e = view.evaluation
         at = self.marker_points.at(q)
         balanced = status is not Held.FAILED and found is not None
+        rest = np.zeros_like(q)
         return Equilibrium(
-            scene=self.scene,
+            scene=self.stated,
             time=self.time,
             status=status,
             message=message,
@@ -154,16 +155,9 @@ class _Search:
             eigenvalues=self._eigen(q)[0],
             iterations=self.iterations,
             steps=self.steps,
-            reactions=self._reactions(q) if balanced else None,
+            reactions=reactions_of(self.evaluator, q, rest, rest, self.time) if balanced else None,
             turns=self.evaluator.turns,
         )
-
-    def _reactions(self, q: Array) -> Reactions | None:
-        """Those at rest; in space they are not known."""
-        if self.scene.dimensions != plane.DIMENSIONS:
-            return None
-        rest = np.zeros_like(q)
-        return reactions_of(self.evaluator, q, rest, rest, self.time)
 
     def _assembled(self) -> Array:
         """The start of the scene, moved with its drives up to the stated time."""

@@ -70,9 +70,10 @@ def chosen_elements(scene: Scene, attitudes: Attitudes) -> dict[str, Element]:
         if isinstance(body, PointMass) or body.element == "rigid":
             continue
         element = SPATIAL[body.element]
-        wish = max(wishes.get(name, []), key=lambda one: one[0], default=None)
-        other = element.other is not None and wish is not None and wish[1] != element.director
-        found[name] = element.other if other and element.other else element
+        wish = max(wishes.get(name, []), key=lambda one: one[0], default=(False, element.director))[1]
+        if body.director is not None:
+            wish = "xyz".index(body.director)
+        found[name] = element.other if element.other is not None and wish != element.director else element
     return found
 
 
