@@ -17,6 +17,7 @@ from shoal.engines.exudyn.checks import judge
 from shoal.engines.exudyn.joints import JOINTS
 from shoal.engines.exudyn.loads import LOADS
 from shoal.engines.exudyn.record import Record, Steps, choose_steps
+from shoal.engines.exudyn.space.joints import SPATIAL_JOINTS
 from shoal.errors import InputError
 from shoal.mechanics.halts import CROSSED
 from shoal.mechanics.start.start import facts
@@ -26,6 +27,8 @@ from shoal.trajectory import Array, Status, Trajectory
 WEAK = "; generalized-alpha is only weakly stable at solver.spectral_radius 1, use 0.9"
 DENSE_LIMIT = 60
 """Unknowns beyond which the sparse linear solver is the faster one."""
+REDUNDANT = 0.9
+"""Spectral radius for machines in space whose constraints depend on each other, unless the scene says its own."""
 MOST = 1e5
 """Most steps that a run takes because of narrow parts of a force law."""
 NAMES: dict[Beam, str] = {"ancf-cable": "exudyn", "geometrically-exact": "exudyn-ge"}
@@ -43,7 +46,7 @@ FEATURES = frozenset(
         "tapered flexible rods",
     }
 )
-CABLE_FEATURES = frozenset({"curved flexible rods", "damped flexible rods"})
+CABLE_FEATURES = frozenset({"machines in space", "curved flexible rods", "damped flexible rods"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +82,7 @@ class ExudynEngine:
         """What Exudyn can simulate here."""
         return Capabilities(
             elements=frozenset(PARTS[self.beam]),
-            joints=frozenset(JOINTS),
+            joints=frozenset(JOINTS) | (SPATIAL_JOINTS if self.beam == "ancf-cable" else frozenset()),
             loads=frozenset(LOADS),
             features=FEATURES | CABLE_FEATURES if self.beam == "ancf-cable" else FEATURES,
             lanes=False,
@@ -173,6 +176,10 @@ class ExudynEngine:
         sparse = machine.unknowns + machine.constraints > DENSE_LIMIT
         kinds = exu.LinearSolverType
         settings.linearSolver.solverType = kinds.EigenSparse if sparse else kinds.EXUdense
+        if machine.redundant:
+            # It alone steps over dependent rows; the checks of joints and energy judge what comes out.
+            settings.linearSolver.solverType = kinds.EigenDense
+            settings.linearSolver.ignoreSingularJacobian = True
         integration = settings.timeIntegration
         integration.numberOfSteps = steps.count
         integration.endTime = steps.count * steps.size
@@ -181,8 +188,9 @@ class ExudynEngine:
         integration.verboseMode = 0
         integration.newton.useModifiedNewton = self.modified_newton
         integration.newton.absoluteTolerance = machine.scene.solver.newton_tolerance
-        integration.solverType = getattr(exu.DynamicSolverType, INTEGRATORS[self._integrator(machine.scene)])
-        integration.generalizedAlpha.spectralRadius = machine.scene.solver.spectral_radius
+        name, radius = self._method(machine)
+        integration.solverType = getattr(exu.DynamicSolverType, INTEGRATORS[name])
+        integration.generalizedAlpha.spectralRadius = radius
         return settings
 
     def _integrator(self, scene: Scene) -> str:
@@ -192,8 +200,18 @@ class ExudynEngine:
         of_kind(INTEGRATORS, name, "integrator")
         return name
 
+    def _method(self, machine: Machine) -> tuple[str, float]:
+        """The integrator of a machine, and its spectral radius.
+
+        Dependent constraints agree with each other on the positions only: on the velocities, drift parts them.
+        """
+        name, radius = self._integrator(machine.scene), machine.scene.solver.spectral_radius
+        if machine.redundant and name == "trapezoidal" and self.integrator is None:
+            return "generalized-alpha", REDUNDANT
+        return name, radius if name == "generalized-alpha" else 1.0
+
     def _model(self, exu: Any, machine: Machine, steps: Steps) -> dict[str, Any]:
-        integrator = self._integrator(machine.scene)
+        integrator, radius = self._method(machine)
         rods = [body for body in machine.scene.bodies.values() if isinstance(body, Rod) and body.element != "rigid"]
         return {
             "exudyn": exu.__version__,
@@ -202,9 +220,10 @@ class ExudynEngine:
             "elements": sum(rod.elements for rod in rods),
             "beam": self.beam,
             "integrator": integrator,
-            "spectral_radius": machine.scene.solver.spectral_radius if integrator == "generalized-alpha" else 1.0,
+            "spectral_radius": radius,
             "newton": "modified" if self.modified_newton else "full",
             "step": steps.size,
+            "redundant_joints": list(machine.redundant),
             "energy_check": "none: motion is prescribed" if machine.driven else "kinetic, elastic, springs, loads",
         }
 
@@ -214,7 +233,7 @@ class ExudynEngine:
             engine=self.name,
             times=wanted,
             markers=tuple(scene.markers),
-            points=np.full((*shape, 2, 1), np.nan),
+            points=np.full((*shape, scene.dimensions, 1), np.nan),
             angles=np.full((*shape, 1), np.nan),
             status=(Status.REFUSED,),
             energy_drift=np.full(1, np.nan),
