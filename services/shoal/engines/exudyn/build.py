@@ -112,10 +112,6 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None) -> Machi
 
     end [s]: of the run, beyond the scene's duration if at all.
     """
-    if scene.dimensions == 3:
-        from shoal.engines.exudyn.space.build import build_in_space
-
-        return build_in_space(exu, scene, end)
     items = importlib.import_module("exudyn.itemInterface")
     scene = complete(scene).scene
     poses = initial_poses(scene)

@@ -5,24 +5,25 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from shoal.engines.capabilities import of_kind, require
-from shoal.engines.contract import Capabilities, check_lanes, sampling_times
+from shoal.engines.contract import Capabilities, sampling_times
 from shoal.engines.exudyn.build import PARTS, Beam, Machine, build, library
 from shoal.engines.exudyn.checks import judge
 from shoal.engines.exudyn.joints import JOINTS
 from shoal.engines.exudyn.loads import LOADS
 from shoal.engines.exudyn.record import Record, Steps, choose_steps
+from shoal.engines.exudyn.space.build import build_in_space
 from shoal.engines.exudyn.space.joints import SPATIAL_JOINTS
-from shoal.errors import InputError
+from shoal.engines.one_by_one import one_by_one
 from shoal.mechanics.halts import CROSSED
 from shoal.mechanics.start.start import facts
 from shoal.scene import Rod, Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 WEAK = "; generalized-alpha is only weakly stable at solver.spectral_radius 1, use 0.9"
 DENSE_LIMIT = 60
@@ -95,7 +96,8 @@ class ExudynEngine:
         require(self, scene)
         damped = self._integrator(scene) == "generalized-alpha"
         exu = library()
-        machine = build(exu, scene, self.beam, float(wanted[-1]))
+        end = float(wanted[-1])
+        machine = build(exu, scene, self.beam, end) if scene.dimensions == 2 else build_in_space(exu, scene, end)
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
         record = Record(steps, machine.reference)
         failure = self._run(exu, machine, record)
@@ -126,18 +128,7 @@ class ExudynEngine:
         self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
     ) -> Trajectory:
         """Run one scene per lane, one after the other; a lane that failed is not a number and has its status."""
-        started = time.perf_counter()
-        require(self, scene)
-        lanes = check_lanes(scene, values)
-        wanted = sampling_times(scene, times)
-        runs = []
-        for lane in range(lanes):
-            numbers = {path: float(np.ravel(column)[lane]) for path, column in values.items()}
-            try:
-                runs.append(self.simulate(scene.with_values(numbers), wanted))
-            except InputError as error:
-                runs.append(self._refused(scene, wanted, str(error)))
-        return _side_by_side(runs, time.perf_counter() - started)
+        return one_by_one(self, scene, values, times)
 
     def _run(self, exu: Any, machine: Machine, record: Record) -> str:
         """Integrate, filling the record. Returns why it ended early, or nothing."""
@@ -226,39 +217,6 @@ class ExudynEngine:
             "redundant_joints": list(machine.redundant),
             "energy_check": "none: motion is prescribed" if machine.driven else "kinetic, elastic, springs, loads",
         }
-
-    def _refused(self, scene: Scene, wanted: Array, message: str) -> Trajectory:
-        shape = (len(wanted), len(scene.markers))
-        return Trajectory(
-            engine=self.name,
-            times=wanted,
-            markers=tuple(scene.markers),
-            points=np.full((*shape, scene.dimensions, 1), np.nan),
-            angles=np.full((*shape, 1), np.nan),
-            status=(Status.REFUSED,),
-            energy_drift=np.full(1, np.nan),
-            constraint_drift=np.full(1, np.nan),
-            steps=0,
-            wall_s=0.0,
-            message=message,
-        )
-
-
-def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
-    """Runs of one lane each as the lanes of one trajectory; only what may be believed keeps its numbers."""
-    believed = [run if run.ok else replace(run, points=run.points * np.nan, angles=run.angles * np.nan) for run in runs]
-    return replace(
-        runs[0],
-        points=np.concatenate([run.points for run in believed], axis=-1),
-        angles=np.concatenate([run.angles for run in believed], axis=-1),
-        status=tuple(run.status[0] for run in runs),
-        energy_drift=np.concatenate([run.energy_drift for run in runs]),
-        constraint_drift=np.concatenate([run.constraint_drift for run in runs]),
-        steps=max(run.steps for run in runs),
-        wall_s=wall_s,
-        message=next((f"lane {lane}: {run.message}" for lane, run in enumerate(runs) if not run.ok), ""),
-        model=next((run.model for run in runs if run.model), {}),
-    )
 
 
 def _too_far(machine: Machine, record: Record) -> float:
