@@ -373,7 +373,20 @@ DIRECTOR = Scene.parse({
     "joints": {"W": {"kind": "weld", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "A"}}},
     "markers": {"e": {"body": "A", "point": "end"}},
 })  # fmt: skip
+TREE = Scene.parse({
+    "name": "tree", "dimensions": 3, "gravity": [0.0, 0.0, -9.81],
+    "bodies": {name: {"kind": "rigid-body", "mass": 1.0, "inertia": [0.1, 0.2, 0.25]} for name in "AB"},
+    "joints": {
+        "S": {"kind": "spherical", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "A"}},
+        "P": {"kind": "slider", "first": {"body": "A", "point": [0.1, 0, 0]}, "second": {"body": "B"},
+              "axis": [1, 1, 0], "rotation": "locked"},
+    },
+    "markers": {"b": {"body": "B", "point": [0.3, 0.1, 0.2]}},
+    "loads": {"F": {"kind": "force", "at": {"body": "B"}, "force": [1, 2, 3]},
+              "T": {"kind": "torque", "at": {"body": "B"}, "torque": 2.0, "axis": [0, 1, 1]}},
+})  # fmt: skip
 ONLY_NATIVE = [
+    TREE,
     SPATIAL,
     DIRECTOR,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),

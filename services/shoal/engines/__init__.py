@@ -35,11 +35,18 @@ def _casadi() -> Engine:
     return CasadiEngine()
 
 
+def _tree() -> Engine:
+    from shoal.engines.tree import TreeEngine
+
+    return TreeEngine()
+
+
 ENGINES |= {
     "gauss": _gauss,
     "exudyn": _exudyn,
     "exudyn-ge": _exudyn_ge,
     "casadi": _casadi,
+    "tree": _tree,
 }
 COMPARED = ("gauss", "exudyn", "casadi")
 """Compared unless somebody names others: three derivations of the same equations."""

@@ -188,6 +188,14 @@ RIGID = (
         by_theory=True,
         reason="a tolerance of 1e-11 in every step, grown as the motion lets errors grow; it knows open chains only",
     ),
+    Method(
+        engine="tree",
+        name="dop853",
+        quick=True,
+        limits=rigid(*[None] * 7) | bounds(1e-12, "pendulum", "double-pendulum"),
+        by_theory=True,
+        reason="a tolerance of 1e-12 in every step, grown as the motion lets errors grow; it knows open chains only",
+    ),
 )
 
 _SCENE_MESH = flexible(7e-2, 8e-2, 4e-2)

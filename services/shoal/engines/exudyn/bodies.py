@@ -11,9 +11,10 @@ from shoal.engines.course import Clock, Course
 from shoal.engines.poses import InitialPose, normal
 from shoal.errors import InputError
 from shoal.scene import Function, PointMass, RigidBody, Rod
+from shoal.scene.dimensions import padded
 from shoal.trajectory import Array
 
-Place = tuple[float, float]
+Place = tuple[float, ...]
 
 
 class Motion(NamedTuple):
@@ -94,7 +95,7 @@ class System:
 
     def marker(self, kind: str, body: Any, local: Place) -> Any:
         """Enter a marker of Exudyn's class `kind` at a local position [m] of one of its bodies."""
-        return self.add(kind, bodyNumber=body, localPosition=[*local, 0.0])
+        return self.add(kind, bodyNumber=body, localPosition=[*padded(local, 3)])
 
     def turned(self, body: Any, local: Place, angle: float) -> Any:
         """Enter a marker with a direction: that of a body at a local position [m], turned by `angle` [rad]."""
@@ -109,7 +110,7 @@ class System:
     def accelerate(self, body: Any, acceleration: Place, **options: Any) -> None:
         """Let an acceleration [m/s^2] act on the distributed mass of an element."""
         marker = self.add("MarkerBodyMass", bodyNumber=body)
-        self.add("LoadMassProportional", markerNumber=marker, loadVector=[*acceleration, 0.0], **options)
+        self.add("LoadMassProportional", markerNumber=marker, loadVector=[*padded(acceleration, 3)], **options)
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from shoal.mechanics.assembly.groups import moving
 from shoal.mechanics.reach import span
 from shoal.mechanics.start.start import complete
 from shoal.scene import GROUND, DrivenAngle, Scene
+from shoal.scene.dimensions import padded
 from shoal.trajectory import Array
 
 Beam = Literal["ancf-cable", "geometrically-exact"]
@@ -61,6 +62,8 @@ class Machine:
     """Size of the machine [m]."""
     reference: Array
     """Coordinates [m or rad] of the undeformed start, from which Exudyn counts, (unknowns,)."""
+    redundant: tuple[str, ...] = ()
+    """Joints that hold what others hold already, for which Exudyn's Jacobian is singular."""
 
     @property
     def unknowns(self) -> int:
@@ -89,7 +92,8 @@ class Machine:
         # A torsion spring counts its turns along all times.
         stored = (exchange.stored(t, q, v)[rows] for exchange in self.exchanges if exchange.stored is not None)
         moving = moving + sum(stored, np.zeros(len(rows)))
-        height = np.sum([share.moment for share in shares], axis=0) @ np.array(self.scene.gravity)
+        gravity = padded(self.scene.gravity, self.scene.dimensions)
+        height = np.sum([share.moment for share in shares], axis=0) @ np.array(gravity)
         return moving - height, moving
 
     def crossed(self, q: Array, v: Array) -> Array:

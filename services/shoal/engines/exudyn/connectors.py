@@ -86,7 +86,7 @@ def add_spring(ends: Ends, first: Attachment, second: Attachment, law: Law, leng
         referenceLength=rest,
         **law.options("springForceUserFunction"),
     )
-    return _exchange(law, lambda q, v: (measure(q, v)[0] - rest, measure(q, v)[1]))
+    return exchange_of(law, lambda q, v: (measure(q, v)[0] - rest, measure(q, v)[1]))
 
 
 def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, angle: float | None) -> Exchange:
@@ -110,7 +110,7 @@ def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, ang
         angle = np.unwrap(np.concatenate([[start], b.direction - a.direction]))[1:]
         return angle - rest, b.rate - a.rate
 
-    return _exchange(law, measure)
+    return exchange_of(law, measure)
 
 
 def add_rail(ends: Ends, first: Attachment, second: Attachment, direction: float, law: Law) -> Exchange:
@@ -129,10 +129,12 @@ def add_rail(ends: Ends, first: Attachment, second: Attachment, direction: float
         speed = np.sum(line * (b.velocity - a.velocity), axis=1) + a.rate * cross(line, apart)
         return np.sum(line * apart, axis=1), speed
 
-    return _exchange(law, measure)
+    return exchange_of(law, measure)
 
 
-def _exchange(law: Law, measure: Callable[[Array, Array], tuple[Array, Array]]) -> Exchange:
+def exchange_of(law: Law, measure: Callable[[Array, Array], tuple[Array, Array]]) -> Exchange:
+    """What a law does with energy; measure: its argument [m or rad] and the rate of that, from q and v."""
+
     def lost(t: Array, q: Array, v: Array) -> Array:
         x, rate = measure(q, v)
         return law.resisting(x, rate) * rate

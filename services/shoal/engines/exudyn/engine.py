@@ -5,27 +5,31 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from shoal.engines.capabilities import of_kind, require
-from shoal.engines.contract import Capabilities, check_lanes, sampling_times
+from shoal.engines.contract import Capabilities, sampling_times
 from shoal.engines.exudyn.build import PARTS, Beam, Machine, build, library
 from shoal.engines.exudyn.checks import judge
 from shoal.engines.exudyn.joints import JOINTS
 from shoal.engines.exudyn.loads import LOADS
 from shoal.engines.exudyn.record import Record, Steps, choose_steps
-from shoal.errors import InputError
+from shoal.engines.exudyn.space.build import build_in_space
+from shoal.engines.exudyn.space.joints import SPATIAL_JOINTS
+from shoal.engines.one_by_one import one_by_one
 from shoal.mechanics.halts import CROSSED
 from shoal.mechanics.start.start import facts
 from shoal.scene import Rod, Scene
-from shoal.trajectory import Array, Status, Trajectory
+from shoal.trajectory import Array, Trajectory
 
 WEAK = "; generalized-alpha is only weakly stable at solver.spectral_radius 1, use 0.9"
 DENSE_LIMIT = 60
 """Unknowns beyond which the sparse linear solver is the faster one."""
+REDUNDANT = 0.9
+"""Spectral radius for machines in space whose constraints depend on each other, unless the scene says its own."""
 MOST = 1e5
 """Most steps that a run takes because of narrow parts of a force law."""
 NAMES: dict[Beam, str] = {"ancf-cable": "exudyn", "geometrically-exact": "exudyn-ge"}
@@ -43,7 +47,7 @@ FEATURES = frozenset(
         "tapered flexible rods",
     }
 )
-CABLE_FEATURES = frozenset({"curved flexible rods", "damped flexible rods"})
+CABLE_FEATURES = frozenset({"machines in space", "curved flexible rods", "damped flexible rods"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +83,7 @@ class ExudynEngine:
         """What Exudyn can simulate here."""
         return Capabilities(
             elements=frozenset(PARTS[self.beam]),
-            joints=frozenset(JOINTS),
+            joints=frozenset(JOINTS) | (SPATIAL_JOINTS if self.beam == "ancf-cable" else frozenset()),
             loads=frozenset(LOADS),
             features=FEATURES | CABLE_FEATURES if self.beam == "ancf-cable" else FEATURES,
             lanes=False,
@@ -92,7 +96,8 @@ class ExudynEngine:
         require(self, scene)
         damped = self._integrator(scene) == "generalized-alpha"
         exu = library()
-        machine = build(exu, scene, self.beam, float(wanted[-1]))
+        end = float(wanted[-1])
+        machine = build(exu, scene, self.beam, end) if scene.dimensions == 2 else build_in_space(exu, scene, end)
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
         record = Record(steps, machine.reference)
         failure = self._run(exu, machine, record)
@@ -123,18 +128,7 @@ class ExudynEngine:
         self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
     ) -> Trajectory:
         """Run one scene per lane, one after the other; a lane that failed is not a number and has its status."""
-        started = time.perf_counter()
-        require(self, scene)
-        lanes = check_lanes(scene, values)
-        wanted = sampling_times(scene, times)
-        runs = []
-        for lane in range(lanes):
-            numbers = {path: float(np.ravel(column)[lane]) for path, column in values.items()}
-            try:
-                runs.append(self.simulate(scene.with_values(numbers), wanted))
-            except InputError as error:
-                runs.append(self._refused(scene, wanted, str(error)))
-        return _side_by_side(runs, time.perf_counter() - started)
+        return one_by_one(self, scene, values, times)
 
     def _run(self, exu: Any, machine: Machine, record: Record) -> str:
         """Integrate, filling the record. Returns why it ended early, or nothing."""
@@ -173,6 +167,10 @@ class ExudynEngine:
         sparse = machine.unknowns + machine.constraints > DENSE_LIMIT
         kinds = exu.LinearSolverType
         settings.linearSolver.solverType = kinds.EigenSparse if sparse else kinds.EXUdense
+        if machine.redundant:
+            # It alone steps over dependent rows; the checks of joints and energy judge what comes out.
+            settings.linearSolver.solverType = kinds.EigenDense
+            settings.linearSolver.ignoreSingularJacobian = True
         integration = settings.timeIntegration
         integration.numberOfSteps = steps.count
         integration.endTime = steps.count * steps.size
@@ -181,8 +179,9 @@ class ExudynEngine:
         integration.verboseMode = 0
         integration.newton.useModifiedNewton = self.modified_newton
         integration.newton.absoluteTolerance = machine.scene.solver.newton_tolerance
-        integration.solverType = getattr(exu.DynamicSolverType, INTEGRATORS[self._integrator(machine.scene)])
-        integration.generalizedAlpha.spectralRadius = machine.scene.solver.spectral_radius
+        name, radius = self._method(machine)
+        integration.solverType = getattr(exu.DynamicSolverType, INTEGRATORS[name])
+        integration.generalizedAlpha.spectralRadius = radius
         return settings
 
     def _integrator(self, scene: Scene) -> str:
@@ -192,8 +191,18 @@ class ExudynEngine:
         of_kind(INTEGRATORS, name, "integrator")
         return name
 
+    def _method(self, machine: Machine) -> tuple[str, float]:
+        """The integrator of a machine, and its spectral radius.
+
+        Dependent constraints agree with each other on the positions only: on the velocities, drift parts them.
+        """
+        name, radius = self._integrator(machine.scene), machine.scene.solver.spectral_radius
+        if machine.redundant and name == "trapezoidal" and self.integrator is None:
+            return "generalized-alpha", REDUNDANT
+        return name, radius if name == "generalized-alpha" else 1.0
+
     def _model(self, exu: Any, machine: Machine, steps: Steps) -> dict[str, Any]:
-        integrator = self._integrator(machine.scene)
+        integrator, radius = self._method(machine)
         rods = [body for body in machine.scene.bodies.values() if isinstance(body, Rod) and body.element != "rigid"]
         return {
             "exudyn": exu.__version__,
@@ -202,44 +211,12 @@ class ExudynEngine:
             "elements": sum(rod.elements for rod in rods),
             "beam": self.beam,
             "integrator": integrator,
-            "spectral_radius": machine.scene.solver.spectral_radius if integrator == "generalized-alpha" else 1.0,
+            "spectral_radius": radius,
             "newton": "modified" if self.modified_newton else "full",
             "step": steps.size,
+            "redundant_joints": list(machine.redundant),
             "energy_check": "none: motion is prescribed" if machine.driven else "kinetic, elastic, springs, loads",
         }
-
-    def _refused(self, scene: Scene, wanted: Array, message: str) -> Trajectory:
-        shape = (len(wanted), len(scene.markers))
-        return Trajectory(
-            engine=self.name,
-            times=wanted,
-            markers=tuple(scene.markers),
-            points=np.full((*shape, 2, 1), np.nan),
-            angles=np.full((*shape, 1), np.nan),
-            status=(Status.REFUSED,),
-            energy_drift=np.full(1, np.nan),
-            constraint_drift=np.full(1, np.nan),
-            steps=0,
-            wall_s=0.0,
-            message=message,
-        )
-
-
-def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
-    """Runs of one lane each as the lanes of one trajectory; only what may be believed keeps its numbers."""
-    believed = [run if run.ok else replace(run, points=run.points * np.nan, angles=run.angles * np.nan) for run in runs]
-    return replace(
-        runs[0],
-        points=np.concatenate([run.points for run in believed], axis=-1),
-        angles=np.concatenate([run.angles for run in believed], axis=-1),
-        status=tuple(run.status[0] for run in runs),
-        energy_drift=np.concatenate([run.energy_drift for run in runs]),
-        constraint_drift=np.concatenate([run.constraint_drift for run in runs]),
-        steps=max(run.steps for run in runs),
-        wall_s=wall_s,
-        message=next((f"lane {lane}: {run.message}" for lane, run in enumerate(runs) if not run.ok), ""),
-        model=next((run.model for run in runs if run.model), {}),
-    )
 
 
 def _too_far(machine: Machine, record: Record) -> float:

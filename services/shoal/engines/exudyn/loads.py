@@ -39,7 +39,7 @@ def _law(load: Spring | TorsionSpring) -> Law:
 def _add_force(ends: Ends, where: str, load: Force) -> Exchange:
     scale = ends.system.course(load.scale, f"{where}.scale")
     marker = ends.turn(load.at) if load.follows else ends.hold(load.at)
-    options = _scaled([*load.force, 0.0], scale)
+    options = scaled([*load.force, 0.0], scale)
     ends.system.add("LoadForceVector", markerNumber=marker, bodyFixed=load.follows, **options)
 
     def power(t: Array, q: Array, v: Array) -> Array:
@@ -57,7 +57,7 @@ def _add_torque(ends: Ends, where: str, load: Torque) -> Exchange:
     torque = ends.system.course(load.torque, f"{where}.torque")
     for side, sign in ((load.at, 1.0), (load.reaction, -1.0)):
         if side is not None:
-            ends.system.add("LoadTorqueVector", markerNumber=ends.turn(side), **_scaled([0.0, 0.0, sign], torque))
+            ends.system.add("LoadTorqueVector", markerNumber=ends.turn(side), **scaled([0.0, 0.0, sign], torque))
 
     def power(t: Array, q: Array, v: Array) -> Array:
         against = 0.0 if load.reaction is None else ends.motion(load.reaction, q, v).rate
@@ -73,7 +73,7 @@ def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange
     force = np.array(load.force)
     if isinstance(part, CablePart | BeamPart):
         for element, mass in zip(part.elements, part.sections.mass, strict=True):
-            options = _scaled([*(force / mass), 0.0], scale)
+            options = scaled([*(force / mass), 0.0], scale)
             system.accelerate(element, options.pop("loadVector")[:2], **options)
         places = [((k + (x + 1) / 2) * part.size, 0.0) for k in range(rod.elements) for x in gauss(3)[0]]
         weights = np.tile(gauss(3)[1] * part.size / 2, rod.elements)
@@ -83,7 +83,7 @@ def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange
         weights = weights * rod.length / 2
         middle = weights @ np.array(places) / rod.length
         marker = part.hold(system, (float(middle[0]), float(middle[1])))
-        system.add("LoadForceVector", markerNumber=marker, **_scaled([*(force * rod.length), 0.0], scale))
+        system.add("LoadForceVector", markerNumber=marker, **scaled([*(force * rod.length), 0.0], scale))
 
     def power(t: Array, q: Array, v: Array) -> Array:
         flow = sum(w * part.motion(q, v, place).velocity for w, place in zip(weights, places, strict=True))
@@ -92,7 +92,7 @@ def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange
     return Exchange(power)
 
 
-def _scaled(vector: list[float], scale: Course) -> dict[str, Any]:
+def scaled(vector: list[float], scale: Course) -> dict[str, Any]:
     """A load vector times a function of time, as Exudyn's options."""
     if scale.function.number is not None:
         return {"loadVector": [scale.function.number * part for part in vector]}

@@ -1,0 +1,1 @@
+"""Machines in space inside Exudyn: Euler parameters, spatial ANCF cables, joints by what they lock."""

@@ -1,0 +1,282 @@
+"""Joints in space inside Exudyn, condition by condition: what each locks, and how far it opens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from shoal.engines.exudyn.bodies import System
+from shoal.engines.exudyn.connectors import Exchange, Law, exchange_of
+from shoal.engines.exudyn.ground import driven
+from shoal.engines.exudyn.space.ends import SpatialEnds, frame_about
+from shoal.engines.exudyn.space.rows import Row, add_rows
+from shoal.errors import InputError
+from shoal.mechanics import rotation as turns
+from shoal.mechanics.assembly.space.sections import ALIGNED
+from shoal.mechanics.joints import Aligned, Along, Apart, Hinged, InPlane, Meet, Square, Turned, conditions
+from shoal.scene import JOINT_KINDS, Attachment, Joint, Revolute, Slider
+from shoal.trajectory import Array
+
+Gap = Callable[[Array, Array], Array]
+
+SPATIAL_JOINTS = frozenset(JOINT_KINDS) - {"coupling"}
+
+
+def add_joint(exu: Any, ends: SpatialEnds, name: str, joint: Joint) -> list[Gap]:
+    """Enter a joint without its friction; how far each of its conditions is open. Raises InputError."""
+    return [CONDITIONS[type(one)](exu, ends, f"joints.{name}", one) for one in conditions(joint, 3)]
+
+
+def add_friction(ends: SpatialEnds, name: str, joint: Joint) -> Exchange | None:
+    """Enter the friction of a joint, if it has any. Raises InputError."""
+    if not isinstance(joint, Revolute | Slider) or not (joint.friction or joint.coulomb):
+        return None
+    law = Law(damping=joint.friction, coulomb=joint.coulomb, speed=joint.coulomb_speed)
+    if isinstance(joint, Revolute):
+        return add_twist(ends, f"joints.{name}.friction", joint.first, joint.second, joint.axis, law, None)
+    return _add_rail(ends, f"joints.{name}.friction", joint, law)
+
+
+def add_twist(
+    ends: SpatialEnds,
+    where: str,
+    first: Attachment,
+    second: Attachment,
+    axis: Any,
+    law: Law,
+    rest: float | None,
+) -> Exchange:
+    """Enter a law over the angle about an axis of two rigid bodies; rest: where it is 0 [rad], else at the start."""
+    require_rigid(ends, where, first, second)
+    one, other = (frame_about(ends.image(side, axis)) for side in (first, second))
+    begin = _angle(ends.start_axes(first)[None] @ one, ends.start_axes(second)[None] @ other)[0]
+    origin = begin if rest is None else rest
+    options = law.options("springTorqueUserFunction")
+    if law.stiffness or law.cubic or law.elastic:
+        # A data coordinate lets Exudyn count full turns.
+        counter = ends.system.add("NodeGenericData", initialCoordinates=[begin], numberOfDataCoordinates=1)
+        options |= {"nodeNumber": counter, "offset": origin}
+    ends.system.add(
+        "ObjectConnectorTorsionalSpringDamper",
+        markerNumbers=[ends.framed(first, one), ends.framed(second, other)],
+        **options,
+    )
+
+    def measure(q: Array, v: Array) -> tuple[Array, Array]:
+        a, b = ends.moved(first, q, v), ends.moved(second, q, v)
+        angle = np.unwrap(np.concatenate([[begin], _angle(a.axes @ one, b.axes @ other)]))[1:]
+        return angle - origin, np.sum((spin(b.axes, b.turning) - spin(a.axes, a.turning)) * (a.axes @ one[:, 2]), 1)
+
+    return exchange_of(law, measure)
+
+
+def spin(axes: Array, turning: Array) -> Array:
+    """Angular velocity [rad/s] along the axes of the ground, (rows, 3)."""
+    return np.asarray(0.5 * np.sum(np.cross(axes, turning, axis=1), axis=2))
+
+
+def require_rigid(ends: SpatialEnds, where: str, *sides: Attachment) -> None:
+    """Raises InputError for a flexible rod and for a point mass, which have no frame."""
+    for side in sides:
+        if ends.is_cable(side):
+            raise InputError(f"{where}: engine exudyn gives {side.body}, a cable in space, no frame; use gauss")
+    ends.require_direction(where, *sides)
+
+
+def _angle(first: Array, second: Array) -> Array:
+    """The angle about the third axes from the first of one to the first of the other, (rows,)."""
+    towards = second[:, :, 0]
+    return np.asarray(np.arctan2(np.sum(first[:, :, 1] * towards, 1), np.sum(first[:, :, 0] * towards, 1)))
+
+
+def _add_rail(ends: SpatialEnds, where: str, joint: Slider, law: Law) -> Exchange:
+    require_rigid(ends, where, joint.first)
+    line = _line(ends, joint.first, joint.direction if joint.axis is None else joint.axis)
+    ends.system.add(
+        "ObjectConnectorLinearSpringDamper",
+        markerNumbers=[ends.turn(joint.first), ends.turn(joint.second)],
+        axisMarker0=line.tolist(),
+        **law.options("springForceUserFunction"),
+    )
+
+    def measure(q: Array, v: Array) -> tuple[Array, Array]:
+        a, b = ends.moved(joint.first, q, v), ends.moved(joint.second, q, v)
+        along, change = a.axes @ line, a.turning @ line
+        apart, speed = b.position - a.position, b.velocity - a.velocity
+        return np.sum(along * apart, 1), np.sum(along * speed + change * apart, 1)
+
+    return exchange_of(law, measure)
+
+
+def _line(ends: SpatialEnds, at: Attachment, along: Any) -> Array:
+    """The direction (3,) of a line in its body's frame: an axis at the start, or an angle there."""
+    if isinstance(along, tuple):
+        return ends.image(at, along)
+    return np.array([np.cos(along), np.sin(along), 0.0])
+
+
+def _lock(ends: SpatialEnds, first: Attachment, second: Attachment, axes: list[int], one: Array, other: Array) -> None:
+    """Exudyn's joint that locks directions of the first marker's frame; one, other: frames (3, 3) in the bodies'."""
+    ends.system.add(
+        "ObjectJointGeneric",
+        markerNumbers=[ends.framed(first, one), ends.framed(second, other)],
+        constrainedAxes=axes,
+    )
+
+
+def _pair(ends: SpatialEnds, condition: Any, q: Array, v: Array) -> tuple[Any, Any]:
+    return ends.moved(condition.first, q, v), ends.moved(condition.second, q, v)
+
+
+def _meet(exu: Any, ends: SpatialEnds, where: str, one: Meet) -> Gap:
+    ends.system.add("ObjectJointSpherical", markerNumbers=[ends.hold(one.first), ends.hold(one.second)])
+    return lambda q, v: _apart(ends, one, q, v)
+
+
+def _apart(ends: SpatialEnds, one: Any, q: Array, v: Array) -> Array:
+    a, b = _pair(ends, one, q, v)
+    return np.asarray(np.linalg.norm(b.position - a.position, axis=1))
+
+
+def _along(exu: Any, ends: SpatialEnds, where: str, one: Along) -> Gap:
+    require_rigid(ends, where, one.first)
+    line = _line(ends, one.first, one.direction)
+    _lock(ends, one.first, one.second, [1, 1, 0, 0, 0, 0], frame_about(line), np.eye(3))
+
+    def gap(q: Array, v: Array) -> Array:
+        a, b = _pair(ends, one, q, v)
+        return np.asarray(np.linalg.norm(np.cross(a.axes @ line, b.position - a.position), axis=1))
+
+    return gap
+
+
+def _in_plane(exu: Any, ends: SpatialEnds, where: str, one: InPlane) -> Gap:
+    require_rigid(ends, where, one.first)
+    normal = ends.image(one.first, one.axis)
+    _lock(ends, one.first, one.second, [0, 0, 1, 0, 0, 0], frame_about(normal), np.eye(3))
+
+    def gap(q: Array, v: Array) -> Array:
+        a, b = _pair(ends, one, q, v)
+        return np.asarray(np.abs(np.sum((a.axes @ normal) * (b.position - a.position), axis=1)))
+
+    return gap
+
+
+def _aligned(exu: Any, ends: SpatialEnds, where: str, one: Aligned) -> Gap:
+    cables = [side for side in (one.first, one.second) if ends.is_cable(side)]
+    if len(cables) == 2:
+        return lambda q, v: np.zeros(len(q))  # neither has a section that could hold an axis
+    if cables:
+        return _cable_axis(exu, ends, where, one, cables[0])
+    ends.require_direction(where, one.first, one.second)
+    images = [ends.image(side, one.axis) for side in (one.first, one.second)]
+    _lock(ends, one.first, one.second, [0, 0, 0, 1, 1, 0], *(frame_about(image) for image in images))
+
+    def gap(q: Array, v: Array) -> Array:
+        a, b = _pair(ends, one, q, v)
+        return np.asarray(np.linalg.norm(np.cross(a.axes @ images[0], b.axes @ images[1]), axis=1))
+
+    return gap
+
+
+def _cable_axis(exu: Any, ends: SpatialEnds, where: str, one: Aligned, cable: Attachment) -> Gap:
+    """A cable is held along the axis or at a right angle to it."""
+    held = one.second if cable is one.first else one.first
+    image = ends.image(held, one.axis)
+    slope = ends.placement.start_of(ends.placement.direction(ends.scene, cable))[0][:, 0]
+    cosine = abs(float(slope @ ends.start_axes(held) @ image)) / float(np.linalg.norm(slope))
+    directions = [image] if cosine < ALIGNED else [part[:, 0] for part in turns.across(image[:, None])]
+    return _products(exu, ends, held, cable, [Row(direction, direction) for direction in directions])
+
+
+def _turned(exu: Any, ends: SpatialEnds, where: str, one: Turned) -> Gap:
+    cables = [side for side in (one.first, one.second) if ends.is_cable(side)]
+    if len(cables) == 2:
+        raise InputError(f"{where}: engine exudyn welds no two cables in space; put a rigid body between them")
+    if cables:
+        held = one.second if cables[0] is one.first else one.first
+        slope = ends.placement.start_of(ends.placement.direction(ends.scene, cables[0]))[0]
+        image = turns.unit(ends.start_axes(held).T @ slope)
+        rows = [Row(normal[:, 0], normal[:, 0]) for normal in turns.across(image)]
+        return _products(exu, ends, held, cables[0], rows)
+    if ends.is_point(one.first) or ends.is_point(one.second):
+        return lambda q, v: np.zeros(len(q))
+    other = ends.start_axes(one.second).T @ ends.start_axes(one.first)
+    _lock(ends, one.first, one.second, [0, 0, 0, 1, 1, 1], np.eye(3), other)
+
+    def gap(q: Array, v: Array) -> Array:
+        a, b = _pair(ends, one, q, v)
+        return np.asarray(np.linalg.norm(b.axes @ other - a.axes, axis=(1, 2)))
+
+    return gap
+
+
+def _square(exu: Any, ends: SpatialEnds, where: str, one: Square) -> Gap:
+    require_rigid(ends, where, one.first, one.second)
+    images = ends.image(one.first, one.axis), ends.image(one.second, one.second_axis)
+    # Exudyn locks the product of the first axis of one and the second axis of the other.
+    first, other = np.roll(frame_about(images[0]), 1, axis=1), np.roll(frame_about(images[1]), -1, axis=1)
+    _lock(ends, one.first, one.second, [0, 0, 0, 0, 0, 1], first, other)
+
+    def gap(q: Array, v: Array) -> Array:
+        a, b = _pair(ends, one, q, v)
+        return np.asarray(np.abs(np.sum((a.axes @ images[0]) * (b.axes @ images[1]), axis=1)))
+
+    return gap
+
+
+def _hinged(exu: Any, ends: SpatialEnds, where: str, one: Hinged) -> Gap:
+    require_rigid(ends, where, one.first, one.second)
+    course = driven(ends.system, one.angle, f"{where}.angle")
+    here, there = (frame_about(ends.image(side, one.axis)) for side in (one.first, one.second))
+
+    def cosine(t: float) -> tuple[float, float]:
+        angle, rate = course.value(t), course.slope(t)
+        return np.cos(angle), -np.sin(angle) * rate
+
+    def sine(t: float) -> tuple[float, float]:
+        angle, rate = course.value(t), course.slope(t)
+        return np.sin(angle), np.cos(angle) * rate
+
+    rows = [Row(here[:, 0], there[:, 0], cosine), Row(here[:, 1], there[:, 0], sine)]
+    add_rows(exu, ends.system, ends.side(one.first), ends.side(one.second), rows)
+    return lambda q, v: np.zeros(len(q))
+
+
+def _distant(exu: Any, ends: SpatialEnds, where: str, one: Apart) -> Gap:
+    length = ends.start_distance(one.first, one.second) if one.length is None else float(one.length(np.zeros(1))[0])
+    markers = [ends.hold(one.first), ends.hold(one.second)]
+    ends.system.add("ObjectConnectorDistance", markerNumbers=markers, distance=length)
+    return lambda q, v: np.asarray(np.abs(_apart(ends, one, q, v) - length))
+
+
+def _products(exu: Any, ends: SpatialEnds, held: Attachment, cable: Attachment, rows: list[Row]) -> Gap:
+    """Directions of a body stay at right angles to a cable."""
+    add_rows(exu, ends.system, ends.side(held), ends.side(cable), rows)
+
+    def gap(q: Array, v: Array) -> Array:
+        axes, slope = ends.moved(held, q, v).axes, ends.moved(cable, q, v).axes[:, :, 0]
+        return np.asarray(np.linalg.norm([np.sum((axes @ row.first) * slope, axis=1) for row in rows], axis=0))
+
+    return gap
+
+
+def still(system: System, ground: Any, body: Any) -> None:
+    """Keep a body from turning."""
+    markers = [part.turn(system, (0.0, 0.0, 0.0)) for part in (ground, body)]
+    system.add("ObjectJointGeneric", markerNumbers=markers, constrainedAxes=[0, 0, 0, 1, 1, 1])
+
+
+CONDITIONS: dict[type, Callable[[Any, SpatialEnds, str, Any], Gap]] = {
+    Meet: _meet,
+    Along: _along,
+    InPlane: _in_plane,
+    Aligned: _aligned,
+    Turned: _turned,
+    Square: _square,
+    Hinged: _hinged,
+    Apart: _distant,
+}
+"""How a condition is entered; what it returns tells how far it opens."""

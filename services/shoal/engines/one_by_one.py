@@ -1,0 +1,67 @@
+"""Lanes of engines that run one scene at a time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shoal.engines.capabilities import require
+from shoal.engines.contract import Engine, check_lanes, sampling_times
+from shoal.errors import InputError
+from shoal.scene import Scene
+from shoal.trajectory import Array, Status, Trajectory
+
+
+def one_by_one(
+    engine: Engine, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
+) -> Trajectory:
+    """One scene per lane, one after the other; a lane that failed is not a number and has its status."""
+    started = time.perf_counter()
+    require(engine, scene)
+    lanes = check_lanes(scene, values)
+    wanted = sampling_times(scene, times)
+    runs = []
+    for lane in range(lanes):
+        numbers = {path: float(np.ravel(column)[lane]) for path, column in values.items()}
+        try:
+            runs.append(engine.simulate(scene.with_values(numbers), wanted))
+        except InputError as error:
+            runs.append(_refused(engine, scene, wanted, str(error)))
+    return _side_by_side(runs, time.perf_counter() - started)
+
+
+def _refused(engine: Engine, scene: Scene, wanted: Array, message: str) -> Trajectory:
+    shape = (len(wanted), len(scene.markers))
+    return Trajectory(
+        engine=engine.name,
+        times=wanted,
+        markers=tuple(scene.markers),
+        points=np.full((*shape, scene.dimensions, 1), np.nan),
+        angles=np.full((*shape, 1), np.nan),
+        status=(Status.REFUSED,),
+        energy_drift=np.full(1, np.nan),
+        constraint_drift=np.full(1, np.nan),
+        steps=0,
+        wall_s=0.0,
+        message=message,
+    )
+
+
+def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
+    """Runs of one lane each as the lanes of one trajectory; only what may be believed keeps its numbers."""
+    believed = [run if run.ok else replace(run, points=run.points * np.nan, angles=run.angles * np.nan) for run in runs]
+    return replace(
+        runs[0],
+        points=np.concatenate([run.points for run in believed], axis=-1),
+        angles=np.concatenate([run.angles for run in believed], axis=-1),
+        status=tuple(run.status[0] for run in runs),
+        energy_drift=np.concatenate([run.energy_drift for run in runs]),
+        constraint_drift=np.concatenate([run.constraint_drift for run in runs]),
+        steps=max(run.steps for run in runs),
+        wall_s=wall_s,
+        message=next((f"lane {lane}: {run.message}" for lane, run in enumerate(runs) if not run.ok), ""),
+        model=next((run.model for run in runs if run.model), {}),
+    )

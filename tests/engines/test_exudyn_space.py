@@ -1,0 +1,219 @@
+"""Exudyn in space: its joints, loads and cables against the native solver, at its own order of convergence."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.engines import get_engine
+from shoal.engines.compare import compare
+from shoal.errors import InputError
+from shoal.mechanics.simulate import simulate
+from shoal.scene import Scene
+from shoal.trajectory import Array
+from shoal_validation.spatial.machines import PUBLISHED, bricard
+
+pytest.importorskip("exudyn")
+
+FINE = {"integrator": "dop853", "relative_tolerance": 1e-11, "absolute_tolerance": 1e-12}
+HELD = {"body": "ground", "point": [0.0, 0.0, 0.0]}
+AXIS, OTHER = [0.3, 0.5, -0.7], [1.0, 0.0, 2.0]
+LINK = {"kind": "rigid-body", "mass": 1.5, "inertia": [0.05, 0.2, 0.22], "centre_of_mass": [0.4, 0.1, 0.05],
+        "named_points": {"end": [0.8, 0.0, 0.1]}}  # fmt: skip
+
+
+def end(number: int) -> dict[str, Any]:
+    return {"body": f"B{number}", "point": "end"}
+
+
+def begin(number: int) -> dict[str, Any]:
+    return {"body": f"B{number}"}
+
+
+def chain(*joints: dict[str, Any], **more: Any) -> Scene:
+    """Equal links from the ground on, one a joint, turned at random."""
+    rng = np.random.default_rng(3)
+    names = [f"B{k}" for k in range(len(joints))]
+    return Scene.parse({
+        "name": "chain", "dimensions": 3, "gravity": [0.3, -1, -9.81], "solver": FINE,
+        "bodies": dict.fromkeys(names, LINK),
+        "joints": {f"J{k}": {"first": end(k - 1) if k else HELD, "second": begin(k), **one}
+                   for k, one in enumerate(joints)} | more.pop("closing", {}),
+        "markers": {name: {"body": name, "point": "end"} for name in names},
+        "initial": {name: {"rotation": rng.normal(size=3).tolist()} for name in names}, **more,
+    })  # fmt: skip
+
+
+def gaps(machine: Scene, times: Array, step: float) -> list[float]:
+    """Distances of Exudyn's markers from the native ones [m], with a step and with half of it."""
+    ours = simulate(machine, times)
+    assert ours.ok, ours.message
+    found = []
+    for one in (step, step / 2):
+        theirs = get_engine("exudyn").simulate(machine.with_values({"solver.step": one}), times)
+        assert theirs.ok, theirs.message
+        assert np.max(np.abs(np.sin(theirs.angles - ours.angles))) < 1e-3
+        found.append(ours.distance(theirs))
+    return found
+
+
+KINDS: dict[str, list[dict[str, Any]]] = {
+    "revolute": [{"axis": AXIS, "friction": 0.2, "coulomb": 0.1}],
+    "universal": [{"kind": "universal", "axis": [1, 0, 0], "second_axis": [0, 1, 1]}],
+    "slider": [{"kind": "slider", "axis": AXIS, "friction": 0.2}],
+    "locked slider": [{"kind": "spherical"}, {"kind": "slider", "direction": 0.4, "rotation": "locked"}],
+    "cylindrical": [{"kind": "cylindrical", "axis": AXIS}, {"kind": "spherical"}],
+    "planar": [{"kind": "planar", "axis": AXIS}, {"kind": "revolute", "axis": OTHER}],
+    "free planar": [{"kind": "planar", "axis": AXIS, "rotation": "free"}],
+    "locked planar": [{"kind": "revolute", "axis": OTHER}, {"kind": "planar", "axis": AXIS, "rotation": "locked"}],
+    "weld": [{"kind": "spherical"}, {"kind": "weld"}, {"kind": "revolute", "axis": AXIS}],
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_joint_moves_as_in_the_native_solver(kind: str) -> None:
+    far, near = gaps(chain(*KINDS[kind]), np.array([0.1, 0.2]), 2e-3)
+    assert near < 1e-5
+    assert near < far / 3.5 or far < 1e-8
+
+
+def between(kind: str, **more: Any) -> dict[str, Any]:
+    return {"L": {"kind": kind, "first": begin(0), "second": begin(1), **more}}
+
+
+LOADS: dict[str, dict[str, Any]] = {
+    "spring": {"L": {"kind": "spring", "first": HELD, "second": end(1), "stiffness": 20.0, "damping": 1.0}},
+    "torsion": between("torsion-spring", stiffness=20.0, damping=0.1, cubic=2.0, angle=0.2, axis=OTHER),
+    "follower": {"L": {"kind": "force", "at": end(1), "force": [3, 4, 5], "follows": True}},
+    "scaled force": {"L": {"kind": "force", "at": end(1), "force": [3, 4, 5], "scale": "sin(3*t)"}},
+    "inner torque": {"L": {"kind": "torque", "at": end(1), "torque": "2*cos(t)", "axis": OTHER, "reaction": begin(0)}},
+    "torque": {"L": {"kind": "torque", "at": end(1), "torque": 2.0, "axis": OTHER}},
+}
+
+
+@pytest.mark.parametrize("load", LOADS)
+def test_every_load_acts_as_in_the_native_solver(load: str) -> None:
+    """Linked by revolute joints; the torsion spring is stiff, and its error at this step is what it is."""
+    machine = chain({"axis": AXIS}, {"axis": OTHER}, loads=LOADS[load])
+    far, near = gaps(machine, np.array([0.1, 0.2]), 2e-3)
+    assert near < 2e-5
+    assert near < far / 3.5
+
+
+def test_a_driven_angle_and_a_moving_ground_point_lead_a_machine() -> None:
+    """The body's energy is not followed, the positions are."""
+    base = {"body": "ground", "point": "P"}
+    machine = Scene.parse({
+        "name": "driven", "dimensions": 3, "gravity": [0, 0, -9.81], "solver": FINE,
+        "bodies": {"B0": LINK, "B1": LINK}, "markers": {"e": end(1)},
+        "ground_points": {"P": {"x": "0.1*sin(3*t)", "z": "0.05*t"}},
+        "joints": {
+            "R": {"first": base, "second": begin(0), "axis": AXIS},
+            "D": {"kind": "driven-angle", "first": HELD, "second": begin(0), "angle": "0.5*t*t", "axis": AXIS},
+            "S": {"kind": "spherical", "first": end(0), "second": begin(1)},
+        },
+    })  # fmt: skip
+    far, near = gaps(machine, np.array([0.2, 0.4]), 2e-3)
+    assert near < 1e-5
+    assert near < far / 3.5
+
+
+def test_a_spherical_pendulum_and_a_comparison_of_it() -> None:
+    start = {"position": [math.sin(math.pi / 3), 0, -0.5], "velocity": [0, 2 * math.sin(math.pi / 3), 0]}
+    pendulum = Scene.parse({
+        "name": "pendulum", "dimensions": 3, "gravity": [0, 0, -9.81],
+        "bodies": {"P": {"kind": "point-mass", "mass": 1}},
+        "joints": {"S": {"kind": "distance", "first": HELD, "second": {"body": "P"}}},
+        "markers": {"P": {"body": "P"}}, "initial": {"P": start}, "solver": {"step": 5e-4},
+    })  # fmt: skip
+    found = compare(pendulum, ["gauss", "exudyn"], [1.0])
+    assert found.ok
+    closed = [-0.738316659552752, -0.431492043650700, -0.518365823037175]
+    assert found.trajectories["gauss"].marker("P")[-1] == pytest.approx(closed, abs=1e-9)
+    assert found.trajectories["exudyn"].marker("P")[-1] == pytest.approx(closed, abs=1e-6)
+
+
+def test_bricards_redundant_loop_is_stepped_over_and_checked() -> None:
+    """Dependent rows: the dense solver that ignores them, constraints on the positions; order two to the reference."""
+    away = []
+    for step in (2e-3, 1e-3):
+        found = get_engine("exudyn").simulate(bricard().with_values({"solver.step": step}), [1.0])
+        assert found.ok, found.message
+        assert len(found.model["redundant_joints"]) == 6
+        away.append(float(np.linalg.norm(found.marker("P3")[-1] - PUBLISHED)))
+    assert away[1] < 1e-6
+    assert away[1] < away[0] / 3.5
+
+
+def rod(length: float, elements: int, modulus: float, **more: Any) -> dict[str, Any]:
+    return {"kind": "rod", "length": length, "height": 0.03, "width": 0.03, "density": 5540.0,
+            "youngs_modulus": modulus, "element": "ancf-cable", "elements": elements} | more  # fmt: skip
+
+
+def flexible(**more: Any) -> Scene:
+    """The spherical double pendulum of two cables on a coarse mesh."""
+    return Scene.parse({
+        "name": "flexible", "dimensions": 3, "gravity": [0.0, -9.81, 0.0],
+        "bodies": {"OA": rod(1.0, 4, 2e8), "AB": rod(2.0, 8, 2e7)},
+        "joints": {"O": {"kind": "spherical", "first": HELD, "second": {"body": "OA"}},
+                   "A": {"kind": "spherical", "first": {"body": "OA", "point": "end"}, "second": {"body": "AB"}}},
+        "markers": {"A": {"body": "OA", "point": "end"}, "B": {"body": "AB", "point": "end"}},
+        "initial": {"OA": {"angle": math.pi / 4, "spin": [0, 2, 0]}, "AB": {"angle": math.pi / 6, "spin": [0, 2, 0]}},
+        "solver": {"integrator": "leapfrog", "step": 1e-5}, **more,
+    })  # fmt: skip
+
+
+def limit(machine: Scene, times: Array, step: float) -> Array:
+    """Exudyn's motion without its error of second order, by Richardson's extrapolation."""
+    runs = [
+        get_engine("exudyn").simulate(machine.with_values({"solver.step": h, "solver.integrator": "auto"}), times)
+        for h in (step, step / 2)
+    ]
+    assert all(run.ok for run in runs)
+    return np.asarray((4 * runs[1].points - runs[0].points) / 3)
+
+
+def test_the_flexible_spherical_pendulum_is_exudyns_on_equal_meshes() -> None:
+    times = np.array([0.02, 0.04])
+    ours = simulate(flexible(), times)
+    assert np.max(np.abs(limit(flexible(), times, 5e-5) - ours.points)) < 1e-8
+
+
+def test_cables_are_clamped_and_hinged_alike() -> None:
+    """A clamped boom, a body welded to its tip, and a cable hinged to that at a right angle to the axis."""
+    head = {"kind": "rigid-body", "mass": 2.0, "inertia": [0.1, 0.12, 0.15], "named_points": {"e": [0.2, 0.1]}}
+    crane = flexible(
+        bodies={"OA": rod(1.0, 2, 2e8), "H": head, "AB": rod(0.5, 1, 2e8)},
+        joints={"foot": {"kind": "weld", "first": HELD, "second": {"body": "OA"}},
+                "W": {"kind": "weld", "first": {"body": "OA", "point": "end"}, "second": {"body": "H"}},
+                "J": {"first": {"body": "H", "point": "e"}, "second": {"body": "AB"}, "axis": [0, 0, 1]}},
+        loads={"wind": {"kind": "distributed-force", "body": "OA", "force": [3.0, -2.0, 1.0]},
+               "push": {"kind": "force", "at": {"body": "AB", "point": "end"}, "force": [5.0, 1.0, 2.0]}},
+        initial={"OA": {"rotation": [0.3, 0.5, 0.2]}, "H": {"angle": 0.2}, "AB": {"angle": -1.0}},
+    )  # fmt: skip
+    times = np.array([0.02, 0.04])
+    assert np.max(np.abs(limit(crane, times, 5e-5) - simulate(crane, times).points)) < 3e-8
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"bodies": {"OA": rod(1.0, 2, 2e8, retardation=1e-3), "AB": rod(2.0, 2, 2e7)}},
+         "OA.retardation: engine exudyn"),
+        ({"joints": {"S": {"kind": "slider", "first": HELD, "second": {"body": "OA"}, "axis": [1, 0, 0]},
+                     "A": {"kind": "spherical", "first": {"body": "OA", "point": "end"}, "second": {"body": "AB"}}}},
+         "gives no direction to a place of a cable"),
+        ({"bodies": {"OA": rod(1.0, 2, 2e8), "AB": rod(2.0, 2, 2e7, element="ancf-quintic")}},
+         "cannot do ancf-quintic"),
+    ],
+)  # fmt: skip
+def test_what_exudyn_cannot_do_in_space_is_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        get_engine("exudyn").simulate(flexible(**change), [0.01])
+
+
+def test_the_geometrically_exact_beam_is_for_the_plane() -> None:
+    with pytest.raises(InputError, match="engine exudyn-ge cannot do machines in space; use gauss or exudyn"):
+        get_engine("exudyn-ge").simulate(flexible(), [0.01])
