@@ -12,7 +12,7 @@ import pytest
 from numba import njit
 from shoal.mechanics import compilation, gates, notes, warm
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.march import loop, store_frame
+from shoal.mechanics.march import loop
 from shoal.mechanics.model import Gates
 from shoal.mechanics.numerics.tile import SINGLE
 from shoal.mechanics.simulate import simulate
@@ -98,7 +98,7 @@ def test_what_is_compiled_ahead_is_what_a_run_calls(scene: Scene, lanes: int) ->
     simulate(scene, np.array([1e-3]), values)
     for kernel in warm.kernels(scene, lanes):
         if kernel.name != "_stiffness":
-            function = {"loop": loop, "store_frame": store_frame}.get(kernel.name) or getattr(gates, kernel.name)
+            function = loop if kernel.name == "loop" else getattr(gates, kernel.name)
             assert kernel.kinds in function.overloads, kernel.name
             assert kernel.cached
 

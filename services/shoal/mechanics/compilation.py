@@ -32,7 +32,6 @@ SECONDS = {
     "_force": 6.0,
     "_motion": 5.0,
     "_settle": 4.0,
-    "store_frame": 3.5,
     "_stiffness": 3.0,
     "_energies": 1.5,
 }

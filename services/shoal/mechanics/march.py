@@ -24,7 +24,7 @@ from shoal.mechanics.integrators.scheme import adaptive, advance, averages, inte
 from shoal.mechanics.marched import Frame, LoopRoom, Marched, frame_type, framed, loop_of, sampled
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import gate
-from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics.pointers import pointer
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 ASSEMBLY = 30
@@ -40,13 +40,15 @@ LOBATTO = 0.5 - 0.5 / np.sqrt(5.0)
 class March:
     """A march that is ready to run from the state in its frame's room, as often as that is put there.
 
-    The compiled loop gets nothing but an address: numba takes 40 us to look at the arrays of a machine.
+    The compiled loop gets nothing but an address, at which the frame lies with pointers for its arrays.
     """
 
     def __init__(self, frame: Frame) -> None:
         self.frame = frame
         self._home = gate.home()
-        store_frame(self._home, frame)
+        gate.put(frame.arrays.home, frame.arrays)
+        gate.put(frame.room.home, frame.room)
+        gate.put(self._home, frame)
         kinds = loop_of(frame)
         if kinds not in _LOOPS:
             _LOOPS[kinds] = gate.address(loop, (frame_type(frame),))
@@ -66,13 +68,6 @@ def march(*arguments: Any) -> Marched:
     ready = March(framed(*arguments))
     ready()
     return ready.frame.record
-
-
-@njit(cache=True)
-def store_frame(home: Array, frame: Frame) -> None:
-    """Put a frame with pointers for its arrays into its home, and its structures where the gates find them."""
-    gates.enter(raw(frame.arrays), raw(frame.room))
-    gate.store(pointer(home), raw(frame))
 
 
 @njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import config, typeof
+from numba import config
 
 from shoal.errors import ShoalError
 from shoal.mechanics import gates
@@ -24,10 +24,9 @@ from shoal.mechanics.assembly.build import build
 from shoal.mechanics.compilation import SECONDS, described
 from shoal.mechanics.dynamics import work_space
 from shoal.mechanics.integrators import INTEGRATORS, choose, halting
-from shoal.mechanics.march import loop, store_frame
+from shoal.mechanics.march import loop
 from shoal.mechanics.marched import frame_type, framed
 from shoal.mechanics.notes import Note, telling
-from shoal.mechanics.numerics import gate
 from shoal.mechanics.numerics.tile import tiles
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
@@ -138,16 +137,11 @@ def kernels(scene: Scene, lanes: int, *, every: bool = False) -> list[Kernel]:
     shared = [Kernel(kernel.__name__, kinds) for kernel, kinds in gates.kernels(tile, arrays, room, every=every)]
     if lanes > 1 and not every:  # lanes mostly differ in their start alone, and share one stability limit
         shared = [kernel for kernel in shared if kernel.name != "_stiffness"]
-    own = [
-        Kernel(loop.__name__, (frame_type(frame),)),
-        Kernel(store_frame.__name__, (typeof(gate.home()), typeof(frame))),
-    ]
-    return own + shared
+    return [Kernel(loop.__name__, (frame_type(frame),)), *shared]
 
 
 def _function(name: str) -> Any:
-    own = {kernel.__name__: kernel for kernel in (loop, store_frame)}
-    return own.get(name) or getattr(gates, name)
+    return loop if name == loop.__name__ else getattr(gates, name)
 
 
 def _compile(kernel: Kernel) -> str:

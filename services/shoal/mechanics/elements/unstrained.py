@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.scene import Rod
@@ -21,6 +20,11 @@ def unstrained(rod: Rod, s: Number) -> tuple[Array, Array]:
     speed along x; by Magnus' expansion with two points of Gauss a step, which is exact where W is constant.
     Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.7.
     """
+    if rod.straight:
+        none, one = 0.0 * np.atleast_1d(np.asarray(s, dtype=float)), np.eye(3)[..., None]
+        return np.stack([none + s, none, none]), one + 0.0 * none
+    from scipy.linalg import expm  # no straight rod waits for scipy
+
     polynomials = rod.twist, tuple(-1.0 * np.asarray(k) for k in rod.side_curvature), rod.curvature
     lanes = np.broadcast_shapes((1,), np.shape(s), *(np.shape(k) for one in polynomials for k in one))
     steps = 1 if all(len(one) <= 1 for one in polynomials) else STEPS
@@ -31,7 +35,7 @@ def unstrained(rod: Rod, s: Number) -> tuple[Array, Array]:
     h = length[..., None, None]
     change = 0.5 * h * (first + second) + np.sqrt(3.0) / 12.0 * h**2 * (first @ second - second @ first)
     total = np.broadcast_to(np.eye(4), (*lanes, 4, 4))
-    for move in scipy.linalg.expm(change):
+    for move in expm(change):
         total = total @ move
     return total[:, :3, 3].T.copy(), total[:, :3, :3].transpose(1, 2, 0).copy()
 

@@ -7,6 +7,7 @@ structure is stored once in its own `home`, and a typed pointer to it is passed 
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,45 @@ HOME = 8192
 def home() -> Array:
     """Memory for one structure, in bytes."""
     return np.zeros(HOME // 8)
+
+
+def put(place: Array, structure: tuple[Any, ...]) -> None:
+    """Write a structure with pointers in place of its arrays, which must outlive its use, into its home.
+
+    It is what `store` writes of `pointers.raw`, without a kernel of its own for every type of structure: members in
+    order, each at a multiple of its alignment, 8 bytes but for yes or no.
+    """
+    memory = place.view(np.uint8).data
+    end, _ = _laid(structure, 0, memory)
+    assert end <= HOME
+
+
+def _laid(value: Any, at: int, memory: memoryview) -> tuple[int, int]:
+    """Lay a member of a structure at the next place that is aligned for it; returns where it ends, its alignment."""
+    if isinstance(value, tuple):
+        align = _alignment(value)
+        at += -at % align
+        for part in value:
+            at, _ = _laid(part, at, memory)
+        return at + -at % align, align
+    if isinstance(value, bool | np.bool_):
+        memory[at] = bool(value)
+        return at + 1, 1
+    at += -at % 8
+    if isinstance(value, np.ndarray):
+        struct.pack_into("=Q", memory, at, value.__array_interface__["data"][0])
+    elif isinstance(value, int | np.integer):
+        struct.pack_into("=q", memory, at, int(value))
+    else:
+        struct.pack_into("=d", memory, at, value)
+    return at + 8, 8
+
+
+def _alignment(value: Any) -> int:
+    """In bytes."""
+    if isinstance(value, tuple):
+        return max((_alignment(part) for part in value), default=1)
+    return 1 if isinstance(value, bool | np.bool_) else 8
 
 
 @intrinsic
