@@ -15,6 +15,8 @@ from shoal_validation.random_space.machines import machine
 RIGID_STEP, CABLE_STEP = 5e-4, 1e-4
 """Of Exudyn as a judge [s]."""
 FINER = 4
+NEWTON = 1e-7
+"""Where its iterations stop: round-off of stiff cables reaches no further."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def _judge(scene: Scene) -> tuple[str, Trajectory | str]:
     """The name of a judge and its run of a scene, or why there is none."""
     rods = {name: body for name, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
     finer = any(body.element == "ancf-quintic" for body in rods.values())
-    values: dict[str, object] = {"solver.step": CABLE_STEP if rods else RIGID_STEP}
+    values: dict[str, object] = {"solver.step": CABLE_STEP if rods else RIGID_STEP, "solver.newton_tolerance": NEWTON}
     if finer:
         for rod, body in rods.items():
             values |= {f"bodies.{rod}.element": "ancf-cable", f"bodies.{rod}.elements": FINER * body.elements}
