@@ -17,9 +17,9 @@ from shoal.engines.exudyn.loads import add_load
 from shoal.engines.theory import left_out
 from shoal.errors import InputError
 from shoal.identification.methods import get_method
+from shoal.mechanics import elements
 from shoal.mechanics.assembly.build import build as build_model
 from shoal.mechanics.assembly.loads import LOADS
-from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.mechanics.joints import CONDITIONS, SPATIAL
 from shoal.scene import JOINT_KINDS, LOAD_KINDS, Attachment, Scene, load_scene
@@ -134,7 +134,7 @@ def test_the_places_of_a_newcomer_are_found_among_its_fields() -> None:
 
 def test_lists_of_the_scene_and_of_the_mechanics_name_the_same() -> None:
     assert set(get_args(IntegratorName)) == {"auto", *INTEGRATORS}
-    assert set(get_args(Element)) == {"rigid", *ELEMENTS}
+    assert set(get_args(Element)) == {"rigid", *elements.ELEMENTS, *elements.SPATIAL}
 
 
 @pytest.mark.parametrize("element", get_args(Element))

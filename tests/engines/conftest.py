@@ -366,6 +366,13 @@ SPATIAL = Scene.parse({
     },
     "markers": {"d": {"body": "D", "point": "e"}},
 })  # fmt: skip
+DIRECTOR = Scene.parse({
+    "name": "director", "dimensions": 3, "gravity": [0.0, 0.0, -9.81],
+    "bodies": {"A": {"kind": "rod", "length": 1.0, "height": 0.03, "width": 0.02, "density": 5540.0,
+                     "youngs_modulus": 2e8, "element": "director-rod", "elements": 2}},
+    "joints": {"W": {"kind": "weld", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "A"}}},
+    "markers": {"e": {"body": "A", "point": "end"}},
+})  # fmt: skip
 TREE = Scene.parse({
     "name": "tree", "dimensions": 3, "gravity": [0.0, 0.0, -9.81],
     "bodies": {name: {"kind": "rigid-body", "mass": 1.0, "inertia": [0.1, 0.2, 0.25]} for name in "AB"},
@@ -384,6 +391,7 @@ ONLY_NATIVE = [
     TREE,
     LOADED,
     SPATIAL,
+    DIRECTOR,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
     pair(

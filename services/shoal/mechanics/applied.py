@@ -19,7 +19,9 @@ class Applied(NamedTuple):
     it turns with, and factor fx, fy [N], (2 * following, lanes): the force (fx + i fy) d/|d| * function(t). In space
     twelve rows, of the point and of the body's directors d, and three factors: the sum of f_k d_k. turning: in space,
     a torque n * function(t) [N m] on a body, as n x d/2 on each of its directors; turned: twelve rows each, those of n
-    and of the directors. space: a tuple as long as vectors are.
+    and of the directors. twisting: the same on a node of a director rod, as (n x r')/|r'|^2 on its slope r' and the
+    rest along it on its director d; twisted: nine rows each, of n, r' and d. share: how much of
+    the torques in space acts. space: a tuple as long as vectors are.
     """
 
     space: tuple[int, ...]
@@ -35,6 +37,10 @@ class Applied(NamedTuple):
     turning: int
     turned: Index
     turning_function: Index
+    twisting: int
+    twisted: Index
+    twisting_function: Index
+    share: float = 1.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -89,7 +95,7 @@ def _add_spatial(
                     f[row + lane] += load
                     power[lane] -= load * zdot[row + lane]
     for number in range(loads.turning):
-        strength = 0.5 * _strength(functions, loads.turning_function[number], t)
+        strength = 0.5 * loads.share * _strength(functions, loads.turning_function[number], t)
         for j in range(3):
             for k in range(3):
                 row = loads.turned[12 * number + 3 + 3 * j + k] * width
@@ -101,3 +107,23 @@ def _add_spatial(
                     load = strength * (z[n1 + lane] * z[d2 + lane] - z[n2 + lane] * z[d1 + lane])
                     f[row + lane] += load
                     power[lane] -= load * zdot[row + lane]
+    for number in range(loads.twisting):
+        strength = loads.share * _strength(functions, loads.twisting_function[number], t)
+        for lane in range(width):
+            first = 9 * number
+            square, along = 0.0, 0.0
+            for k in range(3):
+                slope = z[loads.twisted[first + 3 + k] * width + lane]
+                square += slope * slope
+                along += slope * z[loads.twisted[first + k] * width + lane]
+            for k in range(3):
+                one, other = first + (k + 1) % 3, first + (k + 2) % 3
+                n1, n2 = z[loads.twisted[one] * width + lane], z[loads.twisted[other] * width + lane]
+                s1, s2 = z[loads.twisted[one + 3] * width + lane], z[loads.twisted[other + 3] * width + lane]
+                d1, d2 = z[loads.twisted[one + 6] * width + lane], z[loads.twisted[other + 6] * width + lane]
+                row, load = loads.twisted[first + 3 + k] * width, strength * (n1 * s2 - n2 * s1) / square
+                f[row + lane] += load
+                power[lane] -= load * zdot[row + lane]
+                row, load = loads.twisted[first + 6 + k] * width, strength * along * (s1 * d2 - s2 * d1) / square
+                f[row + lane] += load
+                power[lane] -= load * zdot[row + lane]

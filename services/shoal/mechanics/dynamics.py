@@ -102,7 +102,8 @@ def _derived_rows(tile: Tile, derived: Derived, z: Array, begin: int, end: int, 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def loaded(m: Arrays) -> bool:
     """Whether forces depend on rates or on time."""
-    return m.driven or m.forces.size + m.applied.fixed + m.applied.following + m.applied.turning > 0 or m.damped
+    a = m.applied
+    return m.driven or m.forces.size + a.fixed + a.following + a.turning + a.twisting > 0 or m.damped
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -94,10 +94,12 @@ class Model:
     owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
     (lanes,) or (1,). frames: how bodies hang on the coordinates. mass_entries, stretching_entries: the lower triangles
     of the mass matrix and of the rods' stiffness against stretching, see `Element`; the latter is empty where nobody
-    wants it. slowed: axial modes whose inertia is raised, see `inertia_cap`.
+    wants it. stated: the scene as it was given, in whose order the coordinates are numbered; scene: with the start that
+    agrees with its joints. slowed: axial modes whose inertia is raised, see `inertia_cap`.
     """
 
     scene: Scene
+    stated: Scene
     dimensions: int
     failed: Flags
     frames: dict[str, Frame]

@@ -9,11 +9,11 @@ from pydantic import Field, model_validator
 
 from shoal.scene.record import NonNegative, Positive, Record, Vector, Vector3
 
-Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full"]
+Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full", "director-rod"]
 Quadrature = Literal["full", "reduced"]
 Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
 
-_SHEARS = {"rigid": False, "ancf-cable": False, "ancf-quintic": False, "ancf-full": True}
+_SHEARS = {"rigid": False, "ancf-cable": False, "ancf-quintic": False, "ancf-full": True, "director-rod": False}
 _POINTS = 24
 """Quadrature points along a curved rod."""
 _ONLY_FLEXIBLE = {
@@ -39,7 +39,10 @@ class Rod(Record):
     bending). `law` is that of ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature
     of the unstrained axis over its arc length. `end_height`, `end_width`: the section at the far end of
     a tapered rod (each element has the section of its middle). `retardation` [s]: Kelvin-Voigt damping, stress
-    E (strain + retardation * strain rate).
+    E (strain + retardation * strain rate). In space `director-rod` bends about both axes of its section and twists;
+    `torsion_constant` [m^4] overrides that of the rectangle, `side_curvature` [1/m, ...] bends the unstrained axis
+    towards its local z axis and `twist` [rad/m, ...] turns its sections, both polynomials over the arc length.
+    `director`: the axis of the section that its nodes carry, by default the one that a joint can share.
     """
 
     kind: Literal["rod"] = "rod"
@@ -54,10 +57,13 @@ class Rod(Record):
     quadrature: Quadrature = "full"
     law: Law = "plane-stress"
     curvature: tuple[float, ...] = ()
+    side_curvature: tuple[float, ...] = ()
+    twist: tuple[float, ...] = ()
     end_height: Positive | None = None
     end_width: Positive | None = None
     retardation: NonNegative = 0.0
     torsion_constant: Positive | None = None
+    director: Literal["y", "z"] | None = None
     rotary_inertia: bool = False
 
     @model_validator(mode="after")
@@ -77,6 +83,11 @@ class Rod(Record):
             )
         if self.quadrature != "full" and self.element != "ancf-cable":
             raise ValueError(f"quadrature: {self.element} has its own; {self.quadrature} is for ancf-cable")
+        if self.element != "director-rod":
+            fields = ("side_curvature", "twist", "torsion_constant", "director")
+            ignored = [name for name in fields if getattr(self, name)]
+            if ignored:
+                raise ValueError(f"{ignored[0]}: {self.element} has none; it is for element: director-rod, in space")
         if self.law != "plane-stress" and self.element != "ancf-full":
             raise ValueError(f"law: {self.law} is for ancf-full; {self.element} has no choice of law")
         return self
@@ -102,6 +113,11 @@ class Rod(Record):
     def shears(self) -> bool:
         """Whether its element has shear and the rotary inertia of its sections."""
         return _SHEARS[self.element]
+
+    @property
+    def straight(self) -> bool:
+        """Whether the unstrained rod is neither curved nor twisted."""
+        return not (self.curvature or self.side_curvature or self.twist)
 
     @property
     def tapered(self) -> bool:

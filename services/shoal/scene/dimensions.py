@@ -22,6 +22,9 @@ def check_dimensions(scene: Any) -> None:
         for name, joint in scene.joints.items():
             if joint.kind in SPATIAL_KINDS:
                 raise ValueError(f"joints.{name}.kind: {joint.kind} is a joint in space; say dimensions: 3")
+        for name, body in scene.bodies.items():
+            if body.element == "director-rod":
+                raise ValueError(f"bodies.{name}.element: director-rod is for scenes in space; say dimensions: 3")
         _check_plane(scene, "")
         return
     flat = is_flat(scene)
@@ -31,15 +34,17 @@ def check_dimensions(scene: Any) -> None:
                 raise ValueError(f"initial.{name}.{other}: {one} is stated as well; state one of them")
     for name, body in scene.bodies.items():
         if body.kind == "rod" and body.element == "ancf-full":
-            raise ValueError(f"bodies.{name}.element: ancf-full is for the plane; use ancf-cable or ancf-quintic")
+            raise ValueError(f"bodies.{name}.element: ancf-full is for the plane; use ancf-cable or director-rod")
+        if body.kind == "rod" and body.element == "director-rod":
+            continue
         flexible = body.kind == "rod" and body.element != "rigid"
         if flexible and not flat and (body.height, body.end_height) != (body.width, body.end_width):
             raise ValueError(
                 f"bodies.{name}.width: {body.element} bends alike about both axes of its section; beyond the plane "
-                "z = 0 its width must be its height"
+                "z = 0 its width must be its height, or its element a director-rod"
             )
         if body.kind == "rod" and body.curvature:
-            raise ValueError(f"bodies.{name}.curvature: curved rods are for the plane; leave dimensions: 3 out")
+            raise ValueError(f"bodies.{name}.curvature: in space a curved rod is a director-rod, not {body.element}")
 
 
 def _check_plane(part: Any, path: str) -> None:
@@ -68,6 +73,8 @@ def _is_spatial(name: str, value: Any) -> bool:
         return getattr(value, "number", None) != 0.0
     if name == "inertia":
         return isinstance(value, tuple)
+    if name in ("side_curvature", "twist", "director"):
+        return bool(value)
     return name in ("rotation", "spin", "torsion_constant") and not isinstance(value, str | None)
 
 

@@ -26,7 +26,7 @@ _FEW = 4
 Quantity = Literal["angle", "rate", "position", "velocity", "rotation", "spin"]
 POSES: tuple[Quantity, ...] = ("angle", "position", "rotation")
 RATES: tuple[Quantity, ...] = ("rate", "velocity", "spin")
-_SHAPES = ("length", "curvature", "named_points")
+_SHAPES = ("length", "curvature", "side_curvature", "twist", "named_points")
 """Fields of a body that place its joints."""
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
 

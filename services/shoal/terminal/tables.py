@@ -217,10 +217,11 @@ def comparison_table(comparison: Comparison) -> None:
 
 def equilibrium_table(equilibrium: Equilibrium) -> None:
     """Where the markers rest, what the joints bear, and the evidence."""
-    table = screen.table(f"{equilibrium.scene.name} at rest", "marker", "x [m]", "y [m]", "angle [rad]")
+    axes = [f"{axis} [m]" for axis in "xyz"[: equilibrium.scene.dimensions]]
+    table = screen.table(f"{equilibrium.scene.name} at rest", "marker", *axes, "angle [rad]")
     for name in equilibrium.markers:
-        x, y = equilibrium.marker(name)
-        table.add_row(name, f"{x:z.9f}", f"{y:z.9f}", f"{equilibrium.angle(name):z.9f}")
+        place = (f"{part:z.9f}" for part in equilibrium.marker(name))
+        table.add_row(name, *place, f"{equilibrium.angle(name):z.9f}")
     screen.out.print(table)
     if equilibrium.reactions is not None:
         reactions_table([equilibrium.reactions])
@@ -238,8 +239,14 @@ def reactions_table(found: list[Reactions]) -> None:
     """What every joint exerts on its second body."""
     for reactions in found:
         title = f"joint forces on the second body at t = {reactions.time:g} s"
-        table = screen.table(title, "joint", "kind", "fx [N]", "fy [N]", "torque [N m]", "unique")
-        every = [(*joint.force, joint.torque) for joint in reactions.joints.values()]
+        every = [
+            (*joint.force, *(joint.torque if isinstance(joint.torque, tuple) else (joint.torque,)))
+            for joint in reactions.joints.values()
+        ]
+        spatial = any(len(values) > 3 for values in every)
+        numbered = [f"{kind}{axis} [{unit}]" for kind, unit in (("f", "N"), ("m", "N m")) for axis in "xyz"]
+        headings = numbered if spatial else ["fx [N]", "fy [N]", "torque [N m]"]
+        table = screen.table(title, "joint", "kind", *headings, "unique")
         rounding = _NOTHING * float(np.max(np.abs(every), initial=0.0))
         for (name, joint), values in zip(reactions.joints.items(), every, strict=True):
             numbers = (f"{0.0 if abs(value) < rounding else value:.6g}" for value in values)

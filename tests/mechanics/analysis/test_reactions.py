@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from shoal.errors import InputError
 from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.motion_state import states
 from shoal.mechanics.analysis.reactions import reactions, reactions_of
 from shoal.mechanics.analysis.sections import sections
@@ -187,3 +188,29 @@ def test_sections_of_a_beam_on_two_supports_under_its_weight() -> None:
     np.testing.assert_allclose(cut.shear, -10 * 9.81 * (0.5 - cut.s), atol=1e-6)
     with pytest.raises(InputError, match="flexible rod"):
         sections(evaluator, found.q, rest, rest, 0.0, "OB")
+
+
+def test_reactions_and_modes_number_the_bodies_as_the_motion_does() -> None:
+    """Bodies of which some state a position and some do not: the order of the coordinates is that of the statements."""
+    link = {"kind": "rigid-body", "mass": 1.5, "inertia": 0.2, "centre_of_mass": [0.4, 0.1],
+            "named_points": {"end": [0.8, 0.0]}}  # fmt: skip
+    parts: dict[str, Any] = {
+        "name": "ordered",
+        "bodies": {"A": link, "B": link, "P": {"kind": "point-mass", "mass": 0.3}},
+        "joints": {
+            "O": {"kind": "revolute", "first": {"body": "ground", "point": [0, 0]}, "second": {"body": "A"}},
+            "S": {"kind": "slider", "first": {"body": "A", "point": "end"}, "second": {"body": "B"}, "direction": 0.3},
+            "T": {"kind": "distance", "first": {"body": "ground", "point": [2.0, 0.0]}, "second": {"body": "P"}},
+        },
+        "loads": {"K": {"kind": "spring", "first": {"body": "A", "point": "end"}, "second": {"body": "B"},
+                        "stiffness": 500.0, "length": 0.1},
+                  "Q": {"kind": "spring", "first": {"body": "B", "point": "end"}, "second": {"body": "P"},
+                        "stiffness": 200.0, "length": 0.1}},
+        "markers": {"b": {"body": "B", "point": "end"}, "p": {"body": "P"}},
+        "initial": {"A": {"angle": -1.2}, "P": {"position": [2.0, -0.8]}},
+        "solver": {"integrator": "rk4", "step": 1e-3},
+    }  # fmt: skip
+    scene = Scene.parse(parts)
+    (found,) = reactions(scene, [0.2])
+    assert found.ok
+    assert modes(scene).balanced

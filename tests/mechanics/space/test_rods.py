@@ -112,7 +112,7 @@ def test_a_rod_swings_in_any_plane_as_in_one() -> None:
     ("change", "message"),
     [
         ({"bodies": {"OA": rod(1.0, 2, 2e8, width=0.02), "AB": rod(2.0, 2, 2e7)}}, "width must be its height"),
-        ({"bodies": {"OA": rod(1.0, 2, 2e8, curvature=[0.1]), "AB": rod(2.0, 2, 2e7)}}, "curved rods are"),
+        ({"bodies": {"OA": rod(1.0, 2, 2e8, curvature=[0.1]), "AB": rod(2.0, 2, 2e7)}}, "curved rod is a director-rod"),
         (
             {"joints": {"O": {"kind": "revolute", "first": HELD, "second": {"body": "OA"},
                               "axis": [1, 0, 1]},

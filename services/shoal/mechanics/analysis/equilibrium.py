@@ -28,8 +28,10 @@ class Held(StrEnum):
 class Equilibrium:
     """A state of rest, and the evidence for it.
 
-    balanced: whether the forces balance, stably or not. q: coordinates; multipliers: lambda, Q = C_q' lambda.
-    markers: names; points [m], (markers, 2); angles [rad], counted over full turns from the start, (markers,).
+    scene: as it was given. balanced: whether the forces balance, stably or not. q: coordinates; multipliers: lambda,
+    Q = C_q' lambda.
+    markers: names; points [m], (markers, d); angles [rad], counted over full turns from the start, in
+    space of the direction's shadow in the plane z = 0, (markers,).
     energy: strain, gravity, applied [J]; strain_energy: of every flexible body [J]. residual: unbalanced force
     relative to all forces; gap: worst violation of a joint; correction: the last one, relative to the machine's size.
     eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
@@ -70,7 +72,7 @@ class Equilibrium:
         return bool(np.all(np.real(self.eigenvalues) > zero_level(self.eigenvalues)))
 
     def marker(self, name: str) -> Array:
-        """Position of a marker [m], (2,)."""
+        """Position of a marker [m], (d,)."""
         return np.asarray(self.points[self.markers.index(name)])
 
     def angle(self, name: str) -> float:
@@ -85,7 +87,10 @@ class Equilibrium:
             "time": self.time,
             "stable": self.stable,
             "markers": {
-                name: {"x": plain(self.marker(name)[0]), "y": plain(self.marker(name)[1]), "angle": self.angle(name)}
+                name: {
+                    **dict(zip("xyz", plain(self.marker(name)), strict=False)),
+                    "angle": self.angle(name),
+                }
                 for name in self.markers
             },
             "energy": self.energy,

@@ -16,6 +16,7 @@ from numba import njit
 
 from shoal.mechanics import constraints, forces, functions, gates, plane
 from shoal.mechanics.affine import Affine
+from shoal.mechanics.analysis.load_stiffness import in_plane, in_space
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.derived import derive
 from shoal.mechanics.dynamics import Work, derived_rows, remember, work_space
@@ -27,7 +28,6 @@ from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile
 from shoal.mechanics.tangent import damping_at, stiffness_at, tangent_tile
 from shoal.scene import Scene
-from shoal.scene.dimensions import require_plane
 
 Sparse = scipy.sparse.csr_array
 _LANE = slice(0, 1)
@@ -111,16 +111,17 @@ class Points(NamedTuple):
         return self.matrix @ q + self.constant
 
     def turning(self, q: Array) -> Array:
-        """Of directions: the derivatives of their angles [rad] at q, (vectors, unknowns)."""
-        now = self.at(q)
-        x, y = self.matrix.transpose(1, 0, 2)
+        """Of directions: the derivatives of their angles [rad] at q, about z, (vectors, unknowns)."""
+        now = self.at(q)[:, :2]
+        x, y = self.matrix.transpose(1, 0, 2)[:2]
         return np.asarray(plane.cross(now.T[..., None], (x, y)) / np.sum(now**2, axis=1)[:, None])
 
 
 def points(vectors: Sequence[Affine], unknowns: int) -> Points:
     """Vectors of a placement as one matrix."""
-    matrix = np.zeros((len(vectors), plane.DIMENSIONS, unknowns))
-    constant = np.zeros((len(vectors), plane.DIMENSIONS))
+    dimensions = len(vectors[0].constant) if vectors else plane.DIMENSIONS
+    matrix = np.zeros((len(vectors), dimensions, unknowns))
+    constant = np.zeros((len(vectors), dimensions))
     for k, vector in enumerate(vectors):
         constant[k] = vector.constant[:, 0]
         for unknown, coefficient in vector.terms.items():
@@ -147,7 +148,6 @@ class Evaluator:
     @classmethod
     def of(cls, scene: Scene, *, horizon: float = 0.0) -> Evaluator:
         """The evaluator of a scene; horizon [s]: latest time that will be asked for. Raises InputError."""
-        require_plane(scene, "statics, modes, reactions and section forces are")
         return cls(build(scene, horizon=horizon))
 
     @property
@@ -222,8 +222,9 @@ class Evaluator:
 
     @property
     def follows(self) -> bool:
-        """Whether a load turns with a body, so that there is no potential."""
-        return self._arrays.applied.following > 0
+        """Whether a load turns with a body, or a torque in space does not, so that there is no potential."""
+        applied = self._arrays.applied
+        return applied.following + applied.turning + applied.twisting > 0
 
     def _enter(self, q: Array, v: Array | None) -> None:
         n = self.model.unknowns
@@ -243,7 +244,9 @@ class Evaluator:
         return arrays._replace(
             weight=arrays.weight * load,
             forces=arrays.forces._replace(law=law),
-            applied=applied._replace(coefficient=applied.coefficient * load, factor=applied.factor * load),
+            applied=applied._replace(
+                coefficient=applied.coefficient * load, factor=applied.factor * load, share=applied.share * load
+            ),
         )
 
     def _only(self, body: str, number: int | None = None) -> Arrays:
@@ -265,7 +268,7 @@ class Evaluator:
             weight=0.0 * arrays.weight,
             elements=tuple(families),
             forces=arrays.forces._replace(law=law, table=none, energy=none),
-            applied=applied._replace(coefficient=0.0 * applied.coefficient, factor=0.0 * applied.factor),
+            applied=applied._replace(coefficient=0.0 * applied.coefficient, factor=0.0 * applied.factor, share=0.0),
         )
 
     def _force(self, q: Array, v: Array | None, arrays: Arrays) -> Array:
@@ -296,7 +299,7 @@ class Evaluator:
     def _applied(self, arrays: Arrays, t: float) -> float:
         """Potential of the applied loads [J]; the derived rows must be filled."""
         applied, z = arrays.applied, self._room.z
-        if applied.following:
+        if self.follows:
             return float("nan")
         strength = self._strengths(arrays, applied.fixed_function, t)
         total = -float(np.sum(applied.coefficient * strength * z[applied.row])) if applied.fixed else 0.0
@@ -309,30 +312,20 @@ class Evaluator:
         return total
 
     def _load_stiffness(self, arrays: Arrays, t: float) -> scipy.sparse.csc_array:
-        """-dQ/dq of motors and of forces that turn with a body."""
-        applied, z, n = arrays.applied, self._room.z, self.model.unknowns
-        parts: list[tuple[Index, Index, Array]] = []
-        strength = self._strengths(arrays, applied.following_function, t)
-        for k in range(applied.following):
-            rows = applied.rows[4 * k : 4 * k + 4]
-            dx, dy = z[rows[2:]]
-            size = np.hypot(dx, dy)
-            fx, fy = applied.factor[2 * k : 2 * k + 2] * strength[k]
-            # d/dd of R d/|d| with R = [[fx, -fy], [fy, fx]]: R (I - n n')/|d|
-            normal = np.array([[dy * dy, -dx * dy], [-dx * dy, dx * dx]]) / size**3
-            parts.append((rows[:2], rows[2:], -np.array([[fx, -fy], [fy, fx]]) @ normal))
-        pairs = arrays.forces.rows.reshape(-1, forces.side(arrays.forces))
-        for k, torque in self._torques(arrays, t):
-            for rows, sign in ((pairs[k, :2], -1.0), (pairs[k, 2:4], 1.0)):
-                x, y = z[rows]
-                square = (x * x + y * y) ** 2
-                # The second derivatives of atan2(y, x).
-                turn = np.array([[2 * x * y, y * y - x * x], [y * y - x * x, -2 * x * y]]) / square
-                parts.append((rows, rows, -torque * sign * turn))
+        """-dQ/dq of motors, of forces that turn with a body and of torques."""
+        n, z = self.model.unknowns, self._room.z
+
+        def strengths(numbers: Index) -> Array:
+            return self._strengths(arrays, numbers, t)
+
+        if self.model.dimensions == plane.DIMENSIONS:
+            parts = in_plane(arrays, z, strengths, self._torques(arrays, t))
+        else:
+            parts = in_space(arrays, z, strengths)
         if not parts:
             return scipy.sparse.csc_array((n, n))
-        row = np.concatenate([np.repeat(to, 2) for to, _, _ in parts])
-        column = np.concatenate([np.tile(source, 2) for _, source, _ in parts])
+        row = np.concatenate([np.repeat(to, len(source)) for to, source, _ in parts])
+        column = np.concatenate([np.tile(source, len(to)) for to, source, _ in parts])
         value = np.concatenate([block.ravel() for _, _, block in parts])
         size = self.model.rows
         block = scipy.sparse.csr_array((value, (row, column)), shape=(size, size))

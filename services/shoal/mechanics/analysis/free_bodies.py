@@ -12,11 +12,13 @@ import numpy as np
 import scipy.sparse
 
 from shoal.mechanics import plane
+from shoal.mechanics import rotation as turns
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.forces import LAW
+from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import InitialState, RigidBody, Scene
 
@@ -29,7 +31,7 @@ class FreeBodies:
 
     def __init__(self, evaluator: Evaluator, horizon: float) -> None:
         whole = evaluator.model
-        joined = place(whole.scene)
+        joined = place(whole.stated)
         scene, added = _with_inertia(_without_joints(whole.scene, joined))
         model = build(scene, horizon=horizon)
         # Springs at rest as they start keep the natural values of the whole machine; joint friction came before them.
@@ -48,8 +50,9 @@ class FreeBodies:
         """The mass matrix of inertias alone [kg m^2]."""
         diagonal = np.zeros(self.unknowns)
         for name, inertia in added.items():
-            for row in self.placement.frames[name].vectors[1].own or ():
-                diagonal[row] = inertia
+            directors = self.placement.frames[name].vectors[1:]
+            for row in (row for vector in directors for row in vector.own or ()):
+                diagonal[row] = inertia if len(directors) == 1 else inertia / 2
         return scipy.sparse.csc_array(scipy.sparse.diags_array(diagonal))
 
     @property
@@ -65,6 +68,8 @@ class FreeBodies:
 
 def _without_joints(scene: Scene, placement: Placement) -> Scene:
     """The scene with every body flying free from where the joints placed it."""
+    if scene.dimensions != plane.DIMENSIONS:
+        return _without_joints_in_space(scene, placement)
     initial = {}
     for name in scene.bodies:
         pose, start = placement.poses[name], placement.scene.start(name)
@@ -77,6 +82,26 @@ def _without_joints(scene: Scene, placement: Placement) -> Scene:
             velocity=tuple(pose.velocity[:, 0].tolist()),
         )
     return scene.model_copy(update={"joints": {}, "initial": initial})
+
+
+def _without_joints_in_space(scene: Scene, placement: Placement) -> Scene:
+    """The same in space, with the directors that joints chose for the rods."""
+    initial, bodies = {}, dict(scene.bodies)
+    for name, pose in placement.poses.items():
+        directors, turning = pose.directors[..., 0], pose.turning[..., 0]
+        initial[name] = InitialState.model_construct(
+            angle=None,
+            rate=None,
+            rotation=tuple(turns.vector_of(directors.T).tolist()),
+            spin=tuple((0.5 * np.sum(np.cross(directors, turning), axis=0)).tolist()),
+            position=tuple(pose.position[:, 0].tolist()),
+            velocity=tuple(pose.velocity[:, 0].tolist()),
+            guess=(),
+        )
+        frame = placement.frames[name]
+        if isinstance(frame, BeamFrame) and frame.element.director is not None:
+            bodies[name] = bodies[name].model_copy(update={"director": "xyz"[frame.element.director]})
+    return scene.model_copy(update={"joints": {}, "initial": initial, "bodies": bodies})
 
 
 def _with_inertia(scene: Scene) -> tuple[Scene, dict[str, float]]:

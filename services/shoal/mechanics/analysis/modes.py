@@ -36,7 +36,7 @@ class Mode:
 
     eigenvalue [1/s]: imaginary part the frequency of the oscillation [rad/s], real part its growth. shape: displacement
     of the coordinates, real and with shape' M shape = 1 where nothing is damped, (unknowns,). points: displacement
-    of the markers, (markers, 2); angles: their turns, (markers,).
+    of the markers, (markers, d); angles: their turns, (markers,).
     """
 
     eigenvalue: complex
@@ -118,8 +118,7 @@ class Modes:
                     "mesh_error": self.mesh_errors[number] if self.mesh_errors else None,
                     "shape": {
                         name: {
-                            "dx": _two(mode.points[k, 0]),
-                            "dy": _two(mode.points[k, 1]),
+                            **{f"d{axis}": _two(part) for axis, part in zip("xyz", mode.points[k], strict=False)},
                             "dangle": _two(mode.angles[k]),
                         }
                         for k, name in enumerate(self.markers)

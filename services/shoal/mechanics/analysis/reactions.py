@@ -10,21 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from shoal.mechanics import plane
-from shoal.mechanics.affine import Affine
-from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics import joints, plane
+from shoal.mechanics.analysis import plane_forces, space_forces
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.freedom import Metric
+from shoal.mechanics.analysis.joint_forces import place
 from shoal.mechanics.analysis.motion_state import states
-from shoal.mechanics.frames import BeamFrame, RigidFrame
-from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, conditions, unknown
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
-from shoal.scene import Attachment, Coupling, Revolute, Scene, Slider
+from shoal.scene import Attachment, Coupling, Scene
 from shoal.scene.joints import places
 from shoal.trajectory import plain
 
@@ -38,16 +37,16 @@ BALANCED = 1e-6
 class JointReaction:
     """What a joint exerts on its second body (on its first: the opposite).
 
-    at: where [m]; force [N] and torque [N m] (counter-clockwise), friction included; components: each unknown of the
-    joint by name (fx, fy, torque, normal, axial, coupled) with its value; unique: whether none of them could be
-    different with the same motion.
+    at: where [m]; force [N] and torque [N m] (counter-clockwise, in space a vector), friction included; components:
+    each unknown of the joint by name (fx, fy, torque, normal, axial, coupled, ...) with its value; unique: whether none
+    of them could be different with the same motion.
     """
 
     joint: str
     kind: str
     at: tuple[float, ...]
     force: tuple[float, ...]
-    torque: float
+    torque: float | tuple[float, ...]
     components: dict[str, float]
     unique: bool
 
@@ -88,16 +87,6 @@ class Reactions:
         }
 
 
-class _Component(NamedTuple):
-    """One unknown of a joint: its work per displacement of the free bodies, and the force it is per unit [N]."""
-
-    joint: str
-    name: str
-    gradient: Array
-    force: Array
-    torque: bool
-
-
 def reactions(scene: Scene, times: Sequence[float] = (0.0,)) -> list[Reactions]:
     """Reactions in the motion of a scene at requested times [s]. Raises InputError, ComputationError."""
     evaluator, found = states(scene, times)
@@ -119,12 +108,13 @@ def reactions_of(
     at, rate, change = bodies.state(q, v, a)
     free = bodies.evaluator
     lever = span(bodies.scene)
-    told = [(name, one) for name, joint in bodies.scene.joints.items() for one in conditions(joint)]
-    unknown = [part for name, one in told for part in _of_condition(bodies, name, one, at)]
-    known, rubbed = _friction(bodies, at, rate)
+    here: Any = plane_forces if bodies.scene.dimensions == plane.DIMENSIONS else space_forces
+    told = joints.of_scene(bodies.scene)
+    unknown = [part for name, one in told for part in here.components(bodies, name, one, at)]
+    known, rubbed = here.friction(bodies, at, rate)
     force = free.at(at, rate, t).force
     inertia = bodies.mass @ change
-    displacements = _displacements(bodies, at, lever)
+    displacements = here.displacements(bodies, at, lever)
     missing = displacements @ (inertia - force - known)
     scale = max(
         float(np.linalg.norm(displacements @ part)) for part in (inertia, force, known, force - free.at(at).elastic)
@@ -132,31 +122,32 @@ def reactions_of(
     count = len(unknown)
     columns = np.zeros((len(displacements), count))
     for k, part in enumerate(unknown):
-        columns[:, k] = displacements @ part.gradient * (lever if part.torque else 1.0)
+        columns[:, k] = displacements @ part.gradient * (lever if part.turns else 1.0)
     left, sizes, right = np.linalg.svd(columns, full_matrices=True)
     rank = int(np.sum(sizes > RANK * sizes[0])) if count and len(sizes) else 0
     solution = right[:rank].T @ ((left[:, :rank].T @ missing) / sizes[:rank])
     rest = float(np.linalg.norm(missing - columns @ solution))
     free_play = np.linalg.norm(right[rank:], axis=0) if rank < count else np.zeros(count)
-    joints = {}
+    found = {}
     for name in bodies.scene.joints:
         mine = [k for k, part in enumerate(unknown) if part.joint == name]
-        values = {k: float(solution[k]) * (lever if unknown[k].torque else 1.0) for k in mine}
-        rubbing_force, rubbing_torque = rubbed.get(name, (np.zeros(plane.DIMENSIONS), 0.0))
+        values = {k: float(solution[k]) * (lever if unknown[k].turns else 1.0) for k in mine}
+        none = np.zeros(bodies.scene.dimensions), np.zeros(1 if here is plane_forces else 3)
+        rubbing_force, rubbing_torque = rubbed.get(name, none)
         total = sum((unknown[k].force * values[k] for k in mine), rubbing_force)
-        torque = sum(values[k] for k in mine if unknown[k].torque) + rubbing_torque
+        torque = sum((unknown[k].torque * values[k] for k in mine), rubbing_torque).tolist()
         joint = bodies.scene.joints[name]
-        joints[name] = JointReaction(
+        found[name] = JointReaction(
             name,
             joint.kind,
-            tuple(_place(bodies, _second(joint), at).value.tolist()),
+            tuple(place(bodies, _second(joint), at).value.tolist()),
             tuple(total.tolist()),
-            float(torque),
+            torque[0] if here is plane_forces else tuple(torque),
             {unknown[k].name: values[k] for k in mine},
             bool(np.all(free_play[mine] < SHARE)),
         )
     names = redundant_constraints(evaluator, q, t)
-    return Reactions(t, joints, count - rank, names, rest / scale if scale > 0 else 0.0)
+    return Reactions(t, found, count - rank, names, rest / scale if scale > 0 else 0.0)
 
 
 def redundant_constraints(evaluator: Evaluator, q: Array, t: float = 0.0) -> tuple[str, ...]:
@@ -182,110 +173,3 @@ def redundant_constraints(evaluator: Evaluator, q: Array, t: float = 0.0) -> tup
 
 def _second(joint: Any) -> Attachment:
     return places(joint)[0] if isinstance(joint, Coupling) else joint.second
-
-
-class _Moving(NamedTuple):
-    """A vector of the free bodies and its derivative: (d,) and (d, unknowns)."""
-
-    value: Array
-    slope: Array
-
-
-def _moving(bodies: FreeBodies, vector: Affine, at: Array) -> _Moving:
-    found = points([vector], bodies.unknowns)
-    return _Moving(found.at(at)[0], found.matrix[0])
-
-
-def _place(bodies: FreeBodies, side: Attachment, at: Array) -> _Moving:
-    return _moving(bodies, bodies.placement.point(bodies.scene, side), at)
-
-
-def _gap(bodies: FreeBodies, condition: Any, at: Array) -> _Moving:
-    return _moving(bodies, bodies.placement.gap(bodies.scene, condition), at)
-
-
-def _turning(bodies: FreeBodies, condition: Any, at: Array) -> Array:
-    """d(angle of second - angle of first)."""
-    lines = [bodies.placement.direction(bodies.scene, side) for side in (condition.first, condition.second)]
-    first, second = points(lines, bodies.unknowns).turning(at)
-    return np.asarray(second - first)
-
-
-def _sliding(bodies: FreeBodies, first: Attachment, second: Attachment, turn: float, at: Array) -> tuple[Array, ...]:
-    """Unit vector of a slider's line, and the derivatives of the place along and across it [m]."""
-    direction = bodies.placement.direction(bodies.scene, first).turned(plane.rotation(turn))
-    line, gap = _moving(bodies, direction, at), _gap(bodies, Along(first, second, turn), at)
-    size = np.hypot(*line.value)
-    e = line.value / size
-    # The line is a direction only: its length does no work, only its turn does.
-    turning = plane.cross(line.value, line.slope) / size**2
-    along = e @ gap.slope + plane.cross(e, gap.value) * turning
-    across = plane.cross(e, gap.slope) - (e @ gap.value) * turning
-    return e, along, across
-
-
-def _of_condition(bodies: FreeBodies, name: str, condition: Condition, at: Array) -> list[_Component]:
-    """The unknowns of a condition of a joint."""
-    if isinstance(condition, Sum):
-        axes = ["xyz".index(term.axis) for term in condition.terms]
-        rows = [_place(bodies, term.at, at).slope[axis] for term, axis in zip(condition.terms, axes, strict=True)]
-        gradient = sum(term.factor * row for term, row in zip(condition.terms, rows, strict=True))
-        force = condition.terms[0].factor * np.eye(plane.DIMENSIONS)[axes[0]]
-        return [_Component(name, "coupled", np.asarray(gradient), force, False)]
-    if isinstance(condition, Turned):
-        none = np.zeros(plane.DIMENSIONS)
-        return [_Component(name, "torque", _turning(bodies, condition, at), none, True)]
-    if isinstance(condition, Along):
-        assert not isinstance(condition.direction, tuple)
-        e, _, across = _sliding(bodies, condition.first, condition.second, condition.direction, at)
-        return [_Component(name, "normal", across, plane.quarter(e), False)]
-    if not isinstance(condition, Meet | Apart):
-        raise unknown(condition)
-    gap = _gap(bodies, condition, at)
-    if isinstance(condition, Apart):
-        length = np.hypot(*gap.value)
-        along = gap.value / length if length > 0 else np.eye(plane.DIMENSIONS)[0]
-        return [_Component(name, "axial", along @ gap.slope, along, False)]
-    return [
-        _Component(name, f"f{axis}", slope, unit, False)
-        for axis, slope, unit in zip("xyz", gap.slope, np.eye(plane.DIMENSIONS), strict=False)
-    ]
-
-
-def _friction(bodies: FreeBodies, at: Array, rate: Array) -> tuple[Array, dict[str, tuple[Array, float]]]:
-    """Generalised force of all joint friction, and force and torque of each joint's on its second body."""
-    total = np.zeros(bodies.unknowns)
-    each: dict[str, tuple[Array, float]] = {}
-    for name, joint in bodies.scene.joints.items():
-        if not (isinstance(joint, Revolute | Slider) and (joint.friction or joint.coulomb)):
-            continue
-        if isinstance(joint, Revolute):
-            line, gradient = np.zeros(plane.DIMENSIONS), _turning(bodies, joint, at)
-        else:
-            line, gradient, _ = _sliding(bodies, joint.first, joint.second, joint.direction, at)
-        speed = float(gradient @ rate)
-        drag = -joint.friction * speed - joint.coulomb * float(np.tanh(speed / joint.coulomb_speed))
-        total += drag * gradient
-        each[name] = (line * drag, 0.0 if np.any(line) else drag)
-    return total, each
-
-
-def _displacements(bodies: FreeBodies, at: Array, lever: float) -> Array:
-    """Displacements of the free bodies whose work must vanish, (displacements, unknowns)."""
-    rows = []
-
-    def add(vector: Affine, value: Array) -> None:
-        row = np.zeros(bodies.unknowns)
-        row[list(vector.own or ())] = value
-        rows.append(row)
-
-    axes = np.eye(plane.DIMENSIONS)
-    for frame in bodies.placement.frames.values():
-        order = len(frame.nodes[0]) if isinstance(frame, BeamFrame) else 1
-        free = frame.vectors[:1] if isinstance(frame, RigidFrame) else frame.vectors
-        for k, vector in enumerate(free):
-            for axis in axes:
-                add(vector, axis * lever ** -float(k % order))
-        if isinstance(frame, RigidFrame):
-            add(frame.directors[0], plane.quarter(frame.directors[0].at(at)) / lever)
-    return np.array(rows)

@@ -20,6 +20,7 @@ from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, DistributedForce, Rod, Scene
+from shoal.scene.dimensions import require_plane
 from shoal.scene.joints import places, sides
 
 
@@ -40,6 +41,7 @@ class Sections(NamedTuple):
 def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: str) -> Sections:
     """Section forces of a flexible rod at a state (coordinates, rates, accelerations). Raises InputError."""
     scene = evaluator.model.scene
+    require_plane(scene, "section forces are")
     body = scene.bodies.get(rod)
     if not isinstance(body, Rod) or body.element == "rigid":
         raise InputError(f"{rod}: section forces need a flexible rod of the scene")

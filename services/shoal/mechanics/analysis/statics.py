@@ -24,7 +24,7 @@ from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
-from shoal.scene import Scene
+from shoal.scene import Attachment, Scene
 
 TURN = 0.8
 """Largest turn [rad] of any body or section in one load step."""
@@ -52,14 +52,15 @@ class _Search:
     """One search for an equilibrium."""
 
     def __init__(self, scene: Scene, evaluator: Evaluator, time: float) -> None:
-        self.placement = place(scene)
+        self.stated, self.placement = scene, place(scene)
         scene = self.placement.scene
         self.scene, self.evaluator, self.time = scene, evaluator, time
         unknowns = evaluator.model.unknowns
         self.directions = points(_directions(self.placement), unknowns)
         self.marker_points = points([self.placement.point(scene, at) for at in scene.markers.values()], unknowns)
         self.marker_lines = points([self.placement.direction(scene, at) for at in scene.markers.values()], unknowns)
-        self.angles = np.array([float(start_angle(scene, at)) for at in scene.markers.values()])
+        angles = start_angle if scene.dimensions == plane.DIMENSIONS else self._start_angle
+        self.angles = np.array([float(angles(scene, at)) for at in scene.markers.values()])
         mass = sum(float(body.mass) for body in scene.bodies.values())
         self.balance = Balance(evaluator, time, span(scene), mass)
         self.iterations = self.steps = 0
@@ -101,6 +102,11 @@ class _Search:
                 self._follow(found.q)
         return self._judge(found, message)
 
+    def _start_angle(self, scene: Scene, at: Attachment) -> float:
+        """Of a machine in space: about z."""
+        along = self.placement.start_of(self.placement.direction(scene, at))[0][:, 0]
+        return float(plane.angle(along))
+
     def _judge(self, found: Found, message: str) -> Equilibrium:
         eigenvalues, lowest = self._eigen(found.q)
         zero = zero_level(eigenvalues)
@@ -131,7 +137,7 @@ class _Search:
         balanced = status is not Held.FAILED and found is not None
         rest = np.zeros_like(q)
         return Equilibrium(
-            scene=self.scene,
+            scene=self.stated,
             time=self.time,
             status=status,
             message=message,
@@ -235,7 +241,8 @@ class _Search:
     def _turn(self, one: Array, other: Array) -> float:
         """Largest turn [rad] of a body or section between two states."""
         here, there = (self.directions.at(state).T for state in (one, other))
-        change = np.arctan2(plane.cross(here, there), np.sum(here * there, axis=0))
+        across = plane.cross(here, there) if len(here) == plane.DIMENSIONS else np.cross(here.T, there.T).T
+        change = np.arctan2(np.linalg.norm(np.atleast_2d(across), axis=0), np.sum(here * there, axis=0))
         return float(np.max(np.abs(change), initial=0.0))
 
     def _way(self, one: Array, other: Array) -> float:
@@ -263,13 +270,15 @@ class _Search:
 
 def _directions(placement: Placement) -> list[Any]:
     """The direction of every rigid body and of every node of a rod."""
-    found = []
+    found: list[Any] = []
     for frame in placement.frames.values():
         if isinstance(frame, RigidFrame):
-            found.append(frame.directors[0])
+            found += frame.directors[: len(frame.directors) - 1]
         elif isinstance(frame, BeamFrame):
             count = len(frame.nodes)
             found += [frame.direction((float(frame.length) * k / (count - 1), 0.0)) for k in range(count)]
+            if frame.element.director is not None:
+                found += [node[2] for node in frame.nodes]
     return found
 
 

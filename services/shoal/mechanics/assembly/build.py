@@ -19,10 +19,11 @@ from shoal.scene import GROUND, Scene
 def with_start(model: Model, scene: Scene, lanes: int) -> Model:
     """The same model with the initial state of a scene that differs in nothing else."""
     placement = place(scene)
-    scene = placement.scene
+    stated, scene = scene, placement.scene
     return replace(
         model,
         scene=scene,
+        stated=stated,
         failed=placement.failed,
         lanes=lanes,
         q0=stacked(placement.positions),
@@ -37,7 +38,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     horizon [s]: functions of time are fitted up to it, and at least up to the end of the scene's duration.
     """
     placement = place(scene)
-    scene = placement.scene
+    stated, scene = scene, placement.scene
     horizon = max(horizon, scene.solver.duration)
     rows = Rows(len(placement.positions))
     masses = Masses(scene, placement, rows)
@@ -46,8 +47,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     held = terms.assemble(placement.terms, rows, len(loads.fitted))
     for one in placement.terms.held:
         if one.drive is not None:
-            stated = f"joints.{one.name}" if one.name in scene.joints else one.name.replace(GROUND, "ground_points", 1)
-            with naming(stated):
+            field = f"joints.{one.name}" if one.name in scene.joints else one.name.replace(GROUND, "ground_points", 1)
+            with naming(field):
                 fitting.require_no_jump(one.drive.function, horizon)
                 loads.fitted.append(fitting.fit(one.drive, horizon, one.drive.knots, steep=False))
     held_rows = rows.size
@@ -57,6 +58,7 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
     ]
     return Model(
         scene=scene,
+        stated=stated,
         dimensions=scene.dimensions,
         failed=placement.failed,
         frames=placement.frames,

@@ -18,7 +18,6 @@ from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.holding import direction, hinge, line_of
-from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
@@ -65,6 +64,7 @@ class Loads:
         self.fixed: list[tuple[int, Number, int]] = []
         self.following: list[tuple[list[int], Number, int]] = []
         self.turning: list[tuple[list[int], int]] = []
+        self.twisting: list[tuple[list[int], int]] = []
         for name, joint in scene.joints.items():
             if isinstance(joint, Revolute | Slider) and (np.any(joint.friction) or np.any(joint.coulomb)):
                 self._friction(name, joint)
@@ -111,12 +111,19 @@ class Loads:
         holder = GROUND if load.reaction is None else load.reaction.body
         axis = direction(placement, holder, load.axis)
         number = self._function(f"loads.{name}.torque", load.torque)
-        for body, sense in ((load.at.body, 1.0), (holder, -1.0)):
-            if body != GROUND:
-                frame = placement.frames[body]
-                if not isinstance(frame, RigidFrame):
-                    raise InputError(f"loads.{name}: in space a torque acts on rigid bodies, and {body} is none")
-                self.turning.append((self.rows.of_all([axis * sense, *frame.directors]), number))
+        for side, sense in ((load.at, 1.0), (load.reaction, -1.0)):
+            if side is not None and side.body != GROUND:
+                frame = placement.frames[side.body]
+                if isinstance(frame, RigidFrame):
+                    self.turning.append((self.rows.of_all([axis * sense, *frame.directors]), number))
+                    continue
+                node = frame.node(self.scene.location(side)) if isinstance(frame, BeamFrame) else None
+                if not isinstance(frame, BeamFrame) or frame.element.director is None or node is None:
+                    raise InputError(
+                        f"loads.{name}: in space a torque acts on rigid bodies and on nodes of director rods, and "
+                        f"{side.body} has none there"
+                    )
+                self.twisting.append((self.rows.of_all([axis * sense, *frame.nodes[node][1:]]), number))
 
     def _function(self, field: str, f: Function) -> int:
         """Number of a function of time; -1 for the constant 1."""
@@ -214,7 +221,7 @@ class Loads:
         assert isinstance(rod, Rod)
         number = self._function(f"loads.{name}.scale", load.scale)
         if isinstance(frame, BeamFrame):
-            parts = ELEMENTS[rod.element].weight(1.0, 1.0, 1.0, frame.element_length)
+            parts = frame.element.weight(1.0, 1.0, 1.0, frame.element_length)
             loads = [pair for k in range(rod.elements) for pair in zip(frame.of_element(k), parts, strict=True)]
         else:
             assert isinstance(frame, RigidFrame)
@@ -247,6 +254,9 @@ class Loads:
             len(self.turning),
             index([rows for rows, _ in self.turning]).ravel(),
             index([number for _, number in self.turning]),
+            len(self.twisting),
+            index([rows for rows, _ in self.twisting]).ravel(),
+            index([number for _, number in self.twisting]),
         )
 
 

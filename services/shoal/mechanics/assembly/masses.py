@@ -11,8 +11,9 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.rows import Rows
-from shoal.mechanics.elements import ELEMENTS, FAMILIES, SPATIAL, SPATIAL_FAMILIES
+from shoal.mechanics.elements import FAMILIES, SPATIAL_FAMILIES
 from shoal.mechanics.elements.families import Collected
+from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Number
 from shoal.scene import PointMass, RigidBody, Rod, Scene
@@ -74,7 +75,7 @@ class Masses:
         self._add_load(vectors, matrix[0])
 
     def _add_rod(self, name: str, rod: Rod, frame: BeamFrame) -> None:
-        element = (ELEMENTS if self.scene.dimensions == 2 else SPATIAL)[rod.element]
+        element = frame.element
         length = frame.element_length * np.ones(1) if np.ndim(frame.element_length) else frame.element_length
         for number in range(rod.elements):
             height, width = rod.section((number + 0.5) / rod.elements)
@@ -86,10 +87,8 @@ class Masses:
             nodal: list[Any] = []
             for node in (number, number + 1):
                 s = rod.length * node / rod.elements
-                nodal += [
-                    plane.vector(*padded(rod_axis(rod, s), self.scene.dimensions)),
-                    *element.nodal_vectors(rod, s),
-                ]
+                axis = plane.vector(*rod_axis(rod, s)) if self.scene.dimensions == 2 else unstrained(rod, s)[0]
+                nodal += [axis, *element.nodal_vectors(rod, s)]
             part = element.part(rod, height, width, length, nodal)
             self.families[element.family].add(name, self.rows.of_all(vectors), part)
 

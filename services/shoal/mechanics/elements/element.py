@@ -24,7 +24,9 @@ class Element:
     a unit acceleration. part: (rod, height, width, length, nodal vectors at rest) -> one element for its kernel.
     stretching: (axial stiffness EA [N], length) -> stiffness against stretching on the nodal vectors, the same for
     every direction, if the element has one. products: what its nodes need held, (i, j, value) for the dot product of
-    the i-th and the j-th of a node's vectors besides its position. In space vectors have three components.
+    the i-th and the j-th of a node's vectors besides its position. director: the axis of the section (1: y, 2: z)
+    that a node has as a vector, next to its slope; other: the same element with the other one. In space vectors have
+    three components.
     """
 
     family: type
@@ -38,3 +40,5 @@ class Element:
     normal: bool = False
     stretching: Callable[[Number, Number], list[list[Number]]] | None = None
     products: tuple[tuple[int, int, float], ...] = ()
+    director: int | None = None
+    other: Element | None = None

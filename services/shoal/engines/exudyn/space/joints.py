@@ -14,7 +14,7 @@ from shoal.engines.exudyn.space.ends import SpatialEnds, frame_about
 from shoal.engines.exudyn.space.rows import Row, add_rows, hold_node
 from shoal.errors import InputError
 from shoal.mechanics import rotation as turns
-from shoal.mechanics.assembly.space.rods import ALIGNED
+from shoal.mechanics.assembly.space.sections import ALIGNED
 from shoal.mechanics.joints import Aligned, Along, Apart, Hinged, InPlane, Meet, Square, Turned, conditions
 from shoal.scene import JOINT_KINDS, Attachment, Joint, Revolute, Slider
 from shoal.trajectory import Array

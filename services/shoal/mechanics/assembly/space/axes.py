@@ -8,8 +8,9 @@ import numpy as np
 
 from shoal.mechanics import joints
 from shoal.mechanics.affine import Affine, fixed
-from shoal.mechanics.assembly.groups import is_stiff
 from shoal.mechanics.assembly.space.attitudes import Attitudes
+from shoal.mechanics.assembly.space.sections import Owner, shared
+from shoal.mechanics.elements.element import Element
 from shoal.mechanics.joints import Aligned
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import GROUND, Scene
@@ -19,35 +20,37 @@ from shoal.scene import GROUND, Scene
 class JointAxis:
     """A unit vector that bodies have in common; `where` is known once one of them is placed.
 
-    images: bodies and the vector in their frames, (3, lanes). made: a body's own constraints keep its length.
+    images: who has it, and the vector in their frames, (3, lanes). joints: those that hold it. holders: whose own
+    constraints keep its length.
     """
 
     name: str
-    images: list[tuple[str, Array]]
+    images: list[tuple[Owner, Array]]
     where: Affine | None = None
-    holders: set[str] = field(default_factory=set)
+    holders: set[Owner] = field(default_factory=set)
+    joints: set[str] = field(default_factory=set)
 
-    def local(self, body: str) -> Array:
+    def local(self, body: Owner) -> Array:
         """The vector in a body's frame."""
         return next(image for owner, image in self.images if owner == body)
 
-    def touches(self, body: str) -> bool:
+    def touches(self, body: Owner) -> bool:
         """Whether a body has this axis."""
         return any(owner == body for owner, _ in self.images)
 
 
-def joint_axes(scene: Scene, attitudes: Attitudes) -> list[JointAxis]:
-    """Group the axes that joints let coincide, transitively; those of flexible rods are held by constraints."""
+def joint_axes(scene: Scene, attitudes: Attitudes, elements: dict[str, Element]) -> list[JointAxis]:
+    """Group the axes that joints let coincide, transitively; constraints hold those that a rod cannot share."""
     groups: list[JointAxis] = []
     for name, condition in joints.of_scene(scene):
         if not isinstance(condition, Aligned):
             continue
-        sides = [side.body for side in (condition.first, condition.second)]
-        if all(is_stiff(scene, side) for side in sides):
-            images = [(side, attitudes.image(side, condition.axis)) for side in sides]
-            if condition.axis is None and _opposed(attitudes, images):
-                images[1] = sides[1], -images[1][1]
-            _merge(groups, JointAxis(name, images))
+        sides = condition.first, condition.second
+        images = [found for side in sides if (found := shared(scene, attitudes, elements, side, condition.axis))]
+        if len(images) == len(sides):
+            if condition.axis is None and _opposed(attitudes, sides[0].body, sides[1].body):
+                images[1] = images[1][0], -images[1][1]
+            _merge(groups, JointAxis(name, images, joints={name}))
     for group in groups:
         for body, image in group.images:
             if body == GROUND:
@@ -56,9 +59,9 @@ def joint_axes(scene: Scene, attitudes: Attitudes) -> list[JointAxis]:
     return groups
 
 
-def _opposed(attitudes: Attitudes, images: list[tuple[str, Array]]) -> bool:
-    """Whether two directions point away from each other at the start."""
-    one, other = (attitudes.rotation(body)[:, 0, 0] for body, _ in images)
+def _opposed(attitudes: Attitudes, first: str, second: str) -> bool:
+    """Whether the x axes of two bodies point away from each other at the start."""
+    one, other = (attitudes.rotation(body)[:, 0, 0] for body in (first, second))
     return bool(one @ other < 0)
 
 
@@ -67,12 +70,13 @@ def _merge(groups: list[JointAxis], new: JointAxis) -> None:
         sign = next((s for p in group.images for q in new.images if (s := _same(p, q))), 0.0)
         if sign:
             groups.remove(group)
+            new.joints |= group.joints
             images = [(body, sign * image) for body, image in group.images]
             new.images += [p for p in images if not any(_same(p, q) for q in new.images)]
     groups.append(new)
 
 
-def _same(one: tuple[str, Array], other: tuple[str, Array]) -> float:
+def _same(one: tuple[Owner, Array], other: tuple[Owner, Array]) -> float:
     """1 or -1 if two axes are the same line of the same body, else 0."""
     if one[0] != other[0]:
         return 0.0

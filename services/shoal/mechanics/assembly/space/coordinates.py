@@ -8,6 +8,7 @@ from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import joint_points
 from shoal.mechanics.assembly.space.attitudes import Attitudes
 from shoal.mechanics.assembly.space.axes import joint_axes
+from shoal.mechanics.assembly.space.sections import chosen_elements
 from shoal.scene import Scene
 
 
@@ -18,6 +19,9 @@ class SpatialPlacement(Placement):
         super().__init__(scene, np.zeros(1, dtype=bool))
         self.attitudes = Attitudes(scene)
         self.points = joint_points(scene)
-        self.axes = joint_axes(scene, self.attitudes)
+        self.elements = chosen_elements(scene, self.attitudes)
+        self.axes = joint_axes(scene, self.attitudes, self.elements)
+        self.held = {name for axis in self.axes for name in axis.joints}
+        """Joints whose directions are shared, so that no constraint holds them."""
         self.chosen: set[tuple[str, int]] = set()
         """Bodies, and which joint points tell how they are turned."""

@@ -25,6 +25,7 @@ from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.holding import hold
 from shoal.mechanics.assembly.space.rods import hold_rod, place_rod
+from shoal.mechanics.assembly.space.sections import material
 from shoal.mechanics.frames import Place, PointFrame, RigidFrame
 from shoal.mechanics.joints import Aligned, Along, InPlane, Turned
 from shoal.mechanics.numerics.tile import Array
@@ -51,7 +52,7 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
         if isinstance(body, PointMass):
             _place_point(name, touching[name], pose, result)
         elif isinstance(body, Rod) and body.element != "rigid":
-            place_rod(name, body, touching[name], pose, result)
+            place_rod(scene, name, body, touching[name], pose, result)
         else:
             _place_rigid(name, touching[name], pose, result)
     for point in result.points:
@@ -61,9 +62,10 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
                 result.terms.dot(joint, fixed(normal), point.where - fixed(base), 1)
     hold(scene, result)
     for joint, condition in joints.of_scene(scene):
-        if isinstance(condition, Aligned | Turned) and not all(
+        sides_of_rods = isinstance(condition, Aligned | Turned) and not all(
             is_stiff(scene, side.body) for side in (condition.first, condition.second)
-        ):
+        )
+        if sides_of_rods and joint not in result.held:
             hold_rod(scene, joint, condition, result)
     return result
 
@@ -117,6 +119,7 @@ def _pose(scene: Scene, name: str, mine: list[JointPoint], result: SpatialPlacem
         velocity = 0.0 * position
     else:
         position, velocity, p = _rail(scene, name, result)
+    p = material(scene, name, p)
     return Pose(position - arm(directors, p), directors, velocity - arm(turning, p), turning)
 
 
