@@ -53,6 +53,7 @@ print([name for name in {HEAVY!r} if name in sys.modules])
         ("report 0123", "mlflow", "pipeline"),
         ("serve gauss", "uvicorn", "services"),
         ("export-fmu single-pendulum", "pythonfmu", "fmu"),
+        ("import pyproject.toml", "mujoco", "mujoco"),
     ],
 )
 def test_what_only_an_extra_brings_is_named_in_one_line(command: str, missing: str, extra: str) -> None:

@@ -81,4 +81,4 @@ def test_too_many_jobs_are_refused() -> None:
 
 def test_every_engine_can_be_served() -> None:
     assert f"{{{'|'.join(ENGINES)}}}" in CliRunner().invoke(main, ["serve", "--help"]).stdout
-    assert PORTS == {"gauss": 8001, "exudyn": 8002, "casadi": 8003}
+    assert PORTS == {"gauss": 8001, "exudyn": 8002, "casadi": 8003, "tree": 8004, "mujoco": 8005}

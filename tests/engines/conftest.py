@@ -382,11 +382,14 @@ TREE = Scene.parse({
               "axis": [1, 1, 0], "rotation": "locked"},
     },
     "markers": {"b": {"body": "B", "point": [0.3, 0.1, 0.2]}},
+})  # fmt: skip
+LOADED = Scene.parse(TREE.model_dump(mode="json", exclude_unset=True) | {
     "loads": {"F": {"kind": "force", "at": {"body": "B"}, "force": [1, 2, 3]},
               "T": {"kind": "torque", "at": {"body": "B"}, "torque": 2.0, "axis": [0, 1, 1]}},
 })  # fmt: skip
 ONLY_NATIVE = [
     TREE,
+    LOADED,
     SPATIAL,
     DIRECTOR,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),

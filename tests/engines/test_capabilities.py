@@ -29,7 +29,7 @@ def able(engine: str, machine: Scene) -> bool:
 def test_every_engine_does_what_it_says_and_refuses_the_rest(
     engine: str, name: str, scenes: list[Scene], run: Callable[..., Any]
 ) -> None:
-    pytest.importorskip(engine.partition("-")[0] if engine in ("exudyn", "exudyn-ge", "casadi") else "numpy")
+    pytest.importorskip(engine.partition("-")[0] if engine in ("exudyn", "exudyn-ge", "casadi", "mujoco") else "numpy")
     asking = sorted((machine for machine in scenes if name in wants(machine)), key=lambda machine: len(wants(machine)))
     if name in CAPABILITIES[engine].all:
         machine = next(machine for machine in asking if able(engine, machine))

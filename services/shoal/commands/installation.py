@@ -49,6 +49,23 @@ def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], out: Out
     click.echo(export(load_scene(scene).with_values(values), parameters, out))
 
 
+@click.command("import")
+@click.argument("file", type=click.Path(path_type=Path))
+@options.out(".yaml", otherwise="; else the file's name")
+def import_scene(file: Path, out: Out) -> None:
+    """Write the machine of FILE (URDF, or MuJoCo's MJCF) as a scene. What a scene has not is listed on stderr."""
+    import yaml
+
+    from shoal.imported import read
+
+    found = read(file)
+    path = out or Path(f"{found.scene['name']}.yaml")
+    path.write_text(yaml.safe_dump(found.scene, sort_keys=False), encoding="utf-8")
+    for line in found.left_out:
+        click.echo(f"left out: {line}", err=True)
+    click.echo(path)
+
+
 @click.command()
 @options.as_json
 def doctor(as_json: bool) -> None:

@@ -41,12 +41,19 @@ def _tree() -> Engine:
     return TreeEngine()
 
 
+def _mujoco() -> Engine:
+    from shoal.engines.mujoco import MujocoEngine
+
+    return MujocoEngine()
+
+
 ENGINES |= {
     "gauss": _gauss,
     "exudyn": _exudyn,
     "exudyn-ge": _exudyn_ge,
     "casadi": _casadi,
     "tree": _tree,
+    "mujoco": _mujoco,
 }
 COMPARED = ("gauss", "exudyn", "casadi")
 """Compared unless somebody names others: three derivations of the same equations."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -44,6 +46,17 @@ def library() -> Any:
         raise InputError(f"engine: exudyn cannot be imported ({error}); install shoal[engines]") from None
 
 
+@contextmanager
+def silence(exu: Any) -> Iterator[None]:
+    """Exudyn reports failures on standard output, which belongs to the command line's answer."""
+    spoke = exu.config.printToConsole
+    exu.config.printToConsole = False
+    try:
+        yield
+    finally:
+        exu.config.printToConsole = spoke
+
+
 @dataclass(frozen=True)
 class Machine:
     """An assembled system and the parts that read its coordinates."""
@@ -62,8 +75,8 @@ class Machine:
     """Size of the machine [m]."""
     reference: Array
     """Coordinates [m or rad] of the undeformed start, from which Exudyn counts, (unknowns,)."""
-    redundant: tuple[str, ...] = ()
-    """Joints that hold what others hold already, for which Exudyn's Jacobian is singular."""
+    dependent: int = 0
+    """Number of constraints in space that hold what others hold already: Exudyn's Jacobian is singular."""
 
     @property
     def unknowns(self) -> int:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from shoal.engines.capabilities import of_kind, require
 from shoal.engines.contract import Capabilities, sampling_times
-from shoal.engines.exudyn.build import PARTS, Beam, Machine, build, library
+from shoal.engines.exudyn.build import PARTS, Beam, Machine, build, library, silence
 from shoal.engines.exudyn.checks import judge
 from shoal.engines.exudyn.joints import JOINTS
 from shoal.engines.exudyn.loads import LOADS
@@ -137,7 +136,7 @@ class ExudynEngine:
             return ""
         machine.mbs.SetPostStepUserFunction(record.take)
         try:
-            with _silence(exu):
+            with silence(exu):
                 done, begin, runs = True, 0.0, record.steps.runs
                 for number, (count, end) in enumerate(runs):
                     record.resumed = number > 0
@@ -167,7 +166,7 @@ class ExudynEngine:
         sparse = machine.unknowns + machine.constraints > DENSE_LIMIT
         kinds = exu.LinearSolverType
         settings.linearSolver.solverType = kinds.EigenSparse if sparse else kinds.EXUdense
-        if machine.redundant:
+        if machine.dependent:
             # It alone steps over dependent rows; the checks of joints and energy judge what comes out.
             settings.linearSolver.solverType = kinds.EigenDense
             settings.linearSolver.ignoreSingularJacobian = True
@@ -197,7 +196,7 @@ class ExudynEngine:
         Dependent constraints agree with each other on the positions only: on the velocities, drift parts them.
         """
         name, radius = self._integrator(machine.scene), machine.scene.solver.spectral_radius
-        if machine.redundant and name == "trapezoidal" and self.integrator is None:
+        if machine.dependent and name == "trapezoidal" and self.integrator is None:
             return "generalized-alpha", REDUNDANT
         return name, radius if name == "generalized-alpha" else 1.0
 
@@ -214,7 +213,7 @@ class ExudynEngine:
             "spectral_radius": radius,
             "newton": "modified" if self.modified_newton else "full",
             "step": steps.size,
-            "redundant_joints": list(machine.redundant),
+            "dependent_constraints": machine.dependent,
             "energy_check": "none: motion is prescribed" if machine.driven else "kinetic, elastic, springs, loads",
         }
 
@@ -224,14 +223,3 @@ def _too_far(machine: Machine, record: Record) -> float:
     kept = record.steps.kept
     one_step = (np.diff(kept) == 1) & np.isfinite(record.q[1:]).all(axis=1)
     return float(np.max(machine.crossed(record.q, record.v)[one_step], initial=0.0)) / CROSSED
-
-
-@contextmanager
-def _silence(exu: Any) -> Iterator[None]:
-    """Exudyn reports failures on standard output, which belongs to the command line's answer."""
-    spoke = exu.config.printToConsole
-    exu.config.printToConsole = False
-    try:
-        yield
-    finally:
-        exu.config.printToConsole = spoke

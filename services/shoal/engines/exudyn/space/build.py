@@ -7,21 +7,25 @@ from typing import Any
 
 import numpy as np
 
+from shoal.engines.capabilities import loops
 from shoal.engines.course import Clock
 from shoal.engines.exudyn.bodies import System
-from shoal.engines.exudyn.build import Machine
+from shoal.engines.exudyn.build import Machine, silence
 from shoal.engines.exudyn.ground import drive, driven
 from shoal.engines.exudyn.space.bodies import SolidPart, SpatialCablePart, SpatialGround
 from shoal.engines.exudyn.space.ends import SpatialEnds
 from shoal.engines.exudyn.space.joints import add_friction, add_joint, still
 from shoal.engines.exudyn.space.loads import add_load
 from shoal.mechanics.assembly.groups import moving
-from shoal.mechanics.assembly.space.start import begun, place_started, redundant
+from shoal.mechanics.assembly.space.start import begun, place_started
 from shoal.mechanics.frames import BeamFrame, PointFrame
 from shoal.mechanics.numerics.tile import stacked
 from shoal.mechanics.reach import span
 from shoal.scene import GROUND, PointMass, Rod, Scene
 from shoal.scene.dimensions import padded
+
+DEPENDENT = 1e-9
+"""Singular values of Exudyn's constraints that are zero, relative to the largest."""
 
 
 def build_in_space(exu: Any, scene: Scene, end: float | None = None) -> Machine:
@@ -58,6 +62,13 @@ def build_in_space(exu: Any, scene: Scene, end: float | None = None) -> Machine:
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
     started = scene.model_copy(update={"initial": begun(placement.frames, scene, q, v)})
-    return Machine(
-        started, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), redundant(scene, q)
-    )
+    dependent = _dependent(exu, mbs) if any(loops(scene)) else 0
+    return Machine(started, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent)
+
+
+def _dependent(exu: Any, mbs: Any) -> int:
+    """How many constraints hold what others hold already; the native machine, which shares axes, may have fewer."""
+    solver = importlib.import_module("exudyn.solver")
+    with silence(exu):
+        found = solver.ComputeSystemDegreeOfFreedom(mbs, threshold=DEPENDENT)
+    return int(found["redundantConstraints"])

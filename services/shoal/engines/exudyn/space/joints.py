@@ -11,7 +11,7 @@ from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.connectors import Exchange, Law, exchange_of
 from shoal.engines.exudyn.ground import driven
 from shoal.engines.exudyn.space.ends import SpatialEnds, frame_about
-from shoal.engines.exudyn.space.rows import Row, add_rows
+from shoal.engines.exudyn.space.rows import Row, add_rows, hold_node
 from shoal.errors import InputError
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.space.sections import ALIGNED
@@ -126,6 +126,18 @@ def _lock(ends: SpatialEnds, first: Attachment, second: Attachment, axes: list[i
     )
 
 
+def _lock_place(
+    exu: Any, ends: SpatialEnds, first: Attachment, second: Attachment, axes: list[int], frame: Array
+) -> None:
+    """The same of places only; of a cable, against the ground, without a marker that turns."""
+    if ends.is_cable(second) and ends.is_ground(first):
+        normals = frame[:, np.array(axes) == 1].T
+        base = np.array(ends.part(first)[1])
+        hold_node(exu, ends.system, ends.side(first), ends.side(second), normals, base)
+    else:
+        _lock(ends, first, second, [*axes, 0, 0, 0], frame, np.eye(3))
+
+
 def _pair(ends: SpatialEnds, condition: Any, q: Array, v: Array) -> tuple[Any, Any]:
     return ends.moved(condition.first, q, v), ends.moved(condition.second, q, v)
 
@@ -143,7 +155,7 @@ def _apart(ends: SpatialEnds, one: Any, q: Array, v: Array) -> Array:
 def _along(exu: Any, ends: SpatialEnds, where: str, one: Along) -> Gap:
     require_rigid(ends, where, one.first)
     line = _line(ends, one.first, one.direction)
-    _lock(ends, one.first, one.second, [1, 1, 0, 0, 0, 0], frame_about(line), np.eye(3))
+    _lock_place(exu, ends, one.first, one.second, [1, 1, 0], frame_about(line))
 
     def gap(q: Array, v: Array) -> Array:
         a, b = _pair(ends, one, q, v)
@@ -155,7 +167,7 @@ def _along(exu: Any, ends: SpatialEnds, where: str, one: Along) -> Gap:
 def _in_plane(exu: Any, ends: SpatialEnds, where: str, one: InPlane) -> Gap:
     require_rigid(ends, where, one.first)
     normal = ends.image(one.first, one.axis)
-    _lock(ends, one.first, one.second, [0, 0, 1, 0, 0, 0], frame_about(normal), np.eye(3))
+    _lock_place(exu, ends, one.first, one.second, [0, 0, 1], frame_about(normal))
 
     def gap(q: Array, v: Array) -> Array:
         a, b = _pair(ends, one, q, v)

@@ -52,3 +52,21 @@ def add_rows(exu: Any, system: System, first: Side, second: Side, rows: list[Row
         constraintUserFunction=gap,
         jacobianUserFunction=derivative,
     )
+
+
+def hold_node(exu: Any, system: System, ground: Side, cable: Side, normals: Array, base: Array) -> None:
+    """Keep a node of a cable in planes at rest through a place (3,) [m]; normals: (planes, 3)."""
+
+    def gap(_mbs: Any, _t: float, _item: int, q: Any, v: Any, of_rates: bool) -> Any:
+        return normals @ (np.array(v)[:3] if of_rates else np.array(q)[:3] - base)
+
+    def derivative(_mbs: Any, _t: float, _item: int, _q: Any, _v: Any, _of_rates: bool) -> Any:
+        return exu.MatrixContainer(np.hstack([normals, np.zeros((len(normals), cable.size - 3))]))
+
+    system.add(
+        "ObjectConnectorCoordinateVector",
+        markerNumbers=[system.add("MarkerNodeCoordinates", nodeNumber=side.node) for side in (ground, cable)],
+        scalingMarker0=np.zeros((len(normals), 1)),
+        constraintUserFunction=gap,
+        jacobianUserFunction=derivative,
+    )
