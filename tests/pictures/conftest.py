@@ -16,8 +16,40 @@ from shoal.pictures.answer import Answer
 from shoal.pictures.report import report
 from shoal.pictures.simulation import simulation
 from shoal.pictures.study import study
-from shoal.scene import load_scene
+from shoal.scene import Scene, load_scene
 from shoal.selection import select
+
+TOP = Scene.parse(
+    {
+        "name": "top",
+        "dimensions": 3,
+        "gravity": [0.0, 0.0, -9.81],
+        "bodies": {
+            "top": {
+                "kind": "rigid-body",
+                "mass": 1.0,
+                "inertia": [0.02, 0.02, 0.03],
+                "centre_of_mass": [0.0, 0.0, 0.2],
+            },
+            "rod": {
+                "kind": "rod",
+                "length": 0.5,
+                "height": 0.06,
+                "width": 0.02,
+                "density": 500.0,
+                "rotary_inertia": True,
+            },
+        },
+        "joints": {
+            "foot": {"kind": "spherical", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "top"}},
+            "hinge": {"first": {"body": "top", "point": [0, 0, 0.4]}, "second": {"body": "rod"}, "axis": [1, 0, 0]},
+        },
+        "markers": {"tip": {"body": "rod", "point": "end"}},
+        "initial": {"top": {"spin": [0.0, 0.3, 20.0]}, "rod": {"rotation": [0.0, 0.0, 1.5707963267948966]}},
+        "solver": {"integrator": "dop853", "relative_tolerance": 1e-9, "absolute_tolerance": 1e-10, "duration": 1.0},
+    }
+)
+"""Of rigid bodies in space."""
 
 
 @pytest.fixture(scope="session")
@@ -105,6 +137,8 @@ def pages(several: Answer, request: pytest.FixtureRequest) -> Callable[[str], st
         if kind == "study":
             case, estimates = load_problem("paper-case-1"), request.getfixturevalue("estimates")
             return study({name: Answer(case, estimate) for name, estimate in estimates.items()})
+        if kind == "space":
+            return simulation(verified(get_engine("gauss"), TOP), TOP)
         scene = load_scene("flexible-double-pendulum")
         if kind == "simulation":
             return simulation(verified(get_engine("gauss"), scene), scene)

@@ -57,7 +57,7 @@ class Opened:
         return self.page.evaluate("document.querySelector('canvas').toDataURL()")
 
 
-@pytest.fixture(params=["estimate", "rejected", "study", "simulation", "selection"])
+@pytest.fixture(params=["estimate", "rejected", "study", "simulation", "selection", "space"])
 def path(request: pytest.FixtureRequest, pages: Callable[[str], str], tmp_path: Path) -> Path:
     file = tmp_path / f"{request.param}.html"
     file.write_text(pages(request.param), encoding="utf-8")
@@ -115,3 +115,82 @@ def test_animation_plays_pauses_and_is_scrubbed(browser: Any, pages: Callable[[s
     assert opened.picture() != still
     assert opened.said == []
     page.close()
+
+
+@pytest.fixture
+def space(pages: Callable[[str], str], tmp_path: Path) -> Path:
+    file = tmp_path / "space.html"
+    file.write_text(pages("space"), encoding="utf-8")
+    return file
+
+
+def test_a_machine_in_space_is_turned_moved_and_zoomed(browser: Any, space: Path) -> None:
+    opened = Opened(browser, space, 1280)
+    page, canvas = opened.page, opened.page.locator("canvas").first
+    home = opened.picture()
+
+    def changes(act: Callable[[], object]) -> None:
+        """What is done changes the picture, and Home brings it back."""
+        act()
+        opened.until(lambda: opened.picture() != home)
+        canvas.focus()
+        page.keyboard.press("Home")
+        opened.until(lambda: opened.picture() == home)
+
+    def drag() -> None:
+        box = canvas.bounding_box()
+        page.mouse.move(box["x"] + 200, box["y"] + 200)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 260, box["y"] + 230)
+        page.mouse.up()
+
+    def shifted() -> None:
+        page.keyboard.down("Shift")
+        drag()
+        page.keyboard.up("Shift")
+
+    changes(drag)
+    changes(shifted)
+    changes(lambda: page.mouse.wheel(0, -200))
+    canvas.focus()
+    for key in ("ArrowLeft", "ArrowUp", "+", "-"):
+        changes(lambda key=key: page.keyboard.press(key))  # type: ignore[misc]
+    for name in ("Front", "Top", "Right side", "nearer", "farther"):
+        changes(page.get_by_role("button", name=name, exact=True).click)
+    page.keyboard.press("Space")
+    opened.until(lambda: opened.clock > 0)
+    assert opened.said == []
+    page.close()
+
+
+def test_two_fingers_zoom(browser: Any, space: Path) -> None:
+    context = browser.new_context(viewport={"width": 390, "height": 800}, has_touch=True)
+    page = context.new_page()
+    page.goto(space.as_uri())
+    picture = "document.querySelector('canvas').toDataURL()"
+    before, box = page.evaluate(picture), page.locator("canvas").first.bounding_box()
+    touch = context.new_cdp_session(page)
+
+    def fingers(kind: str, *across: float) -> None:
+        points = [{"x": box["x"] + x, "y": box["y"] + 100, "id": k} for k, x in enumerate(across)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    fingers("touchStart", 150, 200)
+    fingers("touchMove", 100, 250)
+    fingers("touchEnd")
+    assert page.evaluate(picture) != before
+    context.close()
+
+
+def test_views_are_taken_at_once_by_who_wants_no_motion(browser: Any, space: Path) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 900}, reduced_motion="reduce")
+    page = context.new_page()
+    page.goto(space.as_uri())
+    # In the same task as the click, before any frame of an animation.
+    drawn = page.evaluate(
+        """() => { const canvas = document.querySelector('canvas');
+                   document.querySelector("[data-view='top']").click(); const at_once = canvas.toDataURL();
+                   return new Promise((done) => setTimeout(() => done(at_once === canvas.toDataURL()), 600)); }"""
+    )
+    assert drawn
+    context.close()

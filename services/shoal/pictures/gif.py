@@ -13,6 +13,7 @@ from PIL import Image
 
 from shoal.pictures.motion import Motion
 from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
+from shoal.pictures.views import views
 
 _FRAMES = 60
 _PAUSE_MS = 80
@@ -22,7 +23,8 @@ _SHADES = 12
 
 @styled
 def gif(found: Motion, title: str) -> bytes:
-    """The motion as GIF of sixty frames, slowed down or sped up to about five seconds."""
+    """The motion as GIF of sixty frames, slowed down or sped up to about five seconds; in space from a corner."""
+    found = found if found.up is None else found.seen(views(found.up)[-1])
     figure, moving, clock = _stage(found, title)
     drawing: Any = FigureCanvasAgg(figure)
     drawing.draw()
@@ -68,6 +70,8 @@ def _stage(found: Motion, title: str) -> tuple[Figure, list[tuple[Any, Any]], An
         shown.append((drawn, path))
 
     axes.plot(*found.ground.T, "s", color=GREY, markersize=8)
+    for thin in found.thin.values():
+        line(thin, "-", "", color=GREY, linewidth=0.8)
     for outline in found.outlines.values():
         line(outline, "o-", "", color=BLUE, linewidth=3, markersize=4, markevery=[0, -1])
     for number, path in enumerate(found.markers.values()):
@@ -82,8 +86,10 @@ def _stage(found: Motion, title: str) -> tuple[Figure, list[tuple[Any, Any]], An
     axes.set_ylim(low[1] - 0.08 * size, high[1] + 0.08 * size)
     axes.set_aspect("equal")
     headline(figure, title)
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
+    axes.set_xlabel(found.labels[0])
+    axes.set_ylabel(found.labels[1])
+    if not all(found.labels):
+        axes.set_axis_off()
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=3)
     clock = axes.text(0.99, 0.99, "", transform=axes.transAxes, ha="right", va="top", family="monospace")
     for artist in (*(drawn for drawn, _ in shown), clock):

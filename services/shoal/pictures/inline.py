@@ -91,10 +91,13 @@ def _(scene: Scene) -> str:
     for name, body in scene.bodies.items():
         kind = f"{body.elements} {body.element}" if isinstance(body, Rod) and body.element != "rigid" else body.kind
         start = scene.start(name)
-        rows.append([name, kind, f"{start.angle:.6g}", f"{start.rate:.6g}"])
+        both = [[start.angle], [start.rate]]
+        if scene.dimensions == 3:
+            both = [list(start.rotation or (0, 0, start.angle)), list(start.spin or (0, 0, start.rate))]
+        rows.append([name, kind, *(", ".join(f"{x:.6g}" for x in one) for one in both)])
     lead = f"{scene.description} Simulated for {scene.solver.duration:g} s unless told otherwise."
-    headings = ["body", "kind", "angle [rad]", "rate [rad/s]"]
-    return _html(scene.name, lead, "Bodies at the start", headings, rows)
+    said = ("angle [rad]", "rate [rad/s]") if scene.dimensions == 2 else ("rotation [rad]", "spin [rad/s]")
+    return _html(scene.name, lead, "Bodies at the start", ["body", "kind", *said], rows)
 
 
 @html.register
@@ -105,11 +108,12 @@ def _(trajectory: Trajectory) -> str:
     message = f" ({trajectory.message})" if trajectory.message else ""
     rows = [[name, *(f"{x:.6f}" for x in trajectory.marker(name)[-1])] for name in trajectory.markers]
     reach = ", ".join(trajectory.markers)
-    picture = Drawn(
-        "paths", _paths(trajectory), f"x and y of {reach} against time.", "Both coordinates of each marker."
+    alt = f"{' and '.join(trajectory.axes)} of {reach} against time."
+    picture = Drawn("paths", _paths(trajectory), alt, "The coordinates of each marker.")
+    headings = ["marker", *(f"{axis} [m]" for axis in trajectory.axes)]
+    return _html(
+        f"Motion by {trajectory.engine}", f"{several}{trust}{message}.", f"At {end:g} s", headings, rows, picture
     )
-    lead = f"{several}{trust}{message}."
-    return _html(f"Motion by {trajectory.engine}", lead, f"At {end:g} s", ["marker", "x [m]", "y [m]"], rows, picture)
 
 
 @html.register
@@ -134,4 +138,6 @@ def _html(
 def _paths(trajectory: Trajectory) -> Figure:
     markers = {name: trajectory.marker(name) for name in trajectory.markers}
     trust = "" if trajectory.ok else f" ({trajectory.status[0]}: not to be trusted)"
-    return paths(Motion("", trajectory.times, np.empty((0, 2)), {}, markers), f"{trajectory.engine}{trust}")
+    return paths(
+        Motion("", trajectory.times, np.empty((0, len(trajectory.axes))), {}, markers), f"{trajectory.engine}{trust}"
+    )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,9 +11,10 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.errors import ComputationError, InputError
 from shoal.pictures.outline import ground, outlined
+from shoal.pictures.solids import Bar, Solids
+from shoal.pictures.views import View, views
 from shoal.scene import Scene
-from shoal.scene.dimensions import require_plane
-from shoal.trajectory import Array, plain
+from shoal.trajectory import Array, Trajectory, plain
 
 if TYPE_CHECKING:
     from shoal.pictures.answer import Answer
@@ -24,10 +26,13 @@ _FRAMES = 150
 class Motion:
     """One run as the machine's frame sees it; times by the recording's clock [s], (frames,).
 
-    name: of the recording or scene; ground: fixed places [m], (places, 2)
-    outlines: points of each body [m], (frames, points, 2); markers: of the model [m], (frames, 2)
-    measured: places [m], (frames, 2), nan where none was measured near that time; directions: measured angles [rad]
-    behind: outlines of another machine that is drawn below [m], (frames, points, 2)
+    name: of the recording or scene; ground: fixed places [m], (places, d)
+    outlines: points of each body [m], (frames, points, d); markers: of the model [m], (frames, d)
+    measured: places [m], (frames, d), nan where none was measured near that time; directions: measured angles [rad]
+    behind: outlines of another machine that is drawn below [m], (frames, points, d)
+    In space: bars of bodies; links: places that a spring or a distance joins [m], (frames, 2, 3); axes of joints: a
+    point [m] and a direction, (frames, 2, 3); up: the direction against gravity, along an axis, (3,).
+    Of a view on paper: thin lines [m], (frames, points, 2), nan between them; labels of the coordinates.
     """
 
     name: str
@@ -38,6 +43,12 @@ class Motion:
     measured: dict[str, Array] = field(default_factory=dict)
     directions: dict[str, Array] = field(default_factory=dict)
     behind: dict[str, Array] = field(default_factory=dict)
+    bars: dict[str, Bar] = field(default_factory=dict)
+    links: dict[str, Array] = field(default_factory=dict)
+    axes: dict[str, Array] = field(default_factory=dict)
+    up: Array | None = None
+    thin: dict[str, Array] = field(default_factory=dict)
+    labels: tuple[str, str] = ("x [m]", "y [m]")
 
     @property
     def span(self) -> float:
@@ -47,32 +58,89 @@ class Motion:
     @property
     def box(self) -> tuple[Array, Array]:
         """Lower left and upper right corner [m] of all that is shown, (2,) each."""
-        moving = (*self.outlines.values(), *self.behind.values(), *self.measured.values())
-        every = np.concatenate([np.reshape(x, (-1, 2)) for x in (*moving, self.ground)])
+        moving = (*self.outlines.values(), *self.behind.values(), *self.measured.values(), *self.thin.values())
+        solid = (bar.edges for bar in self.bars.values())
+        every = np.concatenate([np.reshape(x, (-1, self.ground.shape[1])) for x in (*moving, *solid, self.ground)])
         return np.nanmin(every, axis=0), np.nanmax(every, axis=0)
+
+    @property
+    def size(self) -> float:
+        """The longest side of the box [m]."""
+        low, high = self.box
+        return float(np.max(high - low))
 
     @property
     def aspect(self) -> float:
         """Height over width of a picture that suits the box."""
+        if self.up is not None:
+            return 0.75
         low, high = self.box
         width, height = high - low
         return float(np.clip((height + 0.1 * width) / max(width, 1e-9), 0.3, 0.8))
 
+    def seen(self, view: View) -> Motion:
+        """A motion in space as it is on paper."""
+
+        def flat(paths: dict[str, Array]) -> dict[str, Array]:
+            return {name: path @ view.plane for name, path in paths.items()}
+
+        arm = 0.06 * self.size * np.array([[-1.0], [1.0]])
+        thin = {f"axis of {name}": line[:, :1] + arm * line[:, 1:] for name, line in self.axes.items()}
+        thin |= {f"edges of {name}": bar.edges for name, bar in self.bars.items() if bar.side is not None}
+        return replace(
+            self,
+            ground=self.ground @ view.plane,
+            outlines=flat(self.outlines),
+            markers=flat(self.markers),
+            measured=flat(self.measured),
+            behind=flat(self.behind),
+            thin=flat(thin | self.links),
+            labels=view.labels,
+            bars={},
+            links={},
+            axes={},
+            up=None,
+        )
+
 
 def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAMES) -> Motion:
     """The motion of a scene until a time [s], as far as it can be computed. Raises InputError, ComputationError."""
-    require_plane(scene, "moving pictures are")
     if until <= 0:
         raise InputError("out: a motion that is shown lasts longer than 0 s; choose later times with --at")
-    traced, points = outlined(scene)
+    traced, read = _traced(scene)
     seen = engine.simulate(traced, np.linspace(0.0, until, frames))
     known = np.all(np.isfinite(seen.points[..., 0]), axis=(1, 2))
     count = frames if np.all(known) else int(np.argmin(known))
     if count < 2:
         raise ComputationError(f"{scene.name}: there is no motion to show: {seen.message or seen.status[0]}")
-    outlines = {body: np.stack([seen.marker(n)[:count] for n in names], axis=1) for body, names in points.items()}
     markers = {name: seen.marker(name)[:count] for name in scene.markers}
-    return Motion(scene.name, seen.times[:count], ground(scene), outlines, markers)
+    return Motion(scene.name, seen.times[:count], ground(scene), markers=markers, **read(seen, count))
+
+
+def _traced(scene: Scene) -> tuple[Scene, Callable[[Trajectory, int], dict[str, Any]]]:
+    """The scene with markers that make its bodies visible, and what reads the fields of a Motion from its frames."""
+    traced, points = outlined(scene)
+    solids = Solids(traced, points, scene) if scene.dimensions == 3 else None
+
+    def read(seen: Trajectory, count: int) -> dict[str, Any]:
+        def at(name: str) -> Array:
+            return seen.marker(name)[:count]
+
+        outlines = {body: np.stack([at(name) for name in names], axis=1) for body, names in points.items()}
+        if solids is None:
+            return {"outlines": outlines}
+        return {"outlines": outlines, "up": upwards(scene), **solids.shown(at, count)}
+
+    return traced if solids is None else solids.scene, read
+
+
+def upwards(scene: Scene) -> Array:
+    """The axis of space that points most nearly against gravity, or z, (3,)."""
+    against = -np.array([*scene.gravity, 0.0][:3])
+    k = int(np.argmax(np.abs(against))) if np.any(against) else 2
+    way: Array = np.zeros(3)
+    way[k] = -1.0 if against[k] < 0 else 1.0
+    return way
 
 
 def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
@@ -81,9 +149,8 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
     samples = answer.estimate.measurement.recordings[recording]
     earliest = max(0.0, -view["delay"] * view["clock"])
     times = np.linspace(earliest, float(samples.times[-1]), frames)
-    traced, points = outlined(answer.estimate.scenes[recording])
+    traced, read = _traced(answer.estimate.scenes[recording])
     seen = answer.model.engine.simulate(traced, np.maximum(0.0, times / view["clock"] + view["delay"]))
-    outlines = {body: np.stack([seen.marker(name) for name in names], axis=1) for body, names in points.items()}
     markers = {channel.marker: seen.marker(channel.marker) for channel in samples.channels}
     nearest = np.abs(samples.times[None] - times[:, None]).argmin(axis=1)
     close = np.abs(samples.times[nearest] - times) <= 1.01 * max(times[1] - times[0], _step(samples.times))
@@ -94,7 +161,8 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
     measured = {m: _place(found, view) for m, found in places.items() if {"x", "y"} <= found.keys()}
     directions = {m: found["angle"] + view["tilt"] for m, found in places.items() if "angle" in found}
     fixed = ground(answer.estimate.scenes[recording])
-    return Motion(recording, times, fixed, outlines, markers, measured, directions)
+    shown = read(seen, frames)
+    return Motion(recording, times, fixed, markers=markers, measured=measured, directions=directions, **shown)
 
 
 def _step(times: Array) -> float:
@@ -110,9 +178,9 @@ def _place(found: dict[str, Array], view: dict[str, float]) -> Array:
 
 def plain_motion(found: Motion) -> dict[str, Any]:
     """As plain numbers for a script in a page, rounded to a ten-thousandth of the machine's size."""
-    low, high = found.box
-    size = float(np.max(high - low))
+    (low, high), size = found.box, found.size
     digits = max(0, 4 - int(np.floor(np.log10(size)))) if size > 0 else 6
+    space = {} if found.up is None else _plain_space(found, digits)
     return {
         "name": found.name,
         "times": np.round(found.times, 6).tolist(),
@@ -123,4 +191,27 @@ def plain_motion(found: Motion) -> dict[str, Any]:
         "markers": {name: plain(np.round(x, digits)) for name, x in found.markers.items()},
         "measured": {name: plain(np.round(x, digits)) for name, x in found.measured.items()},
         "directions": {name: plain(np.round(x, 4)) for name, x in found.directions.items()},
+        **space,
+    }
+
+
+def _plain_space(found: Motion, digits: int) -> dict[str, Any]:
+    bars = {
+        name: {
+            # Otherwise it is the outline.
+            "axis": plain(np.round(bar.axis, digits)) if bar.stands_for else None,
+            "side": None if bar.side is None else plain(np.round(bar.side, 4)),
+            "size": plain(bar.size),
+            "clear": bar.stands_for,
+        }
+        for name, bar in found.bars.items()
+    }
+    assert found.up is not None
+    looks = views(found.up)
+    return {
+        "front": [plain(looks[0].right), plain(looks[0].up)],
+        "views": {view.name: [view.yaw, view.pitch] for view in looks},
+        "bars": bars,
+        "links": {name: plain(np.round(x, digits)) for name, x in found.links.items()},
+        "axes": {name: plain(np.round(x, digits + 1)) for name, x in found.axes.items()},
     }

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from shoal.scene import GROUND, Attachment, Rod, Scene
+from shoal.scene import GROUND, Attachment, RigidBody, Rod, Scene
 from shoal.trajectory import Array
 
 _ALONG = 33
 """Points along a rod, so that its bending shows."""
-_INSIDE = "outline"
+INSIDE = "outline"
+"""How the names of added markers begin."""
 
 
 def outlined(scene: Scene) -> tuple[Scene, dict[str, list[str]]]:
@@ -22,15 +23,18 @@ def outlined(scene: Scene) -> tuple[Scene, dict[str, list[str]]]:
     for name, body in scene.bodies.items():
         # A body that is no rod is drawn as the line through the places that it is joined and observed at.
         places = _along(body) if isinstance(body, Rod) else _joined(scene, name, used)
-        names[name] = [f"{_INSIDE}-{name}-{k}" for k in range(len(places))]
+        if scene.dimensions == 3 and isinstance(body, RigidBody):
+            # Of the lines in space each goes through the centre of mass, where its cuboid is.
+            places = [place for joined in places for place in (list(body.centre_of_mass), joined)]
+        names[name] = [f"{INSIDE}-{name}-{k}" for k in range(len(places))]
         data["markers"] |= {n: {"body": name, "point": p} for n, p in zip(names[name], places, strict=True)}
     return Scene.parse(data, scene.name), {body: found for body, found in names.items() if found}
 
 
 def ground(scene: Scene) -> Array:
-    """The places [m] where the machine is joined to what stands still, (places, 2)."""
+    """The places [m] where the machine is joined to what stands still, (places, d)."""
     still = (at for at in _sides(scene) if at.body == GROUND and not isinstance(at.point, str))
-    return np.array(list(dict.fromkeys(scene.location(at) for at in still))).reshape(-1, 2)
+    return np.array(list(dict.fromkeys(scene.location(at) for at in still))).reshape(-1, scene.dimensions)
 
 
 def _sides(scene: Scene) -> list[Attachment]:

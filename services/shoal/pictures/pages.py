@@ -10,6 +10,7 @@ from jinja2 import BaseLoader, ChoiceLoader, Environment, PackageLoader, StrictU
 from markupsafe import Markup
 
 from shoal.pictures.motion import Motion, plain_motion
+from shoal.pictures.views import views
 from shoal.versions import versions
 
 _SPEEDS = {
@@ -25,6 +26,12 @@ _SHOWN = 5.0
 """Seconds that a motion should take on the screen."""
 _FEW = 4
 """So many names are listed."""
+_SPACE = (
+    "grey squares stand on the ground, chain lines are axes of joints, clear boxes have the mass and inertia of a "
+    "body. Rods are drawn with their section, at least a few dots thick, and shadows fall on a floor below. Drag to "
+    "turn, with Shift to move; wheel or pinch to zoom. On the picture the arrow keys turn, + and − zoom, Home goes "
+    "back, the space bar plays."
+)
 
 
 def environment(*more: BaseLoader) -> Environment:
@@ -50,13 +57,17 @@ def animation(found: Motion, what: str) -> dict[str, Any]:
     over = " over " + " and ".join(shown[1:]) if shown[1:] else ""
     # "</" would end the script element.
     data = json.dumps(plain_motion(found), allow_nan=False).replace("</", "<\\/")
+    caption = f"{shown[0]}{over}; grey squares stand on the ground. The arrow keys move the slider."
+    if found.up is not None:
+        caption = f"{shown[0]}{over}; {_SPACE}"
     return {
         "name": found.name,
         "aspect": round(found.aspect, 3),
         "speeds": list(_SPEEDS.items()),
         "speed": min(_SPEEDS.values(), key=lambda factor: abs(found.span / factor - _SHOWN)),
         "alt": f"Animation of {', '.join(found.outlines)}, {found.span:.3g} s. A picture below shows poses of it.",
-        "caption": f"{shown[0]}{over}; grey squares stand on the ground. The arrow keys move the slider.",
+        "caption": caption,
+        "views": [] if found.up is None else [view.name for view in views(found.up)],
         "data": Markup(data),
     }
 

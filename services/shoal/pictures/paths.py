@@ -15,11 +15,12 @@ _MOST = 6
 
 @styled
 def paths(found: Motion, name: str) -> Figure:
-    """x above, y below, a line for each of at most six paths."""
-    figure, panels = canvas(5.0, nrows=2, sharex=True)
+    """x above, y below it, in space z below them, a line for each of at most six paths."""
+    axes = "xyz"[: found.ground.shape[1]]
+    figure, panels = canvas(1.4 + 1.8 * len(axes), nrows=len(axes), sharex=True)
     lines = _lines(found)
     shown = lines[:_MOST]
-    for panel, axis, k in zip(panels, "xy", (0, 1), strict=True):
+    for panel, axis, k in zip(panels, axes, range(len(axes)), strict=True):
         for (names, path), look in zip(shown, LINES, strict=False):
             panel.plot(found.times, path[:, k], label=names, **look)
         panel.set_ylabel(f"{axis} [m]")

@@ -9,6 +9,7 @@ from matplotlib.patheffects import withStroke
 
 from shoal.pictures.motion import Motion
 from shoal.pictures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, canvas, headline, styled
+from shoal.pictures.views import views
 
 _POSES = 7
 _FEW = 10
@@ -18,11 +19,47 @@ _HALO = [withStroke(linewidth=3, foreground="white")]
 
 @styled
 def poses(found: Motion, title: str) -> Figure:
-    """The machine at a few instants, the later the darker, the paths of its markers, and the measured places."""
-    figure, axes = canvas(1.4 + 5.6 * found.aspect)
+    """The machine at a few instants, the later the darker, the paths of its markers, and the measured places.
+
+    A machine in space from the front, from above it, from its right, as on a drawing, and from a corner.
+    """
+    if found.up is None:
+        figure, axes = canvas(1.4 + 5.6 * found.aspect)
+        _draw(axes, found)
+        axes.set_aspect("equal", adjustable="datalim")
+        shown = axes
+    else:
+        figure, ((top, corner), (front, side)) = canvas(7.4, nrows=2, ncols=2)
+        for axes, view in zip((front, top, side, corner), views(found.up), strict=True):
+            seen = found.seen(view)
+            _draw(axes, seen)
+            _frame(axes, seen, 0.55 * found.size, view.name)
+        shown = front
+    headline(figure, title)
+    figure.legend(*shown.get_legend_handles_labels(), loc="outside lower left", ncols=3)
+    return figure
+
+
+def _frame(axes: Axes, seen: Motion, half: float, name: str) -> None:
+    """So wide [m] to each side that all views along an axis have one scale."""
+    middle = np.mean(seen.box, axis=0)
+    half = half if all(seen.labels) else 0.55 * seen.size
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlim(middle[0] - half, middle[0] + half)
+    axes.set_ylim(middle[1] - half, middle[1] + half)
+    axes.set_title(name, fontweight="normal")
+    if not all(seen.labels):
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.spines[:].set_visible(False)
+
+
+def _draw(axes: Axes, found: Motion) -> None:
     chosen = np.linspace(0, len(found.times) - 1, _POSES).round().astype(int)
     for number, k in enumerate(chosen):
         strength = min(1.0, 0.2 + 0.8 * number / (_POSES - 1))
+        for line in found.thin.values():
+            axes.plot(*line[k].T, color=GREY, alpha=strength, linewidth=0.7)
         for outline in found.outlines.values():
             axes.plot(*outline[k].T, "o-", markersize=2.5, markevery=[0, -1], color=BLUE, alpha=strength, linewidth=2.2)
     size = 7 if len(found.ground) <= _FEW else 3
@@ -33,12 +70,8 @@ def poses(found: Motion, title: str) -> Figure:
         axes.plot(*path.T, color=VERMILION, linewidth=1.2, label="" if number else "paths of the markers")
     _names(axes, found)
     _directions(axes, found, chosen)
-    axes.set_aspect("equal", adjustable="datalim")
-    headline(figure, title)
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=3)
-    return figure
+    axes.set_xlabel(found.labels[0])
+    axes.set_ylabel(found.labels[1])
 
 
 def _names(axes: Axes, found: Motion) -> None:

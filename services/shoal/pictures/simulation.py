@@ -41,6 +41,11 @@ def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None
         trusted=trajectory.ok,
         lead=_lead(trajectory, selection),
         motion=animation(moving, "The machine"),
+        headings=[
+            "marker",
+            *(f"{axis} [m]" for axis in trajectory.axes),
+            *(["angle [rad]"] if _is_flat(trajectory) else []),
+        ],
         rows=[[name, *_end(trajectory, name)] for name in trajectory.markers],
         remarks=remarks(trajectory.model) + _remarks(trajectory, selection),
         pictures=[one.embedded() for one in pictures],
@@ -70,14 +75,19 @@ def _lead(trajectory: Trajectory, selection: Selection | None) -> str:
     if selection is not None:
         found.append(f"error {length(selection.chosen.error)}, for a tolerance of {length(selection.tolerance)}")
     name = trajectory.markers[-1]
-    x, y = trajectory.marker(name)[-1]
+    place = ", ".join(f"{x:.4g}" for x in trajectory.marker(name)[-1])
     trust = f" Estimated at the markers: {', '.join(found)}." if found else ""
-    return f"After {trajectory.times[-1]:g} s, {name} is at ({x:.4g}, {y:.4g}) m.{trust}"
+    return f"After {trajectory.times[-1]:g} s, {name} is at ({place}) m.{trust}"
 
 
-def _end(trajectory: Trajectory, name: str) -> tuple[str, str, str]:
-    x, y = trajectory.marker(name)[-1]
-    return f"{x:.6f}", f"{y:.6f}", f"{trajectory.angle(name)[-1]:.6f}"
+def _is_flat(trajectory: Trajectory) -> bool:
+    """Whether one angle tells how a body is turned."""
+    return trajectory.axes == "xy"
+
+
+def _end(trajectory: Trajectory, name: str) -> list[str]:
+    numbers = [*trajectory.marker(name)[-1], *([trajectory.angle(name)[-1]] if _is_flat(trajectory) else [])]
+    return [f"{x:.6f}" for x in numbers]
 
 
 def _poses(scene: Scene, moving: Motion) -> Drawn:
@@ -86,8 +96,8 @@ def _poses(scene: Scene, moving: Motion) -> Drawn:
     return Drawn(
         "poses",
         poses(moving, ends(scene.name, moving)),
-        alt,
-        "The later, the darker; the thin lines are the paths of the markers.",
+        alt if moving.up is None else f"From the front, above, right and a corner: {alt}",
+        f"The later, the darker; the thin {'red ' if moving.up is not None else ''}lines are the paths of the markers.",
     )
 
 
@@ -97,8 +107,8 @@ def _paths(scene: Scene, moving: Motion) -> Drawn:
     return Drawn(
         "paths",
         paths(moving, scene.name),
-        f"x and y of every marker against time: {words}.",
-        "Both coordinates of each marker.",
+        f"{'x, y and z' if moving.up is not None else 'x and y'} of every marker against time: {words}.",
+        f"{'All' if moving.up is not None else 'Both'} coordinates of each marker.",
     )
 
 

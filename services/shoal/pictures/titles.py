@@ -49,8 +49,7 @@ def refines(name: str, estimates: Mapping[str, Estimate]) -> str:
 def ends(name: str, found: Motion) -> str:
     """Where the last marker is at the end of a motion."""
     marker, path = list(found.markers.items())[-1]
-    x, y = path[-1]
-    place = f"({x:.3g}, {y:.3g})".replace("-", "−")
+    place = f"({', '.join(f'{x:.3g}' for x in path[-1])})".replace("-", "−")
     return f"{name}: {marker} is at {place} m after {found.times[-1]:.3g} s"
 
 
@@ -58,8 +57,8 @@ def reaches(name: str, found: Motion) -> str:
     """How far the marker that moves most goes."""
     spans = {marker: np.ptp(path, axis=0) for marker, path in found.markers.items()}
     marker = max(spans, key=lambda one: float(np.max(spans[one])))
-    x, y = (length(float(span)) for span in spans[marker])
-    return f"{name}: {marker} moves within {x} in x and {y} in y in {found.span:.3g} s"
+    *first, last = (f"{length(float(span))} in {axis}" for span, axis in zip(spans[marker], "xyz", strict=False))
+    return f"{name}: {marker} moves within {', '.join(first)} and {last} in {found.span:.3g} s"
 
 
 def agrees(comparison: Comparison, marker: str) -> str:

@@ -2,12 +2,19 @@
 "use strict";
 const BLUE = "#0072B2", VERMILION = "#D55E00", BLACK = "#000000", ORANGE = "#E69F00", GREY = "#767676";
 
+function handy(wanted) {
+  // The next smaller length of 1, 2 or 5 and zeros.
+  const power = 10 ** Math.floor(Math.log10(wanted));
+  return power * (wanted / power >= 5 ? 5 : wanted / power >= 2 ? 2 : 1);
+}
+
 function animate(figure) {
   const run = JSON.parse(figure.querySelector("script[type='application/json']").textContent);
   const canvas = figure.querySelector("canvas"), slider = figure.querySelector("input");
-  const button = figure.querySelector("button"), clock = figure.querySelector("output");
+  const button = figure.querySelector("button.play"), clock = figure.querySelector("output");
   const speed = figure.querySelector("select"), context = canvas.getContext("2d");
   const count = run.times.length, last = count - 1;
+  const space = run.views && spatial(run, figure, () => draw());
   let frame = 0, playing = false, before = 0, elapsed = 0, width = 0, height = 0;
   slider.max = last;
 
@@ -52,15 +59,21 @@ function animate(figure) {
   }
 
   function scaleBar(size) {
-    const wanted = width / 5 / size, power = 10 ** Math.floor(Math.log10(wanted));
-    const length = power * (wanted / power >= 5 ? 5 : wanted / power >= 2 ? 2 : 1);
+    const length = handy(width / 5 / size);
     line([[12, height - 12], [12 + size * length, height - 12]], GREY, 3);
     text(`${+length.toPrecision(2)} m`, 12, height - 19, "#444", "normal");
   }
 
   function draw() {
-    const { size, to } = place();
     context.clearRect(0, 0, width, height);
+    if (space) space(frame, width, height); else plane();
+    slider.value = frame;
+    clock.textContent = `t = ${run.times[frame].toFixed(3)} s`;
+    slider.setAttribute("aria-valuetext", clock.textContent);
+  }
+
+  function plane() {
+    const { size, to } = place();
     context.lineCap = context.lineJoin = "round";
     for (const p of run.ground.map(to)) {
       context.fillStyle = GREY;
@@ -87,9 +100,6 @@ function animate(figure) {
       if (path[frame][0] !== null && path[frame][1] !== null) circle(to(path[frame]), 7, BLACK, false);
     }
     scaleBar(size);
-    slider.value = frame;
-    clock.textContent = `t = ${run.times[frame].toFixed(3)} s`;
-    slider.setAttribute("aria-valuetext", clock.textContent);
   }
 
   function tick(now) {
