@@ -102,6 +102,7 @@ def test_every_load_acts_as_in_the_native_solver(load: str) -> None:
     assert near < far / 3.5
 
 
+@pytest.mark.slow
 def test_a_driven_angle_and_a_moving_ground_point_lead_a_machine() -> None:
     """The body's energy is not followed, the positions are."""
     base = {"body": "ground", "point": "P"}
@@ -181,6 +182,7 @@ def test_the_flexible_spherical_pendulum_is_exudyns_on_equal_meshes() -> None:
     assert np.max(np.abs(limit(flexible(), times, 5e-5) - ours.points)) < 1e-8
 
 
+@pytest.mark.slow
 def test_cables_are_clamped_and_hinged_alike() -> None:
     """A clamped boom, a body welded to its tip, and a cable hinged to that at a right angle to the axis."""
     head = {"kind": "rigid-body", "mass": 2.0, "inertia": [0.1, 0.12, 0.15], "named_points": {"e": [0.2, 0.1]}}
@@ -197,6 +199,7 @@ def test_cables_are_clamped_and_hinged_alike() -> None:
     assert np.max(np.abs(limit(crane, times, 5e-5) - simulate(crane, times).points)) < 3e-8
 
 
+@pytest.mark.slow
 def test_the_end_of_a_cable_slides_in_a_plane_and_on_a_line() -> None:
     """Both ends of a cable that falls: one on a line, the other in a plane."""
     start = np.array([math.cos(0.4), math.sin(0.4), 0.0])

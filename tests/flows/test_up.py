@@ -133,6 +133,7 @@ def check_study(at: Mapping[str, str], run: dict[str, object], undisturbed: Mapp
             assert figures[f"final/{name}"] == value.value
 
 
+@pytest.mark.slow
 def test_a_study_outlives_prefects_server(tmp_path: Path, undisturbed: Mapping[str, Fit]) -> None:
     """On SQLite; kill -9 in the middle: it is started again, and the worker's flow goes on as if it had been slow."""
     with running(tmp_path, *WITHOUT, settings=OFTEN) as at:
