@@ -13,7 +13,6 @@ from pydantic import Field, ValidationError, model_validator
 from shoal.errors import InputError
 from shoal.identification.recording.source import Channel, EngineSource, FileSource, Source
 from shoal.scene import Scene, expression, load_scene
-from shoal.scene.dimensions import require_plane
 from shoal.scene.load import names, read_named
 from shoal.scene.record import Positive, Record, one_line
 from shoal.scene.scene import Name
@@ -151,7 +150,6 @@ class Problem(Record):
         """The scene to fit, with this problem's and the given values set, and every path checked. Raises InputError."""
         scene = load_scene(self.scene)
         scene = scene.with_values({**self.values, **(values or {})})
-        require_plane(scene, "identification is")
         for name, parameter in self.parameters.items():
             if parameter.path is None or parameter.of_measurement:
                 continue
@@ -178,6 +176,12 @@ class Problem(Record):
             if channel.marker not in scene.markers:
                 known = ", ".join(scene.markers)
                 raise InputError(f"{where}: channels: no marker {channel.marker!r}; there are {known}")
+            if (channel.quantity == "z") > (scene.dimensions == 3):
+                raise InputError(f"{where}: channels: z is measured in space; {scene.name} is a scene in the plane")
+            if channel.quantity in ("angle", "rate") and scene.dimensions == 3:
+                raise InputError(
+                    f"{where}: channels: {channel.quantity} is measured in the plane; in space x, y and z are"
+                )
             if channel.noise is None and self.noise is None and any(p.prior for p in self.parameters.values()):
                 raise InputError(
                     f"{where}: noise: a prior weighs against the data by their noise; state it for {channel.marker}"

@@ -158,7 +158,8 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
     for k, channel in enumerate(samples.channels):
         values = np.where(close, samples.values[nearest, k], np.nan)
         places.setdefault(channel.marker, {})[channel.quantity] = values
-    measured = {m: _place(found, view) for m, found in places.items() if {"x", "y"} <= found.keys()}
+    needed = {"x", "y"} if answer.estimate.scenes[recording].dimensions == 2 else {"x", "y", "z"}
+    measured = {m: _place(found, view) for m, found in places.items() if needed <= found.keys()}
     directions = {m: found["angle"] + view["tilt"] for m, found in places.items() if "angle" in found}
     fixed = ground(answer.estimate.scenes[recording])
     shown = read(seen, frames)
@@ -170,10 +171,11 @@ def _step(times: Array) -> float:
 
 
 def _place(found: dict[str, Array], view: dict[str, float]) -> Array:
-    """From what the camera sees to the machine's frame [m], (frames, 2)."""
+    """From what the camera sees to the machine's frame [m], (frames, d)."""
     x, y = (view["scale"] * found[key] for key in ("x", "y"))
     c, s = np.cos(view["tilt"]), np.sin(view["tilt"])
-    return np.stack([view["x"] + c * x - s * y, view["y"] + s * x + c * y], axis=1)
+    depth = [view["scale"] * found["z"]] if "z" in found else []
+    return np.stack([view["x"] + c * x - s * y, view["y"] + s * x + c * y, *depth], axis=1)
 
 
 def plain_motion(found: Motion) -> dict[str, Any]:

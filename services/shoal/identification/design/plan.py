@@ -25,6 +25,7 @@ from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.source import Channel, EngineSource
 from shoal.identification.spread.sensitivity import AGREED, sensitivity
 from shoal.scene import Scene
+from shoal.scene.dimensions import require_plane
 from shoal.trajectory import Array, plain
 
 _DURATIONS = (0.25, 0.5, 1.0, 1.5, 2.0)
@@ -106,7 +107,9 @@ def design(
     source = next(iter(problem.sources.values()))
     noise, angle_noise = stated_noise(problem, noise, angle_noise)
     duration, rate = today_of(source, measurement, duration, rate)
-    scene, sensors = sensors_of(problem.load_scene(values))
+    stated = problem.load_scene(values)
+    require_plane(stated, "the design of experiments is")
+    scene, sensors = sensors_of(stated)
     present = problem.channels_of(source)
     channels = (*present, *(channel for sensor in sensors for channel in sensor.channels))
     model = _model(problem, scene, channels, grid(duration, rate))

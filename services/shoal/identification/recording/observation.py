@@ -12,7 +12,7 @@ from shoal.trajectory import Array, Trajectory
 
 
 class Camera(NamedTuple):
-    """Where positions are seen from: at rotation(-tilt) (X - [x, y]) / scale. Numbers, or one per lane, (lanes,)."""
+    """Where positions are seen from: at rotation(-tilt) (X - [x, y]) / scale, z at z / scale; numbers or (lanes,)."""
 
     scale: float | Array = 1.0
     x: float | Array = 0.0
@@ -40,6 +40,8 @@ def observe(trajectory: Trajectory, channels: tuple[Channel, ...], seen_by: Came
             if trajectory.rates is None:
                 raise InputError(f"channels: engine {trajectory.engine} tells no rates; use gauss, or no rate")
             columns.append(trajectory.rates[:, index])
+        elif channel.quantity == "z":
+            columns.append(trajectory.points[:, index, 2] / seen_by.scale)
         elif channel.is_position:
             x, y = trajectory.points[:, index, 0] - seen_by.x, trajectory.points[:, index, 1] - seen_by.y
             columns.append((c * x + s * y if channel.quantity == "x" else c * y - s * x) / seen_by.scale)

@@ -129,7 +129,11 @@ def _window(source: FileSource, times: Array, begin: float, path: Path) -> Mask:
 def _mend(times: Array, columns: dict[str, Array], channels: tuple[Channel, ...]) -> list[str]:
     """Put exchanged markers right in the columns, in place; what was found, by rows of samples from 0."""
     places = {(c.marker, c.quantity): c.column for c in channels if c.is_position}
-    pairs = {m: (places[m, "x"], places[m, "y"]) for m, q in places if q == "x" and (m, "y") in places}
+    pairs = {
+        m: (places[m, "x"], places[m, "y"])
+        for m, q in places
+        if q == "x" and (m, "y") in places and (m, "z") not in places
+    }
     if len(pairs) < 2 or len({name for pair in pairs.values() for name in pair}) < 2 * len(pairs):
         return []
     mended, notes = mend(times, {m: np.column_stack([columns[x], columns[y]]) for m, (x, y) in pairs.items()})

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from shoal.scene.record import NonNegative, Positive, Record
 
-Quantity = Literal["x", "y", "angle", "rate"]
+Quantity = Literal["x", "y", "z", "angle", "rate"]
 LengthUnit = Literal["m", "cm", "mm", "um", "in", "px"]
 AngleUnit = Literal["rad", "deg", "rev"]
 
@@ -27,7 +27,7 @@ SI: dict[str, float] = {
 
 
 class Channel(Record):
-    """One measured signal: a marker's x, y [m], angle [rad] or rate of its angle [rad/s].
+    """One measured signal: a marker's x, y, in space z [m], angle [rad] or rate of its angle [rad/s].
 
     The signal is offset + scale * unit * (column - origin); where the y axis grows down, y, angle and rate change sign
     before `offset` is added.
@@ -47,7 +47,7 @@ class Channel(Record):
 
     @model_validator(mode="after")
     def _unit_of_its_quantity(self) -> Self:
-        lengths = self.quantity in ("x", "y")
+        lengths = self.quantity in ("x", "y", "z")
         if self.unit is not None and lengths != (self.unit in LengthUnit.__args__):  # type: ignore[attr-defined]
             right = LengthUnit.__args__ if lengths else AngleUnit.__args__  # type: ignore[attr-defined]
             raise ValueError(f"unit: {self.quantity} is measured in one of {', '.join(right)}, found {self.unit!r}")
@@ -56,15 +56,15 @@ class Channel(Record):
     @property
     def is_position(self) -> bool:
         """Whether it is a coordinate of a marker, in metres."""
-        return self.quantity in ("x", "y")
+        return self.quantity in ("x", "y", "z")
 
 
 class Clocked(Record):
     """What a recording of any kind says: the motion's time is recorded time / clock + delay [s] after its start.
 
     So `clock` is how many seconds the recording's clock shows in one second: 1.26 is a clock that is fast by 26 %.
-    A marker at X [m] is recorded at rotation(-tilt) (X - [x, y]) / scale, angles less `tilt`: clock, delay, scale, x, y
-    and tilt may be parameters, with the paths `measurement.clock` and so on.
+    A marker at X [m] is recorded at rotation(-tilt) (X - [x, y]) / scale, its z at z / scale, angles less `tilt`:
+    clock, delay, scale, x, y and tilt may be parameters, with the paths `measurement.clock` and so on.
     known: fields of the scene that are different in this recording
     channels: instead of those of the problem
     """

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from shoal.identification.recording.measurement import Measurement
     from shoal.identification.recording.source import Channel
 
-QUANTITIES = {"x": "m", "y": "m", "angle": "rad", "rate": "rad/s"}
+QUANTITIES = {"x": "m", "y": "m", "z": "m", "angle": "rad", "rate": "rad/s"}
 """Of what a channel measures."""
 _FIELDS = {
     "angle": "rad",
@@ -24,6 +24,7 @@ _FIELDS = {
     "position": "m",
     "x": "m",
     "y": "m",
+    "z": "m",
     "velocity": "m/s",
     "gravity": "m/s²",
     "density": "kg/m³",

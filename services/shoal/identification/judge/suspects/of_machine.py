@@ -57,13 +57,14 @@ def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
 def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
     """A further mass at each marker, and the mass of each body."""
     loaded, seen = scene.model_dump(mode="json"), dict[str, str]()
+    kind = "spherical" if scene.dimensions == 3 else "revolute"
     for name, marker in scene.markers.items():
         place = str((marker.body, scene.location(marker)))
         if place in seen.values():
             continue
         further, seen[name] = f"further-{name}", place
         loaded["bodies"][further] = {"kind": "point-mass", "mass": _NOTHING * size.mass}
-        loaded["joints"][further] = {"first": loaded["markers"][name], "second": {"body": further}}
+        loaded["joints"][further] = {"kind": kind, "first": loaded["markers"][name], "second": {"body": further}}
     with suppress(InputError):
         with_masses = Scene.parse(loaded)
         for name in seen:
@@ -73,8 +74,9 @@ def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
         field = "density" if isinstance(body, Rod) else "mass"
         yield _ratio(f"mass of {name}", f"bodies.{name}.{field}", float(getattr(body, field)))
     for name, body in scene.bodies.items():
-        if isinstance(body, RigidBody) and body.inertia > 0:
-            yield _ratio(f"inertia of {name}", f"bodies.{name}.inertia", body.inertia)
+        if isinstance(body, RigidBody) and (isinstance(body.inertia, tuple) or body.inertia > 0):
+            if not isinstance(body.inertia, tuple):
+                yield _ratio(f"inertia of {name}", f"bodies.{name}.inertia", body.inertia)
             for axis, where in enumerate(body.centre_of_mass):
                 if where:
                     path = f"bodies.{name}.centre_of_mass.{axis}"
@@ -111,7 +113,7 @@ def _pivots(scene: Scene, size: Size) -> Iterator[Candidate]:
     }
     for (name, field), place in places.items() if len(places) > 1 else ():
         for axis, stated in enumerate(place):
-            words, path = f"{'xy'[axis]} of the pivot {name}", f"joints.{name}.{field}.point.{axis}"
+            words, path = f"{'xyz'[axis]} of the pivot {name}", f"joints.{name}.{field}.point.{axis}"
             yield _near(words, path, stated, _SHIFT * size.length)
     yield from _joints_on_bodies(scene)
 
@@ -125,8 +127,8 @@ def _joints_on_bodies(scene: Scene) -> Iterator[Candidate]:
             body = scene.bodies.get(side.body)
             if not isinstance(body, Rod) or body.element != "rigid":
                 continue
-            along, across = scene.location(side)
-            explicit["joints"][name][field]["point"] = [along, across]
+            along, *across = scene.location(side)
+            explicit["joints"][name][field]["point"] = [along, *across]
             found.append((name, field, along, body.length))
     with suppress(InputError):
         stated = Scene.parse(explicit)
@@ -143,6 +145,9 @@ def _near(name: str, path: str, stated: float, width: float, scene: Scene | None
 
 def _rates(scene: Scene, size: Size) -> Iterator[Candidate]:
     """Rates at the start; in a closed loop of what stands on the ground only, as those of others follow."""
+    if scene.dimensions == 3:
+        yield from _spins(scene, size)
+        return
     direct = is_direct(scene)
     grounded = {side.body for joint in scene.joints.values() if (on := places(joint)) for side in on
                 if any(other.body == GROUND for other in on)}  # fmt: skip
@@ -152,3 +157,12 @@ def _rates(scene: Scene, size: Size) -> Iterator[Candidate]:
         rate, most = scene.start(name).rate, 10.0 * size.rate
         words, path, bounds = f"rate of {name} at the start", f"initial.{name}.rate", (rate - most, rate + most)
         yield Candidate.single(words, path, rate, bounds, rate + _STEP * size.rate, alone=not direct)
+
+
+def _spins(scene: Scene, size: Size) -> Iterator[Candidate]:
+    """Components of the angular velocities that a scene in space states."""
+    for name in scene.bodies:
+        for axis, rate in enumerate(scene.start(name).spin or ()):
+            words, path, most = f"spin of {name} about {'xyz'[axis]} at the start", f"initial.{name}.spin.{axis}", 10.0
+            bounds = (rate - most * size.rate, rate + most * size.rate)
+            yield Candidate.single(words, path, rate, bounds, rate + _STEP * size.rate)

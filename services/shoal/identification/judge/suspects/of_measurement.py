@@ -37,8 +37,9 @@ def of_measurement(model: ForwardModel) -> Iterator[Candidate]:
     stated = first.stated.delay
     bounds = (stated - _EARLY * end, stated + _LATE * end)
     yield Candidate.single("delay", f"{RESERVED}.delay", stated, bounds, stated + _STEP * end, "measurement")
-    size = model.scene.gravity[1]
-    if size != 0.0 and model.scene.gravity[0] == 0.0:
+    axes = np.flatnonzero(model.scene.gravity)
+    if len(axes) == 1 and (axes[0] == 1 or model.scene.dimensions == 3):
+        size = model.scene.gravity[axes[0]]
         lower, upper = sorted((size / _FACTORS, size * _FACTORS))
         probe = size * (1 + _STEP)
-        yield Candidate.single("gravity", "gravity.1", size, (lower, upper), probe, "measurement", factor=True)
+        yield Candidate.single("gravity", f"gravity.{axes[0]}", size, (lower, upper), probe, "measurement", factor=True)

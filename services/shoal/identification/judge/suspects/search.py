@@ -124,7 +124,7 @@ class _Search:
         gross = _GROSS * self.model.rows.signal
         if gross > 0.0 and self._least > gross:
             self._read()
-        if not self._explained and self.before > self.noise:
+        if self.model.scene.dimensions == 2 and not self._explained and self.before > self.noise:
             for dear in (shaken(self.model), bending(self.model)):
                 self._fit(self._near(self._promising([*dear]))[:_DEAR])
         # What lies near an answer that leaves little shows in the regression.

@@ -29,13 +29,13 @@ class Size:
 
 def size_of(scene: Scene) -> Size:
     """The size of a machine."""
-    lengths = [max(float(np.hypot(*place)) for place in body.points.values()) for body in scene.bodies.values()]
+    lengths = [max(float(np.linalg.norm(place)) for place in body.points.values()) for body in scene.bodies.values()]
     ground = [
-        float(np.hypot(*side.point))
+        float(np.linalg.norm(side.point))
         for joint in scene.joints.values()
         for side in places(joint)
         if side.body == "ground" and not isinstance(side.point, str)
     ]
     mass = sum(float(body.mass) for body in scene.bodies.values())
-    gravity = float(np.hypot(*scene.gravity)) or _EARTH
+    gravity = float(np.linalg.norm(scene.gravity)) or _EARTH
     return Size(mass, max([*lengths, 1e-3]), sum(lengths) + max(ground, default=0.0), gravity)
