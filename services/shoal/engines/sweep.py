@@ -75,8 +75,8 @@ class Sweep:
             row: dict[str, Any] = {path: float(values[k]) for path, values in self.grid.items()}
             for marker, positions in self.positions.items():
                 moved = self.displacements[marker]
-                row |= {f"{marker}.x": positions[k, 0], f"{marker}.y": positions[k, 1]}
-                row |= {f"{marker}.dx": moved[k, 0], f"{marker}.dy": moved[k, 1]}
+                for prefix, vectors in (("", positions), ("d", moved)):
+                    row |= {f"{marker}.{prefix}{axis}": part for axis, part in zip("xyz", vectors[k], strict=False)}
             table.append(plain({**row, "status": str(status)}))
         return table
 

@@ -81,16 +81,16 @@ def sweep_table(sweep: Sweep) -> None:
     """Displacements of every marker over the grid."""
     markers = list(sweep.positions)
     last = markers[-1]
+    axes = "xyz"[: sweep.scene.dimensions]
     table = screen.table(
         f"{sweep.scene.name}: displacement of {last} after {sweep.time:g} s",
         *_short(list(sweep.grid)),
-        f"{last}.dx [m]",
-        f"{last}.dy [m]",
+        *(f"{last}.d{axis} [m]" for axis in axes),
         "status",
     )
     for row in sweep.rows():
         numbers = [f"{row[path]:.6g}" for path in sweep.grid]
-        moved = [row[f"{last}.dx"], row[f"{last}.dy"]]
+        moved = [row[f"{last}.d{axis}"] for axis in axes]
         table.add_row(*numbers, *("-" if m is None else f"{m:.6f}" for m in moved), row["status"])
     screen.out.print(table)
     if sweep.check is not None:
