@@ -17,6 +17,7 @@ from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
 Array = Any
 PACKED = functions.pack([fitting.fit(lambda t: 1 + t, 2.0), fitting.fit(lambda t: np.sin(3 * t), 2.0)])
 TIME = 0.7
+NONE = np.zeros(0, dtype=np.int64)
 
 
 @njit(cache=True)
@@ -30,7 +31,7 @@ def loads(coefficient: Array, factor: Array) -> Applied:
     return Applied(
         (0, 0), 3, np.array([0, 1, 1]), np.ravel(coefficient), np.array([-1, 0, 1]),
         2, np.array([0, 1, 2, 3, 2, 3, 4, 5]), np.ravel(factor), np.array([1, -1]),
-        0, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64),
+        0, NONE, NONE, 0, NONE, NONE,
     )  # fmt: skip
 
 
@@ -69,12 +70,30 @@ def test_lanes_are_what_they_are_alone() -> None:
 
 
 def test_nothing_from_no_loads() -> None:
-    none, rows = np.zeros(0), np.zeros(0, dtype=np.int64)
+    none = np.zeros(0)
     found, power = force(
         SINGLE,
-        Applied((0, 0), 0, rows, none, rows, 0, rows, none, rows, 0, rows, rows),
+        Applied((0, 0), 0, NONE, none, NONE, 0, NONE, none, NONE, 0, NONE, NONE, 0, NONE, NONE),
         np.ones((6, 1)),
         np.ones((6, 1)),
     )
     assert not found.any()
     assert power[0] == pytest.approx(0.0)
+
+
+def test_a_torque_on_a_section_works_in_its_turn_alone() -> None:
+    """A torque n f(t) on a node in space with the slope r' and the director d: its power in a turn w is n . w f(t)."""
+    draw = np.random.default_rng(3)
+    n, turn = draw.normal(size=3), draw.normal(size=3)
+    slope = 1.2 * np.linalg.qr(draw.normal(size=(3, 3)))[0][:, 0]
+    director = np.cross(slope, n) / np.linalg.norm(np.cross(slope, n))
+    z = np.concatenate([n, slope, director])
+    held = Applied(
+        (0, 0, 0), 0, NONE, np.zeros(0), NONE, 0, NONE, np.zeros(0), NONE, 0, NONE, NONE,
+        1, np.arange(9), np.array([0]),
+    )  # fmt: skip
+    rates = np.concatenate([np.zeros(3), np.cross(turn, slope) + 0.3 * slope, np.cross(turn, director)])
+    found, power = force(SINGLE, held, z[:, None], rates[:, None])
+    assert power[0] == pytest.approx(-(1 + TIME) * (n @ turn), rel=1e-12)
+    moment = np.cross(slope, found[3:6, 0]) + np.cross(director, found[6:9, 0])
+    np.testing.assert_allclose(moment, (1 + TIME) * n, rtol=1e-12)
