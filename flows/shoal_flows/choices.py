@@ -26,11 +26,17 @@ Names = Mapping[str, Iterable[str]]
 def names(kind: str, own: Iterable[str] | None = None) -> list[str]:
     """The names of a kind: built-in ones, then `own`, else those of the library here."""
     from shoal.identification.problem import built_in_problems
+    from shoal.response.stated import built_in_studies
     from shoal.scene.load import built_in_scenes
     from shoal.shelf import shelf
 
-    built_in = {"scenes": built_in_scenes(), "problems": built_in_problems(), "recordings": [""]}[kind]
-    return [*built_in, *([entry.name for entry in shelf().entries(kind)] if own is None else own)]
+    built_in = {
+        "scenes": built_in_scenes,
+        "problems": built_in_problems,
+        "recordings": lambda: [""],
+        "studies": built_in_studies,
+    }[kind]
+    return [*built_in(), *([entry.name for entry in shelf().entries(kind)] if own is None else own)]
 
 
 def refresh(own: Names | None = None) -> int:

@@ -12,8 +12,12 @@ from shoal.engines import get_engine, spot_checks
 from shoal.engines import sweep as sweeping
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.verification import verified
+from shoal.errors import InputError
 from shoal.identification import Estimate, Measurement, identify, load_problem, measure
 from shoal.pictures.answer import Answer
+from shoal.response import Response, uncertain
+from shoal.response.stated import load_study
+from shoal.response.worst import Worst, worst
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Trajectory
 
@@ -97,6 +101,16 @@ def simulated(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene
 def compared(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -> comparing.Comparison:
     """A scene on several engines. Raises InputError."""
     return comparing.compare(load_scene(scene).with_values(values), engines)
+
+
+def responded(study: str, values: Mapping[str, Any]) -> tuple[Response, list[Worst]]:
+    """A study of uncertain parameters with its worst cases, if any. Raises InputError, ComputationError."""
+    stated = load_study(study)
+    found = uncertain(stated.machine().with_values(values), **stated.asked())
+    try:
+        return found, worst(found, stated.worst_of)
+    except InputError:
+        return found, []
 
 
 def swept(scene: str, grid: Mapping[str, Array], engine: str, time: float | None) -> sweeping.Sweep:

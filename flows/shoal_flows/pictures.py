@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,10 +22,15 @@ from shoal.pictures.overlay import follows, overlay
 from shoal.pictures.pages import animation
 from shoal.pictures.remainders import remainders
 from shoal.pictures.report import report
+from shoal.pictures.response import response
 from shoal.pictures.study import study
 from shoal.pictures.style import png, svg
+from shoal.pictures.uncertainty import uncertainty
+from shoal.response import Response
+from shoal.scene.edited import as_yaml
 
 from shoal_flows.jobs import Cell, Fit, fit
+from shoal_flows.jobs import responded as respond
 
 Picture = tuple[bytes, bytes]
 """The same picture as PNG and as SVG."""
@@ -58,6 +63,16 @@ def album(found: Fit) -> Album:
 def page(fits: Sequence[Fit]) -> str:
     """The page of a study, as `shoal report` makes it."""
     return study({found.cell.name: Answer(load_problem(found.cell.problem), found.estimate) for found in fits})
+
+
+def responded(study: str, values: Mapping[str, Any]) -> tuple[Response, dict[str, bytes]]:
+    """A study of uncertain parameters, and what is shown of it by the name of its file."""
+    found, cases = respond(study, values)
+    album = {"response.html": uncertainty(found).encode()}
+    album |= {f"{marker}.png": png(response(found, marker)) for marker in found.markers}
+    for k, case in enumerate(cases):
+        album[f"worst-{k + 1}.yaml"] = as_yaml(case.scene.model_dump(mode="json", exclude_unset=True)).encode()
+    return found, album
 
 
 def draw_trajectory(fits: Sequence[Fit], name: str) -> Picture:

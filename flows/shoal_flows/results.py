@@ -9,6 +9,7 @@ from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium
+from shoal.response import Response
 from shoal.scene import Scene
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory, plain
@@ -80,6 +81,23 @@ class Swept:
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal run sweep --json` prints."""
         return {**self.sweep.to_json(), "run_id": self.run_id}
+
+
+@dataclass(frozen=True)
+class Responded:
+    """What an uncertain machine may do, with the id of its run."""
+
+    response: Response
+    run_id: str
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it can be believed as it stands."""
+        return self.response.ok
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run uncertain --json` prints."""
+        return {**self.response.to_json(), "run_id": self.run_id}
 
 
 @dataclass(frozen=True)

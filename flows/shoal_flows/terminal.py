@@ -57,7 +57,7 @@ def show(result: Any) -> None:
     """The table of a result."""
     from shoal.terminal import tables
 
-    from shoal_flows.results import AtRest, Compared, DemoResult, Designed, Selected, Simulated, Study, Swept
+    from shoal_flows.results import AtRest, Compared, DemoResult, Designed, Responded, Selected, Simulated, Study, Swept
 
     console = Console(highlight=False)
     if isinstance(result, Study):
@@ -76,6 +76,8 @@ def show(result: Any) -> None:
         tables.selection_table(result.selection)
     elif isinstance(result, Designed):
         tables.design_table(result.design)
+    elif isinstance(result, Responded):
+        tables.response_table(result.response)
     elif isinstance(result, Swept):
         console.print(f"{len(result.sweep.status)} points in {result.sweep.wall_s:.2f} s")
         if result.sweep.check is not None:

@@ -1,4 +1,4 @@
-"""The library of one's own: scenes, recordings and problems that are checked before they are kept.
+"""The library of one's own: scenes, recordings, problems and studies that are checked before they are kept.
 
 Their names stand beside the built-in ones wherever one is taken. An entry holds all files that it needs and that are
 not themselves in the library; what it names there is looked up anew each time, until a study holds on to it.
@@ -18,6 +18,9 @@ from shoal.identification.problem import built_in_problems
 from shoal.identification.recording.reading import YAML, described, read
 from shoal.identification.recording.source import FileSource
 from shoal.identification.recording.table import load_table
+from shoal.response.limits import limit
+from shoal.response.read import parameters
+from shoal.response.stated import KEY, built_in_studies, load_study
 from shoal.scene import Scene, load_scene
 from shoal.scene.edited import Keys, as_yaml, edited
 from shoal.scene.load import LARGEST, built_in_scenes, read_yaml, some, unknown
@@ -82,6 +85,17 @@ def _check_problem(document: Path) -> None:
         measure(problem, scene)
 
 
+def _check_study(document: Path) -> None:
+    study = load_study(str(document))
+    scene, asked = study.machine(), study.asked()
+    _model(scene)
+    if any("empirical(" in text for text in study.vary):
+        raise InputError(f"{document.name}: {KEY}: vary: a table of observations cannot be kept with a study")
+    parameters(asked["vary"], scene)
+    for text in asked["limits"]:
+        limit(text, scene)
+
+
 KINDS = {
     kind.folder: kind
     for kind in (
@@ -97,6 +111,10 @@ KINDS = {
                 ("source", "path"): "recordings",
                 ("recordings", "*", "path"): "recordings",
             },
+        ),
+        Kind(
+            *("studies", "study", _check_study, KEY, lambda name: name in built_in_studies()),
+            references={(KEY, "scene"): "scenes"},
         ),
     )
 }

@@ -209,6 +209,11 @@ def test_a_scene_may_be_given_as_yaml() -> None:
     assert any("InputError: scene: bodies.OA.mass: " in str(message) for message in messages), messages
 
 
+STUDY = """
+uncertain: {scene: single-pendulum, vary: {initial.OA.angle: "-0.1:0.1"}, at: [0.5], limit: A.y > 0.5, verify: false}
+"""
+
+
 def test_what_else_there_is_of_a_machine_is_logged() -> None:
     """The cheapest model within a tolerance, its place of rest, a design of a measurement; each can be repeated."""
     duration = "{solver.duration: 0.1}"
@@ -216,6 +221,7 @@ def test_what_else_there_is_of_a_machine_is_logged() -> None:
         "select": {"scene": "flexible-double-pendulum", "tolerance": "1e-3", "values": duration},
         "statics": {"scene": "rigid-double-pendulum"},
         "design": {"problem": "paper-case-1", "about": "start", "noise": "1e-3"},
+        "uncertain": {"study": json.dumps(STUDY)},
     }
     for flow, parameters in asked.items():
         found = run.run_flow(flow, parameters)

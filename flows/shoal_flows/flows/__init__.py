@@ -19,9 +19,10 @@ from shoal_flows.flows.nightly import nightly  # noqa: E402
 from shoal_flows.flows.select import select  # noqa: E402
 from shoal_flows.flows.statics import statics  # noqa: E402
 from shoal_flows.flows.sweep import sweep  # noqa: E402
+from shoal_flows.flows.uncertain import uncertain  # noqa: E402
 
 FLOWS: dict[str, Flow[..., Any]] = {
-    flow.name: flow for flow in (forward, select, compare, sweep, statics, identify, design, nightly, demo)
+    flow.name: flow for flow in (forward, select, compare, sweep, uncertain, statics, identify, design, nightly, demo)
 }
 
 __all__ = ["FLOWS"]

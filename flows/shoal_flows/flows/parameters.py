@@ -36,6 +36,7 @@ def _named(kind: str, own: str) -> Any:
 
 SceneName = Annotated[str, _named("scenes", "name, YAML, path or address")]
 ProblemName = Annotated[str, _named("problems", "name, YAML, path or address")]
+StudyName = Annotated[str, _named("studies", "name, YAML, path or address")]
 Data = Annotated[str, _named("recordings", "name, path or address")]
 EngineName = Annotated[str, _one_of(ENGINES)]
 Engines = Annotated[list[EngineName], Field(min_length=2, json_schema_extra={"uniqueItems": True})]

@@ -10,6 +10,7 @@ from shoal.engines.sweep import Sweep
 from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.estimates import estimates
+from shoal.response import Response
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory
 
@@ -40,6 +41,22 @@ def of_sweep(result: Sweep) -> str:
     notes = [] if result.check is None else [f"{result.check}."]
     notes += [f"The first {_ROWS} of {len(rows)} points; all are in sweep.csv."] if len(rows) > _ROWS else []
     return "\n\n".join([shown, *notes])
+
+
+def of_response(found: Response) -> str:
+    """Bounds or statistics of every marker at the end, what is told of the limits, and the evidence."""
+    header, rows = found.table()
+    ends: dict[str, dict[str, float]] = {}
+    for name, value in zip(header[1:], rows[-1, 1:].tolist(), strict=True):
+        of, _, told = name.partition(".")[2].partition(".")
+        ends.setdefault(f"{name.partition('.')[0]}.{of}", {})[told] = value
+    shown = table(("at the end", *next(iter(ends.values()))), ((of, *told.values()) for of, told in ends.items()))
+    said = [f"{found.status}; {found.evaluations} runs; {found.why}", found.message]
+    for one in found.limits:
+        kept = {True: "kept", False: "passed", None: "not decided"}[one.kept]
+        told = kept if one.passing is None else f"passed with probability {one.passing.estimate.probability:.3g}"
+        said.append(f"limit {one.limit.text}: {told}")
+    return "\n\n".join([shown, *(one for one in said if one)])
 
 
 def of_equilibrium(found: Equilibrium) -> str:

@@ -15,6 +15,7 @@ from shoal.engines.sweep import Sweep
 from shoal.identification import Measurement
 from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium
+from shoal.response import Response
 from shoal.scene import Scene
 from shoal.selection import Selection
 from shoal.trajectory import Array, Trajectory
@@ -22,7 +23,7 @@ from shoal.trajectory import Array, Trajectory
 from shoal_flows import events, fingerprint, inputs, jobs, pictures, remembered, workers
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.pictures import Picture
-from shoal_flows.tracking import analyses
+from shoal_flows.tracking import analyses, responses
 from shoal_flows.tracking import engines as tracked
 from shoal_flows.tracking.identification import log_fit
 
@@ -84,6 +85,14 @@ def plan(problem: str, data: str | None, how: Mapping[str, Any]) -> tuple[Design
     with events.work(f"a measurement for {inputs.title(problem)}"):
         found = workers.run(notebook.design, problem, data, **how)
         return found, analyses.log_design(found)
+
+
+@task(task_run_name="uncertain", cache_policy=NO_CACHE)
+def respond(study: str, values: Mapping[str, Any]) -> tuple[Response, str]:
+    """How a machine may move whose parameters are uncertain, with the id of its run."""
+    with events.work(f"{inputs.title(study)}: uncertain response"):
+        found, album = workers.run(pictures.responded, study, values)
+        return found, responses.log_response(inputs.title(study), found, album)
 
 
 @task(task_run_name="sweep", cache_policy=NO_CACHE)

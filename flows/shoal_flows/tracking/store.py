@@ -29,6 +29,7 @@ _EXPERIMENTS = {
     "Identification": "Parameters found from measured motion: a parent per study, a child per method, case and seed.",
     "Comparison": "One scene on several engines: a parent run per scene, a child per engine.",
     "Sweep": "One scene over a grid of values.",
+    "Uncertain": "Bounds and probabilities of machines whose parameters are known as intervals or distributions.",
     "Forward": "Motion of one scene on one engine.",
     "Statics": "Where a scene comes to rest.",
     "Selection": "The cheapest model of a scene that meets a tolerance.",

@@ -64,6 +64,9 @@ VIEWS: dict[str, dict[str, View]] = {
     "Sweep": {
         "studies": View("Sweeps", ("params.scene", "params.engine", "metrics.final/points")),
     },
+    "Uncertain": {
+        "studies": View("Studies", ("params.study", "params.method", "tags.verdict", "metrics.final/evaluations")),
+    },
     "Validation": {
         "studies": View("Nights", ("tags.verdict", "params.night", "metrics.lines/passed", "metrics.lines/failed")),
     },

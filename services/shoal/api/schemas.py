@@ -79,7 +79,7 @@ class EngineDocument(BaseModel):
 
 
 class LibraryEntry(BaseModel):
-    """What the library holds under a name. kind: scenes, recordings or problems; version: a hash of the content."""
+    """What the library holds under a name. kind: scenes, recordings, problems or studies; version: a hash of it all."""
 
     kind: str
     name: str

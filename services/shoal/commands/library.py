@@ -10,7 +10,9 @@ import click
 
 from shoal.commands import options
 
-_kind = click.option("--kind", metavar="KIND", help="scene, recording or problem, where the name alone does not tell.")
+_kind = click.option(
+    "--kind", metavar="KIND", help="scene, recording, problem or study, where the name alone does not tell."
+)
 
 
 @click.group()
@@ -25,7 +27,7 @@ def library() -> None:
 @library.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--name", help="Under which it is kept; else that of the file.")
-@click.option("--kind", metavar="KIND", help="scene, recording or problem; else what the fields of FILE say.")
+@click.option("--kind", metavar="KIND", help="scene, recording, problem or study; else what the fields of FILE say.")
 @options.as_json
 def add(file: Path, name: str | None, kind: str | None, as_json: bool) -> None:
     """Check FILE and keep it, with the files that it names.
@@ -42,7 +44,7 @@ def add(file: Path, name: str | None, kind: str | None, as_json: bool) -> None:
 
 
 @library.command("list")
-@click.option("--kind", metavar="KIND", help="Only scenes, recordings or problems.")
+@click.option("--kind", metavar="KIND", help="Only scenes, recordings, problems or studies.")
 @options.as_json
 def list_entries(kind: str | None, as_json: bool) -> None:
     """List the entries with their versions."""

@@ -1,0 +1,59 @@
+"""Uncertain responses in MLflow: one run a study, with its bounds or statistics, its charts and its worst cases."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from shoal.response import Response
+from shoal.trajectory import json_text
+
+from shoal_flows.tracking.model.files import as_yaml
+from shoal_flows.tracking.store import Run, open_run
+
+POINTS = 300
+"""Of a curve, at most."""
+
+
+def log_response(study: str, found: Response, album: Mapping[str, bytes]) -> str:
+    """One run; album: artifacts by path. Returns its id."""
+    scene = found.stated
+    tags = {"kind": "uncertain", "scene": scene.name, "verdict": found.status}
+    with open_run("Uncertain", f"{study} · uncertain", description=scene.description, tags=tags) as run:
+        known = {f"vary.{one.name}": one.marginal.text for one in found.inputs.parameters}
+        run.params({"study": study, "scene": scene.name, "method": found.method, "seed": found.seed, **known})
+        run.params({"why": found.why, "engine": found.engine})
+        run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
+        run.text(json_text(found.to_json(), indent=1), "response.json")
+        for path, content in album.items():
+            run.picture(content, path)
+        _figures(run, found)
+        return run.run_id
+
+
+def _figures(run: Run, found: Response) -> None:
+    run.metric("wall_s", found.wall_s)
+    for name in ("evaluations", "repeated", "failed", "horizon", "mesh_error", "step_error"):
+        value = getattr(found, name)
+        run.metric(f"final/{name}", math.nan if value is None else float(value))
+    told = {}
+    if found.bounds is not None:
+        run.metric("final/gap", found.bounds.gap)
+        told = {"lower": found.bounds.lower, "upper": found.bounds.upper}
+    if found.statistics is not None:
+        told |= {"mean": found.statistics.mean, "std": found.statistics.std}
+    some = np.unique(np.linspace(0, len(found.times) - 1, min(POINTS, len(found.times))).astype(int))
+    for marker in found.markers:
+        for quantity in found.quantities:
+            for name, of in told.items():
+                values = found.column(marker, quantity, of)
+                run.metric(f"final/{marker}.{quantity}/{name}", float(values[-1]))
+                steps = ((round(1000 * found.times[k]), float(values[k])) for k in some)
+                run.series(f"{marker}.{quantity}/{name}", steps)
+    for k, judged in enumerate(found.limits):
+        run.params({f"limit.{k}": judged.limit.text})
+        if judged.passing is not None:
+            run.metric(f"final/limit.{k}/probability", judged.passing.estimate.probability)
+        elif judged.kept is not None:
+            run.metric(f"final/limit.{k}/kept", float(judged.kept))
