@@ -13,6 +13,9 @@ from shoal.api.program import create_program
 from shoal.api.settings import Settings
 from shoal.api.worker import MakeEngine
 
+STOPPED = 30.0
+"""A service that has not stopped by then [s] is left to the end of the process: no wait is without a limit."""
+
 
 @contextmanager
 def serving(engine: str, settings: Settings, make_engine: MakeEngine | None = None) -> Iterator[str]:
@@ -20,7 +23,7 @@ def serving(engine: str, settings: Settings, make_engine: MakeEngine | None = No
     program = create_program(engine, settings, make_engine)
     config = uvicorn.Config(program, port=0, log_level="warning", timeout_graceful_shutdown=1)
     server = uvicorn.Server(config)
-    thread = threading.Thread(target=server.run)
+    thread = threading.Thread(target=server.run, daemon=True)
     thread.start()
     try:
         while not server.started:
@@ -30,7 +33,7 @@ def serving(engine: str, settings: Settings, make_engine: MakeEngine | None = No
         yield url
     finally:
         server.should_exit = True
-        thread.join()
+        thread.join(STOPPED)
 
 
 def eventually(met: Callable[[], bool], seconds: float = 300.0) -> None:
