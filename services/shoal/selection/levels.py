@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from shoal.scene import Rod, Scene
+from shoal.scene.dimensions import is_flat
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ LADDERS = {
         *(quintic(n) for n in COUNTS if n > 1),
     ),
     "ancf-full": (RIGID, *(Level("ancf-full", n) for n in COUNTS)),
+    "director-rod": (RIGID, *(Level("director-rod", n) for n in COUNTS)),
 }
 """From coarse to fine, by the element whose limit is the truth."""
 
@@ -72,10 +74,13 @@ def below(level: Level, limit: str) -> tuple[Level, ...]:
 def open_rods(scene: Scene) -> dict[str, str]:
     """The rods whose model is open, and the element whose limit is their truth: of the scene's theory the finest.
 
-    Bernoulli-Euler's beam, unless the scene names ancf-full, which has shear and stretch of the section.
+    Bernoulli-Euler's beam, unless the scene names ancf-full, which has shear and stretch of the section, or
+    director-rod, which twists. A rigid rod that leaves the plane may twist.
     """
+    finest = dict.fromkeys(("ancf-cable", "ancf-quintic"), "ancf-quintic")
+    finest["rigid"] = "director-rod" if scene.dimensions == 3 and not is_flat(scene) else "ancf-quintic"
     return {
-        name: "ancf-full" if body.element == "ancf-full" else "ancf-quintic"
+        name: finest.get(body.element, body.element)
         for name, body in scene.bodies.items()
         if isinstance(body, Rod) and body.youngs_modulus is not None
     }

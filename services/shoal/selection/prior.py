@@ -9,11 +9,13 @@ This is an order of magnitude. It prunes only where it is far from the tolerance
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
+from shoal.mechanics.rotation import of_vector, product, vector_of
 from shoal.scene import (
     Attachment,
     DistributedForce,
@@ -26,6 +28,7 @@ from shoal.scene import (
     TorsionSpring,
     Weld,
 )
+from shoal.scene.dimensions import padded
 from shoal.scene.joints import places, sides
 from shoal.selection.levels import RIGID, apply
 from shoal.trajectory import Array, Trajectory
@@ -43,7 +46,7 @@ class Prior:
     deflection: quasi-static, largest along the motion [m], nan if the loads cannot be told beforehand
     growth: by which factor the motion carries small changes on
     error: what modelling the rod as rigid costs at the markers, by order of magnitude [m]
-    frequency: lowest bending frequency of the rod, pinned at both ends [rad/s]
+    frequency: lowest bending frequency of the rod, pinned at both ends, about its weaker axis [rad/s]
     """
 
     deflection: float
@@ -64,7 +67,7 @@ def estimate(scene: Scene, rods: tuple[str, ...]) -> dict[str, Prior]:
         assert isinstance(rod, Rod)
         deflection = np.nan if motion is None else _deflection(scene, name, rod, motion)
         assert rod.youngs_modulus is not None
-        speed = np.sqrt(rod.youngs_modulus / rod.density) * rod.height / np.sqrt(12.0)
+        speed = np.sqrt(rod.youngs_modulus / rod.density) * _thickness(scene, rod) / np.sqrt(12.0)
         error = OVERSHOOT * deflection * (1.0 + growth)
         found[name] = Prior(deflection, growth, error, float(np.pi**2 * speed / rod.length**2))
     return found
@@ -92,13 +95,23 @@ def _growth(scene: Scene, times: Array, motion: Trajectory) -> float:
     """Largest displacement of the scene's own markers per displacement at the start."""
     largest = 0.0
     for name, body in scene.bodies.items():
-        start = scene.start(name)
-        near = _run(scene.with_values({f"initial.{name}.angle": start.angle + NUDGE}), times)
-        if near is None:
-            continue
         length = body.length if isinstance(body, Rod) else 1.0
-        largest = max(largest, near.distance(motion) / (NUDGE * length))
+        for values in _nudged(scene, name):
+            near = _run(scene.with_values(values), times)
+            if near is not None:
+                largest = max(largest, near.distance(motion) / (NUDGE * length))
     return largest
+
+
+def _nudged(scene: Scene, name: str) -> list[dict[str, Any]]:
+    """Starts in which one body is turned a little: in the plane, or about each axis of the ground."""
+    start = scene.start(name)
+    if scene.dimensions == 2:
+        return [{f"initial.{name}.angle": start.angle + NUDGE}]
+    stated = np.array([0.0, 0.0, start.angle] if start.rotation is None else start.rotation)
+    attitude = of_vector(stated[:, None])
+    turned = (product(of_vector(nudge[:, None]), attitude)[..., 0] for nudge in NUDGE * np.eye(3))
+    return [{f"initial.{name}.angle": None, f"initial.{name}.rotation": vector_of(one).tolist()} for one in turned]
 
 
 def _deflection(scene: Scene, name: str, rod: Rod, motion: Trajectory) -> float:
@@ -107,9 +120,10 @@ def _deflection(scene: Scene, name: str, rod: Rod, motion: Trajectory) -> float:
     interval = float(motion.times[1] - motion.times[0])
     ends = [motion.marker(f"at-{name}-{end}") for end in ("start", "end")]
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0], axis=1)[:, None]
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)[1:-1]
-    pulls = [np.array(scene.gravity) - np.diff(path, 2, axis=0) / interval**2 for path in ends]
-    transverse = max(float(np.max(np.abs(np.sum(pull * across, axis=1)))) for pull in pulls)
+    gravity = np.array(padded(scene.gravity, scene.dimensions))
+    pulls = [gravity - np.diff(path, 2, axis=0) / interval**2 for path in ends]
+    across = (pull - np.sum(pull * along[1:-1], axis=1)[:, None] * along[1:-1] for pull in pulls)
+    transverse = max(float(np.max(np.linalg.norm(part, axis=1))) for part in across)
     largest = max(float(np.max(np.linalg.norm(pull, axis=1))) for pull in pulls)
     masses = {other: float(body.mass) for other, body in scene.bodies.items()}
     line, length = rod.mass / rod.length * transverse, rod.length
@@ -121,7 +135,13 @@ def _deflection(scene: Scene, name: str, rod: Rod, motion: Trajectory) -> float:
     else:
         sag = line * length**4 / np.pi**4 + force * length**3 / 48 + moment * length**2 / 16
     tension = sum(masses.values()) * largest + force
-    return float(sag / rod.bending_stiffness + tension * length / rod.axial_stiffness)
+    bending_stiffness = rod.axial_stiffness * _thickness(scene, rod) ** 2 / 12
+    return float(sag / bending_stiffness + tension * length / rod.axial_stiffness)
+
+
+def _thickness(scene: Scene, rod: Rod) -> float:
+    """Of the section, in the direction in which it bends most easily [m]."""
+    return float(min(rod.section(0)[: scene.dimensions - 1]))
 
 
 def _applied(scene: Scene, name: str, rod: Rod) -> tuple[float, float]:
@@ -129,9 +149,9 @@ def _applied(scene: Scene, name: str, rod: Rod) -> tuple[float, float]:
     force, moment = 0.0, 0.0
     for load in scene.loads.values():
         if isinstance(load, DistributedForce) and load.body == name:
-            force += float(np.hypot(*load.force)) * rod.length * _constant(load.scale)
+            force += float(np.linalg.norm(load.force)) * rod.length * _constant(load.scale)
         elif isinstance(load, Force) and load.at.body == name:
-            force += float(np.hypot(*load.force)) * _constant(load.scale)
+            force += float(np.linalg.norm(load.force)) * _constant(load.scale)
         elif isinstance(load, Torque) and name in {side.body for side in sides(load).values()}:
             moment += _constant(load.torque)
         elif isinstance(load, Spring | TorsionSpring) and name in {side.body for side in sides(load).values()}:

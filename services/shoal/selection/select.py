@@ -87,7 +87,8 @@ def select(
     """The cheapest model of a scene whose estimated error at the markers is within `tolerance` [m].
 
     The truth is the converged theory: Bernoulli-Euler's beam for rods with a modulus, whatever element the scene
-    names for them, but for ancf-full, which is a theory of its own. Integrator, step, element and number of elements
+    names for them, but for ancf-full and director-rod, which are theories of their own; a rigid rod in space is taken
+    to twist as well as to bend. Integrator, step, element and number of elements
     are chosen; progress is told every model that is run. Raises InputError.
     """
     if not (np.isfinite(tolerance) and tolerance > 0):
@@ -134,7 +135,16 @@ def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
         if isinstance(body, Rod) and body.youngs_modulus is None
     }
     for rod, limit in limits.items():
+        body = scene.bodies[rod]
+        assert isinstance(body, Rod)
+        if limit == "director-rod" and not body.straight:
+            raise InputError(
+                f"bodies.{rod}.element: models are chosen of straight rods in space, and {rod} is curved or twisted; "
+                "state its number of elements instead of a tolerance"
+            )
         if reason := can_be_flexible(scene, rod, limit):
+            if body.element != "rigid":
+                raise InputError(f"bodies.{rod}.element: no other model can take the place of {body.element}: {reason}")
             closed[rod] = reason
     return {rod: limit for rod, limit in limits.items() if rod not in closed}, closed
 

@@ -1,0 +1,95 @@
+"""The cheapest model of machines in space, against Exudyn's cables and against vibrations in closed form."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.errors import InputError
+from shoal.scene import Scene, load_scene
+from shoal.selection import select
+from shoal.selection.levels import RIGID
+
+PENDULUM = load_scene("flexible-spherical-double-pendulum")
+EXUDYN = {"A": [0.677293, -0.321390, -0.661664], "B": [1.920270, 0.149686, -2.134790]}
+"""Ends of both rods at 0.5 s, by 32 and 64 cables of Exudyn and 8 and 16 quintic elements, +-1e-6 m."""
+
+
+@pytest.mark.parametrize("element", ["ancf-cable", "director-rod", "rigid"])
+def test_a_spherical_pendulum_of_rods_keeps_its_word_against_exudyn(element: str) -> None:
+    """Whatever element the scene names; a rigid one says that the rods may twist, which these do not."""
+    tolerance = 1e-3 if element == "ancf-cable" else 1e-2
+    scene = PENDULUM.with_values({f"bodies.{rod}.element": element for rod in ("OA", "AB")})
+    found = select(scene, tolerance)
+    assert found.met
+    assert max(np.linalg.norm(found.trajectory.marker(name)[-1] - at) for name, at in EXUDYN.items()) <= tolerance
+
+
+H, W, E, RHO = 0.03, 0.02, 2e9, 2700.0
+GRAVITY = 0.2
+
+
+def clamped(**more: Any) -> Scene:
+    """A rod of 1 m that sticks out of a wall and is let go under a light gravity across both axes of its section."""
+    rod = {"kind": "rod", "length": 1.0, "height": H, "width": W, "density": RHO, "youngs_modulus": E,
+           "element": "director-rod"}  # fmt: skip
+    return Scene.parse({
+        "name": "clamped", "dimensions": 3, "gravity": [0, -GRAVITY, -GRAVITY], "bodies": {"B": rod | more},
+        "joints": {"W": {"kind": "weld", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "B"}}},
+        "markers": {"e": {"body": "B", "point": "end"}}, "solver": {"duration": 0.2},
+    })  # fmt: skip
+
+
+def let_go(thickness: float, times: Any) -> Any:
+    """Deflection of the end of a cantilever let go under its weight, by ten modes of Euler and Bernoulli's beam."""
+    roots = [1.8751040687, 4.6940911330, 7.8547574382, 10.9955407349, 14.1371683910]
+    roots += [(2 * n - 1) * np.pi / 2 for n in range(6, 11)]
+    x = np.linspace(0.0, 1.0, 20_001)
+    found = np.zeros_like(times)
+    for k in roots:
+        ratio = (np.cosh(k) + np.cos(k)) / (np.sinh(k) + np.sin(k))
+        shape = np.cosh(k * x) - np.cos(k * x) - ratio * (np.sinh(k * x) - np.sin(k * x))
+        share = np.trapezoid(shape, x) / np.trapezoid(shape**2, x) * shape[-1]
+        frequency = k**2 * np.sqrt(E / RHO * thickness**2 / 12)
+        found += GRAVITY * share * (1 - np.cos(frequency * times)) / frequency**2
+    return found
+
+
+def test_a_flat_rod_vibrates_across_both_axes_within_the_tolerance() -> None:
+    tolerance, times = 5e-5, np.linspace(0.02, 0.2, 10)
+    found = select(clamped(), tolerance, times)
+    assert found.met
+    assert found.chosen.levels["B"] != RIGID
+    sag = np.stack([let_go(H, times), let_go(W, times)], axis=1)
+    assert np.max(sag[:, 1]) > 20 * tolerance
+    assert np.max(np.linalg.norm(found.trajectory.marker("e")[:, 1:] + sag, axis=1)) < tolerance
+
+
+def test_a_rod_whose_bending_is_within_the_tolerance_comes_out_rigid() -> None:
+    found = select(clamped(youngs_modulus=2e14), 1e-3)
+    assert found.met
+    assert set(found.chosen.levels.values()) == {RIGID}
+
+
+@pytest.mark.parametrize("bent", [{"curvature": [0.5]}, {"twist": [0.5]}])
+def test_models_are_not_chosen_of_curved_rods_in_space(bent: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=r"bodies.B.element: models are chosen of straight rods in space"):
+        select(clamped(**bent), 1e-3)
+
+
+def test_a_flat_rod_with_a_head_is_not_called_rigid() -> None:
+    """Only a director rod suits it."""
+    scene = clamped().model_dump(mode="json", exclude_unset=True)
+    scene["bodies"]["H"] = {"kind": "rigid-body", "mass": 1.0, "inertia": 0.1}
+    scene["joints"]["H"] = {"kind": "weld", "first": {"body": "B", "point": "end"}, "second": {"body": "H"}}
+    found = select(Scene.parse(scene | {"gravity": [0, 0, -9.81]}), 1e-2)
+    assert found.met
+    assert found.chosen.levels["B"].element == "director-rod"
+
+
+def test_a_flexible_rod_that_no_other_model_suits_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(import_module("shoal.selection.select"), "can_be_flexible", lambda *_: "for a reason")
+    with pytest.raises(InputError, match=r"bodies.B.element: no other model can take the place .*: for a reason"):
+        select(clamped(), 1e-2)
