@@ -18,6 +18,7 @@ from shoal_validation.nightly.result import Night, Verdict
 from shoal_validation.nightly.run import judged
 from shoal_validation.nightly.theory import MOTIONS
 from shoal_validation.problems import get_problem
+from shoal_validation.problems.in_space import swing
 from shoal_validation.problems.one_angle import G
 
 PROBLEMS = ("pendulum", "double-pendulum", "four-bar-2", "parallelogram", "slider-crank", "squeezer")
@@ -82,6 +83,24 @@ def test_rate_and_growth_follow_from_the_equation_in_one_angle(problem: str) -> 
     ]
     assert MOTIONS[problem].rate == pytest.approx(rate, rel=0.01)
     assert MOTIONS[problem].growth == pytest.approx(max(growth), rel=0.02)
+
+
+def test_rate_and_growth_follow_from_the_equations_of_the_spherical_pendulum() -> None:
+    times, start = np.linspace(0.0, get_problem("spherical-pendulum").times[-1], 1001), np.array([np.pi / 3, 0.0, 2.0])
+    polar, polar_rate, _ = swing(tuple(start), times)
+    rate = float(max(np.max(np.abs(polar_rate)), np.max(np.sin(start[0]) ** 2 * start[2] / np.sin(polar) ** 2)))
+    growth = 0.0
+    for change in 1e-4 * np.diag([1.0, rate, rate]):
+        away = (swing(tuple(start + change), times) - swing(tuple(start - change), times)) / 2e-4
+        growth = max(growth, float(np.max(np.abs(away[[0, 2]]))))
+    assert MOTIONS["spherical-pendulum"].rate == pytest.approx(rate, rel=0.01)
+    assert MOTIONS["spherical-pendulum"].growth == pytest.approx(growth, rel=0.02)
+
+
+def test_the_spherical_pendulum_is_where_elliptic_functions_put_it() -> None:
+    """At 1 s, as computed by others."""
+    published = [-0.738316659552752, -0.431492043650700, -0.518365823037175]
+    assert get_problem("spherical-pendulum").reference.points[9] == pytest.approx(published, abs=1e-11)
 
 
 def check_processors(problem: str, method: Method, draws: int, agree: float) -> None:

@@ -175,13 +175,28 @@ class Model:
     def _saddle(self) -> Saddle:
         """The sparse saddle point problem, where there are enough constraints to need it."""
         none = np.zeros(0, dtype=np.int64)
-        if self.constraints.size <= saddle.SMALL:
+        if self.constraints.size <= saddle.SMALL or (self.constraints.size <= saddle.FEW and self._redundant):
             return Saddle(0, 0, _EMPTY, none, np.zeros((0, 1)), none, none)
         pattern, slots, place, entries = saddle.analyse(self.unknowns, self.mass_entries, self.constraints)
         multiplier = np.zeros(len(place), dtype=np.int64)
         multiplier[place[self.unknowns :]] = 1
         base = scatter(pattern, slots, self.mass_entries)
         return Saddle(len(place), pattern.slots, pattern, place, base, entries, multiplier)
+
+    @property
+    def _redundant(self) -> bool:
+        """Whether some constraints depend on others at the start of the first lane."""
+        c, d, first = self.constraints, self.derived, self.q0[:, 0]
+        of_row = np.repeat(np.arange(len(d.constant)), np.diff(d.start))
+        parts = np.bincount(of_row, d.coefficient[:, 0] * first[d.source], len(d.constant))
+        state = np.concatenate([first, d.constant[:, 0] + parts])
+        known = np.where(c.source < 0, 1.0, state[c.source])
+        entries = np.bincount(c.target, c.coefficient[:, 0] * known, len(c.column))
+        slope = np.zeros((c.size, self.unknowns))
+        slope[np.repeat(np.arange(c.size), np.diff(c.entry)), c.column] = entries
+        lengths = np.linalg.norm(slope, axis=1, keepdims=True)
+        size = np.linalg.svd(slope / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
+        return c.size > self.unknowns or bool(size[-1] < _DEPENDENT)
 
     @cached_property
     def _alike(self) -> Alike:
@@ -239,6 +254,8 @@ class Model:
         )
 
 
+_DEPENDENT = 1e-7
+"""Smallest singular value of the constraints' unit rows below which some depend on others."""
 _EMPTY, _ = sparse.analyse(0, [])
 
 

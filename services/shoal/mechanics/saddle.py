@@ -24,6 +24,9 @@ from shoal.mechanics.numerics.vector import copy
 
 SMALL = 16
 """Up to so many constraints the orthogonal projection is used, which is more accurate and about as fast."""
+FEW = 64
+"""Up to so many where some depend on others: without a choice of pivots the row that is left out stays the same one,
+and where the motion brings its part in the dependence near zero, those that are kept look singular."""
 SINGULAR = 1e-10
 """Pivot against its first value below which a row counts as dependent in an acceleration: 1e-5 from singular."""
 SETTLED = 1e-6

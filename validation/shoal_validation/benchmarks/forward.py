@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.exudyn import ExudynEngine
-from shoal.engines.exudyn.build import build as build_exudyn
 from shoal.engines.exudyn.build import library
 from shoal.engines.exudyn.record import choose_steps
 from shoal.mechanics.assembly.build import build
@@ -65,7 +64,7 @@ def measure(quadrature: str, repeats: int = 15) -> list[Row]:
 def exudyn_loop(engine: ExudynEngine, what: Scene) -> float:
     """Seconds of SolveDynamic alone, on a fresh system, without callbacks and files."""
     exu = library()
-    machine = build_exudyn(exu, what, engine.beam)
+    machine = engine.machine(exu, what)
     steps = choose_steps(np.array([what.solver.duration]), what.solver.step, machine.unknowns)
     settings = engine.simulation_settings(exu, machine, steps)
     begin = time.perf_counter()

@@ -81,7 +81,7 @@ RIGID = (
         name="default, verified",
         verify=True,
         quick=True,
-        limits=bounds(1e-12),
+        limits=bounds(1e-12, *RIGID_PROBLEMS),
         by_theory=True,
         reason="order 8 at a relative tolerance of 1e-12 in every step, grown as the motion lets errors grow",
     ),

@@ -12,6 +12,7 @@ from shoal_validation.nightly import own
 from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured, angles, motion, selection
 from shoal_validation.nightly.methods import FLEXIBLE, RIGID, Method
+from shoal_validation.nightly.methods_in_space import IN_SPACE
 from shoal_validation.nightly.result import ROUND_OFF
 from shoal_validation.problems import PROBLEMS
 
@@ -36,7 +37,7 @@ def plan(only: str | None = None, quick: bool = False) -> list[Line]:
 
 def _motions() -> Iterator[Line]:
     for name, problem in PROBLEMS.items():
-        for method in FLEXIBLE if problem.flexible else RIGID:
+        for method in (*(FLEXIBLE if problem.flexible else RIGID), *IN_SPACE):
             if name in method.limits:
                 limit = method.limits[name]
                 run, noise = _call(name, method), (limit or ROUND_OFF) if method.by_theory else ROUND_OFF

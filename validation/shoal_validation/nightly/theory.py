@@ -37,6 +37,7 @@ MOTIONS = {
     "slider-crank": Motion(2.0, 10.6, 74.0),
     # No equation of its own: a change of the crank's rate stays, as in free turning, and counts twice.
     "squeezer": Motion(7e-3, 1140.0, 68.0),
+    "spherical-pendulum": Motion(1.0, 7.07, 12.5),
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from shoal.errors import InputError
 
-from shoal_validation.problems import double_pendulum, one_angle, published
+from shoal_validation.problems import double_pendulum, in_space, one_angle, published
 from shoal_validation.problems.continuum import stored
 from shoal_validation.problems.contract import Problem, Reference
 
@@ -95,6 +95,39 @@ PROBLEMS = {
             "B",
             _HALF_SECOND,
             stored("flexible-hanging"),
+            flexible=True,
+        ),
+        Problem(
+            "spherical-pendulum",
+            "a mass point on 1 m that goes round in space",
+            "spherical-pendulum",
+            "A",
+            np.linspace(0.1, 5.0, 50),
+            in_space.spherical_pendulum,
+        ),
+        Problem(
+            "bricard",
+            "Bricard's mechanism, a loop of six bars whose joints leave no freedom by count",
+            "bricard",
+            "P3",
+            np.array([1.0]),
+            in_space.bricard,
+        ),
+        Problem(
+            "governor",
+            "a flyball governor whose couplers are stiff spring-dampers",
+            "flyball-governor",
+            "s",
+            np.array([1.0, 10.0]),
+            in_space.governor,
+        ),
+        Problem(
+            "flexible-spherical",
+            "two flexible rods on spherical joints, in space",
+            "flexible-spherical-double-pendulum",
+            "B",
+            _HALF_SECOND,
+            stored("flexible-spherical"),
             flexible=True,
         ),
     )

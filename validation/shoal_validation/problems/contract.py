@@ -15,7 +15,7 @@ from shoal.trajectory import Array, Trajectory
 class Reference:
     """Where the watched marker is at the problem's times.
 
-    points: [m], (times, 2); source: who computed or published it, and how; error: its own error [m], as far as its
+    points: [m], (times, d); source: who computed or published it, and how; error: its own error [m], as far as its
     source tells.
     """
 

@@ -13,7 +13,6 @@ import numpy as np
 from shoal.engines.exudyn import ExudynEngine
 from shoal.engines.exudyn.build import library, silence
 from shoal.engines.exudyn.record import choose_steps
-from shoal.engines.exudyn.space.build import build_in_space
 from shoal.engines.prepared import Prepared
 
 from shoal_validation.document import table
@@ -41,7 +40,7 @@ def exudyn(step: float) -> tuple[float, float]:
     found, times = engine.simulate(scene, [1.0]), []
     assert found.ok, found.message
     for _ in range(4):
-        machine = build_in_space(exu, scene, 1.0)
+        machine = engine.machine(exu, scene, 1.0)
         settings = engine.simulation_settings(exu, machine, choose_steps(np.array([1.0]), step, machine.unknowns))
         begin = time.perf_counter()
         with silence(exu):

@@ -15,7 +15,7 @@ OURS, MANY = "ours", "ours, 64 at once"
 
 @dataclass(frozen=True)
 class Run:
-    """What one call gave: path of the watched marker [m], (times, 2); its status and what it says for itself.
+    """What one call gave: path of the watched marker [m], (times, d); its status and what it says for itself.
 
     evaluations: of the accelerations, where the method tells.
     """

@@ -150,5 +150,5 @@ def _caught(call: Callable[[], Run]) -> Run:
 
 
 def _largest(away: Array) -> float:
-    """Largest distance [m] of differences (samples, 2)."""
+    """Largest distance [m] of differences (samples, d)."""
     return float(np.max(np.linalg.norm(away, axis=1)))

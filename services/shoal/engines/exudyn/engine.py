@@ -96,7 +96,7 @@ class ExudynEngine:
         damped = self._integrator(scene) == "generalized-alpha"
         exu = library()
         end = float(wanted[-1])
-        machine = build(exu, scene, self.beam, end) if scene.dimensions == 2 else build_in_space(exu, scene, end)
+        machine = self.machine(exu, scene, end)
         steps = choose_steps(wanted, scene.solver.step, machine.unknowns, machine.clock.halts)
         record = Record(steps, machine.reference)
         failure = self._run(exu, machine, record)
@@ -122,6 +122,10 @@ class ExudynEngine:
             message=f"{verdict.message}{WEAK}" if weak else verdict.message,
             model=self._model(exu, machine, steps) | facts(scene, machine.scene.initial, machine.span),
         )
+
+    def machine(self, exu: Any, scene: Scene, end: float | None = None) -> Machine:
+        """The scene as a system of Exudyn's, for runs up to `end` [s]. Raises InputError."""
+        return build(exu, scene, self.beam, end) if scene.dimensions == 2 else build_in_space(exu, scene, end)
 
     def simulate_many(
         self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
