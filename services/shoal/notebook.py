@@ -184,16 +184,27 @@ def compare(
     return compare(_scene(scene, values), list(engines), times)
 
 
-def statics(scene: Scene | str, time: float = 0.0, *, values: Values | None = None, verify: bool = True) -> Equilibrium:
+def statics(
+    scene: Scene | str,
+    time: float = 0.0,
+    *,
+    values: Values | None = None,
+    verify: bool = True,
+    tolerance: float | None = None,
+) -> Equilibrium:
     """Where a scene comes to rest, and whether it is stable there. Raises InputError.
 
     time: what is applied stands as it is then [s]; values: fields of the scene to set, by dotted path; verify: estimate
-    the error of the mesh by a second run on twice as many elements
+    the error of the mesh by a second run on twice as many elements; tolerance: double the elements of the rods until
+    the error at the markers is below [m]
     """
     from shoal.mechanics.analysis.mesh_error import of_equilibrium
+    from shoal.mechanics.analysis.settled import settled
     from shoal.mechanics.analysis.statics import statics
 
     wanted = _scene(scene, values)
+    if tolerance is not None:
+        return settled(wanted, tolerance, time)
     found = statics(wanted, time)
     return of_equilibrium(found, wanted) if verify else found
 

@@ -158,6 +158,7 @@ class Statics(AtRest):
     """Where a scene comes to rest, with what is applied as it is at `time` [s], and whether it is stable there."""
 
     time: Annotated[float, Field(ge=0)] = 0.0
+    tolerance: Positive | None = None
 
 
 class Modes(AtRest):

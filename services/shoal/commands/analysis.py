@@ -14,10 +14,11 @@ from shoal.errors import check_trusted
 @click.command()
 @click.argument("scene")
 @click.option("--time", default=0.0, show_default=True, metavar="T", help="Applied stand as they are at T [s].")
+@click.option("--tolerance", type=float, metavar="METRES", help="Refine the mesh until its error stays below.")
 @options.values
 @options.verify
 @options.as_json
-def statics(scene: str, time: float, values: Values, verify: bool, as_json: bool) -> None:
+def statics(scene: str, time: float, tolerance: float | None, values: Values, verify: bool, as_json: bool) -> None:
     """Find where SCENE comes to rest, and if it is stable there."""
     from shoal.notebook import statics
     from shoal.scene import load_scene
@@ -25,7 +26,7 @@ def statics(scene: str, time: float, values: Values, verify: bool, as_json: bool
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"balancing {wanted.name}"):
-        equilibrium = statics(wanted, time, verify=verify)
+        equilibrium = statics(wanted, time, verify=verify, tolerance=tolerance)
     screen.show(equilibrium.to_json(), as_json, lambda: tables.equilibrium_table(equilibrium))
     check_trusted(equilibrium.ok, equilibrium.message)
 

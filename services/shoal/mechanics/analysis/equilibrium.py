@@ -93,6 +93,7 @@ class Equilibrium:
                 }
                 for name in self.markers
             },
+            "elements": {name: body.elements for name, body in self.scene.bodies.items() if body.element != "rigid"},
             "energy": self.energy,
             "strain_energy": self.strain_energy,
             "residual": self.residual,

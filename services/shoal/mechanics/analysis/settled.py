@@ -1,0 +1,50 @@
+"""An equilibrium within a tolerance: the mesh is refined until what is left of its error can be told and is small."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
+from shoal.mechanics.analysis.mesh_error import finer
+from shoal.mechanics.analysis.statics import statics
+from shoal.scene import Scene
+
+DOUBLINGS = 7
+"""So often the elements of all rods are doubled."""
+FALLS = (2.0, 4.0)
+"""Between these factors the distance of two meshes is taken to fall with each doubling: at most as at order two."""
+UNSEEN = 3.0
+"""The factor while only one distance is known."""
+SAFE = 2.0
+"""By this factor the estimate has to be below the tolerance."""
+
+
+def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
+    """Where a machine comes to rest, its markers within a tolerance [m] of the limit of ever finer meshes.
+
+    The elements of the scene's flexible rods are doubled together. With d the distance of two meshes in a row and f the
+    factor by which it falls, the finer one is d / (f - 1) from the limit: its `mesh_error`. The coarsest mesh whose
+    estimate is safely within the tolerance is returned; there is none where the status is `failed`. Raises InputError.
+    """
+    if not (np.isfinite(tolerance) and tolerance > 0):
+        raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
+    found, gap = statics(scene, time), np.nan
+    for _ in range(DOUBLINGS):
+        if (fine := finer(scene)) is None:
+            return found
+        scene, coarse, last = fine, found, gap
+        found = statics(scene, time)
+        if not (coarse.ok and found.ok):
+            gap = np.nan
+            continue
+        gap = float(np.max(np.linalg.norm(coarse.points - found.points, axis=1)))
+        fall = np.clip(last / gap, *FALLS) if np.isfinite(last) and gap > 0 else UNSEEN
+        found = replace(found, mesh_error=gap / (float(fall) - 1.0))
+        if found.mesh_error is not None and SAFE * found.mesh_error <= tolerance:
+            return found
+    if not found.ok:
+        return found
+    return replace(found, status=Held.FAILED, message=f"no mesh that was tried is within the tolerance {tolerance:g} m")

@@ -1,0 +1,74 @@
+"""A place of rest within a tolerance: kept against the elastica as published, and said where it is not to be had."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from shoal.cli import main
+from shoal.errors import InputError
+from shoal.mechanics.analysis import settled as module
+from shoal.mechanics.analysis.equilibrium import Held
+from shoal.mechanics.analysis.settled import settled
+from shoal.scene import Scene
+
+MODULUS, SIDE, LENGTH = 2.07e11, 0.1, 2.0
+PUBLISHED = [LENGTH - 0.508537304, -1.207239855]
+"""End of the extensible elastica under 3 EI / L^2, +-1e-9 m."""
+
+
+def cantilever(element: str, **more: Any) -> Scene:
+    load = 3 * MODULUS * SIDE**4 / 12 / LENGTH**2
+    end = {"body": "B", "point": "end"}
+    rod = {"kind": "rod", "length": LENGTH, "height": SIDE, "width": SIDE, "density": 8000.0, "youngs_modulus": MODULUS,
+           "element": element, "elements": 1}  # fmt: skip
+    return Scene.parse({
+        "name": "cantilever", "gravity": [0, 0], "bodies": {"B": rod},
+        "joints": {"W": {"kind": "weld", "first": {"body": "ground", "point": [0, 0]}, "second": {"body": "B"}}},
+        "loads": {"P": {"kind": "force", "at": end, "force": [0, -load]}}, "markers": {"e": end}, **more,
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("element", "more"),
+    [("ancf-cable", {}), ("ancf-quintic", {}), ("ancf-cable", {"dimensions": 3}), ("director-rod", {"dimensions": 3})],
+)
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+def test_the_tolerance_is_kept_against_the_elastica(element: str, more: dict[str, Any], tolerance: float) -> None:
+    found = settled(cantilever(element, **more), tolerance)
+    assert found.ok
+    assert found.mesh_error is not None
+    assert found.mesh_error <= tolerance
+    assert np.linalg.norm(found.marker("e")[:2] - PUBLISHED) <= tolerance
+
+
+def test_a_coarse_tolerance_takes_a_coarse_mesh() -> None:
+    coarse, fine = (
+        settled(cantilever("ancf-cable"), tolerance).to_json()["elements"]["B"] for tolerance in (1e-2, 1e-6)
+    )
+    assert coarse < fine
+
+
+def test_what_no_mesh_settles_is_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "DOUBLINGS", 2)
+    found = settled(cantilever("ancf-cable"), 1e-8)
+    assert found.status is Held.FAILED
+    assert "within the tolerance 1e-08 m" in found.message
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan])
+def test_a_tolerance_is_a_length_above_zero(tolerance: float) -> None:
+    with pytest.raises(InputError, match="tolerance: needs a length above 0 m"):
+        settled(cantilever("ancf-cable"), tolerance)
+
+
+def test_the_command_tells_mesh_and_error() -> None:
+    run = CliRunner().invoke(
+        main, ["statics", "flexible-double-pendulum", "--tolerance", "1e-3", "--json"], standalone_mode=False
+    )
+    data = json.loads(run.stdout)
+    assert data["mesh_error"] <= 1e-3
+    assert data["elements"]["OA"] >= 2
