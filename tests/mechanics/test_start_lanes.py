@@ -75,6 +75,6 @@ def test_what_cannot_be_assembled_is_soon_refused(monkeypatch: pytest.MonkeyPatc
     """Counted by what takes the time; guess after guess it was thousands."""
     looked, rows = [], Closure.rows
     monkeypatch.setattr(Closure, "rows", lambda self, u: looked.append(len(u)) or rows(self, u))
-    with pytest.raises(InputError, match="cannot be assembled; its places stay 18.7 m apart at best"):
+    with pytest.raises(InputError, match=r"cannot be assembled; its places stay 18\.7 m apart at best"):
         started(four_bar([1.0, 2.0, 1.5], 20.0))
     assert len(looked) < 500
