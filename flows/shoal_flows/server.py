@@ -56,6 +56,11 @@ def answers() -> bool:
     return _answers(os.environ["PREFECT_API_URL"])
 
 
+def shared() -> str:
+    """The address of a server that others use too; empty for the one that this process started."""
+    return "" if _started else os.environ.get("PREFECT_API_URL", "")
+
+
 def stop() -> None:
     """Stop the server that this process started."""
     while _started:

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from multiprocessing import get_all_start_methods, get_context, parent_process
+from multiprocessing import active_children, get_all_start_methods, get_context, parent_process
 from threading import Thread
 from typing import ParamSpec, Protocol, TypeVar
 
@@ -45,6 +45,14 @@ def submit(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Pendi
 def run(function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """The result of `submit`; an exception of the function is raised here."""
     return submit(function, *args, **kwargs).result()
+
+
+def abandon() -> None:
+    """End the processes of this machine in the midst of their work; who waits for them is told."""
+    if _pool.cache_info().currsize:
+        _pool.cache_clear()
+        for process in active_children():
+            process.kill()
 
 
 def warm_up() -> Pending[int]:

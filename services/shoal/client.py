@@ -22,9 +22,10 @@ from shoal.identification import Problem, load_problem
 from shoal.identification.recording.reading import YAML, described
 from shoal.identification.recording.source import FileSource
 from shoal.identification.recording.table import Table, load_table
+from shoal.mechanics.analysis.reactions import JointReaction, Reactions
 from shoal.scene import Scene, load_scene
 from shoal.shelf import NAME
-from shoal.trajectory import Array, Trajectory
+from shoal.trajectory import Array
 
 PAUSES = (0.02, 1.0)
 """Between two looks at a job, the shortest and the longest [s]."""
@@ -43,7 +44,7 @@ def _by_service(function: Callable[..., Any], *, job: bool = False) -> Any:
 
     stated = signature(function)
     own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
-    returned = Trajectory if function is notebook.simulate else Answer
+    returned = stated.return_annotation if function in (notebook.simulate, notebook.reactions) else Answer
     method.__signature__ = Signature([own, *stated.parameters.values()], return_annotation=returned)  # type: ignore[attr-defined]
     method.__name__, method.__doc__ = function.__name__, function.__doc__
     return method
@@ -53,7 +54,7 @@ class Client:
     """The service at an http(s) address. The key, if it asks for one, is SHOAL_API_KEY.
 
     Each method takes what the function of the library with its name takes; `engine` is the service's own. `simulate`
-    gives the same Trajectory, to the last bit, the others the object that the command of their name prints with --json.
+    and `reactions` give the same objects, to the last bit, the others what the command of that name prints with --json.
     They raise InputError where the service refuses, ComputationError where it fails or does not answer. What takes long
     is a job of the service; `submit` makes one of any of them, and `status`, `result` and `cancel` take its id.
     """
@@ -110,7 +111,9 @@ class Client:
     def _answer(self, method: str, path: str, content: Answer | None = None) -> Any:
         body = None if content is None else orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
         found = self._service.ask(method, path, body)
-        return trajectory_of(found) if isinstance(found, dict) and "points" in found else found
+        if isinstance(found, dict) and "points" in found:
+            return trajectory_of(found)
+        return _reactions(found) if isinstance(found, dict) and found.keys() == {"status", "reactions"} else found
 
     def _request(self, operation: str, *args: Any, **kwargs: Any) -> Answer:
         """The arguments of a function of the library as the fields of a request. Raises InputError."""
@@ -126,6 +129,20 @@ class Client:
         if "problem" in given:
             given["problem"], given["recordings"] = _problem(given["problem"], given.pop("data", None))
         return {name: _plain(value) for name, value in given.items() if value is not None}
+
+
+def _reactions(found: Answer) -> list[Reactions]:
+    """The reactions that a service answers."""
+    read = []
+    for one in found["reactions"]:
+        joints = {name: JointReaction(**_tuples(joint)) for name, joint in one["joints"].items()}
+        constraints = tuple(one["redundant_constraints"])
+        read.append(Reactions(one["time"], joints, one["redundancy"], constraints, one["unbalanced"]))
+    return read
+
+
+def _tuples(fields: Answer) -> Answer:
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
 
 
 def _scene(given: Scene | str) -> Any:

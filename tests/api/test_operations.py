@@ -20,6 +20,7 @@ from shoal.api.settings import Settings
 from shoal.api.tasks import told
 from shoal.client import Client
 from shoal.errors import ComputationError, InputError
+from shoal.mechanics.analysis.reactions import Reactions
 from shoal.trajectory import Trajectory, plain
 
 SCENE = "rigid-double-pendulum"
@@ -65,6 +66,8 @@ def test_every_operation_is_a_method_with_the_signature_of_its_function() -> Non
     for name in OPERATIONS:
         of_library, of_client = (inspect.signature(getattr(place, name)) for place in (shoal, Client))
         assert list(of_client.parameters.values())[1:] == list(of_library.parameters.values())
+        if name in ("simulate", "reactions"):
+            assert of_client.return_annotation == of_library.return_annotation
         assert getattr(Client, name).__doc__ == getattr(shoal, name).__doc__
 
 
@@ -84,6 +87,10 @@ def test_the_answer_is_the_librarys(client: Client, name: str) -> None:
         assert (far.status, far.message, far.model) == (near.status, near.message, near.model)
         assert far.model["verification"]["time_error"] > 0
         return
+    if name == "reactions":
+        assert far == near
+        assert {type(one) for one in far} == {Reactions}
+        far = told(far)
     assert known(far) == known(plain(told(near)))
     place = far
     for key in ERRORS.get(name, ()):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal_flows.report import overview
@@ -74,6 +75,23 @@ def test_the_page_tells_the_drift_of_a_machine(machine: str, tmp_path: Path) -> 
     assert "(-0.6" in text
     assert "week 29" in text
     assert "http" not in text.replace("http://www.w3.org", "")
+
+
+def test_a_chart_is_drawn_once_and_nothing_of_it_is_cut_off(machine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page has many; the layout that measures what is written draws everything twice."""
+    drawn, draw = [], Figure.draw
+    monkeypatch.setattr(Figure, "draw", lambda self, renderer: drawn.append(self) or draw(self, renderer))
+    page = overview.overview(machine)
+    (figure,) = drawn
+    assert page.count("<img") == 1
+    (axes,) = figure.axes
+    frame, title = figure.bbox, figure._suptitle.get_window_extent()
+    for part in (title, axes.get_tightbbox()):
+        assert frame.x0 <= part.x0
+        assert part.x1 <= frame.x1
+        assert frame.y0 <= part.y0
+        assert part.y1 <= frame.y1
+    assert axes.get_tightbbox().y1 <= title.y0
 
 
 def test_a_machine_without_studies_is_one_line(machine: str) -> None:

@@ -16,6 +16,7 @@ from shoal import doctor
 from shoal.identification import Measurement
 from shoal_flows import jobs
 from shoal_flows.jobs import Cell, Fit
+from shoal_flows.left import WHY
 from shoal_flows.tracking import outbox, store
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -182,6 +183,51 @@ def test_a_night_that_was_broken_off_does_not_block_the_next(tmp_path: Path) -> 
         night = comes_by_itself(at["PREFECT"], "nightly/validation", short)
         assert ended(at["PREFECT"], night)["state_type"] == "COMPLETED"
     assert len(list((tmp_path / "validation").glob("night-*.json"))) == 2
+
+
+def unended(at: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """The runs that stand as running, in MLflow and in Prefect."""
+    asked = {"experiment_ids": ["1", "2", "3"], "filter": "attributes.status = 'RUNNING'"}
+    tracked = call(f"{at['MLFLOW']}/api/2.0/mlflow/runs/search", asked).get("runs", [])
+    begun = call(f"{at['PREFECT']}/api/flow_runs/filter", {"flow_runs": {"state": {"type": {"any_": ["RUNNING"]}}}})
+    return [one["info"]["run_id"] for one in tracked], [one["id"] for one in begun]
+
+
+@pytest.mark.slow
+def test_no_run_stands_as_running_that_nobody_runs(tmp_path: Path) -> None:
+    """After a stop, which flows are told of, and after kill -9 of everything, which leaves it to the next start."""
+    long = {**STUDY, "methods": ["iafsa"], "seeds": list(range(12))}
+
+    def begins(at: Mapping[str, str]) -> tuple[dict[str, object], str]:
+        run = begin(at["PREFECT"], "identify/identify", long)
+        until(lambda: unended(at)[0], "the study is in MLflow")
+        tracked, begun = unended(at)
+        assert begun == [run["id"]]
+        return run, tracked[0]
+
+    def ends(at: Mapping[str, str], run: dict[str, object], tracked: str) -> tuple[str, dict[str, str]]:
+        """What Prefect says of its end, and the tags in MLflow."""
+        assert unended(at) == ([], [])
+        state = call(f"{at['PREFECT']}/api/flow_runs/{run['id']}")["state"]
+        found = call(f"{at['MLFLOW']}/api/2.0/mlflow/runs/get?run_id={tracked}")["run"]
+        assert (state["type"], found["info"]["status"]) == ("CRASHED", "KILLED")
+        return state["message"], {tag["key"]: tag["value"] for tag in found["data"]["tags"]}
+
+    with running(tmp_path, *WITHOUT) as at:
+        stopped = begins(at)
+    assert not list((tmp_path / "running").glob("mlflow-*"))
+    with running(tmp_path, *WITHOUT) as at:
+        said, tags = ends(at, *stopped)
+        # On a busy machine the flow may have had no time to tell Prefect, and the next start has.
+        assert said in ("Execution was aborted by a termination signal.", WHY)
+        assert "broken_off" not in tags
+        killed = begins(at)
+        kill(tmp_path, "shoal_flows.deployment.worker")
+        kill(tmp_path, "prefect", "worker")
+        assert kill(tmp_path, "prefect.engine") == 1
+        until(lambda: unended(at) == ([], []), "the next worker has ended what was left")
+        said, tags = ends(at, *killed)
+        assert said == tags["broken_off"] == WHY
 
 
 @pytest.mark.slow

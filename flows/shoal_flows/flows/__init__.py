@@ -15,6 +15,7 @@ from shoal_flows.flows.demo import demo  # noqa: E402
 from shoal_flows.flows.design import design  # noqa: E402
 from shoal_flows.flows.forward import forward  # noqa: E402
 from shoal_flows.flows.identify import identify  # noqa: E402
+from shoal_flows.flows.marked import marked  # noqa: E402
 from shoal_flows.flows.nightly import nightly  # noqa: E402
 from shoal_flows.flows.select import select  # noqa: E402
 from shoal_flows.flows.statics import statics  # noqa: E402
@@ -24,5 +25,7 @@ from shoal_flows.flows.uncertain import uncertain  # noqa: E402
 FLOWS: dict[str, Flow[..., Any]] = {
     flow.name: flow for flow in (forward, select, compare, sweep, uncertain, statics, identify, design, nightly, demo)
 }
+for flow in FLOWS.values():
+    marked(flow)
 
 __all__ = ["FLOWS"]

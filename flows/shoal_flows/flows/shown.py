@@ -14,6 +14,7 @@ from prefect.artifacts import (
 )
 from prefect.states import Completed
 
+from shoal_flows import workers
 from shoal_flows.inputs import headed
 from shoal_flows.tracking.addresses import run_address, table_address
 from shoal_flows.tracking.record import LOCAL
@@ -86,7 +87,15 @@ class Bar:
 
 @contextmanager
 def progress(total: int, description: str) -> Iterator[Bar]:
-    """A bar that stands at the end when the block is left without an exception."""
+    """A bar that stands at the end when the block is left without an exception.
+
+    A flow that is told to stop does not wait for what it has others compute: it would be killed meanwhile.
+    """
     bar = Bar(total, description)
-    yield bar
+    try:
+        yield bar
+    except BaseException as error:
+        if not isinstance(error, Exception):
+            workers.abandon()
+        raise
     bar.stand_at(total)

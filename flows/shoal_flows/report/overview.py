@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 from jinja2 import PackageLoader
+from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
-from scipy.stats import t as student
+from scipy.special import stdtrit
 from shoal.errors import InputError
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.pages import environment, software
@@ -127,7 +129,7 @@ def drift(times: Sequence[float], values: Sequence[float], widths: Sequence[floa
     middle = float(np.sum(weight * y) / np.sum(weight))
     scatter = float(np.sum(weight * (y - middle - slope * x) ** 2) / (len(y) - 2))
     std = np.sqrt((max(scatter, 1.0) if known else scatter) / np.sum(weight * x**2))
-    return Drift(slope, float(student.ppf(0.975, len(y) - 2) * std), middle, mean)
+    return Drift(slope, float(stdtrit(len(y) - 2, 0.975) * std), middle, mean)
 
 
 def overview(machine: str | None = None) -> str:
@@ -208,7 +210,19 @@ def _figure(name: str, studies: Sequence[Study], line: Drift | None, says: str) 
     axes.set_xlabel("begin of the study (UTC)")
     axes.set_ylabel(name)
     headline(figure, says)
+    _lay_out(figure, axes)
     return figure
+
+
+def _lay_out(figure: Figure, axes: Axes) -> None:
+    """Room for what is written around the axes. The layout that measures it draws everything twice: a page has many."""
+    width, height = 72.0 * figure.get_size_inches()
+    letters = max(map(len, axes.yaxis.get_major_formatter().format_ticks(list(axes.get_yticks()))), default=0)
+    lines = figure.get_suptitle().count("\n") + 1
+    with rc_context({"figure.constrained_layout.use": False}):
+        figure.set_layout_engine(None)
+    left, bottom, right, top = 34 + 8 * letters, 50, 18, 26 + 17 * lines
+    axes.set_position((left / width, bottom / height, (width - left - right) / width, (height - bottom - top) / height))
 
 
 def _date(when: float) -> datetime:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from shoal.identification import Measurement
-from shoal.identification.recording.measurement import Recording
+if TYPE_CHECKING:
+    # A second of importing, which a page of what is in MLflow does without.
+    from shoal.identification import Measurement
+    from shoal.identification.recording.measurement import Recording
 
 _CONTEXT = "mlflow.data.context"
 """The tag by which MLflow tells what a run used a data set for."""

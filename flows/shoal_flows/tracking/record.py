@@ -95,7 +95,7 @@ class Run:
         self.files[path] = content
 
     def end(self, status: str) -> None:
-        """FINISHED or FAILED."""
+        """FINISHED, FAILED or KILLED."""
         self.status, self.ended = status, _now()
 
     def write_files(self, folder: Path) -> None:

@@ -6,7 +6,7 @@ import logging
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +14,7 @@ from typing import Any
 
 from shoal.errors import ComputationError
 
-from shoal_flows import provenance, settings
+from shoal_flows import alive, provenance, settings
 from shoal_flows.tracking import data, origin, outbox, registry, views
 from shoal_flows.tracking.record import LOCAL, Run
 
@@ -48,7 +48,9 @@ def open_run(
     parent: str | None = None,
     took: float = 0.0,
 ) -> Iterator[Run]:
-    """A run from its start to its end, failed if an exception leaves the block; parent: the id of a run.
+    """A run from its start to its end; failed if an exception leaves the block, killed if a signal does.
+
+    parent: the id of a run.
 
     took: how long [s] the work lasted that had ended before the block.
     Where MLflow does not answer, the run goes to the outbox: a result is never lost for that.
@@ -59,14 +61,15 @@ def open_run(
         run.files |= call
     if not _waits(run):
         _attempt(_make, run)
-    try:
-        yield run
-    except BaseException:
-        run.end("FAILED")
+    with alive.held(alive.MLFLOW, run.run_id, _address()) if run.known else nullcontext():
+        try:
+            yield run
+        except BaseException as error:
+            run.end("FAILED" if isinstance(error, Exception) else "KILLED")
+            _deliver(run)
+            raise
+        run.end("FINISHED")
         _deliver(run)
-        raise
-    run.end("FINISHED")
-    _deliver(run)
     if parent is None and not _is_silent():
         # MLflow answers: what an earlier study could not tell it goes along.
         with suppress(ComputationError):

@@ -87,6 +87,8 @@ class Assembly:
         self._yield = np.stack([np.ones_like(arms), np.ones_like(arms), arms**-2], 1).ravel()
         """Inverse of the metric in which displacements are measured, (3 bodies,)."""
         self.closure = Closure(scene, self.guess)
+        self._sought: dict[tuple[int, bytes, bytes], Placed] = {}
+        """What was looked for before: where it is not there, the reason is sought by the same steps."""
 
     def _guess(self, attempt: int, keep: Flags) -> Array:
         """Poses from the stated angles; later attempts shake those not in `keep`, (lanes, bodies)."""
@@ -116,10 +118,24 @@ class Assembly:
     def seek(self, fixed: Flags, values: Array, near: Array | None = None, attempts: int | None = None) -> Placed:
         """Poses with some held, from one guess after another (or near one)."""
         most = attempts or (ATTEMPTS if self.lanes == 1 else FEW)
+        begun = np.where(fixed, values, self.guess if near is None else near)
+        asked = (most, fixed.tobytes(), begun.tobytes())
+        if asked not in self._sought:
+            self._sought[asked] = self._seek(fixed, values, near, most)
+        return self._sought[asked]
+
+    def _seek(self, fixed: Flags, values: Array, near: Array | None, most: int) -> Placed:
         best, ok = np.where(fixed, values, self.guess), np.zeros(self.lanes, dtype=bool)
         for own in (True, False) if self._own else (True,):
             closure = Closure(self.scene, np.where(fixed, values, self.guess), own)
             for attempt in range(most):
+                if attempt == 1 and self.lanes == 1:
+                    # The later guesses at once, as lanes: they take as long as two, and the first that closes is taken.
+                    others = [self._guess(number, fixed[:, 2::3]) for number in range(1, most)]
+                    poses, gap = self.close(closure, np.where(fixed, values, np.concatenate(others)), fixed)
+                    if np.any(gap <= CLOSED):
+                        return Placed(poses[[np.argmax(gap <= CLOSED)]], ~ok)
+                    break
                 begin = near if near is not None and not attempt else self._guess(attempt, fixed[:, 2::3])
                 poses, gap = self.close(closure, np.where(fixed, values, begin), fixed)
                 better = ~ok & (gap <= CLOSED)
@@ -155,11 +171,11 @@ class Assembly:
         u = u.copy()
         rows = closure.rows(u)
         if not len(rows.names):
-            return u, np.zeros(self.lanes)
+            return u, np.zeros(len(u))
         length = np.where(rows.angular, 1.0, self.size) / (1.0 if weight is None else weight)
         gap = rows.gap / length
         norm = np.linalg.norm(gap, axis=1)
-        damping = np.full(self.lanes, 1e-3)
+        damping = np.full(len(u), 1e-3)
         running = norm > 1e-15
         if not np.any(running):
             return u, np.max(np.abs(gap), axis=1)

@@ -1,0 +1,67 @@
+"""`python -m shoal_flows.deployment.worker ARGS`: `prefect worker start ARGS` that leaves no run standing as "running".
+
+What an earlier worker left behind is ended first. When this one is told to stop, so are its flows, which then end their
+runs; Prefect's worker would kill them without a word.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from uuid import uuid4
+
+from shoal.errors import ShoalError
+
+from shoal_flows import alive, settings
+from shoal_flows.left import end_left
+
+_GRACE = 4.0
+"""Seconds that flows have to end their runs: honcho kills after five. What takes longer is ended at the next start."""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run a worker until it ends or this process is told to; returns the exit status."""
+    try:
+        settings.apply()
+        if ended := end_left():
+            sys.stderr.write(f"worker: {ended} runs that were broken off are ended\n")
+    except ShoalError as error:
+        sys.stderr.write(f"worker: {error}\n")
+        return error.exit_status
+    name = uuid4().hex
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "shoal_flows.attached", "prefect", "worker", "start", *arguments],
+        env={**os.environ, alive.WORKER: name},
+        stdin=subprocess.PIPE,
+        # Signals for the whole group reach this process alone, which has its flows end first.
+        start_new_session=True,
+    )
+    try:
+        return process.wait()
+    except KeyboardInterrupt:
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, signal.SIG_IGN)
+        _end_flows(name)
+        process.terminate()
+        process.wait()
+        return 0
+
+
+def _end_flows(worker: str) -> None:
+    """Have the flows of a worker end their runs."""
+    for pid in {mark.pid for mark in alive.of_worker(worker)}:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGTERM)
+    deadline = time.monotonic() + _GRACE
+    while alive.of_worker(worker) and time.monotonic() < deadline:
+        time.sleep(0.05)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
