@@ -11,6 +11,7 @@ from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.page import headline
 from shoal_validation.nightly.plan import plan
 from shoal_validation.nightly.result import Night
+from shoal_validation.nightly.run import compiled
 
 from shoal_flows.flows.parameters import ALL, Only
 from shoal_flows.flows.shown import Bar, ended, progress, show_result
@@ -45,6 +46,8 @@ def nightly(only: Only = ALL, quick: bool = False) -> Validated:
     """
     problem = None if only == ALL else only
     lines = plan(problem, quick)
+    if problem is None:
+        compiled()
     with progress(len(lines), "lines of the night") as bar:
         held = hold(lines, quick=quick, only=problem, progress=_note(bar))
     night = held.night

@@ -20,12 +20,15 @@ from shoal_validation.nightly.page import headline, time_text
 from shoal_validation.nightly.plan import plan
 from shoal_validation.nightly.result import Night, Verdict
 from shoal_validation.nightly.run import Progress as Note
+from shoal_validation.nightly.run import compiled
 
 
 def main(only: str | None, quick: bool, as_json: bool) -> bool:
     """Run a night, keep it and its page, print it; returns whether all is as it should be. Raises InputError."""
     lines = plan(only, quick)
     prepare_kernel_cache()
+    if only is None:
+        compiled(Console(stderr=True, highlight=False).print)
     return carry_out(lines, only, quick, as_json)
 
 

@@ -21,11 +21,18 @@ from shoal_validation.nightly.result import Night, Result, Verdict, apart
 from shoal_validation.nightly.worker import Worker
 
 TIMEOUT = 300.0
-"""A line that takes longer [s] is stopped; where no kernel is compiled yet, the first one of a kind takes a minute."""
+"""A line that takes longer [s] is stopped."""
 PACKAGES = ("shoal", "numpy", "scipy", "numba", "exudyn", "casadi")
 
 Progress = Callable[[int, Line], None]
 """Called with the number of lines done and the line that is next."""
+
+
+def compiled(note: Callable[[str], None] = lambda _: None) -> None:
+    """Compile all kernels before the first line of a whole night, whose time limit is not meant for that."""
+    from shoal.mechanics.warm import warm  # after the folder of kernels is known
+
+    warm(note=note)
 
 
 def run(

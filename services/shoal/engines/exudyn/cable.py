@@ -8,6 +8,7 @@ useReducedOrderIntegration 0 takes 5 Gauss points for the axial strain and 3 for
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -27,6 +28,29 @@ RULES = {"full": (0, gauss(5), gauss(3)), "reduced": (2, LOBATTO_3, gauss(2))}
 """Exudyn's number of a quadrature; its points and weights, axial then bending."""
 
 
+def add_cables(
+    system: System, kind: str, rod: Rod, sections: Sections, nodes: list[Any], more: Mapping[str, Any]
+) -> list[Any]:
+    """Enter the elements of a rod between its nodes, and their weight. more: fields of that kind alone."""
+    found = []
+    for k, pair in enumerate(pairwise(nodes)):
+        cable = system.add(
+            kind,
+            length=rod.length / rod.elements,
+            massPerLength=sections.mass[k],
+            bendingStiffness=sections.bending[k],
+            axialStiffness=sections.axial[k],
+            bendingDamping=rod.retardation * sections.bending[k],
+            axialDamping=rod.retardation * sections.axial[k],
+            nodeNumbers=list(pair),
+            useReducedOrderIntegration=RULES[rod.quadrature][0],
+            **more,
+        )
+        found.append(cable)
+        system.weigh(cable)
+    return found
+
+
 @dataclass(frozen=True)
 class CablePart(Chain, Part):
     """A chain of ObjectANCFCable2D; coordinates of a node: r and r'.
@@ -40,7 +64,7 @@ class CablePart(Chain, Part):
     def add(cls, system: System, rod: Rod, pose: InitialPose) -> CablePart:
         """Enter an unstrained rod at its initial pose."""
         sections = Sections.of(rod)
-        nodes, columns, vectors, elements = [], [], [], []
+        nodes, columns, vectors = [], [], []
         for s in np.linspace(0.0, rod.length, rod.elements + 1):
             axis, lead = complex(rod.axis(s)), pose.angle + float(rod.turn(s))
             place, slope = (axis.real, axis.imag), np.array([np.cos(lead), np.sin(lead)])
@@ -49,21 +73,8 @@ class CablePart(Chain, Part):
             vectors.append([pose.position(place), slope])
             nodes.append(node)
             columns.append(places)
-        for k, pair in enumerate(pairwise(nodes)):
-            cable = system.add(
-                "ObjectANCFCable2D",
-                length=rod.length / rod.elements,
-                massPerLength=sections.mass[k],
-                bendingStiffness=sections.bending[k],
-                axialStiffness=sections.axial[k],
-                bendingDamping=rod.retardation * sections.bending[k],
-                axialDamping=rod.retardation * sections.axial[k],
-                nodeNumbers=list(pair),
-                strainIsRelativeToReference=float(bool(rod.curvature)),
-                useReducedOrderIntegration=RULES[rod.quadrature][0],
-            )
-            elements.append(cable)
-            system.weigh(cable)
+        bent = {"strainIsRelativeToReference": float(bool(rod.curvature))}
+        elements = add_cables(system, "ObjectANCFCable2D", rod, sections, nodes, bent)
         rest = np.array([first + last for first, last in pairwise(vectors)])
         return cls(rod, sections, elements, np.array([first + last for first, last in pairwise(columns)]), rest)
 

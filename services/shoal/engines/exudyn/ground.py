@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -26,7 +26,7 @@ class GroundPart(Holder):
     node: Any
 
     @classmethod
-    def add(cls, system: System) -> GroundPart:
+    def add(cls, system: System) -> Self:
         """Enter the ground."""
         return cls(system.add("ObjectGround"), system.add("NodePointGround"))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.joints import Apart, Meet, Sum, unknown
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import Attachment
+from shoal.scene import Attachment, Revolute, Slider
 
 
 class Component(NamedTuple):
@@ -32,8 +33,32 @@ class Component(NamedTuple):
         return bool(np.any(self.torque))
 
 
+class Rubbing(NamedTuple):
+    """What the friction of a joint acts on: the derivative of its slip, (unknowns,), and force and torque per unit."""
+
+    gradient: Array
+    force: Array
+    torque: Array
+
+
 Friction = tuple[Array, dict[str, tuple[Array, Array]]]
 """Generalised force of all joint friction, (unknowns,), and force and torque of each joint's on its second body."""
+
+
+def friction(
+    bodies: FreeBodies, at: Array, rate: Array, rubbing: Callable[[FreeBodies, Revolute | Slider, Array], Rubbing]
+) -> Friction:
+    """Of all joints."""
+    total = np.zeros(bodies.unknowns)
+    each: dict[str, tuple[Array, Array]] = {}
+    for name, joint in bodies.scene.joints.items():
+        if isinstance(joint, Revolute | Slider) and (joint.friction or joint.coulomb):
+            gradient, force, torque = rubbing(bodies, joint, at)
+            speed = float(gradient @ rate)
+            drag = -joint.friction * speed - joint.coulomb * float(np.tanh(speed / joint.coulomb_speed))
+            total += drag * gradient
+            each[name] = drag * force, drag * torque
+    return total, each
 
 
 class Moving(NamedTuple):

@@ -8,7 +8,7 @@ from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.analysis.free_bodies import FreeBodies
-from shoal.mechanics.analysis.joint_forces import Component, Friction, gap, moving, of_places
+from shoal.mechanics.analysis.joint_forces import Component, Rubbing, gap, moving, of_places
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.joints import Along, Condition, Turned
 from shoal.mechanics.numerics.tile import Array
@@ -28,22 +28,12 @@ def components(bodies: FreeBodies, name: str, condition: Condition, at: Array) -
     return of_places(bodies, name, condition, at, _NO_TURN)
 
 
-def friction(bodies: FreeBodies, at: Array, rate: Array) -> Friction:
-    """Of all joints."""
-    total = np.zeros(bodies.unknowns)
-    each: dict[str, tuple[Array, Array]] = {}
-    for name, joint in bodies.scene.joints.items():
-        if not (isinstance(joint, Revolute | Slider) and (joint.friction or joint.coulomb)):
-            continue
-        if isinstance(joint, Revolute):
-            line, gradient = _NONE, _turning(bodies, joint.first, joint.second, at)
-        else:
-            line, gradient, _ = _sliding(bodies, joint.first, joint.second, joint.direction, at)
-        speed = float(gradient @ rate)
-        drag = -joint.friction * speed - joint.coulomb * float(np.tanh(speed / joint.coulomb_speed))
-        total += drag * gradient
-        each[name] = (line * drag, _NO_TURN if np.any(line) else drag * _TURN)
-    return total, each
+def rubbing(bodies: FreeBodies, joint: Revolute | Slider, at: Array) -> Rubbing:
+    """What the friction of a joint acts on."""
+    if isinstance(joint, Revolute):
+        return Rubbing(_turning(bodies, joint.first, joint.second, at), _NONE, _TURN)
+    line, gradient, _ = _sliding(bodies, joint.first, joint.second, joint.direction, at)
+    return Rubbing(gradient, line, _NO_TURN)
 
 
 def displacements(bodies: FreeBodies, at: Array, lever: float) -> Array:

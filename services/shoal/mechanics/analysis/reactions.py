@@ -19,7 +19,7 @@ from shoal.mechanics.analysis import plane_forces, space_forces
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.freedom import Metric
-from shoal.mechanics.analysis.joint_forces import place
+from shoal.mechanics.analysis.joint_forces import friction, place
 from shoal.mechanics.analysis.motion_state import states
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -111,7 +111,7 @@ def reactions_of(
     here: Any = plane_forces if bodies.scene.dimensions == plane.DIMENSIONS else space_forces
     told = joints.of_scene(bodies.scene)
     unknown = [part for name, one in told for part in here.components(bodies, name, one, at)]
-    known, rubbed = here.friction(bodies, at, rate)
+    known, rubbed = friction(bodies, at, rate, here.rubbing)
     force = free.at(at, rate, t).force
     inertia = bodies.mass @ change
     displacements = here.displacements(bodies, at, lever)

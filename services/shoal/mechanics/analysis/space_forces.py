@@ -12,9 +12,10 @@ import numpy as np
 
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.analysis.free_bodies import FreeBodies
-from shoal.mechanics.analysis.joint_forces import Component, Friction, Moving, gap, moving, of_places
+from shoal.mechanics.analysis.joint_forces import Component, Moving, Rubbing, gap, moving, of_places
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.holding import direction, line_of
+from shoal.mechanics.assembly.space.sections import image
 from shoal.mechanics.frames import BeamFrame, PointFrame
 from shoal.mechanics.joints import Aligned, Along, Hinged, InPlane, Square, Turned
 from shoal.mechanics.numerics.tile import Array
@@ -46,25 +47,14 @@ def components(bodies: FreeBodies, name: str, condition: Any, at: Array) -> list
     return of_places(bodies, name, condition, at, _NONE)
 
 
-def friction(bodies: FreeBodies, at: Array, rate: Array) -> Friction:
-    """Of all joints."""
-    total = np.zeros(bodies.unknowns)
-    each: dict[str, tuple[Array, Array]] = {}
-    for name, joint in bodies.scene.joints.items():
-        if not (isinstance(joint, Revolute | Slider) and (joint.friction or joint.coulomb)):
-            continue
-        if isinstance(joint, Revolute):
-            axis = _axis(bodies, joint.first, joint.second, joint.axis, at)
-            gradient, pair = axis @ _turning(bodies, joint, at), (_NONE, axis)
-        else:
-            along = joint.direction if joint.axis is None else joint.axis
-            line = moving(bodies, line_of(_placement(bodies), joint.first.body, along), at).value
-            gradient, pair = line @ _sliding(bodies, joint, at), (line, _NONE)
-        speed = float(gradient @ rate)
-        drag = -joint.friction * speed - joint.coulomb * float(np.tanh(speed / joint.coulomb_speed))
-        total += drag * gradient
-        each[name] = pair[0] * drag, pair[1] * drag
-    return total, each
+def rubbing(bodies: FreeBodies, joint: Revolute | Slider, at: Array) -> Rubbing:
+    """What the friction of a joint acts on."""
+    if isinstance(joint, Revolute):
+        axis = _axis(bodies, joint.first, joint.second, joint.axis, at)
+        return Rubbing(axis @ _turning(bodies, joint, at), _NONE, axis)
+    along = joint.direction if joint.axis is None else joint.axis
+    line = moving(bodies, line_of(_placement(bodies), joint.first.body, along), at).value
+    return Rubbing(line @ _sliding(bodies, joint, at), line, _NONE)
 
 
 def displacements(bodies: FreeBodies, at: Array, lever: float) -> Array:
@@ -171,8 +161,6 @@ def _held(bodies: FreeBodies, body: str, axis: Any, at: Array) -> Array:
 
 def _of_section(bodies: FreeBodies, side: Attachment, axis: Any, at: Array) -> Array:
     """The same of a section of a director rod."""
-    from shoal.mechanics.assembly.space.sections import image
-
     placement = _placement(bodies)
     frame = bodies.placement.frames[side.body]
     assert isinstance(frame, BeamFrame)

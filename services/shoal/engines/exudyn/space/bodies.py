@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shoal.engines.exudyn.bodies import Energy, Part, Place, System
-from shoal.engines.exudyn.cable import RULES, CablePart
+from shoal.engines.exudyn.cable import CablePart, add_cables
+from shoal.engines.exudyn.ground import GroundPart
 from shoal.engines.sections import Sections
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine
@@ -82,13 +83,33 @@ class SpatialHolder(Protocol):
 
 
 @dataclass(frozen=True)
-class SolidPart(Part):
+class Framed:
+    """An object of Exudyn's with a frame, at whose places there are markers with axes."""
+
+    body: Any
+
+    def hold(self, system: System, place: Place) -> Any:
+        """See SpatialHolder."""
+        return system.marker("MarkerBodyPosition", self.body, place)
+
+    def turn(self, system: System, place: Place, angle: float = 0.0) -> Any:
+        """See SpatialHolder."""
+        return self.framed(system, place, np.eye(3))
+
+    def framed(self, system: System, place: Place, axes: Array) -> Any:
+        """See SpatialHolder."""
+        frame = np.eye(4)
+        frame[:3, :3], frame[:3, 3] = axes, place
+        return system.add("MarkerBodyRigid", bodyNumber=self.body, localHT=frame)
+
+
+@dataclass(frozen=True)
+class SolidPart(Framed, Part):
     """ObjectRigidBody on a node of Euler parameters, to which no attitude is singular, at the body's origin.
 
     A point mass is a ball held at its centre, where nothing turns it; its inertia is of no consequence.
     """
 
-    body: Any
     node: Any
     columns: list[int]
     mass: float
@@ -127,18 +148,6 @@ class SolidPart(Part):
         system.add("LoadForceVector", markerNumber=marker, loadVector=weight.tolist())
         return cls(body, node, columns, given.mass, about_centre, centre)
 
-    def hold(self, system: System, place: Place) -> Any:
-        """See Part."""
-        return system.marker("MarkerBodyPosition", self.body, place)
-
-    def turn(self, system: System, place: Place, angle: float = 0.0) -> Any:
-        """See Part."""
-        return self.framed(system, place, np.eye(3))
-
-    def framed(self, system: System, place: Place, axes: Array) -> Any:
-        """See SpatialHolder."""
-        return _framed(system, self.body, place, axes)
-
     def side(self, place: Place) -> Side:
         """See SpatialHolder."""
         return Side(self.node, 7, False)
@@ -176,24 +185,13 @@ class SpatialCablePart(CablePart):
                 "use gauss"
             )
         sections = Sections.of(rod)
-        nodes, columns, elements = [], [], []
+        nodes, columns = [], []
         for vectors in frame.nodes:
             begin, rates = np.concatenate(_both(vectors, q, v), axis=1)
             node, places = system.node("NodePointSlope1", begin.tolist(), rates.tolist())
             nodes.append(node)
             columns.append(places)
-        for k, pair in enumerate(pairwise(nodes)):
-            cable = system.add(
-                "ObjectANCFCable",
-                length=rod.length / rod.elements,
-                massPerLength=sections.mass[k],
-                bendingStiffness=sections.bending[k],
-                axialStiffness=sections.axial[k],
-                nodeNumbers=list(pair),
-                useReducedOrderIntegration=RULES[rod.quadrature][0],
-            )
-            elements.append(cable)
-            system.weigh(cable)
+        elements = add_cables(system, "ObjectANCFCable", rod, sections, nodes, {})
         per_element = np.array([first + last for first, last in pairwise(columns)])
         return cls(rod, sections, elements, per_element, np.zeros(0), nodes)
 
@@ -243,28 +241,8 @@ class SpatialCablePart(CablePart):
 
 
 @dataclass(frozen=True)
-class SpatialGround:
+class SpatialGround(Framed, GroundPart):
     """ObjectGround, and a node without coordinates."""
-
-    body: Any
-    node: Any
-
-    @classmethod
-    def add(cls, system: System) -> SpatialGround:
-        """Enter the ground."""
-        return cls(system.add("ObjectGround"), system.add("NodePointGround"))
-
-    def hold(self, system: System, place: Place) -> Any:
-        """See SpatialHolder."""
-        return system.marker("MarkerBodyPosition", self.body, place)
-
-    def turn(self, system: System, place: Place, angle: float = 0.0) -> Any:
-        """See SpatialHolder."""
-        return self.framed(system, place, np.eye(3))
-
-    def framed(self, system: System, place: Place, axes: Array) -> Any:
-        """See SpatialHolder."""
-        return _framed(system, self.body, place, axes)
 
     def side(self, place: Place) -> Side:
         """See SpatialHolder."""
@@ -306,12 +284,6 @@ def local_rates(turn: Array) -> Array:
     s, x, y, z = np.moveaxis(turn, -1, 0)
     rows = [[-x, s, z, -y], [-y, -z, s, x], [-z, y, -x, s]]
     return np.asarray(2 * np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
-
-
-def _framed(system: System, body: Any, place: Place, axes: Array) -> Any:
-    frame = np.eye(4)
-    frame[:3, :3], frame[:3, 3] = axes, place
-    return system.add("MarkerBodyRigid", bodyNumber=body, localHT=frame)
 
 
 def _both(vectors: tuple[Affine, ...], q: Array, v: Array) -> list[tuple[Array, Array]]:
