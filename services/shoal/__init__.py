@@ -1,4 +1,4 @@
-"""Shoal: simulate and identify planar rigid-flexible machines.
+"""Shoal: simulate and identify rigid-flexible machines.
 
 `import shoal` costs nothing: each name is imported when it is first used.
 """

@@ -119,7 +119,7 @@ def _extras_named() -> Iterator[None]:
 )
 @click.version_option(package_name="shoal")
 def main() -> None:
-    """Simulate and identify planar rigid-flexible machines, and check the answers against other engines.
+    """Simulate and identify rigid-flexible machines, and check the answers against other engines.
 
     SCENE and PROBLEM are a name (see `shoal scenes`; `shoal library add` makes more) or a YAML file.
     """

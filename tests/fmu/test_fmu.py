@@ -57,6 +57,18 @@ def test_the_motion_is_the_one_of_simulate(unit: Path, step: float) -> None:
     assert np.ptp(found["energy"]) < 1e-5 * np.max(np.abs(found["energy"]))
 
 
+@pytest.mark.parametrize("name", ["spherical-pendulum", "bricard", "flexible-spherical-double-pendulum"])
+def test_machines_in_space_tell_three_coordinates_and_keep_their_energy(name: str, tmp_path: Path) -> None:
+    unit, scene = export(load_scene(name), out=tmp_path / "space.fmu"), load_scene(name)
+    found = run(unit, 0.3, 0.1, **{"gravity.0": 0.5})
+    marker = list(scene.markers)[-1]
+    tip = simulated(scene.with_values({"gravity.0": 0.5}), found["time"], marker)
+    recorded = np.column_stack([found[f"{marker}.{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(recorded, tip, rtol=0, atol=1e-12)
+    assert np.max(np.abs(tip[-1] - tip[0])) > 0.05
+    assert np.ptp(found["energy"]) < 1e-5 * np.max(np.abs(found["energy"]))
+
+
 def test_steps_of_any_length(unit: Path) -> None:
     """Steps that nobody could foresee, beyond the stated end as well, two units side by side."""
     description = fmpy.read_model_description(str(unit))

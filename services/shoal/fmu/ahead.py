@@ -32,14 +32,13 @@ class Ahead:
         self._run: Trajectory | None = None
         self._energies: Array | None = None
 
-    def point(self, marker: str, time: float, step: float) -> tuple[float, float]:
+    def point(self, marker: str, time: float, step: float) -> tuple[float, ...]:
         """A marker [m] at a time [s]; step [s]: the next questions are expected so far apart, if it is finite.
 
         Raises InputError, and ComputationError if the motion up to the horizon cannot be trusted.
         """
         run, sample = self._sample(time, step)
-        x, y = run.marker(marker)[sample]
-        return float(x), float(y)
+        return tuple(run.marker(marker)[sample].tolist())
 
     def energy(self, time: float, step: float) -> float:
         """Kinetic, elastic and gravitational energy [J] at a time [s]; raises what `point` raises."""

@@ -40,17 +40,17 @@ def energies(scene: Scene, times: Array) -> Array:
 
 
 def _states(model: Model, times: Array) -> tuple[Array, Array]:
-    """Coordinates and rates at the times, (times, unknowns) each: the time loop with pairs of unknowns as markers."""
-    solver, n = model.scene.solver, model.unknowns
+    """Coordinates and rates at the times, (times, unknowns) each: the time loop with groups of unknowns as markers."""
+    solver, n, d = model.scene.solver, model.unknowns, model.dimensions
     choice = pick(solver, model, stability.step_limit)
     arrays, room = at_start(model, SINGLE, LANE)
     scheme = choose(solver, model, SINGLE, LANE, choice.name)
     steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
-    first = np.arange(0, n, 2)
-    second = np.minimum(first + 1, n - 1)
-    rows = np.column_stack([first, second, first, second]).ravel()
+    groups = np.minimum(np.arange(0, n, d)[:, None] + np.arange(d), n - 1)
+    rows = np.concatenate([groups, groups], axis=1).ravel()
     stops = halting(solver, model, choice.name, float(times[-1]))
     record = march(SINGLE, scheme, arrays, room, solver.step, steps, times, rows, solver.rank_tolerance, stops)
-    samples = record.samples.reshape(len(times), len(first), sampled(2))
-    q, v = (samples[:, :, columns].reshape(len(times), -1)[:, :n] for columns in (slice(0, 2), slice(5, 7)))
+    samples = record.samples.reshape(len(times), len(groups), sampled(d))
+    point, velocity = slice(0, d), slice(2 * d + 1, 3 * d + 1)
+    q, v = (samples[:, :, columns].reshape(len(times), -1)[:, :n] for columns in (point, velocity))
     return q, v

@@ -29,7 +29,7 @@ def export(scene: Scene, paths: Sequence[str] = (), out: Path | None = None) -> 
     """
     if asked_for(scene):
         raise InputError(f"solver.acceleration: {scene.solver.acceleration!r} is for studies; a unit needs a solver")
-    chosen = list(dict.fromkeys(paths)) or ["gravity.0", "gravity.1", *(f"initial.{b}.angle" for b in scene.bodies)]
+    chosen = list(dict.fromkeys(paths)) or _usual(scene)
     content = {"scene": scene.model_dump(mode="json"), "parameters": {path: number(scene, path) for path in chosen}}
     target = out or Path(f"{identifier(scene)}.fmu")
     with tempfile.TemporaryDirectory() as folder, _paths_as_they_were(), whole(target) as unit:
@@ -38,6 +38,13 @@ def export(scene: Scene, paths: Sequence[str] = (), out: Path | None = None) -> 
         data.write_text(json.dumps(content), encoding="utf-8")
         FmuBuilder.build_FMU(script, unit, [data])
     return target
+
+
+def _usual(scene: Scene) -> list[str]:
+    """Gravity and the initial angles; in space those that are stated, as others may be rotations."""
+    stated = {name for name, start in scene.initial.items() if start.stated("angle")}
+    turned = [name for name in scene.bodies if scene.dimensions == 2 or name in stated]
+    return [*(f"gravity.{k}" for k in range(len(scene.gravity))), *(f"initial.{name}.angle" for name in turned)]
 
 
 def number(scene: Scene, path: str) -> float:

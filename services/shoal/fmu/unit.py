@@ -62,7 +62,7 @@ class SceneUnit(Fmi2Slave):  # type: ignore[misc]
                 )
             )
         for marker in self._scene.markers:
-            for axis, letter in enumerate("xy"):
+            for axis, letter in enumerate("xyz"[: self._scene.dimensions]):
                 where = partial(self._point, marker, axis)
                 self._output(f"{marker}.{letter}", f"{letter} of marker {marker} [m]", where)
         self._output("energy", "kinetic, elastic and gravitational energy [J]", self._energy)

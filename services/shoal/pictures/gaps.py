@@ -20,7 +20,7 @@ def gaps(found: Response, marker: str) -> Figure:
     figure, panel = canvas()
     beyond = np.maximum(bounds.lower - bounds.lower_outer, bounds.upper_outer - bounds.upper)
     within = found.times <= found.horizon
-    for look, quantity in zip(LINES, ("x", "y"), strict=False):
+    for look, quantity in zip(LINES, found.axes, strict=False):
         width = found.column(marker, quantity, bounds.upper - bounds.lower)
         gap = found.column(marker, quantity, beyond)
         panel.plot(found.times, np.maximum(width, LEAST), label=f"width of {quantity}", **look)

@@ -14,10 +14,10 @@ MOST = 6
 
 @styled
 def indices(found: Response, marker: str) -> Figure:
-    """Total Sobol indices of x and y of one marker; found: of random parameters."""
+    """Total Sobol indices of the coordinates of one marker; found: of random parameters."""
     assert found.statistics is not None
-    figure, axes = canvas(6.2, nrows=2, sharex=True)
-    total = {quantity: found.column(marker, quantity, found.statistics.total) for quantity in ("x", "y")}
+    figure, axes = canvas(2.2 + 2.0 * len(found.axes), nrows=len(found.axes), sharex=True)
+    total = {quantity: found.column(marker, quantity, found.statistics.total) for quantity in found.axes}
     largest = np.max([np.nan_to_num(of).max(axis=1) for of in total.values()], axis=0)
     shown = sorted(np.argsort(-largest, kind="stable")[:MOST].tolist())
     for panel, (quantity, of) in zip(axes, total.items(), strict=True):

@@ -16,10 +16,10 @@ FANS = ((0, -1, 0.2), (1, -2, 0.3), (2, -3, 0.4))
 
 @styled
 def response(found: Response, marker: str) -> Figure:
-    """x and y of one marker."""
-    figure, axes = canvas(6.6, nrows=2, sharex=True)
+    """The coordinates of one marker."""
+    figure, axes = canvas(2.2 + 2.2 * len(found.axes), nrows=len(found.axes), sharex=True)
     widest = 0.0
-    for panel, quantity in zip(axes, ("x", "y"), strict=True):
+    for panel, quantity in zip(axes, found.axes, strict=True):
         widest = max(widest, _panel(panel, found, marker, quantity))
     axes[0].legend()
     axes[-1].set_xlabel("time [s]")

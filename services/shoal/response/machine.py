@@ -13,20 +13,20 @@ from shoal.response.inputs import BoolArray
 from shoal.response.kept import Keep
 from shoal.response.runs import Answers
 from shoal.scene import Scene
-from shoal.scene.dimensions import require_plane
 from shoal.trajectory import Array, Status, Trajectory
 
 CHUNK = 2_000_000
 """So many numbers of an answer are computed in one call."""
 FINER = 4.0, 16.0
 """A run that failed is repeated with a step, and adaptive errors, smaller by this, then by that."""
-QUANTITIES = ("x", "y", "angle")
 LEAST_TOLERANCE = 1e-14
 
 
 @dataclass(frozen=True)
 class Machine:
-    """Call it with path -> values. Columns: instants, markers and quantities (x, y [m] and angle [rad]), in this order.
+    """Call it with path -> values. Columns: instants, markers and quantities, in this order.
+
+    Quantities are x, y [m] and angle [rad]; in space x, y and z, where an angle in the plane z = 0 may jump.
 
     columns: their number along each of the three; told: what is told of a motion instead, (lanes, columns);
     keep: of the runs
@@ -38,13 +38,15 @@ class Machine:
     told: Callable[[Trajectory], Array] = field(default_factory=lambda: _columns)
     keep: Keep | None = None
 
-    def __post_init__(self) -> None:
-        require_plane(self.scene, "bounds and statistics are")
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """What is told of every marker."""
+        return ("x", "y", "angle") if self.scene.dimensions == 2 else ("x", "y", "z")
 
     @property
     def columns(self) -> tuple[int, int, int]:
         """Instants, markers, quantities."""
-        return len(self.times), len(self.scene.markers), len(QUANTITIES)
+        return len(self.times), len(self.scene.markers), len(self.quantities)
 
     def __call__(self, values: Mapping[str, Array]) -> Answers:
         """The answers of all runs. Raises InputError."""
@@ -97,7 +99,8 @@ def _careful(scene: Scene, motion: Trajectory, finer: float) -> dict[str, float]
 
 def _columns(motion: Trajectory) -> Array:
     """(lanes, instants * markers * 3)."""
-    whole = np.concatenate([motion.points[:, :, :2], motion.angles[:, :, None]], axis=2)
+    plane = motion.points.shape[2] == 2
+    whole = np.concatenate([motion.points, motion.angles[:, :, None]], axis=2) if plane else motion.points
     return np.moveaxis(whole, -1, 0).reshape(motion.lanes, -1).copy()
 
 

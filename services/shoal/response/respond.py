@@ -38,7 +38,7 @@ from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
 from shoal.response.limits import Judged, Limit, judge, limit
 from shoal.response.limits.judge import Reach, watched
-from shoal.response.machine import QUANTITIES, Machine
+from shoal.response.machine import Machine
 from shoal.response.methods import get_method
 from shoal.response.methods.bounds import HOPELESS
 from shoal.response.read import parameters
@@ -224,7 +224,7 @@ def uncertain(
         inputs=inputs,
         times=when,
         markers=tuple(wanted.markers),
-        quantities=QUANTITIES,
+        quantities=machine.quantities,
         evaluations=answer.runs.evaluations,
         repeated=answer.runs.repeated,
         failed=answer.runs.failed,
@@ -343,7 +343,7 @@ def _beyond(scene: Scene, inputs: Inputs, bounds: Bounds, machine: Machine) -> B
     length = max(float(np.max(reach.size(scene.with_lanes(ends)))), 0.0) if reach.tethered(scene) else math.inf
     anchors = reach.anchors(scene)
     far = np.full((*machine.columns, 2), math.nan)
-    for axis in range(2):
+    for axis in range(scene.dimensions):
         far[:, :, axis, 0] = anchors[:, axis].min() - reach.MARGIN * length
         far[:, :, axis, 1] = anchors[:, axis].max() + reach.MARGIN * length
     late = np.repeat(machine.times > bounds.horizon, int(np.prod(machine.columns[1:])))

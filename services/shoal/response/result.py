@@ -48,7 +48,7 @@ class Response:
 
     status: ok, gap-not-reached, beyond-horizon, failed-runs or model-rejected; message: why it is not ok; why: what the
     method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds: None if a parameter is
-    random; statistics: None if none is; columns are (instants, markers, quantities x, y, angle) in this order;
+    random; statistics: None if none is; columns are (instants, markers, quantities) in this order;
     mesh_error, step_error: of extremal runs [m], None where not estimated; stated: the scene with its model in the
     middle; engine: its name; limits: of what must not happen;
     allocation: tolerances that keep the limit, where they were asked for
@@ -83,6 +83,11 @@ class Response:
         """Whether the answer can be believed as it stands."""
         return self.status == "ok"
 
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Those of the quantities that are coordinates [m]."""
+        return tuple(name for name in self.quantities if name in "xyz")
+
     def column(self, marker: str, quantity: str, of: Array) -> Array:
         """What belongs to one marker and quantity over time; of: (..., columns) -> (..., instants)."""
         shape = len(self.times), len(self.markers), len(self.quantities)
@@ -105,7 +110,9 @@ class Response:
         return header, np.column_stack(columns)
 
     def to_xarray(self) -> xr.Dataset:
-        """Bounds, or statistics, over time [s], marker and axis (x, y [m] and angle [rad]). Raises InputError.
+        """Bounds, or statistics, over time [s], marker and axis (x, y [m] and angle [rad], or x, y, z).
+
+        Raises InputError.
 
         lower, upper over bound (attained, outer); argument_lower, argument_upper over parameter; mean, std, quantiles
         over quantile; first and total Sobol indices over parameter.

@@ -65,7 +65,7 @@ def _widest(found: Response) -> str:
     sizes = {
         (marker, quantity): float(found.column(marker, quantity, width).max())
         for marker in found.markers
-        for quantity in ("x", "y")
+        for quantity in found.axes
     }
     marker, quantity = max(sizes, key=lambda key: sizes[key])
     return f"{marker}.{quantity}.lower"

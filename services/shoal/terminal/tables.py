@@ -177,7 +177,7 @@ def _shares(response: Response) -> None:
     """Sobol's total indices at the end."""
     assert response.statistics is not None
     marker = response.markers[-1]
-    axes = [quantity for quantity in response.quantities if quantity != "angle"]
+    axes = response.axes
     table = screen.table(f"share of the variance of {marker} (total Sobol index)", "", *axes)
     for k, name in enumerate(response.inputs.names):
         shares = [response.column(marker, axis, response.statistics.total[k])[-1] for axis in axes]

@@ -11,7 +11,19 @@ from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
-QUANTITIES = {"x": "m", "y": "m", "angle": "rad", "vx": "m/s", "vy": "m/s", "speed": "m/s", "rate": "rad/s"}
+UNITS = {
+    "x": "m",
+    "y": "m",
+    "z": "m",
+    "angle": "rad",
+    "vx": "m/s",
+    "vy": "m/s",
+    "vz": "m/s",
+    "speed": "m/s",
+    "rate": "rad/s",
+}
+QUANTITIES = {2: ("x", "y", "angle", "vx", "vy", "speed", "rate"), 3: ("x", "y", "z", "vx", "vy", "vz", "speed")}
+"""By dimensions."""
 """Of a marker, with their units."""
 FORM = '"MARKER.QUANTITY < NUMBER", with <, > and abs(MARKER.QUANTITY)'
 _EXPRESSION = re.compile(r"^\s*(abs\()?\s*([^\s()<>]+)\.(\w+)\s*(\))?\s*(<|>)=?\s*(\S+)\s*$")
@@ -31,7 +43,7 @@ class Limit:
     @property
     def unit(self) -> str:
         """Of the bound and the margin."""
-        return QUANTITIES[self.quantity]
+        return UNITS[self.quantity]
 
     def margin(self, of: Array) -> Array:
         """How far the quantity is from the bound, negative beyond it."""
@@ -51,8 +63,8 @@ def limit(text: str, scene: Scene) -> Limit:
     _, marker, quantity, _, sign, number = found.groups()
     if marker not in scene.markers:
         raise InputError(f"limit: {text}: no marker {marker!r}; there are {', '.join(scene.markers)}")
-    if quantity not in QUANTITIES:
-        raise InputError(f"limit: {text}: no quantity {quantity!r}; there are {', '.join(QUANTITIES)}")
+    if quantity not in (known := QUANTITIES[scene.dimensions]):
+        raise InputError(f"limit: {text}: no quantity {quantity!r}; there are {', '.join(known)}")
     try:
         bound = float(number)
     except ValueError:
@@ -65,8 +77,8 @@ def limit(text: str, scene: Scene) -> Limit:
 def _quantity(motion: Trajectory, marker: str, quantity: str) -> Array:
     """(instants, lanes)."""
     k = motion.markers.index(marker)
-    if quantity in ("x", "y"):
-        return np.asarray(motion.points[:, k, "xy".index(quantity)])
+    if quantity in motion.axes:
+        return np.asarray(motion.points[:, k, motion.axes.index(quantity)])
     if quantity == "angle":
         return np.asarray(motion.angles[:, k])
     if motion.velocities is None or motion.rates is None:
@@ -74,4 +86,6 @@ def _quantity(motion: Trajectory, marker: str, quantity: str) -> Array:
     if quantity == "rate":
         return np.asarray(motion.rates[:, k])
     velocity = motion.velocities[:, k]
-    return np.asarray(np.linalg.norm(velocity, axis=1) if quantity == "speed" else velocity[:, "xy".index(quantity[1])])
+    return np.asarray(
+        np.linalg.norm(velocity, axis=1) if quantity == "speed" else velocity[:, motion.axes.index(quantity[1])]
+    )
