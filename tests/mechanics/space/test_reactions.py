@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.reactions import Reactions, reactions
+from shoal.mechanics.analysis.sections import SpatialSections, sections
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene
 
@@ -129,3 +131,51 @@ def test_what_a_loop_holds_twice_is_not_unique() -> None:
     assert set(found.not_unique) == {"low", "high"}
     total = np.add(*(found.joints[name].force for name in ("low", "high")))
     assert total == pytest.approx([0.0, 0.0, 3.0 * 9.81], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("element", "more"),
+    [
+        ("ancf-cable", {}),
+        ("ancf-quintic", {}),
+        ("director-rod", {"width": 0.006}),
+        ("director-rod", {"width": 0.006, "curvature": [0.5], "twist": [1.0]}),
+    ],
+)
+def test_section_forces_balance_the_loads_beyond_the_section(element: str, more: dict[str, Any]) -> None:
+    """A cantilever under its weight, a force and a torque at its end: the law of the lever, on any mesh."""
+    force, torque, gravity = np.array([0.3, -2.0, 1.5]), np.array([0.05, 0.02, -0.03]), np.array([0.0, 1.0, -9.0])
+    end = {"body": "B", "point": "end"}
+    loads: dict[str, Any] = {"P": {"kind": "force", "at": end, "force": force.tolist()}}
+    if element == "director-rod":
+        size = float(np.linalg.norm(torque))
+        loads["M"] = {"kind": "torque", "at": end, "axis": torque.tolist(), "torque": size}
+    else:
+        torque = np.zeros(3)
+    rod = {"kind": "rod", "length": 1.0, "height": 0.01, "width": 0.01, "density": 2700.0, "youngs_modulus": 7e9,
+           "element": element, "elements": 8}  # fmt: skip
+    heavy = scene(
+        gravity=gravity.tolist(),
+        bodies={"B": rod | more},
+        joints={"W": {"kind": "weld", "first": GROUND, "second": {"body": "B"}}},
+        loads=loads,
+        markers={f"m{k}": {"body": "B", "point": [k / 8, 0.0]} for k in range(9)},
+    )
+    found = statics(heavy)
+    assert found.ok, found.message
+    evaluator, rest = Evaluator.of(heavy), np.zeros_like(found.q)
+    cut = sections(evaluator, found.q, rest, rest, 0.0, "B")
+    assert isinstance(cut, SpatialSections)
+    body = heavy.bodies["B"]
+    np.testing.assert_allclose(cut.force, force + np.outer(body.mass * (1 - cut.s), gravity), atol=1e-8)
+    assert cut.moment[-1] == pytest.approx(torque, abs=1e-8)
+    assert cut.torque[-1] == pytest.approx(cut.tangent[-1] @ torque, abs=1e-8)
+    assert found.reactions is not None
+    held = found.reactions.joints["W"]
+    assert -cut.force[0] == pytest.approx(held.force, abs=1e-7)
+    assert -cut.moment[0] == pytest.approx(held.torque, abs=1e-6)
+    light = heavy.with_values({"gravity": [0.0, 0.0, 0.0]})
+    weightless = statics(light)
+    cut = sections(Evaluator.of(light), weightless.q, rest, rest, 0.0, "B")
+    lever = weightless.points[-1] - weightless.points[np.repeat(np.arange(9), 2)[1:-1]]
+    np.testing.assert_allclose(cut.moment, torque + np.cross(lever, force), atol=1e-7)

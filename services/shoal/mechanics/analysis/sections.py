@@ -14,13 +14,13 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import plane
+from shoal.mechanics import rotation as turns
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
-from shoal.mechanics.elements import ELEMENTS
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, DistributedForce, Rod, Scene
-from shoal.scene.dimensions import require_plane
+from shoal.scene.dimensions import padded
 from shoal.scene.joints import places, sides
 
 
@@ -38,10 +38,32 @@ class Sections(NamedTuple):
     moment: Array
 
 
-def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: str) -> Sections:
+class SpatialSections(NamedTuple):
+    """The same in space: what the part beyond exerts on the part before, along the axes of the ground.
+
+    s: arc length [m], (2 elements,). tangent: of the axis, of unit length; force [N]; moment [N m], of which a cable
+    has none about its tangent, (2 elements, 3) each.
+    """
+
+    s: Array
+    tangent: Array
+    force: Array
+    moment: Array
+
+    @property
+    def normal(self) -> Array:
+        """Normal force [N], positive in tension."""
+        return np.asarray(np.sum(self.tangent * self.force, axis=1))
+
+    @property
+    def torque(self) -> Array:
+        """Torsional moment [N m]."""
+        return np.asarray(np.sum(self.tangent * self.moment, axis=1))
+
+
+def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: str) -> Sections | SpatialSections:
     """Section forces of a flexible rod at a state (coordinates, rates, accelerations). Raises InputError."""
     scene = evaluator.model.scene
-    require_plane(scene, "section forces are")
     body = scene.bodies.get(rod)
     if not isinstance(body, Rod) or body.element == "rigid":
         raise InputError(f"{rod}: section forces need a flexible rod of the scene")
@@ -49,12 +71,14 @@ def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: 
     at, rate, change = bodies.state(q, v, a)
     frame = bodies.placement.frames[rod]
     assert isinstance(frame, BeamFrame)
-    element = ELEMENTS[body.element]
+    element = frame.element
     length = float(frame.element_length)
     broken = _interrupted(scene, rod, body)
-    load = np.array(scene.gravity)
+    load = np.array(padded(scene.gravity, scene.dimensions))
     along = [d for d in scene.loads.values() if isinstance(d, DistributedForce) and d.body == rod]
-    rows: list[tuple[float, float, float, float]] = []
+    cross = plane.cross if scene.dimensions == plane.DIMENSIONS else turns.cross
+    arcs: list[float] = []
+    tangents, forces, moments = list[Array](), list[Array](), list[Array]()
     for number, elastic in enumerate(bodies.evaluator.element_forces(at, rate, rod)):
         height, width = body.section((number + 0.5) / body.elements)
         own = np.array([vector.own for vector in frame.of_element(number)])
@@ -62,20 +86,23 @@ def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: 
         weight = np.outer(element.weight(body.density, height, width, length), load)
         unit = np.array(element.weight(1.0, 1.0, 1.0, length))
         for one in along:
-            weight = weight + np.outer(unit, one.force) * float(one.scale(np.array(t)))
+            force = np.array(padded(one.force, scene.dimensions))
+            weight = weight + np.outer(unit, force) * float(one.scale(np.array(t)))
         ends = inertia - elastic[own] - weight
         order = len(ends) // 2
         for end in range(2):
-            part = slice(end * order, (end + 1) * order)
+            part, side = slice(end * order, (end + 1) * order), 1.0 if end == 1 else -1.0
             s = (number + end) * length
-            tangent = frame.direction((s, 0.0)).at(at)
-            tangent = tangent / np.hypot(*tangent)
-            force = (1.0 if end == 1 else -1.0) * ends[part][0]
-            moment = (1.0 if end == 1 else -1.0) * np.sum(plane.cross(at[own][part][1:].T, ends[part][1:].T))
-            row = (float(tangent @ force), float(plane.cross(tangent, force)), float(moment))
-            rows.append((s, *row) if number not in broken else (s, np.nan, np.nan, np.nan))
-    s, normal, shear, bending = np.array(rows).T
-    return Sections(s, normal, shear, bending)
+            tangent = frame.direction((s,) + (0.0,) * (scene.dimensions - 1)).at(at)
+            known = side if number not in broken else np.nan
+            arcs.append(s)
+            tangents.append(tangent / np.linalg.norm(tangent))
+            forces.append(known * ends[part][0])
+            moments.append(known * np.sum(cross(at[own][part][1:].T, ends[part][1:].T), axis=-1))
+    found = SpatialSections(*(np.array(one) for one in (arcs, tangents, forces, moments)))
+    if scene.dimensions != plane.DIMENSIONS:
+        return found
+    return Sections(found.s, found.normal, plane.cross(found.tangent.T, found.force.T), found.moment)
 
 
 def _interrupted(scene: Scene, name: str, rod: Rod) -> set[int]:
