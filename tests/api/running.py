@@ -13,7 +13,7 @@ from shoal.api.program import create_program
 from shoal.api.settings import Settings
 from shoal.api.worker import MakeEngine
 
-STOPPED = 30.0
+STOPPED = 5.0
 """A service that has not stopped by then [s] is left to the end of the process: no wait is without a limit."""
 
 

@@ -46,7 +46,11 @@ def repeated(scene: shoal.Scene, **asked: Any) -> Trajectory:
     return prepared(**asked)
 
 
-@pytest.mark.parametrize("name", scene_names())
+@pytest.mark.parametrize(
+    # The governor's implicit integrator takes a minute to compile in space.
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name == "flyball-governor")) for name in scene_names()],
+)
 def test_every_scene_repeats_itself(name: str) -> None:
     scene = load_scene(name)
     times = scene.solver.step * np.array([1.0, 7.5, 10.0])

@@ -21,8 +21,14 @@ from shoal.pictures.outline import ground
 from shoal.pictures.poses import poses
 from shoal.scene import load_scene, scene_names
 
+COMPILES = "flyball-governor"
+"""Its implicit integrator takes a minute to compile in space."""
 
-@pytest.mark.parametrize("name", [*scene_names(), "n-four-bar-2"])
+
+@pytest.mark.parametrize(
+    "name",
+    [*(pytest.param(name, marks=[pytest.mark.slow] * (name == COMPILES)) for name in scene_names()), "n-four-bar-2"],
+)
 def test_every_scene_moves(name: str) -> None:
     """Outlines of every body, finite, of the size of the machine, standing on its ground."""
     scene = load_scene(name)
