@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
@@ -48,56 +48,54 @@ class Study:
         }
 
 
-@dataclass(frozen=True)
-class Compared:
-    """A comparison with the id of its run and its picture."""
+class Answer(Protocol):
+    """What the library found."""
 
-    comparison: Comparison
+    @property
+    def ok(self) -> bool:
+        """Whether it may be believed."""
+        ...
+
+    def to_json(self) -> dict[str, Any]:
+        """As the library tells it."""
+        ...
+
+
+A = TypeVar("A", bound=Answer)
+
+
+@dataclass(frozen=True)
+class Logged(Generic[A]):
+    """An answer with the id of its run: trusted as the answer is, and told as it is."""
+
+    answer: A
     run_id: str
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it may be believed."""
+        return self.answer.ok
+
+    def to_json(self) -> dict[str, Any]:
+        """The object that `shoal run FLOW --json` prints."""
+        return {**self.answer.to_json(), "run_id": self.run_id}
+
+
+@dataclass(frozen=True)
+class Compared(Logged[Comparison]):
+    """A comparison of engines, with its picture."""
+
     picture: Picture
 
-    @property
-    def trusted(self) -> bool:
-        """Whether every engine ran and may be believed."""
-        return self.comparison.ok
 
-    def to_json(self) -> dict[str, Any]:
-        """The object that `shoal run compare --json` prints."""
-        return {**self.comparison.to_json(), "run_id": self.run_id}
+@dataclass(frozen=True)
+class Swept(Logged[Sweep]):
+    """A sweep."""
 
 
 @dataclass(frozen=True)
-class Swept:
-    """A sweep with the id of its run."""
-
-    sweep: Sweep
-    run_id: str
-
-    @property
-    def trusted(self) -> bool:
-        """Whether every point may be believed."""
-        return self.sweep.ok
-
-    def to_json(self) -> dict[str, Any]:
-        """The object that `shoal run sweep --json` prints."""
-        return {**self.sweep.to_json(), "run_id": self.run_id}
-
-
-@dataclass(frozen=True)
-class Responded:
-    """What an uncertain machine may do, with the id of its run."""
-
-    response: Response
-    run_id: str
-
-    @property
-    def trusted(self) -> bool:
-        """Whether it can be believed as it stands."""
-        return self.response.ok
-
-    def to_json(self) -> dict[str, Any]:
-        """The object that `shoal run uncertain --json` prints."""
-        return {**self.response.to_json(), "run_id": self.run_id}
+class Responded(Logged[Response]):
+    """What an uncertain machine may do."""
 
 
 @dataclass(frozen=True)
@@ -119,20 +117,8 @@ class Simulated:
 
 
 @dataclass(frozen=True)
-class AtRest:
-    """An equilibrium with the id of its run."""
-
-    equilibrium: Equilibrium
-    run_id: str
-
-    @property
-    def trusted(self) -> bool:
-        """Whether it rests there."""
-        return self.equilibrium.ok
-
-    def to_json(self) -> dict[str, Any]:
-        """The object that `shoal run statics --json` prints."""
-        return {**self.equilibrium.to_json(), "run_id": self.run_id}
+class AtRest(Logged[Equilibrium]):
+    """An equilibrium."""
 
 
 @dataclass(frozen=True)
@@ -153,20 +139,8 @@ class Selected:
 
 
 @dataclass(frozen=True)
-class Designed:
-    """What to measure, with the id of its run."""
-
-    design: Design
-    run_id: str
-
-    @property
-    def trusted(self) -> bool:
-        """Whether the best sensor tells the parameter."""
-        return self.design.ok
-
-    def to_json(self) -> dict[str, Any]:
-        """The object that `shoal run design --json` prints."""
-        return {**self.design.to_json(), "run_id": self.run_id}
+class Designed(Logged[Design]):
+    """What to measure."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +170,7 @@ class DemoResult:
         for name, compared in self.comparisons.items():
             if not compared.trusted:
                 found.append(f"{name}: an engine refused the scene or failed")
-            for row in compared.comparison.differences():
+            for row in compared.answer.differences():
                 distance = row["largest"]
                 if "gauss" in row["engines"] and row["marker"] == "B" and not (distance or 1.0) < AGREEMENT:
                     found.append(f"{name}: {' and '.join(row['engines'])} differ by {distance} m at B")

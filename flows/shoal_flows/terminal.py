@@ -71,17 +71,17 @@ def show(result: Any) -> None:
             x, y = result.motion.marker(name)[-1]
             console.print(f"{name} at {result.motion.times[-1]:g} s: ({x:.9f}, {y:.9f}) m")
     elif isinstance(result, AtRest):
-        tables.equilibrium_table(result.equilibrium)
+        tables.equilibrium_table(result.answer)
     elif isinstance(result, Selected):
         tables.selection_table(result.selection)
     elif isinstance(result, Designed):
-        tables.design_table(result.design)
+        tables.design_table(result.answer)
     elif isinstance(result, Responded):
-        tables.response_table(result.response)
+        tables.response_table(result.answer)
     elif isinstance(result, Swept):
-        console.print(f"{len(result.sweep.status)} points in {result.sweep.wall_s:.2f} s")
-        if result.sweep.check is not None:
-            console.print(str(result.sweep.check), soft_wrap=True)
+        console.print(f"{len(result.answer.status)} points in {result.answer.wall_s:.2f} s")
+        if result.answer.check is not None:
+            console.print(str(result.answer.check), soft_wrap=True)
     if not isinstance(result, DemoResult) and not result.run_id.startswith(LOCAL):
         from shoal_flows.tracking.addresses import run_address
 
@@ -166,7 +166,7 @@ def _study(console: Console, study: Study) -> None:
 
 def _differences(console: Console, results: list[Compared]) -> None:
     for compared in results:
-        comparison = compared.comparison
+        comparison = compared.answer
         marker = list(comparison.scene.markers)[-1]
         parts = [
             f"{one}-{other} {row['largest'] * 1e6:.1f} µm" if row["largest"] is not None else f"{one}-{other} ?"

@@ -10,10 +10,12 @@ import httpx
 import pytest
 from shoal.api.settings import Settings
 
-# The modules beside this one are imported by workers too, which are fresh processes with the path of this one.
+# These modules are imported by workers too, which are fresh processes with the path of this one.
+sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 
 import engines_for_tests
+from one_body import pendulum
 from running import serving
 
 
@@ -40,26 +42,7 @@ def obedient() -> Iterator[httpx.Client]:
 @pytest.fixture(scope="session")
 def machine() -> dict[str, object]:
     """An inline scene: one rigid body."""
-    return {
-        "name": "pendulum",
-        "bodies": {
-            "OA": {
-                "kind": "rigid-body",
-                "mass": 1.0,
-                "inertia": 0.1,
-                "centre_of_mass": [0.5, 0.0],
-                "named_points": {"end": [1.0, 0.0]},
-            }
-        },
-        "joints": {
-            "O": {
-                "kind": "revolute",
-                "first": {"body": "ground", "point": [0, 0]},
-                "second": {"body": "OA", "point": "start"},
-            }
-        },
-        "markers": {"A": {"body": "OA", "point": "end"}},
-    }
+    return pendulum(inertia=0.1, centre=0.5)
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
 from shoal.trajectory import Array
-from shoal_validation.spatial.machines import PUBLISHED, bricard
+from shoal_validation.spatial.machines import PUBLISHED, bricard, cable, flexible_pendulum
 
 pytest.importorskip("exudyn")
 
@@ -148,24 +148,6 @@ def test_bricards_redundant_loop_is_stepped_over_and_checked() -> None:
     assert away[1] < away[0] / 3.5
 
 
-def rod(length: float, elements: int, modulus: float, **more: Any) -> dict[str, Any]:
-    return {"kind": "rod", "length": length, "height": 0.03, "width": 0.03, "density": 5540.0,
-            "youngs_modulus": modulus, "element": "ancf-cable", "elements": elements} | more  # fmt: skip
-
-
-def flexible(**more: Any) -> Scene:
-    """The spherical double pendulum of two cables on a coarse mesh."""
-    return Scene.parse({
-        "name": "flexible", "dimensions": 3, "gravity": [0.0, -9.81, 0.0],
-        "bodies": {"OA": rod(1.0, 4, 2e8), "AB": rod(2.0, 8, 2e7)},
-        "joints": {"O": {"kind": "spherical", "first": HELD, "second": {"body": "OA"}},
-                   "A": {"kind": "spherical", "first": {"body": "OA", "point": "end"}, "second": {"body": "AB"}}},
-        "markers": {"A": {"body": "OA", "point": "end"}, "B": {"body": "AB", "point": "end"}},
-        "initial": {"OA": {"angle": math.pi / 4, "spin": [0, 2, 0]}, "AB": {"angle": math.pi / 6, "spin": [0, 2, 0]}},
-        "solver": {"integrator": "leapfrog", "step": 1e-5}, **more,
-    })  # fmt: skip
-
-
 def limit(machine: Scene, times: Array, step: float) -> Array:
     """Exudyn's motion without its error of second order, by Richardson's extrapolation."""
     runs = [
@@ -178,16 +160,16 @@ def limit(machine: Scene, times: Array, step: float) -> Array:
 
 def test_the_flexible_spherical_pendulum_is_exudyns_on_equal_meshes() -> None:
     times = np.array([0.02, 0.04])
-    ours = simulate(flexible(), times)
-    assert np.max(np.abs(limit(flexible(), times, 5e-5) - ours.points)) < 1e-8
+    ours = simulate(flexible_pendulum(), times)
+    assert np.max(np.abs(limit(flexible_pendulum(), times, 5e-5) - ours.points)) < 1e-8
 
 
 @pytest.mark.slow
 def test_cables_are_clamped_and_hinged_alike() -> None:
     """A clamped boom, a body welded to its tip, and a cable hinged to that at a right angle to the axis."""
     head = {"kind": "rigid-body", "mass": 2.0, "inertia": [0.1, 0.12, 0.15], "named_points": {"e": [0.2, 0.1]}}
-    crane = flexible(
-        bodies={"OA": rod(1.0, 2, 2e8), "H": head, "AB": rod(0.5, 1, 2e8)},
+    crane = flexible_pendulum(
+        bodies={"OA": cable(1.0, 2, 2e8), "H": head, "AB": cable(0.5, 1, 2e8)},
         joints={"foot": {"kind": "weld", "first": HELD, "second": {"body": "OA"}},
                 "W": {"kind": "weld", "first": {"body": "OA", "point": "end"}, "second": {"body": "H"}},
                 "J": {"first": {"body": "H", "point": "e"}, "second": {"body": "AB"}, "axis": [0, 0, 1]}},
@@ -203,8 +185,8 @@ def test_cables_are_clamped_and_hinged_alike() -> None:
 def test_the_end_of_a_cable_slides_in_a_plane_and_on_a_line() -> None:
     """Both ends of a cable that falls: one on a line, the other in a plane."""
     start = np.array([math.cos(0.4), math.sin(0.4), 0.0])
-    fallen = flexible(
-        bodies={"OA": rod(1.0, 3, 2e8)}, markers={"A": {"body": "OA", "point": "end"}, "O": {"body": "OA"}},
+    fallen = flexible_pendulum(
+        bodies={"OA": cable(1.0, 3, 2e8)}, markers={"A": {"body": "OA", "point": "end"}, "O": {"body": "OA"}},
         joints={"L": {"kind": "slider", "first": HELD, "second": {"body": "OA"}, "axis": [1, 0, 1]},
                 "P": {"kind": "planar", "first": {"body": "ground", "point": start.tolist()}, "rotation": "free",
                       "second": {"body": "OA", "point": "end"}, "axis": [1, 2, -1]}},
@@ -217,21 +199,21 @@ def test_the_end_of_a_cable_slides_in_a_plane_and_on_a_line() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"bodies": {"OA": rod(1.0, 2, 2e8, retardation=1e-3), "AB": rod(2.0, 2, 2e7)}},
+        ({"bodies": {"OA": cable(1.0, 2, 2e8, retardation=1e-3), "AB": cable(2.0, 2, 2e7)}},
          "OA.retardation: engine exudyn"),
         ({"joints": {"S": {"kind": "spherical", "first": HELD, "second": {"body": "OA"}},
                      "A": {"kind": "weld", "first": {"body": "OA", "point": "end"}, "second": {"body": "AB"}}},
           "initial": {}},
          "welds no two cables"),
-        ({"bodies": {"OA": rod(1.0, 2, 2e8), "AB": rod(2.0, 2, 2e7, element="ancf-quintic")}},
+        ({"bodies": {"OA": cable(1.0, 2, 2e8), "AB": cable(2.0, 2, 2e7, element="ancf-quintic")}},
          "cannot do ancf-quintic"),
     ],
 )  # fmt: skip
 def test_what_exudyn_cannot_do_in_space_is_refused(change: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        get_engine("exudyn").simulate(flexible(**change), [0.01])
+        get_engine("exudyn").simulate(flexible_pendulum(**change), [0.01])
 
 
 def test_the_geometrically_exact_beam_is_for_the_plane() -> None:
     with pytest.raises(InputError, match="engine exudyn-ge cannot do machines in space; use gauss or exudyn"):
-        get_engine("exudyn-ge").simulate(flexible(), [0.01])
+        get_engine("exudyn-ge").simulate(flexible_pendulum(), [0.01])

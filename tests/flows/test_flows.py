@@ -99,7 +99,7 @@ def test_a_result_that_is_not_to_be_trusted_comes_back_as_it_is() -> None:
     """Prefect shows a state of that name; who called the flow gets the result."""
     found = run.run_flow("compare", {"scene": "n-four-bar-2", "engines": "gauss,casadi"})
     assert not found.trusted
-    assert list(found.comparison.refused) == ["casadi"]
+    assert list(found.answer.refused) == ["casadi"]
 
 
 def test_forward_sweep_and_compare_are_logged() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,28 +16,17 @@ from shoal.mechanics.elements.ancf_full import LAWS
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+import element_doors as doors
+
 YOUNG, POISSON, SHEAR, LENGTH, HEIGHT, WIDTH, DENSITY = 2e8, 0.3, 0.85, 0.5, 0.06, 0.04, 5540.0
 laws = pytest.mark.parametrize("law", list(LAWS))
 
 
 @njit(cache=True)
-def _force_door(tile, family, z, f, w):
-    families.add_force(tile, raw(family), pointer(z), pointer(z), pointer(f), pointer(w), pointer(w), True)
-
-
-@njit(cache=True)
 def _mean_door(tile, family, before, after, f, w):
     families.add_mean_force(tile, raw(family), pointer(before), pointer(after), pointer(f), pointer(w))
-
-
-@njit(cache=True)
-def _energy_door(tile, family, z, w, energy):
-    families.add_energy(tile, raw(family), pointer(z), pointer(w), pointer(energy), 0)
-
-
-@njit(cache=True)
-def _tangent_door(tile, family, z, w, out):
-    families.tangent(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
 
 
 def _family(
@@ -77,8 +68,8 @@ def _bent(seed: int) -> Any:
 
 
 def _force(family: Any, z: Any) -> Any:
-    f = np.zeros(z.size)
-    _force_door(SINGLE, family, z.copy(), f, np.zeros(ELEMENT_ROOM))
+    f, at, work = np.zeros(z.size), z.copy(), np.zeros(ELEMENT_ROOM)
+    doors.force(SINGLE, family, at, at, f, work, work)
     return f
 
 
@@ -90,27 +81,18 @@ def _mean_force(family: Any, before: Any, after: Any) -> Any:
 
 def _energy(family: Any, z: Any) -> float:
     energy = np.zeros(1)
-    _energy_door(SINGLE, family, z.copy(), np.zeros(ELEMENT_ROOM), energy)
+    doors.energy(SINGLE, family, z.copy(), np.zeros(ELEMENT_ROOM), energy)
     return float(energy[0])
 
 
 def _tangent(family: Any, z: Any) -> Any:
     """Assembled over the chain."""
     out = np.full(144 * family.size, np.nan)
-    _tangent_door(SINGLE, family, z.copy(), np.zeros(ELEMENT_ROOM), out)
+    doors.tangent(SINGLE, family, z.copy(), np.zeros(ELEMENT_ROOM), out)
     whole = np.zeros((z.size, z.size))
     for rows, block in zip(family.rows[: 12 * family.size].reshape(-1, 12), out.reshape(-1, 12, 12), strict=True):
         whole[np.ix_(rows, rows)] += block
     return whole
-
-
-def _differences(function: Any, z: Any, h: float) -> Any:
-    """Derivatives by central differences of order four, exact for quartics; last axis: the coordinate."""
-    columns = []
-    for unit in h * np.eye(z.size):
-        near, far = function(z + unit) - function(z - unit), function(z + 2 * unit) - function(z - 2 * unit)
-        columns.append((8 * near - far) / (12 * h))
-    return np.array(columns).T
 
 
 def _matrices(law: str, shear: float = SHEAR) -> tuple[Any, Any]:
@@ -139,10 +121,10 @@ def _integrated_energy(law: str, z: Any) -> float:
             (0.0, 1.0, _matrices(law)[1]),
         ]:
             step = 1e-3  # position_shape is cubic in x and linear in y: differences of order four are exact
-            fx = _differences(
+            fx = doors.differences(
                 lambda at, y=y: np.array(ancf_full.position_shape(at[0], y, LENGTH)) @ nodal, np.array([x]), step
             )
-            fy = _differences(
+            fy = doors.differences(
                 lambda at, x=x: np.array(ancf_full.position_shape(x, at[0], LENGTH)) @ nodal, np.array([y]), step
             )
             u, v = fx[0] / LENGTH, fy[0]
@@ -197,11 +179,11 @@ def test_energy_is_the_integral_over_the_rectangle(law: str, seed: int) -> None:
 def test_force_and_tangent_are_derivatives(law: str, seed: int) -> None:
     family, z = _family(law), _bent(seed)
     force = _force(family, z)
-    gradient = _differences(lambda at: _energy(family, at), z, 1e-2)
+    gradient = doors.differences(lambda at: _energy(family, at), z, 1e-2)
     np.testing.assert_allclose(force, -gradient, rtol=0, atol=1e-11 * np.abs(force).max())
     tangent = _tangent(family, z)
     np.testing.assert_allclose(tangent, tangent.T, rtol=0, atol=1e-14 * np.abs(tangent).max())
-    slope = _differences(lambda at: _force(family, at), z, 1e-2)
+    slope = doors.differences(lambda at: _force(family, at), z, 1e-2)
     np.testing.assert_allclose(tangent, -slope, rtol=0, atol=1e-11 * np.abs(tangent).max())
     # Inner forces: no resultant, no moment.
     f, at = (values[0::2] + 1j * values[1::2] for values in (force, z))
@@ -240,10 +222,10 @@ def test_lanes_equal_singles(law: str) -> None:
     others = np.roll(states, 1, axis=1)
     wide, single, work = _family(law, lanes=width), _family(law), np.zeros(64 * width)
     forces, means, energy, blocks = (np.zeros(rows * width) for rows in (12, 12, 1, 144))
-    _force_door(WIDE, wide, states.ravel(), forces, work)
+    doors.force(WIDE, wide, states.ravel(), states.ravel(), forces, work, work)
     _mean_door(WIDE, wide, states.ravel(), others.ravel(), means, work)
-    _energy_door(WIDE, wide, states.ravel(), work, energy)
-    _tangent_door(WIDE, wide, states.ravel(), work, blocks)
+    doors.energy(WIDE, wide, states.ravel(), work, energy)
+    doors.tangent(WIDE, wide, states.ravel(), work, blocks)
     for lane in range(width):
         z = states[:, lane].copy()
         for found, expected in (

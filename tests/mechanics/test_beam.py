@@ -2,42 +2,28 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk, ellipkinc
 from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import beam, cubic, families, quintic
 from shoal.mechanics.elements.beam import CUBIC, QUINTIC
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import element_doors as doors
 
 EA, EI, LENGTH, ETA = 1.6e5, 5.3, 0.5, 2e-3
 RULES = [(CUBIC, 5, 3), (QUINTIC, 4, 4), (QUINTIC, 5, 5)]
 every_rule = pytest.mark.parametrize(("vectors", "axial", "bending"), RULES)
 orders = pytest.mark.parametrize("vectors", [CUBIC, QUINTIC])
-
-
-@njit(cache=True)
-def _force_door(tile, family, z, zdot, f, w, power):
-    families.add_force(tile, raw(family), pointer(z), pointer(zdot), pointer(f), pointer(w), pointer(power), True)
-
-
-@njit(cache=True)
-def _energy_door(tile, family, z, w, energy):
-    families.add_energy(tile, raw(family), pointer(z), pointer(w), pointer(energy), 0)
-
-
-@njit(cache=True)
-def _tangent_door(tile, family, viscous, z, w, out):
-    if viscous:
-        families.damping(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
-    else:
-        families.tangent(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
 
 
 def _straight(vectors: int, length: float) -> list[complex]:
@@ -108,7 +94,7 @@ def _arc(vectors: int, radius: float, length: float, begin: float = 0.0) -> list
 
 def _force(family: Any, z: Any, zdot: Any = None) -> tuple[Any, float]:
     f, power = np.zeros(z.size), np.zeros(1)
-    _force_door(
+    doors.force(
         SINGLE, family, z.copy(), np.zeros(z.size) if zdot is None else zdot.copy(), f, np.zeros(ELEMENT_ROOM), power
     )
     return f, float(power[0])
@@ -116,7 +102,7 @@ def _force(family: Any, z: Any, zdot: Any = None) -> tuple[Any, float]:
 
 def _energy(family: Any, z: Any) -> float:
     energy = np.zeros(1)
-    _energy_door(SINGLE, family, z.copy(), np.zeros(ELEMENT_ROOM), energy)
+    doors.energy(SINGLE, family, z.copy(), np.zeros(ELEMENT_ROOM), energy)
     return float(energy[0])
 
 
@@ -124,22 +110,13 @@ def _matrix(family: Any, z: Any, *, viscous: bool = False) -> Any:
     """Assembled over the chain."""
     side = family.side
     out = np.full(family.size * side * side, np.nan)
-    _tangent_door(SINGLE, family, viscous, z.copy(), np.zeros(ELEMENT_ROOM), out)
+    doors.matrix(SINGLE, family, viscous, z.copy(), np.zeros(ELEMENT_ROOM), out)
     whole = np.zeros((z.size, z.size))
     for rows, block in zip(
         family.rows[: side * family.size].reshape(-1, side), out.reshape(-1, side, side), strict=True
     ):
         whole[np.ix_(rows, rows)] += block
     return whole
-
-
-def _differences(function: Any, z: Any, h: float) -> Any:
-    """Derivatives by central differences of order four, last axis: the coordinate."""
-    columns = []
-    for unit in h * np.eye(z.size):
-        near, far = function(z + unit) - function(z - unit), function(z + 2 * unit) - function(z - 2 * unit)
-        columns.append((8 * near - far) / (12 * h))
-    return np.array(columns).T
 
 
 @orders
@@ -163,7 +140,7 @@ def test_mass_is_positive_exact_and_keeps_mass_and_moments(vectors: int) -> None
 def test_shapes_are_derivatives_of_each_other_and_interpolate(vectors: int) -> None:
     x, h, order = 0.3, 1e-4, vectors // 2
     for lower in (0, 1):
-        change = _differences(
+        change = doors.differences(
             lambda at, lower=lower: np.array(beam.shape(vectors, at[0], LENGTH, lower)), np.array([x]), h
         )
         np.testing.assert_allclose(beam.shape(vectors, x, LENGTH, lower + 1), change[:, 0] / LENGTH, atol=1e-9)
@@ -199,11 +176,11 @@ def test_force_and_tangent_are_derivatives(vectors: int, axial: int, bending: in
     family = _family((vectors, axial, bending), rest=[_arc(vectors, 0.8, LENGTH)])
     z = _bent(vectors, seed)
     force = _force(family, z)[0]
-    gradient = _differences(lambda at: _energy(family, at), z, 1e-3)
+    gradient = doors.differences(lambda at: _energy(family, at), z, 1e-3)
     np.testing.assert_allclose(force, -gradient, rtol=0, atol=1e-7 * np.abs(force).max())
     tangent = _matrix(family, z)
     np.testing.assert_array_equal(tangent, tangent.T)
-    slope = _differences(lambda at: _force(family, at)[0], z, 1e-3)
+    slope = doors.differences(lambda at: _force(family, at)[0], z, 1e-3)
     np.testing.assert_allclose(tangent, -slope, rtol=0, atol=1e-7 * np.abs(tangent).max())
     # Inner forces: no resultant, no moment.
     order = vectors // 2
@@ -245,10 +222,10 @@ def test_lanes_equal_singles(vectors: int) -> None:
     for wide, single in ((elastic, _family(rule)), (damped, _family(rule, eta=ETA))):
         forces, power, energy = np.zeros(side * width), np.zeros(width), np.zeros(width)
         work = np.zeros(64 * width)
-        _force_door(WIDE, wide, states.ravel(), rates.ravel(), forces, work, power)
-        _energy_door(WIDE, wide, states.ravel(), work, energy)
+        doors.force(WIDE, wide, states.ravel(), rates.ravel(), forces, work, power)
+        doors.energy(WIDE, wide, states.ravel(), work, energy)
         blocks = np.zeros(side * side * width)
-        _tangent_door(WIDE, wide, wide.damped, states.ravel(), work, blocks)
+        doors.matrix(WIDE, wide, wide.damped, states.ravel(), work, blocks)
         for lane in range(width):
             z, v = states[:, lane].copy(), rates[:, lane].copy()
             force, lost = _force(single, z, v)

@@ -2,36 +2,25 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from numba import njit
 from shoal.engines.casadi.element import cable_element
 from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import beam, cubic, families
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import element_doors as doors
 
 EA, EI, LENGTH = 1.6e5, 5.3, 0.5
 VARIANTS = {"full": (cubic.FULL, cubic.FULL_RULE), "reduced": (cubic.REDUCED, cubic.REDUCED_RULE)}
 both = pytest.mark.parametrize("quadrature", list(VARIANTS))
-
-
-@njit(cache=True)
-def _force_door(tile, family, z, f, w, power):
-    families.add_force(tile, raw(family), pointer(z), pointer(z), pointer(f), pointer(w), pointer(power), True)
-
-
-@njit(cache=True)
-def _energy_door(tile, family, z, w, energy):
-    families.add_energy(tile, raw(family), pointer(z), pointer(w), pointer(energy), 0)
-
-
-@njit(cache=True)
-def _tangent_door(tile, family, z, w, out):
-    families.tangent(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
 
 
 def _element(quadrature: str, lanes: int = 1) -> Any:
@@ -56,20 +45,20 @@ def _bent(seed: int) -> Any:
 
 
 def _force(quadrature: str, z: Any) -> Any:
-    f = np.zeros(8)
-    _force_door(SINGLE, _element(quadrature), z.copy(), f, np.zeros(ELEMENT_ROOM), np.zeros(1))
+    f, at = np.zeros(8), z.copy()
+    doors.force(SINGLE, _element(quadrature), at, at, f, np.zeros(ELEMENT_ROOM), np.zeros(1))
     return f
 
 
 def _energy(quadrature: str, z: Any) -> float:
     energy = np.zeros(1)
-    _energy_door(SINGLE, _element(quadrature), z.copy(), np.zeros(ELEMENT_ROOM), energy)
+    doors.energy(SINGLE, _element(quadrature), z.copy(), np.zeros(ELEMENT_ROOM), energy)
     return float(energy[0])
 
 
 def _tangent(quadrature: str, z: Any) -> Any:
     out = np.full(64, np.nan)
-    _tangent_door(SINGLE, _element(quadrature), z.copy(), np.zeros(ELEMENT_ROOM), out)
+    doors.tangent(SINGLE, _element(quadrature), z.copy(), np.zeros(ELEMENT_ROOM), out)
     return out.reshape(8, 8)
 
 
@@ -133,8 +122,10 @@ def test_lanes_equal_singles(quadrature: str) -> None:
     states = np.array([_bent(seed) for seed in range(width)]).T
     forces, tangents = np.zeros((8, width)), np.zeros((64, width))
     elements = _element(quadrature, width)
-    _force_door(WIDE, elements, states.ravel(), forces.reshape(-1), np.zeros(64 * width), np.zeros(width))
-    _tangent_door(WIDE, elements, states.ravel(), np.zeros(64 * width), tangents.reshape(-1))
+    doors.force(
+        WIDE, elements, states.ravel(), states.ravel(), forces.reshape(-1), np.zeros(64 * width), np.zeros(width)
+    )
+    doors.tangent(WIDE, elements, states.ravel(), np.zeros(64 * width), tangents.reshape(-1))
     for lane in range(width):
         single = _force(quadrature, np.ascontiguousarray(states[:, lane]))
         np.testing.assert_allclose(forces[:, lane], single, atol=1e-13 * np.abs(single).max())

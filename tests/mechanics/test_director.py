@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,10 @@ from shoal.mechanics.elements.section import torsion_constant
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+import element_doors as doors
+
 YOUNG, SHEAR, HEIGHT, WIDTH, LENGTH = 2e8, 7.5e7, 0.04, 0.02, 0.5
 REST = (0.1, 0.2, -0.1, 0.05, 0.1, 0.3, 0.01, -0.02, 0.005)
 
@@ -21,11 +27,6 @@ REST = (0.1, 0.2, -0.1, 0.05, 0.1, 0.3, 0.01, -0.02, 0.005)
 def _door(tile, family, z, f, w, energy):
     families.add_force(tile, raw(family), pointer(z), pointer(z), pointer(f), pointer(w), pointer(energy), True)
     families.add_energy(tile, raw(family), pointer(z), pointer(w), pointer(energy), 0)
-
-
-@njit(cache=True)
-def _tangent_door(tile, family, z, w, out):
-    families.tangent(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
 
 
 def _elements(free: tuple[float, ...], count: int = 1, *, tile: Any = SINGLE) -> Any:
@@ -77,7 +78,7 @@ def test_force_and_stiffness_are_derivatives_and_turn_with_the_rod(seed: int) ->
     assert many == pytest.approx(5 * (energy + _evaluate(_state(9), REST)[0]), rel=1e-12)
     np.testing.assert_allclose(apart[8], force, atol=1e-13 * np.abs(force).max())
     out = np.zeros(18 * 18)
-    _tangent_door(SINGLE, _elements(REST), z.ravel().copy(), np.zeros(ELEMENT_ROOM), out)
+    doors.tangent(SINGLE, _elements(REST), z.ravel().copy(), np.zeros(ELEMENT_ROOM), out)
     columns = np.array([(_evaluate(z - u, REST)[1] - _evaluate(z + u, REST)[1]).ravel() / (2 * h) for u in units])
     stiffness = out.reshape(18, 18)
     np.testing.assert_allclose(stiffness, columns.T, atol=1e-7 * np.abs(stiffness).max())

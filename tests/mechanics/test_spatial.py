@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
 from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import beam, cubic, families, quintic, spatial_cubic, spatial_quintic
-from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import element_doors as doors
 
 EA, EI, LENGTH, ETA = 1.6e5, 5.3, 0.5, 2e-3
 Family = Any
@@ -66,24 +70,6 @@ def cases(wanted: Callable[[str], bool] = lambda case: True) -> Any:
 every, damped = cases(), cases(lambda case: "damped" in case)
 
 
-@njit(cache=True)
-def _force_door(tile, family, z, zdot, f, w, power):
-    families.add_force(tile, raw(family), pointer(z), pointer(zdot), pointer(f), pointer(w), pointer(power), True)
-
-
-@njit(cache=True)
-def _energy_door(tile, family, z, w, energy):
-    families.add_energy(tile, raw(family), pointer(z), pointer(w), pointer(energy), 0)
-
-
-@njit(cache=True)
-def _matrix_door(tile, family, z, w, out, viscous):
-    if viscous:
-        families.damping(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
-    else:
-        families.tangent(tile, raw(family), pointer(z), pointer(w), pointer(out), 0)
-
-
 def _elements(case: str, *, lanes: int = 1, count: int = 1, dimensions: int = 3) -> Any:
     """So many elements side by side, none of which shares a node with another."""
     family, variant, rule, vectors = CASES[case]
@@ -121,19 +107,19 @@ def _force(case: str, z: Any, zdot: Any = None, power: Any = None) -> Any:
     rates = np.zeros(z.size) if zdot is None else zdot.ravel().copy()
     lost = np.zeros(1) if power is None else power
     elements = _elements(case, dimensions=dimensions)
-    _force_door(SINGLE, elements, z.ravel().copy(), rates, f, np.zeros(ELEMENT_ROOM), lost)
+    doors.force(SINGLE, elements, z.ravel().copy(), rates, f, np.zeros(ELEMENT_ROOM), lost)
     return f.reshape(z.shape)
 
 
 def _energy(case: str, z: Any) -> float:
     energy, elements = np.zeros(1), _elements(case, dimensions=z.shape[1])
-    _energy_door(SINGLE, elements, z.ravel().copy(), np.zeros(ELEMENT_ROOM), energy)
+    doors.energy(SINGLE, elements, z.ravel().copy(), np.zeros(ELEMENT_ROOM), energy)
     return float(energy[0])
 
 
 def _matrix(case: str, z: Any, *, viscous: bool = False) -> Any:
     out, elements = np.zeros(z.size**2), _elements(case, dimensions=z.shape[1])
-    _matrix_door(SINGLE, elements, z.ravel().copy(), np.zeros(ELEMENT_ROOM), out, viscous)
+    doors.matrix(SINGLE, elements, viscous, z.ravel().copy(), np.zeros(ELEMENT_ROOM), out)
     return out.reshape(z.size, z.size)
 
 
@@ -227,12 +213,12 @@ def test_lanes_and_neighbours_equal_singles(case: str) -> None:
     wide, matrices = np.zeros((side, width)), np.zeros((side**2, width))
     lanes, room = _elements(case, lanes=width), np.zeros(64 * width)
     at = np.ascontiguousarray(states.T).ravel(), np.ascontiguousarray(rates.T).ravel()
-    _force_door(WIDE, lanes, *at, wide.reshape(-1), room, np.zeros(width))
-    _matrix_door(WIDE, lanes, at[0], room, matrices.reshape(-1), False)
+    doors.force(WIDE, lanes, *at, wide.reshape(-1), room, np.zeros(width))
+    doors.matrix(WIDE, lanes, False, at[0], room, matrices.reshape(-1))
     many, blocks = np.zeros(side * width), np.zeros(side**2 * width)
     neighbours, room = _elements(case, count=width), np.zeros(ELEMENT_ROOM)
-    _force_door(SINGLE, neighbours, states.ravel(), rates.ravel(), many, room, np.zeros(1))
-    _matrix_door(SINGLE, neighbours, states.ravel(), room, blocks, False)
+    doors.force(SINGLE, neighbours, states.ravel(), rates.ravel(), many, room, np.zeros(1))
+    doors.matrix(SINGLE, neighbours, False, states.ravel(), room, blocks)
     for found, expected in ((wide.T, singles), (many, singles), (matrices.T, tangents), (blocks, tangents)):
         np.testing.assert_allclose(found.reshape(expected.shape), expected, atol=1e-13 * np.abs(expected).max())
 

@@ -3,65 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.special import ellipj, ellipk
 from shoal.errors import InputError
 from shoal.response import respond, uncertain
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.marginals import Interval
 from shoal.response.respond import Answer
-from shoal.response.runs import Answers, Model
+from shoal.response.runs import Answers
 from shoal.scene import Scene
 from shoal.trajectory import Array
+from shoal_validation.uncertain.problems import Motion, Problem, pendulum, rod, two
 
-PENDULUM = {
-    "name": "pendulum",
-    "gravity": [0.0, -9.81 / 0.98],
-    "bodies": {
-        "OA": {
-            "kind": "rigid-body",
-            "mass": 1.0,
-            "inertia": 0.0,
-            "centre_of_mass": [1.0, 0.0],
-            "named_points": {"end": [1.0, 0.0]},
-        }
-    },
-    "joints": {
-        "O": {
-            "kind": "revolute",
-            "first": {"body": "ground", "point": [0, 0]},
-            "second": {"body": "OA", "point": "start"},
-        }
-    },
-    "markers": {"A": {"body": "OA", "point": "end"}},
-    "initial": {"OA": {"angle": 1.0 - np.pi / 2}},
-    "solver": {"duration": 1000.0, "samples": 10, "integrator": "dop853", "relative_tolerance": 1e-13},
-}
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import one_body
+
+PENDULUM = one_body.pendulum(
+    gravity=[0.0, -9.81 / 0.98],
+    initial={"OA": {"angle": 1.0 - np.pi / 2}},
+    solver={"duration": 1000.0, "samples": 10, "integrator": "dop853", "relative_tolerance": 1e-13},
+)
 """Swings as one of length 0.98 (1 + inertia) m."""
-Motion = Callable[[Array, Array], Array]
-"""Places in the box, (runs, parameters, 1), and instants [s] to answers, (runs, instants)."""
-
-
-def pendulum(u: Array, times: Array) -> Array:
-    """Angle [rad] of a pendulum of 1 m +-2 % released from 1 rad: Jacobi's elliptic functions."""
-    k = math.sin(0.5)
-    sine = ellipj(ellipk(k * k) + np.sqrt(9.81 / (1 + 0.02 * u[:, 0])) * times, k * k)[0]
-    return np.asarray(2 * np.arcsin(k * sine))
-
-
-def rod(u: Array, times: Array) -> Array:
-    """First axial mode of a rod with Kelvin-Voigt damping (frequency 10 rad/s +-2 %, ratio 0.002 +-20 %)."""
-    frequency, ratio = 10 * np.sqrt(1 + 0.04 * u[:, 0]), 0.002 * (1 + 0.2 * u[:, 1])
-    return np.asarray(np.exp(-ratio * frequency * times) * np.cos(frequency * np.sqrt(1 - ratio**2) * times))
-
-
-def two(u: Array, times: Array) -> Array:
-    """Two frequencies without a common measure, and the waves that a curve makes of them."""
-    one, other = 3.1 * (1 + 0.01 * u[:, 0]) * times, 7.7 * (1 - 0.01 * u[:, -1]) * times
-    return np.asarray(np.sin(0.3 * np.cos(one) + (0.2 + 0.01 * u[:, 0]) * np.cos(other)))
+FINE = {1: 400_001, 2: 1001}
+"""Places along each axis of the box, at which its bounds are looked for."""
 
 
 def three(u: Array, times: Array) -> Array:
@@ -70,25 +38,14 @@ def three(u: Array, times: Array) -> Array:
 
 
 def asked(motion: Motion, parameters: int, times: Array, method: str = "auto", **options: float) -> Answer:
-    def at(instants: Array) -> Model:
-        def model(values: dict[str, Array]) -> Answers:
-            u = np.stack([values[f"u{k}"] for k in range(parameters)], axis=1)[:, :, None]
-            return Answers(motion(u, instants), np.ones(len(u), dtype=bool))
-
-        return model
-
-    known = tuple(Parameter(f"u{k}", Interval(-1.0, 1.0), {f"u{k}": 1.0}) for k in range(parameters))
-    one = np.zeros(len(times), dtype=int)
-    count = len(times)
-    return respond(at(times), Inputs(known), count, method=method, groups=one, instants=times, over_time=at, **options)
+    problem, count = Problem("motion", parameters, tuple(times), motion), len(times)
+    one, at = np.zeros(count, dtype=int), problem.at
+    return respond(at(times), problem.inputs, count, method=method, groups=one, instants=times, over_time=at, **options)
 
 
 def exact(motion: Motion, parameters: int, times: Array) -> tuple[Array, Array]:
     """Bounds by a grid, which lie inside the true ones by its width squared."""
-    places = np.linspace(-1, 1, {1: 400_001, 2: 1001}[parameters])
-    u = np.stack([axis.ravel() for axis in np.meshgrid(*[places] * parameters)], axis=1)[:, :, None]
-    found = np.array([(y.min(), y.max()) for y in (motion(u, np.array([at])) for at in times)])
-    return found[:, 0], found[:, 1]
+    return Problem("motion", parameters, tuple(times), motion).reference(FINE)
 
 
 @pytest.mark.parametrize("method", ["auto", "time-warp", "torus"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,29 +16,15 @@ from shoal.errors import InputError
 from shoal.response import uncertain
 from shoal.scene import Scene, load_scene
 
-PENDULUM = {
-    "name": "pendulum",
-    "gravity": [0.0, -9.81],
-    "bodies": {
-        "OA": {
-            "kind": "rigid-body",
-            "mass": 1.0,
-            "inertia": 0.0,
-            "centre_of_mass": [1.0, 0.0],
-            "named_points": {"end": [1.0, 0.0]},
-        }
-    },
-    "joints": {
-        "O": {
-            "kind": "revolute",
-            "first": {"body": "ground", "point": [0, 0]},
-            "second": {"body": "OA", "point": "start"},
-        }
-    },
-    "markers": {"A": {"body": "OA", "point": "end"}},
-    "initial": {"OA": {"angle": 1.0 - np.pi / 2}},
-    "solver": {"duration": 10.0, "samples": 10, "integrator": "dop853"},
-}
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from one_body import pendulum
+
+PENDULUM = pendulum(
+    gravity=[0.0, -9.81],
+    initial={"OA": {"angle": 1.0 - np.pi / 2}},
+    solver={"duration": 10.0, "samples": 10, "integrator": "dop853"},
+)
 """1 m long, released from 1 rad to the vertical: an inertia m k^2 makes it swing as one of length 1 + k^2."""
 
 

@@ -45,5 +45,5 @@ def design(
     how = {"about": about, "noise": noise, "angle_noise": angle_noise, "duration": duration, "rate": rate}
     with progress(1, f"a measurement for {name}"):
         result = Designed(*plan(problem, data or None, {**how, "parameter": parameter, "values": values}))
-    show_result(f"{name}: what to measure", tables.of_design(result.design), result.run_id)
+    show_result(f"{name}: what to measure", tables.of_design(result.answer), result.run_id)
     return ended(result, ["no candidate tells every parameter; name one as `parameter`"])

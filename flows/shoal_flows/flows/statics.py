@@ -29,5 +29,5 @@ def statics(
     name = title(scene)
     with progress(1, f"{name} at rest"):
         result = AtRest(*at_rest(scene, time, values))
-    show_result(f"{name} at rest", tables.of_equilibrium(result.equilibrium), result.run_id)
-    return ended(result, [f"{result.equilibrium.status}: {result.equilibrium.message}"])
+    show_result(f"{name} at rest", tables.of_equilibrium(result.answer), result.run_id)
+    return ended(result, [f"{result.answer.status}: {result.answer.message}"])

@@ -58,7 +58,7 @@ def engine_rows(compared: Compared) -> list[list[str]]:
     """Every pair of engines and marker: largest distance and distance at the end."""
     return [
         [" and ".join(row["engines"]), row["marker"], length(row["largest"]), length(row["final"])]
-        for row in compared.comparison.differences()
+        for row in compared.answer.differences()
     ]
 
 
@@ -75,7 +75,7 @@ def commands(case: str, scene: str, study: Study, compared: Compared) -> list[li
     for same in same_mesh_cells(case):
         options = " ".join(f"--set {path}={value}" for path, value in same.values.items())
         rows.append([f"{same.method}, same mesh", f"shoal identify {same.problem} --method {same.method} {options}"])
-    engines = ",".join(compared.comparison.trajectories)
+    engines = ",".join(compared.answer.trajectories)
     return [*rows, ["engines", f"shoal compare {scene} --engines {engines}"]]
 
 

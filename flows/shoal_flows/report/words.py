@@ -33,7 +33,7 @@ def largest_error(fit: Fit) -> float:
 
 def largest_distance(compared: Compared) -> float:
     """Largest distance [m] of two engines at the tip."""
-    return max((row["largest"] or np.inf) for row in compared.comparison.differences() if row["marker"] == "B")
+    return max((row["largest"] or np.inf) for row in compared.answer.differences() if row["marker"] == "B")
 
 
 def identified(title: str, study: Study) -> str:
@@ -102,7 +102,7 @@ def like_with_like(title: str, case: str, same: Study, study: Study) -> str:
 
 def confirmed(title: str, compared: Compared, study: Study) -> str:
     """Which engines confirm."""
-    names = list(compared.comparison.trajectories)
+    names = list(compared.answer.trajectories)
     text = (
         f"{title}: {', '.join(names[:-1])} and {names[-1]} put the tip of the paper's 2/4 mesh within "
         f"{length(largest_distance(compared))} of each other over the whole motion."

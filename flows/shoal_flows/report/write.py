@@ -67,7 +67,7 @@ def _case(result: DemoResult, case: str) -> dict[str, Any]:
         "figures": [_figure(title, name, study) for name in study.pictures],
         "engines_figure": _picture(
             compared.picture,
-            f"{title}: position of the tip against time by {', '.join(compared.comparison.trajectories)}, which lie on "
+            f"{title}: position of the tip against time by {', '.join(compared.answer.trajectories)}, which lie on "
             f"one line, and below their distances, at most {length(words.largest_distance(compared))}.",
             "Above, the motions, drawn in falling widths so that each shows; below, what lies between them.",
         ),

@@ -1,6 +1,7 @@
 """How a machine answers when its parameters are known as intervals or distributions only."""
 
-from shoal.response.respond import respond, uncertain
+from shoal.response.respond import respond
 from shoal.response.result import Response
+from shoal.response.uncertain import uncertain
 
 __all__ = ["Response", "respond", "uncertain"]

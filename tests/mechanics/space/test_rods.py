@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,29 +9,14 @@ import pytest
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene, load_scene
+from shoal_validation.spatial.machines import cable, flexible_pendulum
 
 HELD = {"body": "ground", "point": [0, 0, 0]}
-FINE = {"integrator": "leapfrog", "step": 1e-5, "duration": 0.5}
-
-
-def rod(length: float, elements: int, modulus: float, **more: Any) -> dict[str, Any]:
-    return {"kind": "rod", "length": length, "height": 0.03, "width": 0.03, "density": 5540.0,
-            "youngs_modulus": modulus, "element": "ancf-cable", "elements": elements} | more  # fmt: skip
 
 
 def pendulum(**more: Any) -> Scene:
-    """Two rods of 1 m and 2 m on spherical joints, spun about the vertical."""
-    return Scene.parse({
-        "name": "flexible spherical double pendulum", "dimensions": 3, "gravity": [0.0, -9.81, 0.0],
-        "bodies": {"OA": rod(1.0, 32, 2e8), "AB": rod(2.0, 64, 2e7)},
-        "joints": {
-            "O": {"kind": "spherical", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "OA"}},
-            "A": {"kind": "spherical", "first": {"body": "OA", "point": "end"}, "second": {"body": "AB"}},
-        },
-        "markers": {"A": {"body": "OA", "point": "end"}, "B": {"body": "AB", "point": "end"}},
-        "initial": {"OA": {"angle": math.pi / 4, "spin": [0, 2, 0]}, "AB": {"angle": math.pi / 6, "spin": [0, 2, 0]}},
-        "solver": FINE, **more,
-    })  # fmt: skip
+    """Two rods of 1 m and 2 m on spherical joints, spun about the vertical, on a fine mesh."""
+    return flexible_pendulum(**{"bodies": {"OA": cable(1.0, 32, 2e8), "AB": cable(2.0, 64, 2e7)}, **more})
 
 
 def test_a_flexible_spherical_double_pendulum_ends_where_exudyns_does() -> None:
@@ -68,8 +52,8 @@ def test_welded_damped_tapered_and_hinged_rods_move_in_space_as_in_the_plane() -
     }
     both({
         "name": "crane",
-        "bodies": {"boom": rod(1.0, 3, 2e8, retardation=1e-3), "head": tip, "jib": rod(0.5, 2, 2e7, end_height=0.02),
-                   "arm": rod(0.6, 2, 2e8)},
+        "bodies": {"boom": cable(1.0, 3, 2e8, retardation=1e-3), "head": tip,
+                   "jib": cable(0.5, 2, 2e7, end_height=0.02), "arm": cable(0.6, 2, 2e8)},
         "joints": {
             "foot": {"kind": "weld", "first": {"body": "ground", "point": [0, 0]}, "second": {"body": "boom"}},
             "W": {"kind": "weld", "first": {"body": "boom", "point": "end"}, "second": {"body": "head"}},
@@ -95,7 +79,7 @@ def test_a_rod_swings_in_any_plane_as_in_one() -> None:
     def end(rotation: Rotation) -> Any:
         scene = Scene.parse({
             "name": "cantilever", "dimensions": 3, "gravity": rotation.apply([0, -9.81, 0]).tolist(),
-            "bodies": {"B": rod(1.0, 4, 2e8)},
+            "bodies": {"B": cable(1.0, 4, 2e8)},
             "joints": {"W": {"kind": "weld", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "B"}}},
             "markers": {"e": {"body": "B", "point": "end"}},
             "initial": {"B": {"rotation": rotation.as_rotvec().tolist()}},
@@ -111,8 +95,9 @@ def test_a_rod_swings_in_any_plane_as_in_one() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"bodies": {"OA": rod(1.0, 2, 2e8, width=0.02), "AB": rod(2.0, 2, 2e7)}}, "width must be its height"),
-        ({"bodies": {"OA": rod(1.0, 2, 2e8, curvature=[0.1]), "AB": rod(2.0, 2, 2e7)}}, "curved rod is a director-rod"),
+        ({"bodies": {"OA": cable(1.0, 2, 2e8, width=0.02), "AB": cable(2.0, 2, 2e7)}}, "width must be its height"),
+        ({"bodies": {"OA": cable(1.0, 2, 2e8, curvature=[0.1]), "AB": cable(2.0, 2, 2e7)}},
+         "curved rod is a director-rod"),
         (
             {"joints": {"O": {"kind": "revolute", "first": HELD, "second": {"body": "OA"},
                               "axis": [1, 0, 1]},
@@ -138,7 +123,7 @@ def test_a_rod_that_joints_would_bend_at_the_start_is_refused() -> None:
         for name, x, at in (("O", 0.0, "start"), ("E", 1.01, "end"))
     }
     held = pendulum(
-        bodies={"OA": rod(1.0, 2, 2e8)}, joints=ends, markers={"m": {"body": "OA", "point": "centre"}}, initial={}
+        bodies={"OA": cable(1.0, 2, 2e8)}, joints=ends, markers={"m": {"body": "OA", "point": "centre"}}, initial={}
     )
     with pytest.raises(InputError, match=r"initial\.OA: .* unstrained rod would"):
         simulate(held, np.array([0.1]))

@@ -9,7 +9,7 @@ failure: an engine that cannot do the scene says so, and a run that is wrong is 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from shoal_validation.nightly.theory import bounds
@@ -72,9 +72,34 @@ def mesh(element: str, elements: tuple[int, int], **fields: object) -> dict[str,
     }
 
 
+def selection(tolerance: float, problems: Iterable[str], *, quick: bool) -> Method:
+    """The model that is selected for an error [m], which must keep it."""
+    return Method(
+        name=f"selection, {tolerance:.0e} m".replace("e-0", "e-"),
+        tolerance=tolerance,
+        quick=quick,
+        limits=dict.fromkeys(problems, tolerance),
+        reason="the tolerance that was asked for",
+    )
+
+
 _RK4 = rigid(5e-10, 5e-9, 1e-8, 1e-8, 5e-9, 1e-7, 1e-10)
 _TRAPEZOIDAL = rigid(5e-5, 2e-4, None, None, None, None, 2e-6)
 _NOT_SINGULAR = "order 2 at the scene's step; on linkages that become singular Exudyn gives up"
+
+
+def _of_open_chains(engine: str, name: str, tolerance: float) -> Method:
+    """An engine in minimal coordinates, which follows a motion as closely as its tolerance lets it."""
+    return Method(
+        engine=engine,
+        name=name,
+        quick=True,
+        limits=rigid(*[None] * len(RIGID_PROBLEMS)) | bounds(tolerance, "pendulum", "double-pendulum"),
+        by_theory=True,
+        reason=f"a tolerance of {tolerance:.0e} in every step, grown as the motion lets errors grow; it knows open "
+        "chains only",
+    )
+
 
 RIGID = (
     Method(
@@ -85,13 +110,7 @@ RIGID = (
         by_theory=True,
         reason="order 8 at a relative tolerance of 1e-12 in every step, grown as the motion lets errors grow",
     ),
-    Method(
-        name="selection, 1e-4 m",
-        tolerance=1e-4,
-        quick=True,
-        limits=rigid(*[1e-4] * 7),
-        reason="the tolerance that was asked for",
-    ),
+    selection(1e-4, RIGID_PROBLEMS, quick=True),
     Method(
         name="selection, 1e-6 m",
         tolerance=1e-6,
@@ -180,22 +199,8 @@ RIGID = (
         limits=without(_TRAPEZOIDAL, "four-bar-40"),
         reason=f"{_NOT_SINGULAR}; for rigid bodies the same model as exudyn",
     ),
-    Method(
-        engine="casadi",
-        name="cvodes",
-        quick=True,
-        limits=rigid(*[None] * 7) | bounds(1e-11, "pendulum", "double-pendulum"),
-        by_theory=True,
-        reason="a tolerance of 1e-11 in every step, grown as the motion lets errors grow; it knows open chains only",
-    ),
-    Method(
-        engine="tree",
-        name="dop853",
-        quick=True,
-        limits=rigid(*[None] * 7) | bounds(1e-12, "pendulum", "double-pendulum"),
-        by_theory=True,
-        reason="a tolerance of 1e-12 in every step, grown as the motion lets errors grow; it knows open chains only",
-    ),
+    _of_open_chains("casadi", "cvodes", 1e-11),
+    _of_open_chains("tree", "dop853", 1e-12),
 )
 
 _SCENE_MESH = flexible(7e-2, 8e-2, 4e-2)
@@ -210,16 +215,7 @@ FLEXIBLE = (
         limits=_SCENE_MESH,
         reason=_SCENE_REASON,
     ),
-    *(
-        Method(
-            name=f"selection, {tolerance:.0e} m".replace("e-0", "e-"),
-            tolerance=tolerance,
-            quick=tolerance >= 1e-3,
-            limits=flexible(*[tolerance] * 3),
-            reason="the tolerance that was asked for",
-        )
-        for tolerance in (1e-2, 1e-3, 1e-4, 1e-5)
-    ),
+    *(selection(tolerance, FLEXIBLE_PROBLEMS, quick=tolerance >= 1e-3) for tolerance in (1e-2, 1e-3, 1e-4, 1e-5)),
     *(
         Method(
             name=f"4/8 cables, {name}",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shoal_validation.nightly.methods import Method, integrator, mesh
+from shoal_validation.nightly.methods import Method, integrator, mesh, selection
 from shoal_validation.nightly.theory import bounds
 
 _RIGID = ("spherical-pendulum", "bricard", "governor")
@@ -59,16 +59,7 @@ IN_SPACE = (
         limits=_rigid(1e-4, 5e-6, 2e-4),
         reason="order 2 at the scene's step",
     ),
-    *(
-        Method(
-            name=f"selection, {tolerance:.0e} m".replace("e-0", "e-"),
-            tolerance=tolerance,
-            quick=tolerance == 1e-3,
-            limits=dict.fromkeys((*_RIGID, _FLEXIBLE), tolerance),
-            reason="the tolerance that was asked for",
-        )
-        for tolerance in (1e-3, 1e-4)
-    ),
+    *(selection(tolerance, (*_RIGID, _FLEXIBLE), quick=tolerance == 1e-3) for tolerance in (1e-3, 1e-4)),
     *(
         Method(
             engine=engine,

@@ -1,0 +1,97 @@
+"""Bounds from the runs of a study: attained ones, outer ones by the error of its surrogate, and how long they hold."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from shoal.response.enclosure import Enclosure, enclosure, foretold
+from shoal.response.extremes import Extremes, Surrogate, extremes
+from shoal.response.methods.bounds import HOPELESS
+from shoal.response.result import Bounds
+from shoal.response.study import Found, Study
+from shoal.trajectory import Array
+
+DRAWN = 93
+"""Random runs between whose extremes 95 % of all lie with 95 % confidence: 1 - 0.95^n - n 0.05 0.95^(n-1) >= 0.95."""
+STARTS = 8
+"""Searches for the extremes of a surrogate of cycles."""
+
+
+def bounds_of(study: Study, found: Found) -> Bounds:
+    """Attained bounds of all runs, after the extremal points of the surrogate are run, and outer ones by its error."""
+    runs, error, surrogate = study.runs, found.error, found.surrogate
+    named = None
+    if surrogate is not None:
+        # Over many cycles there are many extremes.
+        starts = STARTS if found.foretold else 1
+        named = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed, starts)
+        if error is None:
+            error = _confirmed(study, surrogate, named)
+    values, germs = runs.values, runs.germs
+    at_lower, at_upper = germs[values.argmin(axis=0)], germs[values.argmax(axis=0)]
+    lower, upper = values.min(axis=0), values.max(axis=0)
+    unknown = np.full(len(lower), np.nan)
+    told = Enclosure(lower, upper, unknown, unknown, unknown)
+    if surrogate is not None and named is not None and error is not None:
+        told = (foretold if found.foretold else enclosure)(study, surrogate, named, error)
+        at_lower = np.where((told.lower < lower)[:, None], named.at_lower, at_lower)
+        at_upper = np.where((told.upper > upper)[:, None], named.at_upper, at_upper)
+    end = _horizon(study, told.gap)
+    within = told.gap[study.instants <= end]
+    return Bounds(
+        told.lower,
+        told.upper,
+        told.lower_outer,
+        told.upper_outer,
+        study.inputs.named(at_lower),
+        study.inputs.named(at_upper),
+        float(within.max()) if within.size else math.nan,
+        end,
+    )
+
+
+def likely(study: Study, bounds: Bounds) -> Bounds:
+    """Beyond the horizon: between the least and the largest of 93 random runs lie, with 95 % confidence, 95 % of all.
+
+    Whatever the distribution of the answers (Wilks, Determination of sample sizes for setting tolerance limits, Annals
+    of Mathematical Statistics 12, 1941); the intervals are taken as evenly likely.
+    """
+    runs, made, failed = study.runs, len(study.runs.germs), study.runs.failed
+    runs.all(study.inputs.drawn(DRAWN, study.seed + 1))
+    if runs.failed > failed:
+        return bounds
+    drawn, germs = runs.values[made:], study.inputs.named(runs.germs[made:])
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
+    lower, upper = low < bounds.lower, high > bounds.upper
+    return replace(
+        bounds,
+        lower=np.where(lower, low, bounds.lower),
+        upper=np.where(upper, high, bounds.upper),
+        lower_outer=np.fmin(bounds.lower_outer, low),
+        upper_outer=np.fmax(bounds.upper_outer, high),
+        at_lower=np.where(lower[:, None], germs[drawn.argmin(axis=0)], bounds.at_lower),
+        at_upper=np.where(upper[:, None], germs[drawn.argmax(axis=0)], bounds.at_upper),
+        likely=np.stack([low, high]),
+    )
+
+
+def _confirmed(study: Study, surrogate: Surrogate, foretold: Extremes) -> Array | None:
+    """The error of a surrogate at its own extremal points, which are run; None if there are no runs left for it."""
+    runs = study.runs
+    wanted: Array = np.unique(np.round(np.vstack([foretold.at_lower, foretold.at_upper]), 2), axis=0)
+    wanted = wanted[: max(0, min(len(wanted), runs.left, study.fair))]
+    made = len(runs.germs)
+    if not len(wanted) or runs(wanted) == 0:
+        return None
+    return np.asarray(np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0))
+
+
+def _horizon(study: Study, gap: Array) -> float:
+    """The last instant up to which outer and attained bounds meet [s]; infinite if they do at all, or are unknown."""
+    first = study.instants[np.nan_to_num(gap) > max(study.gap or 0.0, HOPELESS)].min(initial=math.inf)
+    if math.isinf(first):
+        return math.inf
+    return float(study.instants[study.instants < first].max(initial=0.0))

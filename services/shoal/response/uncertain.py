@@ -1,0 +1,288 @@
+"""The main path: scene, what is known of its parameters -> runs by a method -> bounds or statistics -> their errors."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shoal.engines import get_engine
+from shoal.engines.contract import sampling_times
+from shoal.engines.spot_checks import larger
+from shoal.engines.verification import verified
+from shoal.errors import ComputationError, InputError
+from shoal.mechanics import reach
+from shoal.memory import Memory
+from shoal.response.allocation import (
+    TARGET,
+    Allocation,
+    Reached,
+    accepted,
+    costs_of,
+    of_distributions,
+    of_intervals,
+)
+from shoal.response.attained import DRAWN
+from shoal.response.inputs import Correlations, Inputs, Parameter
+from shoal.response.kept import Keep, TimeIsUpError
+from shoal.response.limits import MOST as LIMIT_RUNS
+from shoal.response.limits import Judged, Limit, judge, limit
+from shoal.response.limits.judge import Reach, watched
+from shoal.response.machine import Machine
+from shoal.response.read import parameters
+from shoal.response.respond import MOST, Answer, respond
+from shoal.response.result import Bounds, Response
+from shoal.response.runs import Model
+from shoal.scene import Scene, load_scene
+from shoal.trajectory import Array
+from shoal.versions import versions
+
+CHECKED = 6
+"""Extremal runs, or drawn ones, that are looked at by more careful runs."""
+
+
+def uncertain(
+    scene: Scene | str,
+    vary: Mapping[str, Any] | Sequence[str | Parameter],
+    times: Sequence[float] | Array | None = None,
+    *,
+    values: Mapping[str, Any] | None = None,
+    method: str = "auto",
+    gap: float | None = None,
+    correlations: Correlations | None = None,
+    degree: int | None = None,
+    count: int | None = None,
+    tolerance: float | None = None,
+    engine: str = "gauss",
+    verify: bool = True,
+    seed: int = 0,
+    most: int = MOST,
+    limits: Sequence[str] = (),
+    limit_method: str = "auto",
+    limit_runs: int = LIMIT_RUNS,
+    allocate: bool = False,
+    costs: Mapping[str, float] | None = None,
+    target: float = TARGET,
+    checkpoint: Path | str | None = None,
+    time_limit: float | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Response:
+    """How the markers of a scene may move if some of its fields are known as intervals or distributions only.
+
+    vary: path -> (low, high), a text such as "normal(1, 0.01)" or a frozen distribution of scipy, or a list of what
+    `--vary` takes; times: instants [s], else the scene's own; method: one of `METHODS`; gap: between outer and attained
+    bounds, as a share of the largest width, that must be reached; correlations: of pairs of random parameters;
+    degree, count: of a method that has one; tolerance: error [m] that the markers of the middle machine may have, for
+    which the cheapest model is found; verify: estimate mesh and step errors of extremal runs; most: runs that may be
+    made; limits: what must not happen, such as "B.y < -1.2"; limit_method: one of `WAYS`; limit_runs: for each of them;
+    allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of tightening each;
+    target: probability of passing it that is allowed; checkpoint: file that keeps the runs, from which the
+    same study goes on; time_limit [s]: after which it ends with what is known; progress: is told how many runs there
+    are. Raises InputError, ComputationError.
+    """
+    begin = time.perf_counter()
+    end = None if time_limit is None else time.monotonic() + time_limit
+    wanted = load_scene(scene) if isinstance(scene, str) else scene
+    wanted = wanted.with_values(values) if values else wanted
+    inputs = Inputs(parameters(vary, wanted), correlations)
+    if inputs.random.any() and not inputs.random.all():
+        one, other = (inputs.names[int(np.argmax(inputs.random == kind))] for kind in (True, False))
+        raise InputError(f"vary: {one} has a distribution and {other} an interval; give both the one or the other")
+    if allocate and len(limits) != 1:
+        raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")
+    when, asked = sampling_times(wanted, times), [limit(text, wanted) for text in limits]
+    if tolerance is not None:
+        wanted = _modelled(wanted, inputs, tolerance, when, engine)
+    keep = _keep(wanted, when, engine, checkpoint, end)
+    machine = Machine(wanted, when, get_engine(engine), keep=keep)
+    count_t, count_m, count_q = machine.columns
+    try:
+        answer = respond(
+            machine,
+            inputs,
+            count_t * count_m * count_q,
+            method=method,
+            groups=np.tile(np.arange(count_m * count_q), count_t),
+            instants=np.repeat(when, count_m * count_q),
+            gap=gap,
+            degree=degree,
+            count=count,
+            seed=seed,
+            most=most,
+            progress=progress,
+            over_time=lambda instants: replace(machine, times=instants, keep=None),
+        )
+    except TimeIsUpError:
+        raise ComputationError("time-limit: it was over before the first runs were made") from None
+    bounds = answer.bounds
+    if bounds is not None and math.isfinite(answer.horizon):
+        bounds = _beyond(wanted, inputs, bounds, machine)
+    mesh, step, rejected = _errors(machine, answer, seed) if verify and not keep.over else (None, None, "")
+    judged, allocation = list[Judged](), None
+    try:
+        for passed in asked:
+            bounded = _reach(inputs, when, gap, seed, most)
+            how = dict[str, Any](way=limit_method, most=limit_runs, seed=seed, verify=verify, progress=progress)
+            judged.append(judge(passed, machine, inputs, bounded, **how))
+        if allocate:
+            allocation = _allocated(asked[0], machine, inputs, costs or {}, target, seed, most)
+    except TimeIsUpError:
+        pass
+    finally:
+        keep.close()
+    status, message = _status(answer, gap, rejected, judged)
+    if keep.over:
+        missing = [one.text for one in asked[len(judged) :]]
+        status, message = (
+            "time-limit",
+            f"the {time_limit:g} s were over" + (f"; nothing is known of {', '.join(missing)}" if missing else ""),
+        )
+    if status == "ok" and allocation is not None and not allocation.ok:
+        status, message = "allocation-not-met", allocation.message
+    return Response(
+        status=status,
+        message=message,
+        scene=wanted.name,
+        method=method,
+        why=answer.found.why,
+        inputs=inputs,
+        times=when,
+        markers=tuple(wanted.markers),
+        quantities=machine.quantities,
+        evaluations=answer.runs.evaluations,
+        repeated=answer.runs.repeated,
+        failed=answer.runs.failed,
+        seed=seed,
+        wall_s=time.perf_counter() - begin,
+        horizon=min(answer.horizon, float(when[-1])),
+        bounds=bounds,
+        statistics=answer.statistics,
+        mesh_error=mesh,
+        step_error=step,
+        stated=wanted,
+        engine=engine,
+        limits=tuple(judged),
+        allocation=allocation,
+    )
+
+
+def _beyond(scene: Scene, inputs: Inputs, bounds: Bounds, machine: Machine) -> Bounds:
+    """Outer bounds that are the kinematic reach beyond the horizon, where there is one; angles have none."""
+    ends = inputs.values(np.array([-np.ones(len(inputs)), np.ones(len(inputs))]))
+    length = max(float(np.max(reach.size(scene.with_lanes(ends)))), 0.0) if reach.tethered(scene) else math.inf
+    anchors = reach.anchors(scene)
+    far = np.full((*machine.columns, 2), math.nan)
+    for axis in range(scene.dimensions):
+        far[:, :, axis, 0] = anchors[:, axis].min() - reach.MARGIN * length
+        far[:, :, axis, 1] = anchors[:, axis].max() + reach.MARGIN * length
+    late = np.repeat(machine.times > bounds.horizon, int(np.prod(machine.columns[1:])))
+    lower, upper = bounds.lower_outer.copy(), bounds.upper_outer.copy()
+    lower[late], upper[late] = far.reshape(-1, 2)[late].T
+    return replace(bounds, lower_outer=lower, upper_outer=upper)
+
+
+def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, float | None, str]:
+    """Largest mesh and step errors [m] of the runs that attain most bounds, or of some that were drawn."""
+    runs = answer.runs
+    if answer.bounds is not None:
+        values = runs.values
+        used = Counter([*values.argmin(axis=0).tolist(), *values.argmax(axis=0).tolist()])
+        chosen = [run for run, _ in used.most_common(CHECKED)]
+    else:
+        chosen = np.random.default_rng(seed).choice(len(runs.germs), min(CHECKED, len(runs.germs)), False).tolist()
+    mesh: float | None = None
+    step: float | None = None
+    for run in chosen:
+        given = {path: float(at[0]) for path, at in runs.inputs.values(runs.germs[[run]]).items()}
+        careful = verified(machine.engine, machine.scene.with_values(given), machine.times)
+        if not careful.ok:
+            return mesh, step, f"a more careful run does not bear one out: {careful.message}"
+        estimated = careful.model.get("verification", {})
+        mesh = larger(mesh, estimated.get("mesh_error"))
+        step = larger(step, estimated.get("time_error"))
+    return mesh, step, ""
+
+
+def _keep(scene: Scene, times: Array, engine: str, checkpoint: Path | str | None, end: float | None) -> Keep:
+    """Raises InputError."""
+    if checkpoint is None:
+        return Keep(None, end)
+    study = repr((scene.fingerprint, times.tolist(), engine, versions(("shoal",))))
+    return Keep(Memory(Path(checkpoint), hashlib.sha1(study.encode()).hexdigest(), "study"), end)
+
+
+def _reach(inputs: Inputs, when: Array, gap: float | None, seed: int, most: int) -> Reach:
+    """Bounds of the margins of a model over time."""
+
+    def reach(model: Model) -> tuple[Array, Array, Array, int, int]:
+        answer = respond(
+            model, inputs, len(when), groups=np.zeros(len(when)), instants=when, gap=gap, seed=seed, most=most
+        )
+        bounds, runs = answer.bounds, answer.runs
+        assert bounds is not None
+        outer = np.where(when <= bounds.horizon, bounds.lower_outer, -math.inf)
+        return bounds.lower, outer, runs.germs[runs.values.argmin(axis=0)], runs.evaluations, runs.failed
+
+    return reach
+
+
+def _allocated(
+    wanted: Limit, machine: Machine, inputs: Inputs, costs: Mapping[str, float], target: float, seed: int, most: int
+) -> Allocation:
+    """The cheapest tolerances that keep a limit."""
+    told, when = watched(machine, wanted), machine.times
+    prices, widest = costs_of(costs, inputs), accepted(machine.scene, inputs)
+    if inputs.random.all():
+        return of_distributions(wanted.text, told, inputs, target, prices, widest, seed)
+
+    def least(here: Inputs) -> Reached:
+        lower, outer, germs, evaluations, _ = _reach(here, when, None, seed, most)(told)
+        worst = int(lower.argmin())
+        return Reached(float(outer.min()), float(lower[worst]), germs[worst], evaluations)
+
+    return of_intervals(wanted.text, told, inputs, least, prices, widest)
+
+
+def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[Judged]) -> tuple[str, str]:
+    """ok, or what speaks against believing the answer, and why."""
+    runs, bounds = answer.runs, answer.bounds
+    if runs.failed:
+        return "failed-runs", f"{runs.failed} of {runs.evaluations} runs failed even with smaller steps: {runs.why}"
+    if rejected:
+        return "model-rejected", rejected
+    if math.isfinite(answer.horizon):
+        return "beyond-horizon", (
+            f"bounds hold until {answer.horizon:g} s; beyond, small changes of the parameters change everything, and "
+            "what is told is what runs attained, how far the machine reaches, and, if every value is as likely as "
+            f"another, where with 95 % confidence 95 % of all runs lie ({DRAWN} random runs)"
+        )
+    if bounds is not None and gap is not None and not bounds.gap <= gap:
+        found = "is not known" if math.isnan(bounds.gap) else f"is {bounds.gap:.1e}"
+        return "gap-not-reached", f"the gap between outer and attained bounds {found} of the width, asked for {gap:g}"
+    doubts = [one.doubt for one in judged if one.doubt]
+    if doubts:
+        return "limit-in-doubt", "; ".join(doubts)
+    if bounds is not None and math.isnan(bounds.gap):
+        return "ok", "bounds are what runs attained; this method cannot tell how far beyond them others lie"
+    return "ok", ""
+
+
+def _modelled(scene: Scene, inputs: Inputs, tolerance: float, times: Array, engine: str) -> Scene:
+    """The cheapest model for the machine in the middle."""
+    from shoal.selection import select
+
+    if engine != "gauss":
+        raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
+    middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
+    selection = select(scene.with_values({path: float(at[0]) for path, at in middle.items()}), tolerance, times)
+    if not selection.met:
+        raise ComputationError(f"tolerance: no model within {tolerance:g} m: {selection.reason}")
+    stated = {path: scene.value(path) for path in middle}
+    return selection.chosen.scene.with_values(stated)
