@@ -158,6 +158,7 @@ def limit(machine: Scene, times: Array, step: float) -> Array:
     return np.asarray((4 * runs[1].points - runs[0].points) / 3)
 
 
+@pytest.mark.slow
 def test_the_flexible_spherical_pendulum_is_exudyns_on_equal_meshes() -> None:
     times = np.array([0.02, 0.04])
     ours = simulate(flexible_pendulum(), times)

@@ -126,12 +126,12 @@ def mesh_matters(scene: Scene, scale: float) -> bool:
     return all(run.ok for run in runs) and runs[0].distance(runs[1]) > WRONG * scale
 
 
-@pytest.mark.parametrize("seed", [*range(FEW), DAMPED])
+@pytest.mark.parametrize("seed", range(FEW))
 def test_the_verdict_on_a_few_machines_is_right(seed: int) -> None:
     assert fault(seed) == ""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [*range(FEW, MANY), *range(DAMPED + 1, DAMPED + 40)])
+@pytest.mark.parametrize("seed", [*range(FEW, MANY), *range(DAMPED, DAMPED + 40)])
 def test_the_verdict_on_many_machines_is_right(seed: int) -> None:
     assert fault(seed) == ""

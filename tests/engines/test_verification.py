@@ -43,7 +43,13 @@ def test_wrong_runs_that_conserve_energy_are_not_believed(name: str) -> None:
     assert run.status[0] is not Status.OK, run.model["verification"]
 
 
-@pytest.mark.parametrize("name", [name for name in PROBLEMS if name != "squeezer"])
+EXACT = [name for name in PROBLEMS if name != "squeezer"]
+LONG = {"governor"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in EXACT]
+)
 def test_estimated_error_covers_the_true_one(name: str) -> None:
     """References: closed forms, scipy, Exudyn (see the problem library)."""
     problem = get_problem(name)

@@ -62,6 +62,7 @@ def test_a_run_whose_process_was_killed_is_ended_and_one_that_lives_is_not(clien
     assert end_left() == 0
 
 
+@pytest.mark.slow
 def test_what_another_mlflow_knows_is_left_to_whoever_uses_that(
     client: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

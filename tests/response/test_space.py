@@ -29,6 +29,7 @@ def places(gravity: float) -> Any:
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), -np.cos(polar)], axis=1)
 
 
+@pytest.mark.slow
 def test_bounds_of_all_coordinates_are_those_of_the_equations() -> None:
     found = uncertain(PENDULUM, {"gravity.2": (LOW, HIGH)}, TIMES)
     assert found.ok, found.message

@@ -20,6 +20,7 @@ def test_auto_is_never_wrong_in_silence(problem: object) -> None:
     assert problem.name in methods_table([auto, corners])
 
 
+@pytest.mark.slow
 def test_random_studies_keep_their_word() -> None:
     studies = [random_study(seed) for seed in range(1000, 1002)]
     assert all(study.kept for study in studies)

@@ -105,7 +105,7 @@ def test_a_noise_that_was_stated_too_small_is_told_and_no_wrong_model() -> None:
     assert judged(1e-3, 4e-3 * draws).verdict is Verdict.REJECTED
 
 
-@pytest.mark.parametrize("noise", [None, 3e-3])
+@pytest.mark.parametrize("noise", [pytest.param(None, marks=pytest.mark.slow), 3e-3])
 def test_correlated_noise_and_digits_are_no_wrong_model(noise: float | None) -> None:
     """AR(1) with a memory of ten samples, as large as stated, on positions rounded to six digits."""
     for seed in range(4):
@@ -166,7 +166,8 @@ def model_of(stated: Problem) -> ForwardModel:
     return ForwardModel(stated, stated.load_scene(), get_engine("gauss"), textbook(stated))
 
 
-@pytest.mark.parametrize("noise", [pytest.param(1e-3, marks=pytest.mark.slow), None])
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [1e-3, None])
 def test_a_false_minimum_is_left(noise: float | None) -> None:
     """A descent from far away ends where the motion is another one; a refit for a suspect finds the way out."""
     model = model_of(problem(noise))

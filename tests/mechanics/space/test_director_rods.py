@@ -54,6 +54,7 @@ def test_the_princeton_beam_bends_as_published() -> None:
     assert found.marker("e")[1:] == pytest.approx([8.97920e-3, 109.11312e-3], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_moment_fixed_in_space_winds_a_rod_into_a_helix_with_the_fourth_order() -> None:
     """EI = GJ = 1 N m^2, moment (1, 2, 3) N m, the end in closed form; without a potential such a moment flutters."""
     closed = np.array([-0.0687126610, 0.5555528458, -0.0141310102])
