@@ -21,10 +21,10 @@ from shoal.errors import ComputationError, InputError
 from shoal.identification import Problem, load_problem
 from shoal.identification.recording.reading import YAML, described
 from shoal.identification.recording.source import FileSource
-from shoal.identification.recording.table import Table, load_table
-from shoal.mechanics.analysis.reactions import JointReaction, Reactions
+from shoal.mechanics.analysis.joint_reactions import JointReaction, Reactions
 from shoal.scene import Scene, load_scene
 from shoal.shelf import NAME
+from shoal.table import Table, load_table
 from shoal.trajectory import Array
 
 PAUSES = (0.02, 1.0)

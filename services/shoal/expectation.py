@@ -15,10 +15,10 @@ from shoal.identification.recording.observation import camera, observe
 from shoal.identification.recording.plausible import check_units
 from shoal.identification.recording.reading import described, read
 from shoal.identification.recording.source import Channel, FileSource
-from shoal.identification.recording.table import load_table
 from shoal.scene import Scene
 from shoal.scene.expect import Expectation, ExpectedEngine, ExpectedRecording, ExpectedValue
 from shoal.shelf import located
+from shoal.table import load_table
 from shoal.trajectory import Array, Trajectory
 
 INSTANTS = 50

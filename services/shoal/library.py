@@ -17,16 +17,17 @@ from shoal.identification import load_problem, measure
 from shoal.identification.problem import built_in_problems
 from shoal.identification.recording.reading import YAML, described, read
 from shoal.identification.recording.source import FileSource
-from shoal.identification.recording.table import load_table
 from shoal.response.limits import limit
 from shoal.response.read import parameters
 from shoal.response.stated import KEY, built_in_studies, load_study
 from shoal.scene import Scene, load_scene
 from shoal.scene.edited import Keys, as_yaml, edited
 from shoal.scene.load import LARGEST, built_in_scenes, read_yaml, some, unknown
+from shoal.scene.measured import PARTS
 from shoal.scene.parametric import parametric
 from shoal.shelf import LARGEST as LARGEST_ENTRY
 from shoal.shelf import NAME, Entry, Files, check_name, check_paths, located, shelf
+from shoal.table import load_table
 
 if TYPE_CHECKING:
     from shoal.mechanics.model import Model
@@ -102,7 +103,7 @@ KINDS = {
         Kind("recordings", "recording", _check_recording, "path", references={("path",): ""}),
         Kind(
             *("scenes", "scene", _check_scene, "bodies", lambda name: _scene_named(name)),
-            references={("expect", "*", "path"): "recordings"},
+            references={("expect", "*", "path"): "recordings", **{(part, "*", "*", "path"): "" for part in PARTS}},
         ),
         Kind(
             *("problems", "problem", _check_problem, "parameters", lambda name: name in built_in_problems()),

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from shoal.identification import Estimate, Problem
     from shoal.identification.design import Design
     from shoal.mechanics.analysis.equilibrium import Equilibrium
+    from shoal.mechanics.analysis.joint_reactions import Reactions
     from shoal.mechanics.analysis.modes import Modes
-    from shoal.mechanics.analysis.reactions import Reactions
     from shoal.pictures.inline import Picture
     from shoal.response import Response
     from shoal.selection import Selection

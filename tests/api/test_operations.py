@@ -20,7 +20,7 @@ from shoal.api.settings import Settings
 from shoal.api.tasks import told
 from shoal.client import Client
 from shoal.errors import ComputationError, InputError
-from shoal.mechanics.analysis.reactions import Reactions
+from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.trajectory import Trajectory, plain
 
 SCENE = "rigid-double-pendulum"

@@ -204,6 +204,14 @@ CASES = [
         ),
         RIGID,
     ),
+    Case(
+        pair(
+            "geared",
+            {"E": joint(at("ground", [1.0, 0.0]), at("B")), "G": joint(at("A"), at("B"), "gear", ratio="-3/7")},
+            start={"angle": -0.4},
+        ),
+        RIGID,
+    ),
     Case(pendulum("force-in-time", loads=force(at("A", "end"), 3.0, 9.0, scale="sin(8*t)")), RIGID),
     Case(
         pendulum(
@@ -394,6 +402,7 @@ ONLY_NATIVE = [
     DIRECTOR,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
+    pendulum("at-rest", CABLE, CLAMP).with_values({"initial.from": "statics", "initial.A.rate": 0.0}),
     pair(
         "coupled",
         {

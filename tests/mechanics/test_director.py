@@ -11,15 +11,16 @@ import pytest
 from numba import njit
 from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import director, families
-from shoal.mechanics.elements.section import torsion_constant
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
+from shoal.scene.sections import Rectangle
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 import element_doors as doors
 
 YOUNG, SHEAR, HEIGHT, WIDTH, LENGTH = 2e8, 7.5e7, 0.04, 0.02, 0.5
+SECTION = Rectangle(HEIGHT, WIDTH)
 REST = (0.1, 0.2, -0.1, 0.05, 0.1, 0.3, 0.01, -0.02, 0.005)
 
 
@@ -32,7 +33,9 @@ def _door(tile, family, z, f, w, energy):
 def _elements(free: tuple[float, ...], count: int = 1, *, tile: Any = SINGLE) -> Any:
     found = families.Collected()
     for number in range(count):
-        part = director.entry(YOUNG, SHEAR, HEIGHT, WIDTH, LENGTH, [*free])
+        part = director.entry(
+            YOUNG, SHEAR * SECTION.torsion, SECTION.area, (SECTION.bending, SECTION.side), LENGTH, [*free]
+        )
         found.add("rod", [*range(18 * number, 18 * (number + 1))], part)
     return packed(found.family(director.DirectorRods), slice(0, len(tile)), tile)
 
@@ -88,7 +91,7 @@ def test_force_and_stiffness_are_derivatives_and_turn_with_the_rod(seed: int) ->
 def test_a_uniform_twist_has_the_energy_of_saint_venant(twist: float) -> None:
     z = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [LENGTH, 0, 0], [1, 0, 0], [0, np.cos(twist), np.sin(twist)]])
     energy, force = _evaluate(z @ _turned(4).T)
-    torque = SHEAR * torsion_constant(HEIGHT, WIDTH) * twist / LENGTH
+    torque = SHEAR * SECTION.torsion * twist / LENGTH
     assert energy == pytest.approx(torque * twist / 2, rel=1e-12)
     np.testing.assert_allclose(np.cross(z, force @ _turned(4))[5], [-torque, 0, 0], atol=1e-11 * torque)
 

@@ -96,7 +96,7 @@ def truth(uniform_rods: Rods) -> Callable[[str, Any], Any]:
         if name == "rigid":
             friction = np.array([[0.5, -0.5], [-0.5, 0.5]])
             bodies = [RIGID.bodies["OA"], RIGID.bodies["AB"]]
-            masses = [body.density * body.area * body.length for body in bodies]
+            masses = [body.density * body.section_at(0.0).area * body.length for body in bodies]
             inertias = [mass * body.length**2 / 12 for mass, body in zip(masses, bodies, strict=True)]
             angles, _ = uniform_rods(
                 masses,

@@ -110,7 +110,7 @@ def test_every_slender_rod_is_accepted_and_weighs_what_its_prism_does(
     height, width = height * length, width * length
     rod = Rod(length=length, height=height, width=width, density=density, youngs_modulus=modulus, element="ancf-cable")
     volume = length * height * width
-    assert rod.area == pytest.approx(height * width, rel=1e-14)
+    assert rod.section_at(0.5).area == pytest.approx(height * width, rel=1e-14)
     assert rod.mass == pytest.approx(density * volume, rel=1e-14)
     # A slender rod about its middle: m L^2 / 12; about an end (Steiner): m L^2 / 3.
     assert rod.inertia == pytest.approx(density * volume * length**2 / 12, rel=1e-14)

@@ -18,6 +18,7 @@ FEATURES = (
     "free bodies",
     "closed loops",
     "moving ground points",
+    "starts at rest",
     "functions of time",
     "varying distances",
     "dry friction",
@@ -48,6 +49,8 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
                 yield f"{where}.retardation", "damped flexible rods"
         if scene.start(name).position is not None:
             yield f"initial.{name}.position", "free bodies"
+    if scene.starts_at_rest:
+        yield "initial.from", "starts at rest"
     for name in scene.ground_points:
         yield f"ground_points.{name}", "moving ground points"
     for name, joint in scene.joints.items():

@@ -3,52 +3,54 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from shoal.scene import Rod
+from shoal.scene.sections import Section
 from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
 class Sections:
-    """Height and width [m] of each element, those of its middle, (elements,)."""
+    """The section of each element, that of its middle; every property is (elements,)."""
 
     rod: Rod
-    height: Array
-    width: Array
+    section: Section
 
     @classmethod
     def of(cls, rod: Rod) -> Sections:
         """The sections of a rod."""
-        height, width = rod.section((np.arange(rod.elements) + 0.5) / rod.elements)
-        still = np.zeros(rod.elements)
-        return cls(rod, height + still, width + still)
+        return cls(rod, rod.section_at((np.arange(rod.elements) + 0.5) / rod.elements))
+
+    def _each(self, value: Any) -> Array:
+        return np.asarray(value * np.ones(self.rod.elements))
 
     @property
     def mass(self) -> Array:
         """Mass per length [kg/m]."""
-        return self.rod.density * self.height * self.width
+        return self._each(self.rod.density * self.section.area)
 
     @property
     def inertia(self) -> Array:
         """Rotary inertia per length, rho I [kg m]."""
-        return self.rod.density * self.width * self.height**3 / 12
+        return self._each(self.rod.density * self.section.bending)
 
     @property
     def axial(self) -> Array:
         """EA [N]."""
         assert self.rod.youngs_modulus is not None
-        return self.rod.youngs_modulus * self.height * self.width
+        return self._each(self.rod.youngs_modulus * self.section.area)
 
     @property
     def bending(self) -> Array:
         """EI [N m^2]."""
         assert self.rod.youngs_modulus is not None
-        return self.rod.youngs_modulus * self.width * self.height**3 / 12
+        return self._each(self.rod.youngs_modulus * self.section.bending)
 
     @property
     def shear(self) -> Array:
-        """k G A [N], G = E / (2 (1 + nu)), k of a rectangle: Cowper (1966), J. Appl. Mech. 33, 335, table 1."""
+        """k G A [N], G = E / (2 (1 + nu)), k of the section."""
         nu = self.rod.poisson_ratio
-        return 10 * (1 + nu) / (12 + 11 * nu) * self.axial / (2 * (1 + nu))
+        return self._each(self.section.shear(nu)) * self.axial / (2 * (1 + nu))

@@ -62,6 +62,6 @@ def _rods(scene: Scene, shearing: bool) -> tuple[dict[str, Rod], dict[str, Rod]]
 def slender_share(rod: Rod) -> float:
     """By how much shear and rotary inertia lower the stiffness of a rod in bending, over its mass."""
     nu = rod.poisson_ratio
-    kappa = 10 * (1 + nu) / (12 + 11 * nu)
-    slenderness = np.pi * rod.height / np.sqrt(12.0) / rod.length
-    return float(slenderness**2 * (2 * (1 + nu) / kappa + 1.0))
+    section = rod.section_at(0.0)
+    slenderness = np.pi * np.sqrt(section.bending / section.area) / rod.length
+    return float(slenderness**2 * (2 * (1 + nu) / section.shear(nu) + 1.0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.mechanics import stability
+from shoal.mechanics.analysis.at_rest import begun
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.motion_state import LANE
 from shoal.mechanics.assembly.build import build
@@ -24,7 +25,7 @@ def energies(scene: Scene, times: Array) -> Array:
 
     Springs count as elastic; what applied loads could still do does not count. For a scene that `simulate` accepts.
     """
-    model = capped(build(scene, horizon=max(float(times[-1]), scene.solver.duration)))
+    model = begun(capped(build(scene, horizon=max(float(times[-1]), scene.solver.duration))))
     instants = times
     if model.forces.size:
         # Turns of torsion springs are counted from sample to sample, which must be less than half a turn apart.

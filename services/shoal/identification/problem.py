@@ -22,7 +22,20 @@ MEASUREMENT = ("clock", "delay", "scale", "x", "y", "tilt")
 """What a parameter can be that is none of the scene's: the path is `measurement.` and one of these."""
 RESERVED = "measurement"
 _POSITIVE = {
-    *("length", "height", "width", "end_height", "end_width", "density", "mass", "inertia", "youngs_modulus"),
+    *(
+        "length",
+        "height",
+        "width",
+        "end_height",
+        "end_width",
+        "wall",
+        "web",
+        "flange",
+        "density",
+        "mass",
+        "inertia",
+        "youngs_modulus",
+    ),
     *("stiffness", "damping", "friction", "coulomb", "retardation", "clock", "scale"),
 }
 """Last names of paths to quantities that are positive, and known by their order of magnitude rather than by a sum."""

@@ -1,5 +1,8 @@
 """Constraints that are at most quadratic in the coordinates: C = sum of factor u w + c + f(t), one kernel for all.
 
+Gears are the exception, C = sum of share * angle + c but for multiples of a period, as their teeth have no numbers. As
+the vectors d of the angles are of unit length, C_q is linear in d all the same, (-d_y, d_x), and there is no bias.
+
 u and w are rows of the state: unknowns, or components of vectors that are affine in them. As differences of points
 are formed before they are multiplied, the round-off of C does not grow with the distance from the origin. C_q, the
 bias C_qq v v + f''(t) and the third derivative of C follow from the same lists. The Jacobian is sparse: entry e is
@@ -8,8 +11,10 @@ the column `column[e]` of the constraint whose range in `entry` contains e.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from shoal.mechanics import functions
@@ -26,6 +31,8 @@ class Constraints(NamedTuple):
     constant: c, (constraints, lanes). lengths: C is in m to that power. drive: number of the function f of every
     constraint (-1: none). Part r of the Jacobian adds coefficient[r] * z[source[r]] to the entry target[r]; source = -1
     stands for 1.
+    Angle r of constraint k in turned[k]:turned[k+1] is that of the vector in the rows rising[r] and rising[r] + 1, with
+    the factor share[r]; period: of every constraint [rad].
     """
 
     size: int
@@ -42,6 +49,10 @@ class Constraints(NamedTuple):
     target: Index
     source: Index
     coefficient: Array
+    turned: Index
+    rising: Index
+    share: Array
+    period: Array
 
 
 @njit(cache=True, error_model="numpy")
@@ -59,6 +70,21 @@ def residual(tile: Tile, constraints: Constraints, drives: Functions, t: float, 
                 if left >= 0:
                     product *= z[left * width + lane]
                 value[k * width + lane] += product
+        if constraints.turned[k] < constraints.turned[k + 1]:
+            _add_angles(width, constraints, k, z, value)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_angles(width: int, constraints: Constraints, k: int, z: Array, value: Array) -> None:
+    """The angles of constraint k, and its nearest multiple of the period taken off."""
+    for lane in range(width):
+        total = value[k * width + lane]
+        for r in range(constraints.turned[k], constraints.turned[k + 1]):
+            row = constraints.rising[r]
+            angle = math.atan2(z[(row + 1) * width + lane], z[row * width + lane])
+            total += constraints.share[r * width + lane] * angle
+        period = constraints.period[k * width + lane]
+        value[k * width + lane] = total - period * np.rint(total / period)
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,7 +1,7 @@
 """What joints demand: each kind as a few conditions, which are all that the rest of the mechanics knows of it.
 
 A joint shares what it can (`assembly.groups`), holds the rest by constraints (`assembly.placement`), closes at the
-start (`start.closure`) and pushes where its conditions forbid a motion (`analysis.reactions`).
+start (`start.closure`) and pushes where its conditions forbid a motion (`analysis.joint_reactions`).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.mechanics.numerics.tile import Number
 from shoal.scene import (
     GROUND,
@@ -21,6 +22,7 @@ from shoal.scene import (
     Distance,
     DrivenAngle,
     Function,
+    Gear,
     Parallel,
     Perpendicular,
     Planar,
@@ -99,6 +101,27 @@ class Turned:
 
 
 @dataclass(frozen=True)
+class Geared:
+    """Whole numbers times the angles of directions add up to what they do at the start, or differ by whole turns.
+
+    So teeth do that mesh: of gears with m and n teeth m turns of one are n turns of the other.
+    """
+
+    sides: tuple[Attachment, ...]
+    teeth: tuple[int, ...]
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """Of the angles, the largest of them 1."""
+        return tuple(count / self.most for count in self.teeth)
+
+    @property
+    def most(self) -> int:
+        """The largest number."""
+        return max(map(abs, self.teeth))
+
+
+@dataclass(frozen=True)
 class Sum:
     """The sum of factor * coordinate follows a function of time [m]."""
 
@@ -144,13 +167,20 @@ class Hinged:
     axis: Vector3
 
 
-Condition = Meet | Along | Apart | Turned | Sum
+Condition = Meet | Along | Apart | Turned | Geared | Sum
 """What the plane knows; the others are of space."""
 
 
 def _slider(joint: Slider) -> list[Condition]:
     line = Along(joint.first, joint.second, joint.direction)
     return [line, Turned(joint.first, joint.second)] if joint.rotation == "locked" else [line]
+
+
+def _gear(joint: Gear) -> list[Condition]:
+    if np.ndim(joint.ratio):
+        raise InputError("ratio of a gear: is of whole teeth, so that it cannot vary; state each in a scene of its own")
+    m, n = joint.fraction.numerator, joint.fraction.denominator
+    return [Geared((joint.second, joint.first, joint.carrier), (n, -m, m - n))]
 
 
 CONDITIONS: dict[type, Callable[[Any], list[Condition]]] = {
@@ -161,6 +191,7 @@ CONDITIONS: dict[type, Callable[[Any], list[Condition]]] = {
     Parallel: lambda joint: [Turned(joint.first, joint.second, either=(0.0, np.pi))],
     Perpendicular: lambda joint: [Turned(joint.first, joint.second, either=(np.pi / 2, -np.pi / 2))],
     DrivenAngle: lambda joint: [Turned(joint.first, joint.second, joint.angle)],
+    Gear: _gear,
     Coupling: lambda joint: [Sum(joint.terms, joint.value)],
 }
 

@@ -81,9 +81,7 @@ def stretch(scene: Scene, energy: Array) -> Array:
         if isinstance(rod, Rod) and rod.element != "rigid":
             assert rod.youngs_modulus is not None
             # The thinnest section bounds the stiffness of a tapered rod.
-            height, width = rod.section(1.0)
-            area = np.minimum(rod.height, height) * np.minimum(rod.width, width)
-            strain = np.sqrt(2 * energy / (rod.youngs_modulus * area * rod.length))
+            strain = np.sqrt(2 * energy / (rod.youngs_modulus * rod.thinnest.area * rod.length))
             total = total + rod.length * np.minimum(strain, BREAKS)
     return total
 

@@ -87,7 +87,8 @@ class Solids:
     def _bar(self, name: str, body: Body) -> Callable[[At], Bar] | None:
         if isinstance(body, Rod):
             names = self._outlines[name]
-            size = np.stack(body.section(np.linspace(0.0, 1.0, len(names))), axis=1)
+            section = body.section_at(np.linspace(0.0, 1.0, len(names)))
+            size = np.column_stack([side * np.ones(len(names)) for side in (section.height, section.width)])
             across = None if body.element != "rigid" else self._add(name, (0.0, body.length, 0.0))
             return lambda at: _bar(at, names, across, size, body.length)
         if body.kind == "point-mass":

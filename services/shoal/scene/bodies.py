@@ -8,10 +8,12 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from shoal.scene.record import NonNegative, Positive, Record, Vector, Vector3
+from shoal.scene.sections import SECTIONS, Section
 
 Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full", "director-rod"]
 Quadrature = Literal["full", "reduced"]
 Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
+SectionName = Literal["rectangle", "round", "tube", "i-beam"]
 
 _SHEARS = {"rigid": False, "ancf-cable": False, "ancf-quintic": False, "ancf-full": True, "director-rod": False}
 _POINTS = 24
@@ -29,26 +31,31 @@ _ONLY_FLEXIBLE = {
 class Rod(Record):
     """A homogeneous rod that starts at its body's origin along the x axis.
 
-    Lengths in m, density in kg/m^3, moduli in Pa. `height` is the thickness in the plane of
-    motion. `element` is the model of the rod, with `elements` elements of equal length: `rigid`,
-    `ancf-cable` (cubic, Bernoulli-Euler), `ancf-quintic` (the same of higher order) or `ancf-full`
-    (with shear and stretch of the section). `rigid` where nothing else is stated that only a flexible
-    rod has. `rotary_inertia`: whether a rigid rod has that of its height; the paper's has not, nor
-    have cables and quintic elements, while ancf-full always has. `quadrature` of a cable is `full`
-    (Gauss, 5 points axial and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points
-    bending). `law` is that of ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature
-    of the unstrained axis over its arc length. `end_height`, `end_width`: the section at the far end of
-    a tapered rod (each element has the section of its middle). `retardation` [s]: Kelvin-Voigt damping, stress
-    E (strain + retardation * strain rate). In space `director-rod` bends about both axes of its section and twists;
-    `torsion_constant` [m^4] overrides that of the rectangle, `side_curvature` [1/m, ...] bends the unstrained axis
-    towards its local z axis and `twist` [rad/m, ...] turns its sections, both polynomials over the arc length.
-    `director`: the axis of the section that its nodes carry, by default the one that a joint can share.
+    Lengths in m, density in kg/m^3, moduli in Pa. `height` is the thickness in the plane of motion, of a `section`
+    that is round or a tube its outer diameter; `width`, `wall` (of a tube), `web` and `flange` (thicknesses, of an
+    i-beam) are stated where the section has them. `element` is the model of the rod, with `elements` elements of
+    equal length: `rigid`, `ancf-cable` (cubic, Bernoulli-Euler), `ancf-quintic` (the same of higher order) or
+    `ancf-full` (with shear and stretch of the section). `rigid` where nothing else is stated that only a flexible
+    rod has. `rotary_inertia`: whether a rigid rod has that of its height; the paper's has not, nor have cables and
+    quintic elements, while ancf-full always has. `quadrature` of a cable is `full` (Gauss, 5 points axial and 3
+    bending) or `reduced` (3 Lobatto points axial, 2 Gauss points bending). `law` is that of ancf-full. `curvature`
+    [1/m, 1/m^2, ...]: polynomial of the curvature of the unstrained axis over its arc length. `end_height`,
+    `end_width`: those at the far end of a tapered rod, along which they change evenly (each element has the section
+    of its middle). `retardation` [s]: Kelvin-Voigt damping, stress E (strain + retardation * strain rate). In space
+    `director-rod` bends about both axes of its section and twists; `torsion_constant` [m^4] overrides that of the
+    section, `side_curvature` [1/m, ...] bends the unstrained axis towards its local z axis and `twist` [rad/m, ...]
+    turns its sections, both polynomials over the arc length. `director`: the axis of the section that its nodes
+    carry, by default the one that a joint can share.
     """
 
     kind: Literal["rod"] = "rod"
     length: Positive
     height: Positive
-    width: Positive
+    width: Positive | None = None
+    section: SectionName = "rectangle"
+    wall: Positive | None = None
+    web: Positive | None = None
+    flange: Positive | None = None
     density: Positive
     youngs_modulus: Positive | None = None
     poisson_ratio: Annotated[float, Field(gt=-1, le=0.5)] = 0.3
@@ -93,10 +100,29 @@ class Rod(Record):
         return self
 
     @model_validator(mode="after")
+    def _section_is_told(self) -> Rod:
+        needs = SECTIONS[self.section].needs
+        for field in ("width", "wall", "web", "flange"):
+            if (getattr(self, field) is None) == (field in needs):
+                raise ValueError(
+                    f"{field} is missing; section {self.section} needs it (m)"
+                    if field in needs
+                    else f"{field}: section {self.section} has none"
+                )
+        if self.end_width is not None and "width" not in needs:
+            raise ValueError(f"end_width: section {self.section} has no width; state end_height, its diameter there")
+        if self.element == "ancf-full" and self.section != "rectangle":
+            raise ValueError(f"section: that of ancf-full is a rectangle, found {self.section}; use ancf-cable")
+        for end in (0.0, 1.0):
+            if fault := self.section_at(end).fault():
+                raise ValueError(fault)
+        return self
+
+    @model_validator(mode="after")
     def _slender_and_complete(self) -> Rod:
         if self.height > self.length:
             raise ValueError(f"height {self.height:g} m is larger than the length {self.length:g} m; a rod is slender")
-        if self.width > self.length:
+        if self.width is not None and self.width > self.length:
             raise ValueError(f"width {self.width:g} m is larger than the length {self.length:g} m; a rod is slender")
         if self.element != "rigid" and self.youngs_modulus is None:
             raise ValueError(f"youngs_modulus is missing; element {self.element} needs it (Pa)")
@@ -124,16 +150,22 @@ class Rod(Record):
         """Whether the section changes along the rod."""
         return self.end_height is not None or self.end_width is not None
 
-    def section(self, x: Any) -> tuple[Any, Any]:
-        """Height and width [m] at the fraction x of the length."""
-        end_height = self.height if self.end_height is None else self.end_height
-        end_width = self.width if self.end_width is None else self.end_width
-        return self.height + (end_height - self.height) * x, self.width + (end_width - self.width) * x
+    def section_at(self, x: Any) -> Section:
+        """The section at the fraction x of the length."""
+        height, width = (
+            here if here is None or there is None else here + (there - here) * x
+            for here, there in ((self.height, self.end_height), (self.width, self.end_width))
+        )
+        return SECTIONS[self.section].of(height, width, self.wall, self.web, self.flange)
 
     @property
-    def area(self) -> float:
-        """Cross-section at the start [m^2]."""
-        return self.width * self.height
+    def thinnest(self) -> Section:
+        """A section that no place of the rod falls below in any length."""
+        height, width = (
+            here if here is None or there is None else np.minimum(here, there)
+            for here, there in ((self.height, self.end_height), (self.width, self.end_width))
+        )
+        return SECTIONS[self.section].of(height, width, self.wall, self.web, self.flange)
 
     @property
     def mass(self) -> float:
@@ -148,7 +180,8 @@ class Rod(Record):
         total: float = sum(mass * abs(place - x - 1j * y) ** 2 for mass, place in self._pieces())
         if self.rotary_inertia:
             total += sum(
-                mass * height**2 / 12 for (mass, _), height in zip(self._pieces(), self._heights(), strict=True)
+                mass * section.bending / section.area
+                for (mass, _), section in zip(self._pieces(), self._sections(), strict=True)
             )
         return total
 
@@ -161,14 +194,13 @@ class Rod(Record):
     def _pieces(self) -> list[tuple[Any, Any]]:
         """Masses [kg] at places x + iy [m] that have the rod's mass, centre and inertia (Gauss's quadrature)."""
         pieces = []
-        for x, weight in self._rule():
-            height, width = self.section(x)
-            pieces.append((self.density * height * width * self.length * weight, self.axis(x * self.length)))
+        for (x, weight), section in zip(self._rule(), self._sections(), strict=True):
+            pieces.append((self.density * section.area * self.length * weight, self.axis(x * self.length)))
         return pieces
 
-    def _heights(self) -> list[Any]:
-        """The heights [m] of the pieces."""
-        return [self.section(x)[0] for x, _ in self._rule()]
+    def _sections(self) -> list[Section]:
+        """The sections of the pieces."""
+        return [self.section_at(x) for x, _ in self._rule()]
 
     def _rule(self) -> list[tuple[float, float]]:
         """Nodes as fractions of the length, and weights."""
@@ -191,13 +223,15 @@ class Rod(Record):
     def axial_stiffness(self) -> float:
         """EA [N] at the start."""
         assert self.youngs_modulus is not None
-        return self.youngs_modulus * self.area
+        stiffness: float = self.youngs_modulus * self.section_at(0.0).area
+        return stiffness
 
     @property
     def bending_stiffness(self) -> float:
         """EI [N m^2] at the start, bending in the plane of motion."""
         assert self.youngs_modulus is not None
-        return self.youngs_modulus * self.width * self.height**3 / 12
+        stiffness: float = self.youngs_modulus * self.section_at(0.0).bending
+        return stiffness
 
     @property
     def points(self) -> dict[str, Vector]:

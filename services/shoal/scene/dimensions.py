@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from shoal.errors import InputError
 from shoal.scene.record import Record
 
 SPATIAL_KINDS = ("spherical", "universal", "cylindrical", "planar")
+PLANAR_KINDS = ("gear",)
 _Z = (0.0, 0.0, 1.0)
 
 
@@ -27,6 +30,9 @@ def check_dimensions(scene: Any) -> None:
                 raise ValueError(f"bodies.{name}.element: director-rod is for scenes in space; say dimensions: 3")
         _check_plane(scene, "")
         return
+    for name, joint in scene.joints.items():
+        if joint.kind in PLANAR_KINDS:
+            raise ValueError(f"joints.{name}.kind: {joint.kind} is a joint of the plane; say dimensions: 2")
     flat = is_flat(scene)
     for name, start in scene.initial.items():
         for one, other in (("angle", "rotation"), ("rate", "spin")):
@@ -38,7 +44,8 @@ def check_dimensions(scene: Any) -> None:
         if body.kind == "rod" and body.element == "director-rod":
             continue
         flexible = body.kind == "rod" and body.element != "rigid"
-        if flexible and not flat and (body.height, body.end_height) != (body.width, body.end_width):
+        alike = flexible and all(np.isclose(s.bending, s.side, rtol=1e-12) for s in map(body.section_at, (0.0, 1.0)))
+        if flexible and not flat and not alike:
             raise ValueError(
                 f"bodies.{name}.width: {body.element} bends alike about both axes of its section; beyond the plane "
                 "z = 0 its width must be its height, or its element a director-rod"

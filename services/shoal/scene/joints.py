@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -166,6 +167,49 @@ class DrivenAngle(Tie):
     axis: Axis = Z
 
 
+MOST_TEETH = 1000
+
+
+def _fraction(value: Any) -> Any:
+    """A ratio as a user may write it: a number, or two whole ones with a slash."""
+    if isinstance(value, str):
+        try:
+            return float(Fraction(value.replace(" ", "")))
+        except (ValueError, ZeroDivisionError):
+            raise ValueError(f"a ratio is a number, or two whole ones as '-20/31', found {value[:40]!r}") from None
+    return value
+
+
+class Gear(Tie):
+    """Gears, a belt or a chain: the second body turns `ratio` times as fast as the first, as seen from a carrier.
+
+    ratio: negative for gears that mesh outside, positive for belts, chains and ring gears; a fraction of whole numbers
+    up to 1000, which may be written as text. carrier: the body that carries both bearings, by default the ground.
+    """
+
+    kind: Literal["gear"] = "gear"
+    turned: ClassVar[tuple[str, ...]] = ("first", "second", "carrier")
+    ratio: Annotated[float, BeforeValidator(_fraction)]
+    carrier: Attachment = Attachment(body=GROUND, point=(0.0, 0.0))
+
+    @model_validator(mode="after")
+    def _of_whole_numbers(self) -> Gear:
+        if not isinstance(self.ratio, float):
+            return self
+        near = self.fraction
+        if not self.ratio or abs(near.numerator) > MOST_TEETH or abs(near - self.ratio) > 1e-9 * abs(self.ratio):
+            raise ValueError(
+                f"ratio: must be a fraction of whole numbers up to {MOST_TEETH}, found {self.ratio:.12g}; write it as "
+                "'-20/31'"
+            )
+        return self
+
+    @property
+    def fraction(self) -> Fraction:
+        """The ratio as teeth of the first over those of the second."""
+        return Fraction(self.ratio).limit_denominator(MOST_TEETH)
+
+
 class CoupledCoordinate(Record):
     """A coordinate of a place, with its factor in a coupling."""
 
@@ -200,6 +244,7 @@ Joint = Annotated[
         | Parallel
         | Perpendicular
         | DrivenAngle
+        | Gear
         | Coupling,
         Field(discriminator="kind"),
     ],

@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 from shoal.errors import InputError
+from shoal.scene.measured import with_signals
 from shoal.scene.parametric import EXAMPLES, parametric
 from shoal.scene.scene import Scene
 from shoal.shelf import located, shelf
@@ -191,4 +192,4 @@ def _read(name: str) -> Scene:
     data = read_named(name, scene_library(), "scene", scene_names())
     if not isinstance(data, dict):
         raise InputError(f"{name}: a scene is a mapping of fields, found {type(data).__name__}")
-    return Scene.parse(data, name)
+    return Scene.parse(with_signals(data, Path(name).parent, name), name)

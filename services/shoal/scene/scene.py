@@ -21,6 +21,7 @@ from shoal.scene.loads import DistributedForce, Force, Load
 from shoal.scene.record import Angle, Record, Vector, Vector3, one_line
 from shoal.scene.solver import Solver
 
+INITIAL, FROM = "initial", "from"
 _FEW = 4
 """So many names are listed."""
 Quantity = Literal["angle", "rate", "position", "velocity", "rotation", "spin"]
@@ -67,7 +68,8 @@ class Begin(NamedTuple):
 class Scene(Record):
     """A machine in SI units: bodies, joints, loads, markers, initial state, gravity, solver settings.
 
-    dimensions: 2, or 3 for one in space.
+    dimensions: 2, or 3 for one in space. initial_from: `statics` for a machine that starts at rest where its forces
+    balance; a file says it as `from` in `initial`, whose angles and positions then say near where.
 
     expect: what the nights of its library ask of it; no part of the machine, so that what is written of a scene,
     compared by its fingerprint or made of it by `with_values` is without.
@@ -84,8 +86,20 @@ class Scene(Record):
     ground_points: dict[Name, MovingPoint] = {}
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
     initial: dict[str, InitialState] = {}
+    initial_from: Literal["statics"] | None = None
     solver: Solver = Solver()
     expect: Annotated[dict[Name, Expectation], Field(exclude=True)] = {}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_within(cls, data: Any) -> Any:
+        if isinstance(data, dict) and isinstance(data.get("initial"), dict) and FROM in data["initial"]:
+            initial = dict(data["initial"])
+            origin = initial.pop(FROM)
+            if origin not in ("statics", None):
+                raise ValueError(f"initial.from: a start is computed by statics, found {str(origin)[:40]!r}")
+            return {**data, "initial": initial, "initial_from": origin}
+        return data
 
     def __repr__(self) -> str:
         parts = [_counted("body", "bodies", self.bodies), _counted("joint", "joints", self.joints)]
@@ -96,6 +110,11 @@ class Scene(Record):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.starts_at_rest:
+            for name, start in self.initial.items():
+                for quantity in RATES:
+                    if np.any(getattr(start, quantity)):
+                        raise ValueError(f"initial.{name}.{quantity}: a start from statics is at rest; leave it out")
         if GROUND in self.bodies:
             raise ValueError("bodies.ground: the name 'ground' is taken by the fixed frame")
         for name, joint in self.joints.items():
@@ -198,6 +217,11 @@ class Scene(Record):
         except ValidationError as error:
             raise one_line(error, source, cls) from None
 
+    @property
+    def starts_at_rest(self) -> bool:
+        """Whether the start is the place of rest near the one that is stated."""
+        return self.initial_from == "statics"
+
     def location(self, attachment: Attachment) -> Any:
         """Coordinates [m] of an attachment in its body's (or the ground's) frame, (d,); on a flexible rod (s, y)."""
         if attachment.body == GROUND and isinstance(attachment.point, str):
@@ -223,6 +247,7 @@ class Scene(Record):
 
         What is set last is kept: where a path moves the start or a joint, the other initial values become guesses.
         """
+        values = {f"{INITIAL}_{FROM}" if path == f"{INITIAL}.{FROM}" else path: x for path, x in values.items()}
         fresh = [path for path, value in values.items() if not self._has(path, value)]
         data = self._guessing(fresh).model_dump(mode="json")
         for path, value in values.items():

@@ -67,7 +67,7 @@ def estimate(scene: Scene, rods: tuple[str, ...]) -> dict[str, Prior]:
         assert isinstance(rod, Rod)
         deflection = np.nan if motion is None else _deflection(scene, name, rod, motion)
         assert rod.youngs_modulus is not None
-        speed = np.sqrt(rod.youngs_modulus / rod.density) * _thickness(scene, rod) / np.sqrt(12.0)
+        speed = np.sqrt(rod.youngs_modulus / rod.density) * min(rod.section_at(0).gyration(scene.dimensions))
         error = OVERSHOOT * deflection * (1.0 + growth)
         found[name] = Prior(deflection, growth, error, float(np.pi**2 * speed / rod.length**2))
     return found
@@ -135,13 +135,8 @@ def _deflection(scene: Scene, name: str, rod: Rod, motion: Trajectory) -> float:
     else:
         sag = line * length**4 / np.pi**4 + force * length**3 / 48 + moment * length**2 / 16
     tension = sum(masses.values()) * largest + force
-    bending_stiffness = rod.axial_stiffness * _thickness(scene, rod) ** 2 / 12
+    bending_stiffness = rod.axial_stiffness * min(rod.section_at(0).gyration(scene.dimensions)) ** 2
     return float(sag / bending_stiffness + tension * length / rod.axial_stiffness)
-
-
-def _thickness(scene: Scene, rod: Rod) -> float:
-    """Of the section, in the direction in which it bends most easily [m]."""
-    return float(min(rod.section(0)[: scene.dimensions - 1]))
 
 
 def _applied(scene: Scene, name: str, rod: Rod) -> tuple[float, float]:

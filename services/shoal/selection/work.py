@@ -51,8 +51,7 @@ class Forecast:
         assert isinstance(rod, Rod)
         if level.element not in _BENDING:  # the thickness mode does not know the length of its element
             return self._steps[key]
-        bending = self.scene.dimensions - 1  # in so many directions
-        gyration = max(*rod.section(0)[:bending], *rod.section(1)[:bending]) / np.sqrt(12.0)
+        gyration = max(max(rod.section_at(x).gyration(self.scene.dimensions)) for x in (0, 1))
         turn = rod.length / (_BENDING[level.element] * gyration)
 
         def growth(n: int) -> float:

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from shoal.identification import Estimate
     from shoal.identification.design import Design
     from shoal.mechanics.analysis.equilibrium import Equilibrium
+    from shoal.mechanics.analysis.joint_reactions import Reactions
     from shoal.mechanics.analysis.modes import Modes
-    from shoal.mechanics.analysis.reactions import Reactions
     from shoal.response import Response
     from shoal.response.allocation import Allocation
     from shoal.response.limits import Judged

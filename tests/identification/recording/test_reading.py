@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from shoal import table as tabular
 from shoal.errors import InputError
 from shoal.identification import Recording
-from shoal.identification.recording import table as tabular
 from shoal.identification.recording.reading import described
 from shoal.identification.recording.reading import read as read_source
 from shoal.identification.recording.source import SI, Channel, FileSource

@@ -11,14 +11,14 @@ from scipy.integrate import quad
 from shoal.errors import InputError
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.statics import statics
-from shoal.mechanics.elements.section import torsion_constant
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Rod, Scene
+from shoal.scene.sections import Rectangle
 
 E, NU, H, W, RHO = 7e10, 0.3, 0.04, 0.02, 2700.0
 STRONG, WEAK = E * W * H**3 / 12, E * H * W**3 / 12
-TORSION = E / (2 * (1 + NU)) * float(torsion_constant(H, W))
+TORSION = E / (2 * (1 + NU)) * float(Rectangle(H, W).torsion)
 GROUND = {"body": "ground", "point": [0, 0, 0]}
 
 
@@ -73,7 +73,7 @@ def test_a_clamped_rod_vibrates_about_both_axes_and_in_torsion() -> None:
     """Frequencies of Euler and Bernoulli, that of a shaft in torsion, and Kelvin-Voigt damping, omega/2 times eta."""
     found = modes(cantilever(16, retardation=1e-5, height=0.2, width=0.1), count=6).modes
     area, weak, strong = 0.02, 0.2 * 0.1**3 / 12, 0.1 * 0.2**3 / 12
-    shear = E / (2 * (1 + NU)) * float(torsion_constant(0.2, 0.1))
+    shear = E / (2 * (1 + NU)) * float(Rectangle(0.2, 0.1).torsion)
     torsional = 0.25 * math.sqrt(shear / (RHO * (weak + strong)))
     bending = [k**2 / (2 * math.pi) * math.sqrt(E * weak / (RHO * area)) for k in (1.8751041, 4.6940911)]
     frequencies = np.array([mode.frequency for mode in found])
@@ -109,7 +109,7 @@ def test_a_narrow_rod_buckles_sideways() -> None:
     """Prandtl's load 4.0126 sqrt(EI GJ)/L^2, raised by the bending before (Timoshenko and Gere, Stability, 6.3)."""
     width = 0.004
     weak, strong = E * H * width**3 / 12, E * width * H**3 / 12
-    twisting = E / (2 * (1 + NU)) * float(torsion_constant(H, width))
+    twisting = E / (2 * (1 + NU)) * float(Rectangle(H, width).torsion)
     raised = 1 / math.sqrt((1 - weak / strong) * (1 - twisting / strong))
     load = 4.0126 * math.sqrt(weak * twisting) * raised
     below, above = (

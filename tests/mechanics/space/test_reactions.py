@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from shoal.mechanics.analysis.evaluate import Evaluator
-from shoal.mechanics.analysis.reactions import Reactions, reactions
+from shoal.mechanics.analysis.joint_reactions import Reactions
+from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.sections import SpatialSections, sections
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene, load_scene

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 from shoal.mechanics.analysis.settled import settled
 from shoal.mechanics.analysis.statics import statics
-from shoal.mechanics.elements.section import torsion_constant
 from shoal.scene import Scene
+from shoal.scene.sections import Rectangle
 
 E, NU, L = 7e10, 0.3, 1.0
 
@@ -50,7 +50,7 @@ def by_shooting(rod: dict[str, Any], force: Any) -> Any:
     """r' = (1 + n/EA) d1, D' = D [u], m' = f x r', u = u0 + K^-1 D'm, from the clamp on so that no moment is left."""
     h, w, length, modulus = rod["height"], rod["width"], rod["length"], rod["youngs_modulus"]
     shear = modulus / (2 * (1 + rod["poisson_ratio"]))
-    torsion = rod.get("torsion_constant", float(torsion_constant(h, w)))
+    torsion = rod.get("torsion_constant", float(Rectangle(h, w).torsion))
     stiffness = np.array([shear * torsion, modulus * h * w**3 / 12, modulus * w * h**3 / 12])
     names = ("twist", "side_curvature", "curvature")
     shapes = [np.polynomial.Polynomial(rod.get(name, [0.0])) for name in names]

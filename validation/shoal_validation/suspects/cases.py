@@ -162,7 +162,7 @@ def _bent(scene: Scene, body: str, size: Size, rng: np.random.Generator) -> dict
     """Fields of a rod that bends."""
     rod = scene.bodies[body]
     sag = float(rng.uniform(0.005, 0.03))
-    modulus = rod.mass * size.gravity * rod.length**2 / (8 * rod.width * rod.height**3 / 12 * sag)  # type: ignore[union-attr]
+    modulus = rod.mass * size.gravity * rod.length**2 / (8 * rod.section_at(0.0).bending * sag)  # type: ignore[union-attr]
     fields = {"youngs_modulus": float(modulus), "element": "ancf-cable", "elements": 4}
     return {f"bodies.{body}.{field}": value for field, value in fields.items()}
 

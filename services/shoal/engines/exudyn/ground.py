@@ -61,12 +61,19 @@ def driven(system: System, f: Function, field: str) -> Course:
     return course
 
 
+def mesh(system: System, first: Coordinate, second: Coordinate, ratio: float) -> None:
+    """Let second be `ratio` times first; Exudyn counts coordinates from the start."""
+    # Its constraint is factorValue1 times the coordinate of marker 1, less that of marker 0.
+    system.add("ObjectConnectorCoordinate", markerNumbers=_markers(system, second, first), factorValue1=ratio)
+
+
+def _markers(system: System, *coordinates: Coordinate) -> list[Any]:
+    return [system.add("MarkerNodeCoordinate", nodeNumber=node, coordinate=number) for node, number in coordinates]
+
+
 def drive(system: System, first: Coordinate, second: Coordinate, course: Course) -> None:
     """Let second - first follow a function of time; Exudyn counts coordinates from the start."""
-    markers = [
-        system.add("MarkerNodeCoordinate", nodeNumber=node, coordinate=coordinate)
-        for node, coordinate in (first, second)
-    ]
+    markers = _markers(system, first, second)
     begin = course.value(0.0)
     system.add(
         "ObjectConnectorCoordinate",

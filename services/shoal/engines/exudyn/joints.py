@@ -13,12 +13,24 @@ from shoal.engines.exudyn.bodies import RigidPart
 from shoal.engines.exudyn.chain import cross
 from shoal.engines.exudyn.connectors import Exchange, Law, add_rail, add_torsion
 from shoal.engines.exudyn.ends import Ends
-from shoal.engines.exudyn.ground import Coordinate, GroundPart, drive, driven
+from shoal.engines.exudyn.ground import Coordinate, GroundPart, drive, driven, mesh
 from shoal.errors import InputError
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.joints import Turned, conditions
 from shoal.mechanics.start.closure import value_of
-from shoal.scene import Attachment, Distance, DrivenAngle, Joint, Parallel, Perpendicular, Revolute, Slider, Weld
+from shoal.scene import (
+    GROUND,
+    Attachment,
+    Distance,
+    DrivenAngle,
+    Gear,
+    Joint,
+    Parallel,
+    Perpendicular,
+    Revolute,
+    Slider,
+    Weld,
+)
 from shoal.trajectory import Array
 
 Gap = Callable[[Array, Array], Array]
@@ -82,18 +94,25 @@ def _add_distance(ends: Ends, where: str, joint: Distance) -> None:
 
 def _add_drive(ends: Ends, where: str, joint: DrivenAngle) -> None:
     """The angle is a difference of two coordinates, which Exudyn counts from the start."""
-    ends.require_direction(where, joint.first, joint.second)
-
-    def coordinate(side: Attachment) -> Coordinate:
-        part, _ = ends.part(side)
-        if isinstance(part, GroundPart):
-            return part.node, 0
-        if isinstance(part, RigidPart):
-            return part.node, 2
-        raise InputError(f"{where}: drives the angle of a flexible rod; weld a rigid body to it instead")
-
     course = driven(ends.system, joint.angle, f"{where}.angle")
-    drive(ends.system, coordinate(joint.first), coordinate(joint.second), course)
+    drive(ends.system, _angle(ends, where, joint.first), _angle(ends, where, joint.second), course)
+
+
+def _add_gear(ends: Ends, where: str, joint: Gear) -> None:
+    if joint.carrier.body != GROUND:
+        raise InputError(f"{where}.carrier: engine exudyn cannot do gears on a carrier that turns; use gauss")
+    mesh(ends.system, _angle(ends, where, joint.first), _angle(ends, where, joint.second), joint.ratio)
+
+
+def _angle(ends: Ends, where: str, side: Attachment) -> Coordinate:
+    """The coordinate of Exudyn that is the angle of a body."""
+    ends.require_direction(where, side)
+    part, _ = ends.part(side)
+    if isinstance(part, GroundPart):
+        return part.node, 0
+    if isinstance(part, RigidPart):
+        return part.node, 2
+    raise InputError(f"{where}: turns a flexible rod; weld a rigid body to it instead")
 
 
 def _rub_pin(ends: Ends, where: str, joint: Revolute, law: Law) -> Exchange:
@@ -134,6 +153,12 @@ def _twisted(ends: Ends, joint: Parallel | Perpendicular, q: Array, v: Array) ->
     return np.asarray(np.abs(np.angle(np.exp(1j * (b.direction - a.direction - _turn(ends, joint))))))
 
 
+def _slipped(ends: Ends, joint: Gear, q: Array, v: Array) -> Array:
+    a, b = (ends.motion(side, q, v).direction for side in (joint.first, joint.second))
+    slip = (b - b[0]) - joint.ratio * (a - a[0])
+    return np.asarray(np.abs(slip) / max(1.0, abs(joint.ratio)))
+
+
 def _not_seen(ends: Ends, joint: DrivenAngle, q: Array, v: Array) -> Array:
     return np.zeros(len(q))
 
@@ -146,6 +171,7 @@ JOINTS: dict[str, tuple[Callable[[Ends, str, Any], None], Callable[[Ends, Any, A
     "parallel": (_add_turn, _twisted),
     "perpendicular": (_add_turn, _twisted),
     "driven-angle": (_add_drive, _not_seen),
+    "gear": (_add_gear, _slipped),
 }
 """How a kind is entered, and how far it opens."""
 FRICTION: dict[str, Callable[[Ends, str, Any, Law], Exchange]] = {"revolute": _rub_pin, "slider": _rub_slider}

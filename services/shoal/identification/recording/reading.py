@@ -14,9 +14,9 @@ from shoal.identification.recording.measurement import Recording
 from shoal.identification.recording.noise import differences
 from shoal.identification.recording.source import SI, Channel, FileSource
 from shoal.identification.recording.swaps import mend
-from shoal.identification.recording.table import Mask, Table, load_table
 from shoal.scene.load import read_yaml
 from shoal.scene.record import one_line
+from shoal.table import Mask, Table, load_table
 from shoal.trajectory import Array
 
 YAML = (".yaml", ".yml")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shoal.mechanics.analysis.balance import zero_level
-from shoal.mechanics.analysis.reactions import Reactions
+from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene
 from shoal.trajectory import plain

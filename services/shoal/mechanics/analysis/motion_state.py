@@ -9,6 +9,7 @@ import numpy as np
 
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import stability
+from shoal.mechanics.analysis.at_rest import begun
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import choose, facts, halting, pick
@@ -39,7 +40,7 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
     """
     if not len(times) or not all(np.isfinite(t) and t >= 0 for t in times):
         raise InputError("times: give times of at least 0 s")
-    model = build(scene, horizon=max(times))
+    model = begun(build(scene, horizon=max(times)))
     choice = pick(scene.solver, model, stability.step_limit)
     if max(times) > 0:
         check_step(scene, choice)

@@ -10,7 +10,7 @@ from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.joint_forces import Component, Rubbing, gap, moving, of_places
 from shoal.mechanics.frames import BeamFrame, RigidFrame
-from shoal.mechanics.joints import Along, Condition, Turned
+from shoal.mechanics.joints import Along, Condition, Geared, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, Revolute, Slider
 
@@ -21,6 +21,10 @@ def components(bodies: FreeBodies, name: str, condition: Condition, at: Array) -
     """The unknowns of a condition of a joint."""
     if isinstance(condition, Turned):
         return [Component(name, "torque", _turning(bodies, condition.first, condition.second, at), _NONE, _TURN)]
+    if isinstance(condition, Geared):
+        lines = [bodies.placement.direction(bodies.scene, side) for side in condition.sides]
+        turning = np.array(condition.factors) @ points(lines, bodies.unknowns).turning(at)
+        return [Component(name, "torque", turning, _NONE, _TURN * condition.factors[0])]
     if isinstance(condition, Along):
         assert not isinstance(condition.direction, tuple)
         e, _, across = _sliding(bodies, condition.first, condition.second, condition.direction, at)

@@ -80,11 +80,11 @@ def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: 
     arcs: list[float] = []
     tangents, forces, moments = list[Array](), list[Array](), list[Array]()
     for number, elastic in enumerate(bodies.evaluator.element_forces(at, rate, rod)):
-        height, width = body.section((number + 0.5) / body.elements)
+        section = body.section_at((number + 0.5) / body.elements)
         own = np.array([vector.own for vector in frame.of_element(number)])
-        inertia = np.array(element.mass(body.density, height, width, length)) @ change[own]
-        weight = np.outer(element.weight(body.density, height, width, length), load)
-        unit = np.array(element.weight(1.0, 1.0, 1.0, length))
+        inertia = np.array(element.mass(body.density, section, length)) @ change[own]
+        weight = np.outer(element.weight(body.density * section.area, length), load)
+        unit = np.array(element.weight(1.0, length))
         for one in along:
             force = np.array(padded(one.force, scene.dimensions))
             weight = weight + np.outer(unit, force) * float(one.scale(np.array(t)))

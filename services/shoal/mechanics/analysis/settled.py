@@ -42,8 +42,9 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
             continue
         gap = float(np.max(np.linalg.norm(coarse.points - found.points, axis=1)))
         fall = np.clip(last / gap, *FALLS) if np.isfinite(last) and gap > 0 else UNSEEN
-        found = replace(found, mesh_error=gap / (float(fall) - 1.0))
-        if found.mesh_error is not None and SAFE * found.mesh_error <= tolerance:
+        error = gap / (float(fall) - 1.0)
+        found = replace(found, mesh_error=error)
+        if SAFE * error <= tolerance:
             return found
     if not found.ok:
         return found

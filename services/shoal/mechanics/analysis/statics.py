@@ -17,7 +17,7 @@ from shoal.mechanics import plane
 from shoal.mechanics.analysis.balance import Balance, Found, zero_level
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.evaluate import Evaluator, points
-from shoal.mechanics.analysis.reactions import reactions_of
+from shoal.mechanics.analysis.joint_reactions import reactions_of
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.placement import place

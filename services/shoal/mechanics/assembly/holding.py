@@ -10,7 +10,7 @@ from shoal.mechanics.affine import fixed
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import is_stiff, kept_rotation
 from shoal.mechanics.frames import BeamFrame
-from shoal.mechanics.joints import Along, Apart, Meet, Sum, Turned
+from shoal.mechanics.joints import Along, Apart, Geared, Meet, Sum, Turned
 from shoal.scene import GROUND, Function, Scene
 
 
@@ -22,6 +22,8 @@ def hold(scene: Scene, result: Placement) -> None:
             if isinstance(condition, Turned):
                 clamped = condition is joints.weld_of(conditions) and _is_clamp(scene, condition, result)
                 _keep_turn(scene, name, condition, clamped, result)
+            elif isinstance(condition, Geared):
+                _keep_mesh(scene, name, condition, result)
             else:
                 _keep(scene, name, condition, result)
 
@@ -61,6 +63,16 @@ def _keep_turn(scene: Scene, name: str, condition: Turned, clamped: bool, result
     elif not stiff and not clamped:
         held = result.direction(scene, first).turned(kept_rotation(scene, condition))
         result.terms.cross(name, held, result.direction(scene, second), 0)
+
+
+def _keep_mesh(scene: Scene, name: str, condition: Geared, result: Placement) -> None:
+    if not all(is_stiff(scene, side.body) for side in condition.sides):
+        raise InputError(f"joints.{name}: turns a flexible rod; weld a rigid body to it instead")
+    directions = [result.direction(scene, side) for side in condition.sides]
+    starts = [plane.angle(result.start_of(one)[0]) for one in directions]
+    begin = sum(factor * angle for factor, angle in zip(condition.factors, starts, strict=True))
+    parts = tuple((factor, one) for factor, one in zip(condition.factors, directions, strict=True) if factor)
+    result.terms.mesh(name, parts, -begin, 2 * np.pi / condition.most)
 
 
 def _is_clamp(scene: Scene, weld: Turned, result: Placement) -> bool:

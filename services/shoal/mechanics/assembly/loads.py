@@ -221,7 +221,7 @@ class Loads:
         assert isinstance(rod, Rod)
         number = self._function(f"loads.{name}.scale", load.scale)
         if isinstance(frame, BeamFrame):
-            parts = frame.element.weight(1.0, 1.0, 1.0, frame.element_length)
+            parts = frame.element.weight(1.0, frame.element_length)
             loads = [pair for k in range(rod.elements) for pair in zip(frame.of_element(k), parts, strict=True)]
         else:
             assert isinstance(frame, RigidFrame)

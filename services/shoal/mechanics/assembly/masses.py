@@ -78,18 +78,18 @@ class Masses:
         element = frame.element
         length = frame.element_length * np.ones(1) if np.ndim(frame.element_length) else frame.element_length
         for number in range(rod.elements):
-            height, width = rod.section((number + 0.5) / rod.elements)
+            section = rod.section_at((number + 0.5) / rod.elements)
             vectors = frame.of_element(number)
-            _add(self.mass, vectors, element.mass(rod.density, height, width, length))
+            _add(self.mass, vectors, element.mass(rod.density, section, length))
             if element.stretching is not None and self.scene.solver.caps_inertia:
-                _add(self.stretching, vectors, element.stretching(rod.youngs_modulus * height * width, length))
-            self._add_load(vectors, element.weight(rod.density, height, width, length))
+                _add(self.stretching, vectors, element.stretching(rod.youngs_modulus * section.area, length))
+            self._add_load(vectors, element.weight(rod.density * section.area, length))
             nodal: list[Any] = []
             for node in (number, number + 1):
                 s = rod.length * node / rod.elements
                 axis = plane.vector(*rod_axis(rod, s)) if self.scene.dimensions == 2 else unstrained(rod, s)[0]
                 nodal += [axis, *element.nodal_vectors(rod, s)]
-            part = element.part(rod, height, width, length, nodal)
+            part = element.part(rod, section, length, nodal)
             self.families[element.family].add(name, self.rows.of_all(vectors), part)
 
     def _add_load(self, vectors: list[Affine], masses: list[Number]) -> None:
@@ -118,7 +118,8 @@ def second_moments(body: Rod | RigidBody) -> list[list[Number]]:
     inertia, their sum with that along the axis is the plane's.
     """
     if isinstance(body, Rod):
-        across, wide = body.mass * body.height**2 / 12, body.mass * body.width**2 / 12
+        section = body.section_at(0.0)
+        across, wide = body.mass * section.bending / section.area, body.mass * section.side / section.area
         along = body.inertia - across
         matrix = [[along, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, wide]]
     else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,11 +43,32 @@ class Term:
         return [(x[i], y[j], form[i, j], u, w) for i, j in zip(*np.nonzero(form), strict=True)]
 
 
+@dataclass(frozen=True)
+class Mesh:
+    """Sum of factor * angle of unit vector + constant = 0, but for multiples of the period [rad]."""
+
+    name: str
+    parts: tuple[tuple[float, Affine], ...]
+    constant: Number
+    period: float
+    drive: None = None
+    lengths: int = 0
+
+    def slopes(self, rows: Callable[[Affine], tuple[int, ...]]) -> Iterator[tuple[int, int, Number]]:
+        """(unknown, row, coefficient): derivatives by an unknown are coefficients times rows, as d is a unit vector."""
+        for factor, vector in self.parts:
+            if vector.terms:
+                x, y = rows(vector)
+                for unknown, (along, across) in vector.terms.items():
+                    yield unknown, y, -factor * along
+                    yield unknown, x, factor * across
+
+
 class Terms:
     """Collects constraints before their vectors have rows."""
 
     def __init__(self) -> None:
-        self.held: list[Term] = []
+        self.held: list[Term | Mesh] = []
 
     def dot(
         self, name: str, u: Affine, w: Affine, lengths: int, constant: Number = 0.0, drive: Composed | None = None
@@ -62,6 +83,10 @@ class Terms:
     def cross(self, name: str, u: Affine, w: Affine, lengths: int, drive: Composed | None = None) -> None:
         """u x w + drive(t) = 0 of two vectors of the plane, measured in m to the power of `lengths`."""
         self.held.append(Term(name, u, w, plane.CROSS, 0.0, drive, lengths))
+
+    def mesh(self, name: str, parts: tuple[tuple[float, Affine], ...], constant: Number, period: float) -> None:
+        """Sum of factor * angle of unit vector + constant = 0, but for multiples of the period [rad]."""
+        self.held.append(Mesh(name, parts, constant, period))
 
     def vanish(self, name: str, vector: Affine, drives: tuple[Composed, ...] | None = None) -> None:
         """vector + drives(t) = 0, a linear constraint for each component [m]."""
@@ -78,9 +103,20 @@ def assemble(terms: Terms, rows: Rows, driven: int) -> Constraints:
     column: list[int] = []
     parts: list[tuple[int, int, Number]] = []
     drive = []
+    turned, rising, shares, periods = [0], list[int](), list[Number](), list[Number]()
     for held in terms.held:
         found: dict[int, int] = {}
-        for left, right, factor, u, w in held.products(rows.of):
+        if isinstance(held, Mesh):
+            for unknown, source, coefficient in held.slopes(rows.of):
+                if np.any(coefficient):
+                    if unknown not in found:
+                        found[unknown] = len(column)
+                        column.append(unknown)
+                    parts.append((found[unknown], source, coefficient))
+            for share, vector in held.parts:
+                rising.append(rows.of(vector)[0])
+                shares.append(share)
+        for left, right, factor, u, w in held.products(rows.of) if isinstance(held, Term) else ():
             lefts.append(left)
             rights.append(right)
             factors.append(factor)
@@ -98,6 +134,8 @@ def assemble(terms: Terms, rows: Rows, driven: int) -> Constraints:
                     parts.append((found[unknown], other, coefficient))
         start.append(len(lefts))
         entry.append(len(column))
+        turned.append(len(rising))
+        periods.append(held.period if isinstance(held, Mesh) else 1.0)
         drive.append(-1 if held.drive is None else driven)
         driven += held.drive is not None
 
@@ -116,4 +154,8 @@ def assemble(terms: Terms, rows: Rows, driven: int) -> Constraints:
         index([target for target, _, _ in parts]),
         index([source for _, source, _ in parts]),
         stacked([coefficient for _, _, coefficient in parts]),
+        index(turned),
+        index(rising),
+        stacked(shares),
+        stacked(periods),
     )

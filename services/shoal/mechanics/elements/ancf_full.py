@@ -25,6 +25,7 @@ from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
+from shoal.scene.sections import Section
 
 # Rows of the work space: d, r1_x, r2_x, n, m; the same of a second configuration; forces on them.
 _X, _AFTER, _FORCE = 0, 10, 20
@@ -111,9 +112,9 @@ def mass_matrix(density: Number, length: Number, height: Number, width: Number) 
     return full
 
 
-def weight(density: Number, length: Number, height: Number, width: Number) -> list[Number]:
+def weight(line: Number, length: Number) -> list[Number]:
     """Consistent load of a unit acceleration [kg, kg m] on the six vectors."""
-    first, first_slope, second, second_slope = beam.weight(beam.CUBIC, density * width * height, length)
+    first, first_slope, second, second_slope = beam.weight(beam.CUBIC, line, length)
     return [first, first_slope, 0.0 * first, second, second_slope, 0.0 * first]
 
 
@@ -229,9 +230,9 @@ def _direction_shape(x: Number, y: Number, length: Number) -> list[Number]:
     return [zero, zero, 1 - x + zero, zero, zero, x + zero]
 
 
-def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
+def _part(rod: Rod, section: Section, length: Number, nodal: list[Number]) -> Entry:
     law = LAWS[rod.law]
-    numbers = coefficients(law, length, height, width, rod.youngs_modulus, rod.poisson_ratio)
+    numbers = coefficients(law, length, section.height, section.width, rod.youngs_modulus, rod.poisson_ratio)
     return Entry(quadrature(law), 0, False, numbers, [])
 
 
@@ -240,8 +241,8 @@ ELEMENT = Element(
     nodal_vectors=lambda rod, s: [plane.vector(1.0 + 0.0 * s, 0.0), plane.vector(0.0 * s, 1.0)],
     position_shape=position_shape,
     direction_shape=_direction_shape,
-    mass=lambda density, height, width, length: mass_matrix(density, length, height, width),
-    weight=lambda density, height, width, length: weight(density, length, height, width),
+    mass=lambda density, section, length: mass_matrix(density, length, section.height, section.width),
+    weight=lambda line, length: weight(line, length),
     part=_part,
     clamped=1,
     normal=True,

@@ -30,6 +30,7 @@ from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import Entry
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.scene import Rod
+from shoal.scene.sections import Section
 
 CUBIC = 4
 QUINTIC = 6
@@ -161,7 +162,7 @@ def element(
     vectors: int,
     family: type,
     nodal_vectors: Callable[[Rod, Number], list[Number]],
-    part: Callable[[Rod, Number, Number, Number, list[Number]], Entry],
+    part: Callable[[Rod, Section, Number, list[Number]], Entry],
 ) -> Element:
     """A beam element as `Element` states it."""
     return Element(
@@ -169,8 +170,8 @@ def element(
         nodal_vectors=nodal_vectors,
         position_shape=lambda x, y, length: shape(vectors, x, length, 0),
         direction_shape=lambda x, y, length: shape(vectors, x, length, 1),
-        mass=lambda density, height, width, length: mass_matrix(vectors, density * height * width, length),
-        weight=lambda density, height, width, length: weight(vectors, density * height * width, length),
+        mass=lambda density, section, length: mass_matrix(vectors, density * section.area, length),
+        weight=lambda line, length: weight(vectors, line, length),
         part=part,
         stretching=lambda axial, length: stretching(vectors, axial, length),
     )
@@ -181,13 +182,12 @@ def part(
     rule: Array,
     variant: int,
     rod: Rod,
-    height: Number,
-    width: Number,
+    section: Section,
     length: Number,
     nodal: list[Number],
 ) -> Entry:
     """One element of a rod with this rule; nodal: its nodal vectors at rest, (2, ...)."""
-    axial, bending = rod.youngs_modulus * height * width, rod.youngs_modulus * width * height**3 / 12
+    axial, bending = rod.youngs_modulus * section.area, rod.youngs_modulus * section.bending
     numbers = [1.0 / length, axial * length, bending / length, rod.retardation + 0.0 * length]
     return Entry(rule, variant, bool(np.any(rod.retardation)), numbers, reference(vectors, rule, nodal, length))
 

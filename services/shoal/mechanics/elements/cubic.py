@@ -25,6 +25,7 @@ from shoal.mechanics.numerics.pointers import shift
 from shoal.mechanics.numerics.simd import EIGHT, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
+from shoal.scene.sections import Section
 
 ROWS = 2 * beam.CUBIC
 FULL, REDUCED, CURVED, DAMPED = range(4)
@@ -238,13 +239,13 @@ implement(
 )
 
 
-def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
+def _part(rod: Rod, section: Section, length: Number, nodal: list[Number]) -> Entry:
     reduced, damped = rod.quadrature == "reduced", bool(np.any(rod.retardation))
     if reduced and (damped or rod.curvature):
         raise InputError("quadrature: a curved or damped ancf-cable has the full quadrature")
     variant = REDUCED if reduced else DAMPED if damped else CURVED if rod.curvature else FULL
     rule = REDUCED_RULE if reduced else FULL_RULE
-    return beam.part(beam.CUBIC, rule, variant, rod, height, width, length, nodal)
+    return beam.part(beam.CUBIC, rule, variant, rod, section, length, nodal)
 
 
 ELEMENT = beam.element(beam.CUBIC, Cubics, lambda rod, s: [beam.tangent(rod, s)], _part)

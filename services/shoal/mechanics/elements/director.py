@@ -28,13 +28,13 @@ from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficie
 from shoal.mechanics.elements.director_strains import AXIAL, BENDING, STRAINS, curve, gradient, strains
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
-from shoal.mechanics.elements.section import torsion_constant
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.numerics.pointers import pointer, shift
 from shoal.mechanics.numerics.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.mechanics.numerics.triples import dot, plus, times
 from shoal.scene import Rod
+from shoal.scene.sections import Section
 
 ROWS, COEFFICIENTS = 18, 6
 ELASTIC, DAMPED = 0, 1
@@ -259,30 +259,31 @@ def _at_rest(rod: Rod, length: Number, nodal: list[Number]) -> list[Number]:
     return list(found)
 
 
-def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
+def _part(rod: Rod, section: Section, length: Number, nodal: list[Number], across: bool = False) -> Entry:
     free = _at_rest(rod, length, nodal)
     young: Number = rod.youngs_modulus
     shear = young / (2 * (1 + rod.poisson_ratio))
-    return entry(young, shear, height, width, length, free, rod.torsion_constant, rod.retardation)
+    torsion = section.torsion if rod.torsion_constant is None else rod.torsion_constant
+    bending = (section.side, section.bending) if across else (section.bending, section.side)
+    return entry(young, shear * torsion, section.area, bending, length, free, rod.retardation)
 
 
 def entry(
     young: Number,
-    shear: Number,
-    height: Number,
-    width: Number,
+    twisting: Number,
+    area: Number,
+    bending: tuple[Number, Number],
     length: Number,
     free: list[Number],
-    torsion: Number | None = None,
     retardation: Number = 0.0,
 ) -> Entry:
-    """One element of this material [Pa] and section [m], whose director is along its height.
+    """One element.
 
-    free: strains at rest; torsion: the torsion constant [m^4], of a rectangle where it is None.
+    young: Young's modulus [Pa]; twisting: stiffness GJ [N m^2]; area [m^2]; bending: second moments along the director
+    and across it [m^4]; free: strains at rest; retardation [s].
     """
-    bending = young * width * height**3 / 12 / length, young * height * width**3 / 12 / length
-    twisting = shear * (torsion_constant(height, width) if torsion is None else torsion) / length
-    numbers = [1.0 / length, young * height * width * length, twisting, *bending, retardation + 0.0 * length]
+    bend = [young * moment / length for moment in bending]
+    numbers = [1.0 / length, young * area * length, twisting / length, *bend, retardation + 0.0 * length]
     damped = bool(np.any(retardation))
     return Entry(BENDING, DAMPED if damped else ELASTIC, damped, numbers, free)
 
@@ -302,10 +303,10 @@ def _padded(factors: list[Number]) -> list[Number]:
     return [*factors[:2], 0.0, *factors[2:], 0.0]
 
 
-def _mass(density: Number, height: Number, width: Number, length: Number) -> list[list[Number]]:
+def _mass(density: Number, section: Section, length: Number) -> list[list[Number]]:
     """That of the cable, and the polar inertia of the section on the directors, which are linear in between."""
-    cable = beam.mass_matrix(beam.CUBIC, density * height * width, length)
-    polar = density * height * width * (height**2 + width**2) / 12 * length
+    cable = beam.mass_matrix(beam.CUBIC, density * section.area, length)
+    polar = density * section.polar * length
     rows = [_padded(row) for row in cable]
     first, second = [0.0, 0.0, polar / 3, 0.0, 0.0, polar / 6], [0.0, 0.0, polar / 6, 0.0, 0.0, polar / 3]
     return [*rows[:2], first, *rows[2:], second]
@@ -322,8 +323,8 @@ ALONG_Z = Element(
     position_shape=lambda x, y, length: _padded(beam.shape(beam.CUBIC, x, length, 0)),
     direction_shape=lambda x, y, length: _padded(beam.shape(beam.CUBIC, x, length, 1)),
     mass=_mass,
-    weight=lambda density, height, width, length: _padded(beam.weight(beam.CUBIC, density * height * width, length)),
-    part=lambda rod, height, width, length, nodal: _part(rod, width, height, length, nodal),
+    weight=lambda line, length: _padded(beam.weight(beam.CUBIC, line, length)),
+    part=lambda rod, section, length, nodal: _part(rod, section, length, nodal, across=True),
     stretching=_stretching,
     products=((1, 1, 1.0), (0, 1, 0.0)),
     director=2,

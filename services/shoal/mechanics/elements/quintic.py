@@ -19,6 +19,7 @@ from shoal.mechanics.numerics.pointers import shift
 from shoal.mechanics.numerics.simd import EIGHT, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
+from shoal.scene.sections import Section
 
 ROWS = 2 * beam.QUINTIC
 FOUR, FOUR_CURVED, FOUR_DAMPED, FIVE, FIVE_CURVED, FIVE_DAMPED = range(6)
@@ -261,11 +262,11 @@ def _nodal_vectors(rod: Rod, s: Number) -> list[Number]:
     return [tangent, curvature * plane.quarter(tangent)]
 
 
-def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
+def _part(rod: Rod, section: Section, length: Number, nodal: list[Number]) -> Entry:
     rule = recommended(rod.elements)
     kind = 2 if np.any(rod.retardation) else 1 if rod.curvature else 0
     variant = (FOUR if len(rule) == 4 else FIVE) + kind
-    return beam.part(beam.QUINTIC, rule, variant, rod, height, width, length, nodal)
+    return beam.part(beam.QUINTIC, rule, variant, rod, section, length, nodal)
 
 
 ELEMENT = beam.element(beam.QUINTIC, Quintics, _nodal_vectors, _part)

@@ -33,6 +33,7 @@ from shoal.mechanics.numerics.pointers import shift
 from shoal.mechanics.numerics.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
+from shoal.scene.sections import Section
 
 DIMENSIONS = 3
 STRAIGHT = 1e-16
@@ -212,16 +213,16 @@ def viscosity(tile: Tile, family: Family, z: Array, w: Array, out: Array, first:
     _blocks(tile, True, family, z, w, out, first)
 
 
-def part(rule: Array, variant: int, rod: Rod, height: Number, width: Number, length: Number) -> Entry:
+def part(rule: Array, variant: int, rod: Rod, section: Section, length: Number) -> Entry:
     """One element of a rod with this rule. Raises InputError for a curved one."""
     if rod.curvature:
         raise InputError(f"curvature: an {rod.element} is straight in space")
-    axial, bending = rod.youngs_modulus * height * width, rod.youngs_modulus * width * height**3 / 12
+    axial, bending = rod.youngs_modulus * section.area, rod.youngs_modulus * section.bending
     numbers = [1.0 / length, axial * length, bending / length, rod.retardation + 0.0 * length]
     return Entry(rule, variant, bool(np.any(rod.retardation)), numbers, [])
 
 
-def element(vectors: int, family: type, entry: Callable[[Rod, Number, Number, Number, list[Number]], Entry]) -> Element:
+def element(vectors: int, family: type, entry: Callable[[Rod, Section, Number, list[Number]], Entry]) -> Element:
     """A straight element in space as `Element` states it; its nodal vectors have three components."""
 
     def nodal_vectors(rod: Rod, s: Number) -> list[Number]:

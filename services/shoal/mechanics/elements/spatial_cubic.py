@@ -21,6 +21,7 @@ from shoal.mechanics.elements.strain import stretch
 from shoal.mechanics.numerics.simd import EIGHT, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
+from shoal.scene.sections import Section
 
 ROWS = spatial.DIMENSIONS * beam.CUBIC
 FULL, REDUCED, DAMPED = range(3)
@@ -177,12 +178,12 @@ implement(
 )
 
 
-def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
+def _part(rod: Rod, section: Section, length: Number, nodal: list[Number]) -> Entry:
     reduced, damped = rod.quadrature == "reduced", bool(np.any(rod.retardation))
     if reduced and damped:
         raise InputError("quadrature: a damped ancf-cable has the full quadrature")
     variant = REDUCED if reduced else DAMPED if damped else FULL
-    return spatial.part(REDUCED_RULE if reduced else FULL_RULE, variant, rod, height, width, length)
+    return spatial.part(REDUCED_RULE if reduced else FULL_RULE, variant, rod, section, length)
 
 
 ELEMENT = spatial.element(beam.CUBIC, SpatialCubics, _part)

@@ -14,6 +14,7 @@ from shoal.mechanics.elements.strain import stretch
 from shoal.mechanics.numerics.simd import EIGHT, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
+from shoal.scene.sections import Section
 
 ROWS = spatial.DIMENSIONS * beam.QUINTIC
 FOUR, FOUR_DAMPED, FIVE, FIVE_DAMPED = range(4)
@@ -139,10 +140,10 @@ implement(
 )
 
 
-def _part(rod: Rod, height: Number, width: Number, length: Number, nodal: list[Number]) -> Entry:
+def _part(rod: Rod, section: Section, length: Number, nodal: list[Number]) -> Entry:
     rule = recommended(rod.elements)
     variant = (FOUR if len(rule) == 4 else FIVE) + int(bool(np.any(rod.retardation)))
-    return spatial.part(rule, variant, rod, height, width, length)
+    return spatial.part(rule, variant, rod, section, length)
 
 
 ELEMENT = spatial.element(beam.QUINTIC, SpatialQuintics, _part)

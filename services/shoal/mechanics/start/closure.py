@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shoal.mechanics.joints import Along, Apart, Condition, Meet, Sum, Turned, conditions, unknown
+from shoal.mechanics.joints import Along, Apart, Condition, Geared, Meet, Sum, Turned, conditions, unknown
 from shoal.mechanics.numerics.tile import Array, Index, Number
 from shoal.mechanics.plane import as_complex, phasor
 from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
@@ -164,6 +164,12 @@ class Closure:
                 at = self.place(u, term.at).times(term.factor * (1.0 if term.axis == "x" else -1j))
                 gap, slope, none = gap + at.value.real, slope + at.slope.real, none + at.rate.real
             return [(gap, slope, none - rate_of(condition.value))]
+        if isinstance(condition, Geared):
+            gap, slope = none, np.zeros((len(u), u.shape[1]))
+            for factor, side in zip(condition.factors, condition.sides, strict=True):
+                (now, along), (begin, _) = self._angle(u, side), self._angle(self.begin if self.own else u, side)
+                gap, slope = gap + factor * (now - begin), slope + factor * along
+            return [(gap, slope, none)]
         if isinstance(condition, Turned):
             if {condition.first.body, condition.second.body} & self._points:
                 return []

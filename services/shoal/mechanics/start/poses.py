@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shoal.mechanics.joints import Apart, Turned, of_scene
+from shoal.mechanics.joints import Apart, Geared, Turned, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.reach import extents, span
 from shoal.mechanics.start.closure import Closure
@@ -28,6 +28,10 @@ ITERATIONS = 80
 ATTEMPTS = 24
 """Guesses for one machine; of many lanes fewer are tried."""
 FEW = 6
+_SHAKEN = 1200
+"""Poses of all guesses of one machine together: to shake a long chain at random hardly ever helps."""
+_PATIENCE, _STANDS = 8, 0.99
+"""In so many steps a search that does not stand still lowers its gaps to less than this part."""
 DEPENDENT = 1e-6
 """Part of a pose that the joints leave free, below which they tell it."""
 
@@ -117,12 +121,16 @@ class Assembly:
 
     def seek(self, fixed: Flags, values: Array, near: Array | None = None, attempts: int | None = None) -> Placed:
         """Poses with some held, from one guess after another (or near one)."""
-        most = attempts or (ATTEMPTS if self.lanes == 1 else FEW)
+        most = attempts or (self._attempts if self.lanes == 1 else FEW)
         begun = np.where(fixed, values, self.guess if near is None else near)
         asked = (most, fixed.tobytes(), begun.tobytes())
         if asked not in self._sought:
             self._sought[asked] = self._seek(fixed, values, near, most)
         return self._sought[asked]
+
+    @property
+    def _attempts(self) -> int:
+        return int(np.clip(_SHAKEN // max(self.guess.shape[1], 1), FEW, ATTEMPTS))
 
     def _seek(self, fixed: Flags, values: Array, near: Array | None, most: int) -> Placed:
         best, ok = np.where(fixed, values, self.guess), np.zeros(self.lanes, dtype=bool)
@@ -161,7 +169,9 @@ class Assembly:
     def _own(self) -> bool:
         """Whether joints keep what the start gives them."""
         return any(
-            (isinstance(one, Turned) and one.is_of_start) or (isinstance(one, Apart) and one.length is None)
+            (isinstance(one, Turned) and one.is_of_start)
+            or (isinstance(one, Apart) and one.length is None)
+            or isinstance(one, Geared)
             for _, one in of_scene(self.scene)
         )
 
@@ -180,7 +190,8 @@ class Assembly:
         if not np.any(running):
             return u, np.max(np.abs(gap), axis=1)
         slope = rows.slope / length[:, None]
-        for _ in range(ITERATIONS):
+        before = np.full(len(u), np.inf)
+        for iteration in range(ITERATIONS):
             if not np.any(running):
                 break
             each = slope * give[:, None, :]
@@ -202,6 +213,9 @@ class Assembly:
             slope = np.where(taken[:, None, None], rows.slope / length[:, None], slope)
             norm = np.where(taken, new, norm)
             running &= (norm > 1e-15) & ~stalled & (damping * norm < 1e6)
+            if iteration % _PATIENCE == _PATIENCE - 1:
+                running &= (norm < _STANDS * before) | (norm < ROUNDING)
+                before = norm
         return u, np.max(np.abs(gap), axis=1)
 
     def _in_order(self) -> Placed:
@@ -215,6 +229,8 @@ class Assembly:
             near = np.where(fixed, values, self.guess)
             free = self.seek(none, values, near)
             u, ok = np.where(ok[:, None], u, free.poses), ok | free.ok
+            if not np.any(ok):
+                return Placed(u, ok)
             for one in firm:
                 u, kept = self._keep(one, u, kept)
             length = np.tile([self.size, self.size, 1.0], len(self.scene.bodies))

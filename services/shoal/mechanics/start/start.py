@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.frames import Frame
-from shoal.mechanics.joints import Apart, Meet, Turned, of_scene
+from shoal.mechanics.joints import Apart, Geared, Meet, Turned, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.start.poses import Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
@@ -94,7 +94,9 @@ def gives_numbers(scene: Scene) -> bool:
     if scene.dimensions == 3:
         return True
     kept = any(
-        (isinstance(one, Turned) and one.angle is None) or (isinstance(one, Apart) and one.length is None)
+        (isinstance(one, Turned) and one.angle is None)
+        or (isinstance(one, Apart) and one.length is None)
+        or isinstance(one, Geared)
         for _, one in of_scene(scene)
     )
     return kept or any(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.joints import Along, Apart, Meet, Sum, Turned, of_scene, unknown
+from shoal.mechanics.joints import Along, Apart, Geared, Meet, Sum, Turned, of_scene, unknown
 from shoal.mechanics.numerics.tile import Array, Number
 from shoal.mechanics.plane import as_complex, phasor
 from shoal.mechanics.start.closure import Closure, lead, place_of, rate_of, value_of
@@ -39,7 +39,7 @@ class Walk:
                         return name, None, None, 0.0
                 continue
             for _, condition in of_scene(self.scene):
-                if not isinstance(condition, Meet | Along | Apart | Turned | Sum):
+                if not isinstance(condition, Meet | Along | Apart | Turned | Geared | Sum):
                     raise unknown(condition)
                 if not isinstance(condition, Meet | Along | Apart) or not isinstance(condition, kind):
                     continue
@@ -61,7 +61,7 @@ class Walk:
         needed = {
             name
             for name, condition in of_scene(self.scene)
-            if not isinstance(condition, Sum)
+            if not isinstance(condition, Sum | Geared)
             and any((id(here), id(there)) in used for here, there in _both_ways(condition))
         }
         return [name for name in self.scene.joints if name not in needed]

@@ -28,7 +28,7 @@ def bending(model: ForwardModel) -> Iterator[Candidate]:
     for name, body in scene.bodies.items():
         if not isinstance(body, Rod) or body.element != "rigid":
             continue
-        middle = body.mass * size.gravity * body.length**2 / (8 * body.width * body.height**3 / 12 * _SAG)
+        middle = body.mass * size.gravity * body.length**2 / (8 * body.section_at(0.0).bending * _SAG)
         probes = middle * np.geomspace(1 / _STIFFER, _STIFFER, _WAYS)
         free = Parameter(path=f"bodies.{name}.youngs_modulus", lower=probes[0] / 2, upper=probes[-1] * 2, scale="log")
         fields = {"youngs_modulus": middle, "element": "ancf-cable", "elements": _FOR_ANGLES if angles else _ELEMENTS}

@@ -58,7 +58,7 @@ class _Closing:
 
     def __init__(self, scene: Scene, placement: SpatialPlacement) -> None:
         self.scene, self.placement = scene, placement
-        self.terms = placement.terms.held
+        self.terms = [one for one in placement.terms.held if isinstance(one, Term)]
         self.q, self.v = stacked(placement.positions), stacked(placement.velocities)
         self.size = float(reach.span(scene))
         self.scale = np.array([self.size**term.lengths for term in self.terms])

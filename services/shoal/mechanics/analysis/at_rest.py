@@ -1,0 +1,33 @@
+"""Machines that start where their forces balance, bent or prestressed as they are there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics.analysis.statics import statics
+from shoal.mechanics.model import Model
+from shoal.scene import Scene
+
+
+def begun(model: Model, scenes: Sequence[Scene] | None = None) -> Model:
+    """The model at rest in its equilibrium, where its scene wants to start there; else the model as it is.
+
+    scenes: of every lane, else the one of the model. Raises InputError where a scene has no stable equilibrium.
+    """
+    if not model.stated.starts_at_rest:
+        return model
+    found = [_equilibrium(scene) for scene in scenes or [model.stated]]
+    places, turns = (np.stack(columns, axis=1) for columns in zip(*found, strict=True))
+    return replace(model, q0=places, v0=np.zeros_like(places), start_angles=turns, shared_tiles={})
+
+
+def _equilibrium(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and the angles that angle forces have counted."""
+    found = statics(scene)
+    if not found.ok:
+        raise InputError(f"initial.from: statics finds no stable place of rest: {found.message}")
+    return found.q, found.turns

@@ -1,0 +1,162 @@
+"""Forces and torques in every joint, from the balance of every body taken by itself.
+
+For each free body M a = Q + (what its joints exert), with unknown forces that do work in no displacement the joint
+allows. All balances together are solved by least squares. Where joints hold more than they need to (redundant
+constraints), the solution of least norm is reported, torques counted as forces at the machine's size as lever, and
+the joints whose forces are not unique are named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shoal.mechanics import joints, plane
+from shoal.mechanics.analysis import plane_forces, space_forces
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.free_bodies import FreeBodies
+from shoal.mechanics.analysis.freedom import Metric
+from shoal.mechanics.analysis.joint_forces import friction, place
+from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.reach import span
+from shoal.scene import Attachment, Coupling
+from shoal.scene.joints import places
+from shoal.trajectory import plain
+
+RANK = 1e-9
+SHARE = 1e-6
+"""A component that takes part in a self-stress (of unit size) by less than this is unique."""
+BALANCED = 1e-6
+
+
+@dataclass(frozen=True)
+class JointReaction:
+    """What a joint exerts on its second body (on its first: the opposite).
+
+    at: where [m]; force [N] and torque [N m] (counter-clockwise, in space a vector), friction included; components:
+    each unknown of the joint by name (fx, fy, torque, normal, axial, coupled, ...) with its value; unique: whether none
+    of them could be different with the same motion.
+    """
+
+    joint: str
+    kind: str
+    at: tuple[float, ...]
+    force: tuple[float, ...]
+    torque: float | tuple[float, ...]
+    components: dict[str, float]
+    unique: bool
+
+
+@dataclass(frozen=True)
+class Reactions:
+    """Reactions at one state.
+
+    redundancy: how many self-stresses are possible. constraints: those of the model that depend on others, at a
+    neighbouring state as well. unbalanced: what no joint can balance, relative to all forces.
+    """
+
+    time: float
+    joints: dict[str, JointReaction]
+    redundancy: int
+    constraints: tuple[str, ...]
+    unbalanced: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether all bodies are balanced."""
+        return self.unbalanced < BALANCED
+
+    @property
+    def not_unique(self) -> tuple[str, ...]:
+        """Joints whose forces are not unique."""
+        return tuple(name for name, joint in self.joints.items() if not joint.unique)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "time": self.time,
+            "joints": {name: plain(vars(joint)) for name, joint in self.joints.items()},
+            "redundancy": self.redundancy,
+            "not_unique": list(self.not_unique),
+            "redundant_constraints": list(self.constraints),
+            "unbalanced": plain(self.unbalanced),
+        }
+
+
+def reactions_of(
+    evaluator: Evaluator, q: Array, v: Array, a: Array, t: float = 0.0, *, bodies: FreeBodies | None = None
+) -> Reactions:
+    """Reactions at one state: coordinates, rates and accelerations, each (unknowns,)."""
+    bodies = bodies or FreeBodies(evaluator, t)
+    rubbing = evaluator.model.forces.size - bodies.evaluator.model.forces.size
+    bodies.evaluator.turns = evaluator.turns[rubbing:]
+    at, rate, change = bodies.state(q, v, a)
+    free = bodies.evaluator
+    lever = span(bodies.scene)
+    here: Any = plane_forces if bodies.scene.dimensions == plane.DIMENSIONS else space_forces
+    told = joints.of_scene(bodies.scene)
+    unknown = [part for name, one in told for part in here.components(bodies, name, one, at)]
+    known, rubbed = friction(bodies, at, rate, here.rubbing)
+    force = free.at(at, rate, t).force
+    inertia = bodies.mass @ change
+    displacements = here.displacements(bodies, at, lever)
+    missing = displacements @ (inertia - force - known)
+    scale = max(
+        float(np.linalg.norm(displacements @ part)) for part in (inertia, force, known, force - free.at(at).elastic)
+    )
+    count = len(unknown)
+    columns = np.zeros((len(displacements), count))
+    for k, part in enumerate(unknown):
+        columns[:, k] = displacements @ part.gradient * (lever if part.turns else 1.0)
+    left, sizes, right = np.linalg.svd(columns, full_matrices=True)
+    rank = int(np.sum(sizes > RANK * sizes[0])) if count and len(sizes) else 0
+    solution = right[:rank].T @ ((left[:, :rank].T @ missing) / sizes[:rank])
+    rest = float(np.linalg.norm(missing - columns @ solution))
+    free_play = np.linalg.norm(right[rank:], axis=0) if rank < count else np.zeros(count)
+    found = {}
+    for name in bodies.scene.joints:
+        mine = [k for k, part in enumerate(unknown) if part.joint == name]
+        values = {k: float(solution[k]) * (lever if unknown[k].turns else 1.0) for k in mine}
+        none = np.zeros(bodies.scene.dimensions), np.zeros(1 if here is plane_forces else 3)
+        rubbing_force, rubbing_torque = rubbed.get(name, none)
+        total = sum((unknown[k].force * values[k] for k in mine), rubbing_force)
+        torque = sum((unknown[k].torque * values[k] for k in mine), rubbing_torque).tolist()
+        joint = bodies.scene.joints[name]
+        found[name] = JointReaction(
+            name,
+            joint.kind,
+            tuple(place(bodies, _second(joint), at).value.tolist()),
+            tuple(total.tolist()),
+            torque[0] if here is plane_forces else tuple(torque),
+            {unknown[k].name: values[k] for k in mine},
+            bool(np.all(free_play[mine] < SHARE)),
+        )
+    names = redundant_constraints(evaluator, q, t)
+    return Reactions(t, found, count - rank, names, rest / scale if scale > 0 else 0.0)
+
+
+def redundant_constraints(evaluator: Evaluator, q: Array, t: float = 0.0) -> tuple[str, ...]:
+    """Names of the constraints that depend on others, at q and, if the machine can move, at a state beside it too."""
+    if evaluator.model.constraints.size == 0:
+        return ()
+    metric = Metric(evaluator.mass)
+    freedom = metric.freedom(evaluator.at(q, t=t).jacobian)
+    if freedom.dependent.shape[1] == 0:
+        return ()
+    if freedom.basis.shape[1]:
+        # A fixed combination of all free directions, long enough to leave a singular position.
+        step = freedom.basis @ np.cos(1.0 + np.arange(freedom.basis.shape[1]))
+        q = q + 0.05 * step / np.max(np.abs(step))
+        for _ in range(20):
+            evaluation = evaluator.at(q, t=t)
+            q = q + metric.freedom(evaluation.jacobian).shift(-evaluation.gap)
+        freedom = metric.freedom(evaluator.at(q, t=t).jacobian)
+    involved = np.max(np.abs(freedom.dependent), axis=1, initial=0.0) > SHARE
+    names = evaluator.model.constraint_names
+    return tuple(dict.fromkeys(name for name, yes in zip(names, involved, strict=True) if yes))
+
+
+def _second(joint: Any) -> Attachment:
+    return places(joint)[0] if isinstance(joint, Coupling) else joint.second

@@ -1,0 +1,67 @@
+"""Functions of time that a scene names by a file: the measured signal becomes a table in the scene, when it is read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from shoal.errors import InputError
+from shoal.scene.record import Positive, Record, one_line
+from shoal.shelf import LARGEST
+
+PARTS = ("joints", "loads", "ground_points")
+"""Parts of a scene whose members have functions of time: PART.NAME.FIELD."""
+
+
+class Signal(Record):
+    """A column of a table (CSV or Parquet) over another.
+
+    path: from the folder of the scene's file. time, column: their names; time_scale: seconds in a unit of the time,
+    scale: SI units in a unit of the column. start: the time of the table [s] at which the motion begins. smooth: as of
+    `Function`. Rows with a gap are left out.
+    """
+
+    path: str
+    column: str
+    time: str = "t"
+    time_scale: Positive = 1.0
+    scale: float = 1.0
+    start: float = 0.0
+    smooth: bool = True
+
+    def table(self, folder: Path) -> dict[str, Any]:
+        """The function as a scene has it. Raises InputError."""
+        # Where no scene names a file, none of what reads tables is loaded.
+        from shoal.table import load_table
+
+        found = load_table(folder / self.path, largest=LARGEST)
+        times, values = found.numbers(self.time), found.numbers(self.column)
+        told = np.isfinite(times) & np.isfinite(values)
+        rows = np.column_stack([self.time_scale * times - self.start, self.scale * values])[told]
+        return {"table": rows.tolist(), "smooth": self.smooth}
+
+
+def with_signals(data: Any, folder: Path, source: str) -> Any:
+    """The fields of a scene with the signals that they name as tables. Raises InputError, one line with the field."""
+    for path, field, stated in signals(data):
+        try:
+            field[path[-1]] = Signal.model_validate(stated).table(folder)
+        except ValidationError as error:
+            raise one_line(error, f"{source}: {'.'.join(path)}") from None
+        except InputError as error:
+            raise InputError(f"{source}: {'.'.join(path)}: {error}") from None
+    return data
+
+
+def signals(data: Any) -> Iterator[tuple[tuple[str, str, str], dict[str, Any], dict[str, Any]]]:
+    """Where signals stand in the fields of a scene: the path, the mapping that holds the field, and the field."""
+    for part in PARTS:
+        members = data.get(part) if isinstance(data, dict) else None
+        for name, member in members.items() if isinstance(members, dict) else ():
+            for field, value in member.items() if isinstance(member, dict) else ():
+                if isinstance(value, dict) and "path" in value:
+                    yield (part, str(name), str(field)), member, value

@@ -1,0 +1,135 @@
+"""Starts from statics: a machine that starts where its forces balance stays there, and swings when it is let go."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.engines import get_engine
+from shoal.engines.verification import verified
+from shoal.errors import InputError
+from shoal.mechanics.analysis.motion_state import states
+from shoal.mechanics.analysis.statics import statics
+from shoal.scene import Scene
+
+HEIGHT, YOUNG, DENSITY, LENGTH, FORCE = 0.02, 2e9, 1000.0, 1.0, 1e-3
+
+
+def blade(scale: Any = 1.0, elements: int = 8, force: float = FORCE, **fields: Any) -> Scene:
+    """A cantilever under a force across its tip."""
+    rod = {"kind": "rod", "length": LENGTH, "height": HEIGHT, "width": HEIGHT, "density": DENSITY,
+           "youngs_modulus": YOUNG, "element": "ancf-cable", "elements": elements}  # fmt: skip
+    return Scene.parse(
+        {
+            "name": "blade",
+            "gravity": [0.0, 0.0],
+            "bodies": {"blade": rod},
+            "joints": {"clamp": {"kind": "weld", "first": {"body": "ground", "point": [0.0, 0.0]},
+                                 "second": {"body": "blade"}}},
+            "loads": {"tip": {"kind": "force", "at": {"body": "blade", "point": "end"}, "force": [0.0, force],
+                              "scale": scale}},
+            "markers": {"tip": {"body": "blade", "point": "end"}},
+            "initial": {"from": "statics"},
+            "solver": {"duration": 0.2, "samples": 20},
+        }
+        | fields
+    )  # fmt: skip
+
+
+def let_go(t: Any) -> Any:
+    """Deflection of the tip [m] at the time after which the force is gone: 4 F/(m L) sum of cos(w_i t)/w_i^2."""
+    roots = [1.8751040687119611, 4.694091132974175, 7.854757438237613, 10.995540734875467, 14.13716839104647]
+    roots += [np.pi * (k - 0.5) for k in range(6, 40)]
+    line, stiffness = DENSITY * HEIGHT**2, YOUNG * HEIGHT**4 / 12
+    w = np.array(roots) ** 2 * np.sqrt(stiffness / line) / LENGTH**2
+    return 4 * FORCE / (line * LENGTH) * np.sum(np.cos(np.multiply.outer(t, w)) / w**2, axis=-1)
+
+
+def test_who_starts_in_balance_stays_there() -> None:
+    scene = blade(force=5.0)
+    run = verified(get_engine("gauss"), scene)
+    assert run.ok, run.message
+    bent = statics(scene).marker("tip")
+    assert bent[1] > 0.05
+    assert run.marker("tip") == pytest.approx(np.tile(bent, (len(run.times), 1)), abs=1e-9)
+
+
+def test_a_bent_blade_swings_as_its_modes_when_it_is_let_go() -> None:
+    gone = 1e-3
+    solver = {"duration": 0.2, "samples": 20, "integrator": "generalized-alpha", "step": 5e-5}
+    run = verified(get_engine("gauss"), blade(f"1 - step(t - {gone})", elements=12, solver=solver))
+    assert run.ok, run.message
+    known = let_go(np.maximum(run.times - gone, 0.0))
+    assert run.marker("tip")[:, 1] == pytest.approx(known, abs=5e-4 * FORCE * LENGTH**3 * 4 / (YOUNG * HEIGHT**4))
+
+
+def test_a_mass_hangs_from_its_spring() -> None:
+    spring = {"kind": "spring", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "mass"},
+              "stiffness": 100.0, "length": 1.0}  # fmt: skip
+    scene = Scene.parse(
+        {
+            "name": "hanging",
+            "bodies": {"mass": {"kind": "point-mass", "mass": 2.0}},
+            "loads": {"spring": spring},
+            "markers": {"mass": {"body": "mass"}},
+            "initial": {"from": "statics", "mass": {"position": [0.0, -1.0]}},
+            "solver": {"duration": 1.0},
+        }
+    )
+    run = get_engine("gauss").simulate(scene)
+    assert run.marker("mass") == pytest.approx(np.tile([0.0, -1.0 - 2.0 * 9.81 / 100.0], (len(run.times), 1)), abs=1e-9)
+
+
+def test_every_lane_has_its_own_place_of_rest() -> None:
+    scene = blade(force=5.0)
+    moduli = np.array([1e9, 2e9, 4e9])
+    run = get_engine("gauss").simulate_many(scene, {"bodies.blade.youngs_modulus": moduli}, [0.0, 0.1])
+    for lane, modulus in enumerate(moduli):
+        bent = statics(scene.with_values({"bodies.blade.youngs_modulus": modulus})).marker("tip")
+        assert run.marker("tip", lane) == pytest.approx(np.tile(bent, (2, 1)), abs=1e-9)
+
+
+def test_states_along_the_motion_begin_there_too() -> None:
+    scene = blade(force=5.0)
+    (state,) = states(scene, [0.05])[1]
+    assert state.q == pytest.approx(statics(scene).q, abs=1e-9)
+
+
+def test_what_is_written_of_a_scene_can_be_read_and_set() -> None:
+    scene = blade()
+    again = Scene.parse(scene.model_dump(mode="json"))
+    assert again == scene
+    assert again.starts_at_rest
+    assert not scene.with_values({"initial.from": None}).starts_at_rest
+    assert blade(initial={}).with_values({"initial.from": "statics"}).starts_at_rest
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"initial": {"from": "rest"}}, "initial.from: a start is computed by statics, found 'rest'"),
+        ({"initial": {"from": "statics", "blade": {"rate": 1.0}}}, "initial.blade.rate: a start from statics is at"),
+    ],
+)
+def test_what_cannot_start_at_rest_is_one_line(fields: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        blade(**fields)
+
+
+def test_nothing_starts_where_nothing_holds_it() -> None:
+    scene = Scene.parse(
+        {
+            "name": "falling",
+            "bodies": {"mass": {"kind": "point-mass", "mass": 2.0}},
+            "markers": {"mass": {"body": "mass"}},
+            "initial": {"from": "statics", "mass": {"position": [0.0, 0.0]}},
+        }
+    )
+    with pytest.raises(InputError, match=r"initial.from: statics finds no stable place of rest: .*falls without end"):
+        get_engine("gauss").simulate(scene)
+
+
+def test_engines_that_know_no_statics_refuse_it() -> None:
+    with pytest.raises(InputError, match=r"^initial.from: engine casadi cannot do starts at rest; use gauss$"):
+        get_engine("casadi").simulate(blade())

@@ -1,0 +1,97 @@
+"""A measured signal drives a machine: the file that a scene names becomes its table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from shoal import library
+from shoal.engines import get_engine
+from shoal.errors import InputError
+from shoal.scene import Scene, load_scene
+
+CRANK: dict[str, Any] = {
+    "name": "driven",
+    "gravity": [0.0, 0.0],
+    "bodies": {"crank": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.1, "named_points": {"tip": [0.5, 0.0]}}},
+    "joints": {
+        "pivot": {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "crank"}},
+        "motor": {"kind": "driven-angle", "first": {"body": "ground", "point": [0.0, 0.0]},
+                  "second": {"body": "crank"}, "angle": {"path": "encoder.csv", "column": "angle"}},
+    },
+    "markers": {"tip": {"body": "crank", "point": "tip"}},
+    "solver": {"duration": 1.0, "samples": 10},
+}  # fmt: skip
+
+
+def written(folder: Path, signal: dict[str, Any], text: str | None = None) -> str:
+    """The file of a scene whose motor follows a signal, 0.3 sin(2 t) over an encoder's clock where no text is given."""
+    times = np.linspace(-0.2, 1.4, 161)
+    rows = "\n".join(f"{1e3 * (t + 5.0):.6f},{np.degrees(0.3 * np.sin(2 * t)):.12f}" for t in times)
+    (folder / "encoder.csv").write_text(f"# an encoder\nms,angle\n{rows}\n" if text is None else text)
+    motor = {**CRANK["joints"]["motor"], "angle": {"path": "encoder.csv", **signal}}
+    file = folder / "driven.yaml"
+    file.write_text(yaml.safe_dump({**CRANK, "joints": {**CRANK["joints"], "motor": motor}}))
+    return str(file)
+
+
+STATED = {"time": "ms", "time_scale": 1e-3, "start": 5.0, "column": "angle", "scale": np.pi / 180}
+
+
+def test_a_crank_follows_its_encoder(tmp_path: Path) -> None:
+    scene = load_scene(written(tmp_path, STATED))
+    run = get_engine("gauss").simulate(scene)
+    angle = 0.3 * np.sin(2 * run.times)
+    # A spline through samples 0.01 s apart is off by 5/384 h^4 max f(4) = 6e-10 rad, near its ends by more.
+    assert run.marker("tip") == pytest.approx(0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1), abs=1e-8)
+
+
+def test_what_is_kept_of_the_scene_has_the_numbers(tmp_path: Path) -> None:
+    scene = load_scene(written(tmp_path, STATED))
+    (tmp_path / "encoder.csv").unlink()
+    again = Scene.parse(scene.model_dump(mode="json"))
+    assert again.fingerprint == scene.fingerprint
+    assert len(again.joints["motor"].angle.table) == 161
+
+
+def test_a_library_keeps_the_signal_with_its_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHOAL_LIBRARY", str(tmp_path / "library"))
+    file = written(tmp_path, STATED)
+    entry = library.add(file)
+    fingerprint = load_scene(file).fingerprint
+    (tmp_path / "encoder.csv").unlink()
+    assert sorted(entry.files()) == ["driven.yaml", "encoder.csv"]
+    assert load_scene("driven").fingerprint == fingerprint
+
+
+@pytest.mark.parametrize("path", ["../encoder.csv", "/etc/hostname", "none.csv"])
+def test_a_signal_does_not_lead_out_of_a_library(path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHOAL_LIBRARY", str(tmp_path / "library"))
+    stated = Path(written(tmp_path, STATED)).read_text().replace("encoder.csv", path)
+    with pytest.raises(InputError, match=r"leads out of the entry|is not among the files"):
+        library.put("scenes", "driven", {"driven.yaml": stated.encode()})
+
+
+@pytest.mark.parametrize(
+    ("signal", "text", "told"),
+    [
+        ({"column": "angel", "time": "ms"}, None, "joints.motor.angle: .*no column 'angel'; there are ms, angle"),
+        ({"column": "angle"}, None, "joints.motor.angle: .*no column 't'"),
+        ({"column": "angle", "colour": 1}, None, "joints.motor.angle: colour: Extra inputs"),
+        ({"column": "angle"}, "t,angle\n0,0\n1,x\n", "row 3, column 'angle': 'x' is not a number"),
+        ({"column": "angle"}, "t,angle\n0,0\n0,1\n", "joints.motor.angle.table: times must increase"),
+        ({"column": "angle", "path": "gone.csv"}, None, "joints.motor.angle: data: .*gone.csv cannot be read"),
+    ],
+)
+def test_a_wrong_signal_is_one_line(signal: dict[str, Any], text: str | None, told: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=told) as error:
+        load_scene(written(tmp_path, signal, text))
+    assert "\n" not in str(error.value)
+
+
+def test_a_scene_that_is_no_file_states_its_tables() -> None:
+    with pytest.raises(InputError, match=r"'encoder.csv' is read where the scene is one; here state its table"):
+        Scene.parse(CRANK)
