@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
+from shoal.mechanics.start.closure import Closure
 from shoal.mechanics.start.start import complete, is_direct
-from shoal.scene import Scene
+from shoal.scene import Scene, load_scene
 
 
 class State(NamedTuple):
@@ -461,3 +462,15 @@ def test_a_point_mass_has_no_direction_to_hold(kind: str) -> None:
     free = {"initial": {name: {"position": [0.0, 0.0]} for name in "pq"}}
     with pytest.raises(InputError, match=r"joints\.J.*: p is a point mass, which has no direction"):
         Scene.parse(scene({name: {"kind": "point-mass", "mass": 1.0} for name in "pq"}, joints) | free)
+
+
+def test_a_long_chain_that_cannot_be_assembled_is_not_sought_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A crank six times too long in the first of twelve loops: the gaps of the joints are looked at a few times."""
+    looked = []
+    rows = Closure.rows
+    monkeypatch.setattr(Closure, "rows", lambda self, u: looked.append(len(u)) or rows(self, u))
+    scene = load_scene("n-four-bar-12")
+    path = "bodies.crank0.named_points.end.0"
+    with pytest.raises(InputError, match=r"^joints\.C1: cannot be assembled; its places stay 5 m apart at best$"):
+        complete(scene.with_values({path: 5 * scene.value(path) + 1.0}))
+    assert len(looked) < 400

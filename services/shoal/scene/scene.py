@@ -93,13 +93,17 @@ class Scene(Record):
     @model_validator(mode="before")
     @classmethod
     def _from_within(cls, data: Any) -> Any:
-        if isinstance(data, dict) and isinstance(data.get("initial"), dict) and FROM in data["initial"]:
-            initial = dict(data["initial"])
-            origin = initial.pop(FROM)
-            if origin not in ("statics", None):
-                raise ValueError(f"initial.from: a start is computed by statics, found {str(origin)[:40]!r}")
-            return {**data, "initial": initial, "initial_from": origin}
-        return data
+        if not isinstance(data, dict) or not isinstance(data.get(INITIAL, {}), dict):
+            return data
+        initial = dict(data.get(INITIAL, {}))
+        origin = initial.pop(FROM, data.get("initial_from"))
+        if origin is None:
+            return {**data, INITIAL: initial}
+        if origin != "statics":
+            raise ValueError(f"initial.from: a start is computed by statics, found {str(origin)[:40]!r}")
+        # Where the search for the place of rest begins is near it, no more.
+        near = {name: _guessed(start) for name, start in initial.items()}
+        return {**data, INITIAL: near, "initial_from": origin}
 
     def __repr__(self) -> str:
         parts = [_counted("body", "bodies", self.bodies), _counted("joint", "joints", self.joints)]
@@ -324,6 +328,14 @@ class Scene(Record):
         """Twelve hexadecimal digits that change when any field does, not with the order of the fields."""
         text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _guessed(start: Any) -> Any:
+    """The initial state of a body with its pose as a guess."""
+    stated = start.model_dump() if isinstance(start, InitialState) else start
+    if not isinstance(stated, dict):
+        return start
+    return {**stated, "guess": [quantity for quantity in POSES if stated.get(quantity) is not None]}
 
 
 def _counted(one: str, many: str, names: Mapping[str, Any]) -> str:

@@ -81,6 +81,27 @@ def test_a_mass_hangs_from_its_spring() -> None:
     assert run.marker("mass") == pytest.approx(np.tile([0.0, -1.0 - 2.0 * 9.81 / 100.0], (len(run.times), 1)), abs=1e-9)
 
 
+def test_what_is_stated_beside_is_near_the_place_of_rest_only() -> None:
+    """A weight on a rope from the tip: it hangs straight below, wherever it was said to be."""
+    found = {}
+    for near in ([1.2, -0.3], [0.8, -1.0]):
+        scene = blade(
+            gravity=[0.0, -9.81],
+            bodies={**blade().model_dump(mode="json")["bodies"], "load": {"kind": "point-mass", "mass": 0.05}},
+            joints={**blade().model_dump(mode="json")["joints"],
+                    "rope": {"kind": "distance", "first": {"body": "blade", "point": "end"},
+                             "second": {"body": "load"}, "length": 0.5}},
+            markers={"tip": {"body": "blade", "point": "end"}, "load": {"body": "load"}},
+            initial={"from": "statics", "load": {"position": near}},
+        )  # fmt: skip
+        run = verified(get_engine("gauss"), scene)
+        assert run.ok, run.message
+        found[tuple(near)] = run.marker("load")[0]
+        assert run.marker("load")[-1] == pytest.approx(run.marker("tip")[0] - [0.0, 0.5], abs=1e-7)
+    first, second = found.values()
+    assert first == pytest.approx(second, abs=1e-8)
+
+
 def test_every_lane_has_its_own_place_of_rest() -> None:
     scene = blade(force=5.0)
     moduli = np.array([1e9, 2e9, 4e9])
