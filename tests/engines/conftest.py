@@ -402,6 +402,13 @@ ONLY_NATIVE = [
     DIRECTOR,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
+    scene(
+        "ring",
+        {"A": CABLE | {"curvature": [2 * np.pi / CABLE["length"]], "elements": 6}},
+        {"W": joint(at("A"), at("A", "end"), "weld")},
+        {"half": at("A", "centre")},
+        initial={"A": {"position": [0.0, 0.0]}},
+    ),
     pendulum("at-rest", CABLE, CLAMP).with_values({"initial.from": "statics", "initial.A.rate": 0.0}),
     pair(
         "coupled",

@@ -473,4 +473,4 @@ def test_a_long_chain_that_cannot_be_assembled_is_not_sought_for_long(monkeypatc
     path = "bodies.crank0.named_points.end.0"
     with pytest.raises(InputError, match=r"^joints\.C1: cannot be assembled; its places stay 5 m apart at best$"):
         complete(scene.with_values({path: 5 * scene.value(path) + 1.0}))
-    assert len(looked) < 400
+    assert sum(looked) < 3000

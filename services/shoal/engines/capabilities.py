@@ -8,7 +8,7 @@ from typing import TypeVar
 from shoal.engines.contract import Engine
 from shoal.engines.known import ENGINES
 from shoal.errors import InputError
-from shoal.scene import GROUND, Function, Joint, Load, PointMass, Rod, Scene
+from shoal.scene import GROUND, Coupling, Function, Joint, Load, PointMass, Rod, Scene
 from shoal.scene.joints import places
 
 T = TypeVar("T")
@@ -17,6 +17,7 @@ FEATURES = (
     "point masses",
     "free bodies",
     "closed loops",
+    "closed rods",
     "moving ground points",
     "starts at rest",
     "functions of time",
@@ -55,6 +56,8 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
         yield f"ground_points.{name}", "moving ground points"
     for name, joint in scene.joints.items():
         yield from _item(f"joints.{name}", joint)
+        if not isinstance(joint, Coupling) and joint.first.body == joint.second.body:
+            yield f"joints.{name}", "closed rods"
     yield from ((f"joints.{name}", "closed loops") for name in loops(scene))
     for name, load in scene.loads.items():
         yield from _item(f"loads.{name}", load)

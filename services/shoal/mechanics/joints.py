@@ -44,6 +44,11 @@ class Meet:
     first: Attachment
     second: Attachment
 
+    @property
+    def within(self) -> bool:
+        """Whether both are of one body: a rod that closes upon itself."""
+        return self.first.body == self.second.body
+
 
 @dataclass(frozen=True)
 class Along:

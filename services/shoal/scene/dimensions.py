@@ -33,6 +33,8 @@ def check_dimensions(scene: Any) -> None:
     for name, joint in scene.joints.items():
         if joint.kind in PLANAR_KINDS:
             raise ValueError(f"joints.{name}.kind: {joint.kind} is a joint of the plane; say dimensions: 2")
+        if joint.kind != "coupling" and joint.first.body == joint.second.body:
+            raise ValueError(f"joints.{name}: closes {joint.first.body!r} upon itself; that is for the plane")
     flat = is_flat(scene)
     for name, start in scene.initial.items():
         for one, other in (("angle", "rotation"), ("rate", "spin")):

@@ -125,7 +125,12 @@ class Scene(Record):
             for field, side in joint_types.sides(joint).items():
                 self._check_attachment(f"joints.{name}.{field}", side)
             if not isinstance(joint, joint_types.Coupling) and joint.first.body == joint.second.body:
-                raise ValueError(f"joints.{name}: joins {joint.first.body!r} to itself; a joint needs two bodies")
+                body = self.bodies.get(joint.first.body)
+                if body is None or body.element == "rigid":
+                    raise ValueError(
+                        f"joints.{name}: joins {joint.first.body!r} to itself; a joint needs two bodies, or two places "
+                        "of a flexible rod"
+                    )
         for name, load in self.loads.items():
             for field, side in joint_types.sides(load).items():
                 self._check_attachment(f"loads.{name}.{field}", side)

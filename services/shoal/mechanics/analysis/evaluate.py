@@ -12,65 +12,23 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse
-from numba import njit
 
-from shoal.mechanics import constraints, forces, functions, gates, plane
+from shoal.mechanics import forces, functions, plane
 from shoal.mechanics.affine import Affine
+from shoal.mechanics.analysis import kernels
 from shoal.mechanics.analysis.load_stiffness import in_plane, in_space
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.derived import derive
-from shoal.mechanics.dynamics import Work, derived_rows, remember, work_space
+from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS
 from shoal.mechanics.gates import ready
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
-from shoal.mechanics.numerics.pointers import pointer, raw
-from shoal.mechanics.numerics.tile import SINGLE, Array, Index, Tile
+from shoal.mechanics.numerics.tile import SINGLE, Array, Index
 from shoal.mechanics.tangent import damping_at, stiffness_at, tangent_tile
 from shoal.scene import Scene
 
 Sparse = scipy.sparse.csr_array
 _LANE = slice(0, 1)
-
-
-@njit(cache=True, error_model="numpy")
-def _look(
-    tile: Tile, arrays: Arrays, room: Work, t: float, gap: Array, rate: Array, bias: Array, jacobian: Array
-) -> None:
-    """Force (into room.a), energies (room.energy) and constraints of the state in `room`."""
-    m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
-    derive(tile, m.derived, w.z, m.unknowns, m.rows, False)
-    derive(tile, m.derived, w.zdot, m.unknowns, m.rows, True)
-    gates.force(tile, m, w, t, w.z, w.zdot, w.a)
-    gates.energies(tile, m, w)
-    constraints.residual(tile, m.constraints, m.functions, t, w.z, pointer(gap))
-    constraints.rates(tile, m.constraints, m.functions, t, pointer(rate))
-    constraints.bias(tile, m.constraints, m.functions, t, w.zdot, pointer(bias))
-    constraints.jacobian(tile, m.constraints, w.z, 1.0, pointer(jacobian))
-
-
-@njit(cache=True, error_model="numpy")
-def _elastic(tile: Tile, arrays: Arrays, room: Work) -> None:
-    """The elastic part of the force, into room.a."""
-    m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
-    gates.elastic_force(tile, m, w, w.z, w.a, False)
-
-
-@njit(cache=True, error_model="numpy")
-def _accelerate(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: float) -> None:
-    """The acceleration by Gauss's principle, into room.a."""
-    m, w = raw(arrays), raw(room)
-    gates.enter(m, w)
-    gates.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
-
-
-@njit(cache=True, error_model="numpy")
-def _remember(tile: Tile, arrays: Arrays, room: Work) -> None:
-    """Count the turns of angle forces."""
-    m, w = raw(arrays), raw(room)
-    remember(tile, m, w)
 
 
 @dataclass(frozen=True)
@@ -162,7 +120,7 @@ class Evaluator:
     def remember(self, q: Array) -> None:
         """Count the turns of angle forces after a move of less than half a turn to q."""
         self._enter(q, None)
-        _remember(SINGLE, self._arrays, self._room)
+        kernels.remember(SINGLE, self._arrays, self._room)
 
     def at(self, q: Array, v: Array | None = None, t: float = 0.0, *, load: float = 1.0) -> Evaluation:
         """Look at the state q, v (default: at rest) at time t [s]; `load` scales gravity and applied loads."""
@@ -171,18 +129,18 @@ class Evaluator:
         held = arrays.constraints
         gap, rate, bias = (np.zeros(held.size) for _ in range(3))
         entries = np.zeros(len(held.column))
-        _look(SINGLE, arrays, room, t, gap, rate, bias, entries)
+        kernels.look(SINGLE, arrays, room, t, gap, rate, bias, entries)
         force = room.a[:n].copy()
         kinetic, strain, gravity = (float(part) for part in room.energy)
         applied = self._applied(arrays, t)
-        _elastic(SINGLE, arrays, room)
+        kernels.elastic(SINGLE, arrays, room)
         jacobian = Sparse((entries, held.column, held.entry), shape=(held.size, n))
         return Evaluation(force, room.a[:n].copy(), gap, rate, bias, jacobian, kinetic, strain, gravity, applied)
 
     def acceleration(self, q: Array, v: Array, t: float = 0.0) -> Array:
         """The acceleration by Gauss's principle, (unknowns,)."""
         self._enter(q, v)
-        _accelerate(SINGLE, self._arrays, self._room, t, self.model.scene.solver.rank_tolerance)
+        kernels.accelerate(SINGLE, self._arrays, self._room, t, self.model.scene.solver.rank_tolerance)
         return self._room.a[: self.model.unknowns].copy()
 
     def stiffness(
@@ -276,7 +234,7 @@ class Evaluator:
         self._enter(q, v)
         gap, rate, bias = (np.zeros(arrays.constraints.size) for _ in range(3))
         entries = np.zeros(len(arrays.constraints.column))
-        _look(SINGLE, arrays, self._room, 0.0, gap, rate, bias, entries)
+        kernels.look(SINGLE, arrays, self._room, 0.0, gap, rate, bias, entries)
         return self._room.a[: self.model.unknowns].copy()
 
     def _energy(self, q: Array, arrays: Arrays) -> float:

@@ -12,7 +12,7 @@ from shoal.mechanics.assembly.groups import JointPoint, place_of
 from shoal.mechanics.assembly.pose import Pose
 from shoal.mechanics.assembly.terms import Terms
 from shoal.mechanics.frames import Frame
-from shoal.mechanics.joints import Along, Apart
+from shoal.mechanics.joints import Along, Apart, Meet
 from shoal.mechanics.numerics.tile import Array, Flags, Number
 from shoal.scene import GROUND, Attachment, Scene
 
@@ -69,7 +69,7 @@ class Placement:
             return fixed(np.eye(scene.dimensions)[0][:, None])
         return self.frames[at.body].direction(scene.location(at))
 
-    def gap(self, scene: Scene, condition: Along | Apart) -> Affine:
+    def gap(self, scene: Scene, condition: Along | Apart | Meet) -> Affine:
         """The way from the first place of a condition to the second."""
         return self.point(scene, condition.second) - self.point(scene, condition.first)
 

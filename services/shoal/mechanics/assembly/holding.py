@@ -49,6 +49,8 @@ def _keep(scene: Scene, name: str, condition: Meet | Along | Apart | Sum, result
         terms.dot(name, fixed(axes[0][:, None]), total, 1, drive=condition.value.through("neg"))
     elif not isinstance(condition, Meet):  # which is shared, or a constraint where its loop closes
         raise joints.unknown(condition)
+    elif condition.within:
+        terms.vanish(name, result.gap(scene, condition))
 
 
 def _keep_turn(scene: Scene, name: str, condition: Turned, clamped: bool, result: Placement) -> None:

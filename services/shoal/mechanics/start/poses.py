@@ -196,7 +196,8 @@ class Assembly:
                 break
             each = slope * give[:, None, :]
             matrix = each @ slope.transpose(0, 2, 1)
-            scale = np.sqrt(np.einsum("lkk->lk", slope * self._yield @ slope.transpose(0, 2, 1))) + 1e-300
+            scale = np.sqrt(np.einsum("lkk->lk", slope * self._yield @ slope.transpose(0, 2, 1)))
+            scale = np.where(scale > 0, scale, 1.0)  # what closes a rod upon itself depends on no pose
             matrix = matrix / scale[:, :, None] / scale[:, None, :]
             small = np.clip(damping * norm, 1e-13, 1e3)
             matrix += small[:, None, None] * np.eye(matrix.shape[1])

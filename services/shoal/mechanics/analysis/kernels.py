@@ -1,0 +1,53 @@
+"""The compiled kernels behind `evaluate`: what of a state is asked for, one call each."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from shoal.mechanics import constraints, gates
+from shoal.mechanics.derived import derive
+from shoal.mechanics.dynamics import Work
+from shoal.mechanics.dynamics import remember as count
+from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics.tile import Array, Tile
+
+
+@njit(cache=True, error_model="numpy")
+def look(
+    tile: Tile, arrays: Arrays, room: Work, t: float, gap: Array, rate: Array, bias: Array, jacobian: Array
+) -> None:
+    """Force (into room.a), energies (room.energy) and constraints of the state in `room`."""
+    m, w = raw(arrays), raw(room)
+    gates.enter(m, w)
+    derive(tile, m.derived, w.z, m.unknowns, m.rows, False)
+    derive(tile, m.derived, w.zdot, m.unknowns, m.rows, True)
+    gates.force(tile, m, w, t, w.z, w.zdot, w.a)
+    gates.energies(tile, m, w)
+    constraints.residual(tile, m.constraints, m.functions, t, w.z, pointer(gap))
+    constraints.rates(tile, m.constraints, m.functions, t, pointer(rate))
+    constraints.bias(tile, m.constraints, m.functions, t, w.zdot, pointer(bias))
+    constraints.jacobian(tile, m.constraints, w.z, 1.0, pointer(jacobian))
+
+
+@njit(cache=True, error_model="numpy")
+def elastic(tile: Tile, arrays: Arrays, room: Work) -> None:
+    """The elastic part of the force, into room.a."""
+    m, w = raw(arrays), raw(room)
+    gates.enter(m, w)
+    gates.elastic_force(tile, m, w, w.z, w.a, False)
+
+
+@njit(cache=True, error_model="numpy")
+def accelerate(tile: Tile, arrays: Arrays, room: Work, t: float, tolerance: float) -> None:
+    """The acceleration by Gauss's principle, into room.a."""
+    m, w = raw(arrays), raw(room)
+    gates.enter(m, w)
+    gates.acceleration(tile, m, w, t, w.z, w.zdot, tolerance, w.a)
+
+
+@njit(cache=True, error_model="numpy")
+def remember(tile: Tile, arrays: Arrays, room: Work) -> None:
+    """Count the turns of angle forces."""
+    m, w = raw(arrays), raw(room)
+    count(tile, m, w)
