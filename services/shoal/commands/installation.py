@@ -1,4 +1,4 @@
-"""Shoal itself: as a service, as a unit in another program, and whether all of it is there."""
+"""Shoal itself: as a service, in other programs, and whether all of it is there."""
 
 from __future__ import annotations
 
@@ -47,6 +47,31 @@ def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], out: Out
     from shoal.scene import load_scene
 
     click.echo(export(load_scene(scene).with_values(values), parameters, out))
+
+
+@click.command()
+@click.argument("scene")
+@click.option(
+    "--to",
+    required=True,
+    type=click.Choice(["exudyn"]),
+    help="exudyn: a Python script that runs by itself.",
+)
+@options.values
+@click.option("--verify/--no-verify", default=True, show_default=True, help="Run it there and here, and compare.")
+@options.out(".py", otherwise="; else the scene's name")
+def export(scene: str, to: str, values: Values, verify: bool, out: Out) -> None:
+    """Write SCENE as a file of another tool. How far its motion is from ours is told on stderr."""
+    from shoal.exported import export
+    from shoal.scene import load_scene
+    from shoal.terminal import screen
+
+    wanted = load_scene(scene).with_values(values)
+    with screen.working(f"exporting {wanted.name}"):
+        done = export(wanted, to, out, verify=verify)
+    if done.distance is not None:
+        click.echo(f"{to}: its motion is within {done.distance:.2g} m of `shoal simulate`", err=True)
+    click.echo(done.file)
 
 
 @click.command("import")

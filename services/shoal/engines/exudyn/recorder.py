@@ -133,7 +133,7 @@ class Texts:
         """A force as a function of its elongation."""
         if law.formula is not None:
             return f"lambda x: {formulas.text(law.formula, 'x')}"
-        return f"lambda x: polynomials({{'until': np.inf}}, {self._table(law)})(x)"
+        return f"polynomials({{'until': np.inf}}, {self._table(law)})"
 
     def _of_time(self, course: Course, which: str) -> str:
         """The variable that holds a function of time or its slope, which is defined with the first use."""

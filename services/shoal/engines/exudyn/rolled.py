@@ -82,7 +82,8 @@ class Statements:
         yield from self._loop(turns)
 
     def _loop(self, turns: list[list[Entry]]) -> Iterator[str]:
-        calls, columns, lists, shared = [], {}, [], {}
+        calls, columns, lists = [], dict[str, list[str]](), []
+        shared: dict[Key, tuple[str, int]] = {}
         for place, one in enumerate(turns[0]):
             own = [turn[place] for turn in turns]
             options: dict[str, str] = {}

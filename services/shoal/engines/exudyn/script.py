@@ -86,7 +86,7 @@ class _Script:
             yield ""
         yield ""
         yield from ("SC = exu.SystemContainer()", "mbs = SC.AddSystem()")
-        if any("clock" in line for line in functions):
+        if "clock" in body:
             yield "clock = {'until': np.inf}  # no function of time is asked for later values than this"
         if functions:
             yield ""
@@ -126,10 +126,9 @@ class _Script:
             if len(runs) == 1 or path not in ("timeIntegration.endTime", "timeIntegration.numberOfSteps"):
                 yield f"settings.{path} = {value}"
         yield from _RECORD.splitlines()
-        if len(runs) == 1:
-            yield "done = mbs.SolveDynamic(settings)"
-        else:
-            yield from _runs(self.steps)
+        yield "try:"
+        yield from (["    done = mbs.SolveDynamic(settings)"] if len(runs) == 1 else _runs(self.steps))
+        yield from ("except exu.SolverError:", "    done = False")
         solver, axes = self.scene.solver, "xyz"[: self.scene.dimensions]
         yield from _TABLE.format(
             samples=solver.samples + 1, duration=repr(solver.duration), axes=axes, count=len(axes)
@@ -152,7 +151,7 @@ def record(mbs, t):
 mbs.SetPostStepUserFunction(record)"""
 _TABLE = """
 if not done:
-    sys.exit("Exudyn's solver gave up")
+    sys.exit(f"Exudyn's solver gave up at {{times[-1]:g}} s")
 wanted = np.linspace(0.0, {duration}, {samples})[1:]
 table = sampled(wanted, np.array(times), *(np.array(of).reshape(len(times), -1) for of in (places, speeds)))
 columns = [f"{{name}}.{{axis}}" for name in markers for axis in "{axes}"]
@@ -164,15 +163,15 @@ print(out)"""
 
 def _runs(steps: Steps) -> Iterator[str]:
     """One run after the other, each up to where a function of time jumps or bends."""
-    yield "done, begin = True, 0.0"
-    yield "for steps, end in ["
-    yield from (f"    ({count}, {end!r})," for count, end in steps.runs)
-    yield "]:"
-    yield "    clock['until'] = np.nextafter(end, 0.0)"
-    yield "    settings.timeIntegration.startTime, settings.timeIntegration.endTime = begin, end"
-    yield "    settings.timeIntegration.numberOfSteps = steps"
-    yield "    done = done and mbs.SolveDynamic(settings, updateInitialValues=True)"
-    yield "    begin = end"
+    yield "    done, begin = True, 0.0"
+    yield "    for steps, end in ["
+    yield from (f"        ({count}, {end!r})," for count, end in steps.runs)
+    yield "    ]:"
+    yield "        clock['until'] = np.nextafter(end, 0.0)"
+    yield "        settings.timeIntegration.startTime, settings.timeIntegration.endTime = begin, end"
+    yield "        settings.timeIntegration.numberOfSteps = steps"
+    yield "        done = done and mbs.SolveDynamic(settings, updateInitialValues=True)"
+    yield "        begin = end"
 
 
 def _changes(usual: Any, chosen: Any) -> Iterator[tuple[str, str]]:
@@ -205,15 +204,18 @@ def _wrapped(line: str) -> Iterator[str]:
         return
     if call := re.fullmatch(r"(.*?mbs\.Add\w+\(\w+\()(.*?)(\)+)", line):
         inner = " " * (indent + 4)
-        options = re.split(r", (?=[A-Za-z]\w*=)", call[2] + call[3][:-2 - (".append(" in call[1])])
+        options = re.split(r", (?=[A-Za-z]\w*=)", call[2] + call[3][: -2 - (".append(" in call[1])])
         rows = [""]
         for option in options:
             if rows[-1] and len(inner + rows[-1] + option) + 2 > WIDTH:
                 rows.append("")
             rows[-1] += f"{option}, "
         yield call[1]
-        yield from (f"{inner}{row.rstrip()}" for row in rows)
-        yield " " * indent + call[3][-2 - (".append(" in call[1]):]
+        for row in rows:
+            yield from textwrap.wrap(
+                row, WIDTH, initial_indent=inner, subsequent_indent=inner + "    ", break_long_words=False
+            )
+        yield " " * indent + call[3][-2 - (".append(" in call[1]) :]
         return
     yield from textwrap.wrap(
         line, WIDTH, subsequent_indent=" " * (indent + 4), break_long_words=False, break_on_hyphens=False

@@ -69,7 +69,9 @@ def build_in_space(exu: Any, scene: Scene, end: float | None = None, system_of: 
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
     started = scene.model_copy(update={"initial": begun(placement.frames, scene, q, v)})
     dependent = _dependent(exu, mbs) if any(loops(scene)) else 0
-    return Machine(started, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent)
+    return Machine(
+        started, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent
+    )
 
 
 def _dependent(exu: Any, mbs: Any) -> int:
