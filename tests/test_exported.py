@@ -22,13 +22,26 @@ def test_an_exported_script_is_compared_first(tmp_path: Path, monkeypatch: pytes
     assert "endTime = 0.2" in (tmp_path / "single-pendulum.py").read_text()
 
 
+def test_an_exported_machine_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["export", "andrews-squeezer", "--to", "mjcf"])
+    assert done.exit_code == 0, done.output
+    assert done.stdout == "andrews-squeezer.xml\n"
+    assert re.fullmatch(r"mjcf: its motion is within \S+e-09 m of `shoal simulate`\n", done.stderr)
+    back = CliRunner().invoke(main, ["import", "andrews-squeezer.xml"])
+    assert back.exit_code == 0, back.output
+    assert back.stderr == "left out: geoms: 15 that are only seen\n"
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "message"),
     [
-        ("single-pendulum --to exudyn --out x.xml", 2, "out: x.xml ends in .xml; use .*.py"),
+        ("single-pendulum --to exudyn --out x.xml", 2, "out: x.xml ends in .xml; exudyn has .py"),
         ("single-pendulum --to adams", 2, "'adams' is not .*"),
         ("flexible-double-pendulum --to exudyn --set bodies.AB.element=ancf-full", 2,
          "bodies.AB.element: engine exudyn cannot do ancf-full$"),
+        ("flexible-double-pendulum --to mjcf", 2, "bodies.OA.element: MJCF has no ancf-cable; rigid bodies only$"),
         ("parallelogram --to exudyn --set solver.step=1e-2 --set solver.duration=4", 3,
          "parallelogram: exudyn: .*--no-verify writes the file all the same"),
     ],

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shoal.engines import get_engine
+from shoal.engines.contract import sampling_times
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
@@ -64,5 +65,20 @@ def _script(scene: Scene) -> str:
     return script(scene)
 
 
-TOOLS = {"exudyn": Tool(".py", _script, lambda scene: get_engine("exudyn").simulate(scene))}
+def _mjcf(scene: Scene) -> str:
+    from shoal.engines.mujoco.engine import stepped
+
+    return stepped(scene).text
+
+
+def _in_mujoco(scene: Scene) -> Trajectory:
+    from shoal.engines.mujoco.engine import MujocoEngine, stepped
+
+    return MujocoEngine().run(stepped(scene), sampling_times(scene, None))
+
+
+TOOLS = {
+    "exudyn": Tool(".py", _script, lambda scene: get_engine("exudyn").simulate(scene)),
+    "mjcf": Tool(".xml", _mjcf, _in_mujoco),
+}
 """What scenes are exported to, by name."""

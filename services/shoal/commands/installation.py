@@ -54,12 +54,12 @@ def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], out: Out
 @click.option(
     "--to",
     required=True,
-    type=click.Choice(["exudyn"]),
-    help="exudyn: a Python script that runs by itself.",
+    type=click.Choice(["exudyn", "mjcf"]),
+    help="exudyn: a Python script that runs by itself; mjcf: MuJoCo's format, of rigid bodies.",
 )
 @options.values
 @click.option("--verify/--no-verify", default=True, show_default=True, help="Run it there and here, and compare.")
-@options.out(".py", otherwise="; else the scene's name")
+@options.out(".py", ".xml", otherwise="; else the scene's name")
 def export(scene: str, to: str, values: Values, verify: bool, out: Out) -> None:
     """Write SCENE as a file of another tool. How far its motion is from ours is told on stderr."""
     from shoal.exported import export
