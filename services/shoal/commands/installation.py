@@ -40,13 +40,20 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None, ke
     metavar="PATH",
     help="A number of the scene that a host may set (repeatable); else gravity and the initial angles.",
 )
+@click.option(
+    "--input",
+    "inputs",
+    multiple=True,
+    metavar="PATH",
+    help="A load's scale or torque, or a drive, that a host may change during the run (repeatable).",
+)
 @options.out(".fmu", otherwise="; else the scene's name")
-def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], out: Out) -> None:
+def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], inputs: tuple[str, ...], out: Out) -> None:
     """Write SCENE as an FMI 2.0 unit for co-simulation. A host needs this installation to run it."""
     from shoal.fmu.export import export
     from shoal.scene import load_scene
 
-    click.echo(export(load_scene(scene).with_values(values), parameters, out))
+    click.echo(export(load_scene(scene).with_values(values), parameters, out, inputs=inputs))
 
 
 @click.command()
