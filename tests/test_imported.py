@@ -143,7 +143,7 @@ def test_the_command_writes_a_scene_and_lists_the_rest(tmp_path: Path) -> None:
     [
         ("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "mass"),
         ("<mujoco><worldbody", "bad.xml: "),
-        ('<mujoco><worldbody><body name="b"><joint type="slide"/><joint type="slide" axis="1 0 0"/>'
+        ('<mujoco><worldbody><body name="b"><joint type="slide"/><joint type="hinge" axis="1 0 1"/>'
          '<geom size="0.1"/></body></worldbody></mujoco>', "b: no joint of a scene stands for its 2 joints"),
     ],
 )  # fmt: skip

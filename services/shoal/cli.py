@@ -22,7 +22,7 @@ import click
 from shoal.commands.analysis import modes, reactions, statics
 from shoal.commands.built_in import problems, scenes
 from shoal.commands.forward import compare, simulate, sweep
-from shoal.commands.installation import doctor, export_fmu, import_scene, serve
+from shoal.commands.installation import doctor, export, export_fmu, import_scene, serve
 from shoal.commands.inverse import design, identify
 from shoal.commands.library import library
 from shoal.commands.uncertain import uncertain
@@ -113,7 +113,7 @@ def _extras_named() -> Iterator[None]:
         *(simulate, sweep, uncertain, compare),
         *(statics, modes, reactions),
         *(identify, design),
-        *(serve, export_fmu, import_scene, doctor),
+        *(serve, export, export_fmu, import_scene, doctor),
     ],
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )

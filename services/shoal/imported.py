@@ -51,10 +51,13 @@ class _Reading:
     mujoco: Any
     model: Any
     left_out: list[str] = field(default_factory=list)
+    kept: set[int] = field(default_factory=set)
+    """Equalities that joints stand for already."""
 
     def __post_init__(self) -> None:
         self.data = self.mujoco.MjData(self.model)
-        self.mujoco.mj_kinematics(self.model, self.data)
+        self.key = self._start()
+        self.mujoco.mj_forward(self.model, self.data)
         self.names = self._names(self.mujoco.mjtObj.mjOBJ_BODY, self.model.nbody, "body")
         self.joint_names = self._names(self.mujoco.mjtObj.mjOBJ_JOINT, self.model.njnt, "joint")
         self.owners = [0]
@@ -62,6 +65,16 @@ class _Reading:
             # A frame without mass that is fixed to its parent is a place on it.
             alias = self.model.body_mass[body] == 0 and self.model.body_jntnum[body] == 0
             self.owners.append(self.owners[self.model.body_parentid[body]] if alias else body)
+
+    def _start(self) -> int | None:
+        """The keyframe `start`, if it has the rates of a machine that stands as the file draws it."""
+        for key in range(self.model.nkey):
+            if self.mujoco.mj_id2name(self.model, self.mujoco.mjtObj.mjOBJ_KEY, key) != "start":
+                continue
+            if np.array_equal(self.model.key_qpos[key], self.model.qpos0):
+                self.data.qvel[:] = self.model.key_qvel[key]
+                return key
+        return None
 
     def _names(self, kind: Any, count: int, what: str) -> list[str]:
         found: list[str] = []
@@ -86,9 +99,24 @@ class _Reading:
                 raise InputError(f"{self.names[body]}: moves and has no mass; give it some, with an inertia")
             bodies[self.names[body]] = self._body(body)
             turn = Rotation.from_quat(self.data.xquat[body], scalar_first=True)
-            initial[self.names[body]] = {"rotation": _numbers(turn.as_rotvec())}
+            start = initial[self.names[body]] = {"rotation": _numbers(turn.as_rotvec())}
+            if self.key is not None:
+                speeds = np.zeros(6)
+                self.mujoco.mj_objectVelocity(self.model, self.data, self.mujoco.mjtObj.mjOBJ_XBODY, body, speeds, 0)
+                start |= {"spin": _numbers(speeds[:3])}
+            if self._slides(body):
+                start["position"] = _numbers(self.data.xpos[body])
+                if self.key is not None:
+                    start["velocity"] = _numbers(speeds[3:])
+            if self._is_mass(body):
+                bodies[self.names[body]] = {"kind": "point-mass", "mass": bodies[self.names[body]]["mass"]}
+                start.pop("rotation")
+                start.pop("spin", None)
+                continue
             self._hang(body, joints, loads, initial)
+        self._tendons(joints, loads)
         self._equalities(joints)
+        self._actuators(loads)
         self.left_out += self._counted()
         markers = {name: {"body": name} for name in bodies}
         for site, marker in enumerate(self._names(self.mujoco.mjtObj.mjOBJ_SITE, model.nsite, "site")):
@@ -133,12 +161,15 @@ class _Reading:
         found = [kinds(model.jnt_type[one]) for one in own]
         parent, name = model.body_parentid[body], self.names[body]
         if found == [kinds.mjJNT_FREE]:
-            initial[name]["position"] = _numbers(self.data.xpos[body])
             return
         place = self.data.xanchor[own[0]] if own else self.data.xpos[body]
         made: dict[str, Any] = {"first": self._at(parent, place), "second": self._at(body, place)}
         axes = [self.data.xaxis[one] for one in own]
-        hinge, slide = kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE
+        hinge, slide, ball = kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE, kinds.mjJNT_BALL
+        if found in ([hinge, slide], [ball, slide], [hinge, slide, slide], [ball, slide, slide]) and self._meet(own):
+            # The line or plane is fixed to the body, not to its parent.
+            made = {"first": made["second"], "second": made["first"]}
+            found, axes = found[::-1], axes[::-1]
         if not own:
             made |= {"kind": "weld"}
         elif found == [hinge]:
@@ -151,21 +182,133 @@ class _Reading:
             made |= {"kind": "universal", "axis": _numbers(axes[0]), "second_axis": _numbers(axes[1])}
         elif len(found) == 2 and {*found} == {hinge, slide} and np.linalg.norm(np.cross(*axes)) < SQUARE:
             made |= {"kind": "cylindrical", "axis": _numbers(axes[0])}
+        elif found == [slide, hinge] and self._meet(own) and abs(axes[0] @ axes[1]) < SQUARE:
+            flat = {**made, "kind": "planar", "axis": _numbers(axes[1]), "rotation": "axis"}
+            joints[f"{self.joint_names[own[0]]}-plane"] = flat
+            made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "free"}
+        elif found == [slide, ball] and self._meet(own):
+            made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "free"}
+        elif found[:2] == [slide] * 2 and self._is_plane(found[2:], axes) and self._meet(own):
+            rotation = "locked" if len(found) == 2 else "axis" if found[2] == hinge else "free"
+            made |= {"kind": "planar", "axis": _numbers(np.cross(axes[0], axes[1])), "rotation": rotation}
         else:
             raise InputError(f"{name}: no joint of a scene stands for its {len(own)} joints; put bodies between them")
-        self._friction(own, made, loads)
+        self._friction(body, own, made, loads)
         joints[self.joint_names[own[0]] if own else f"{name}-weld"] = made
+
+    def _is_plane(self, turns: list[Any], axes: list[Array]) -> bool:
+        """Whether two slides, and a hinge or a ball after them, leave a plane and turns about its normal, or all."""
+        normal = np.cross(axes[0], axes[1])
+        if np.linalg.norm(normal) < SQUARE or len(turns) > 1:
+            return False
+        hinged = [self.mujoco.mjtJoint.mjJNT_HINGE]
+        return turns != hinged or bool(np.linalg.norm(np.cross(normal, axes[2])) < SQUARE * np.linalg.norm(normal))
+
+    def _slides(self, body: int) -> bool:
+        """Whether its joints leave the place of a body free."""
+        first, kinds = self.model.body_jntadr[body], self.mujoco.mjtJoint
+        own = self.model.jnt_type[first : first + self.model.body_jntnum[body]]
+        return bool(np.any((own == int(kinds.mjJNT_SLIDE)) | (own == int(kinds.mjJNT_FREE))))
+
+    def _is_mass(self, body: int) -> bool:
+        """Whether a body only slides against the ground, each way, with nothing on it: what a point mass does."""
+        model = self.model
+        first, count = model.body_jntadr[body], model.body_jntnum[body]
+        if count != 3 or self.owners[model.body_parentid[body]] != 0 or np.any(model.body_ipos[body]):
+            return False
+        slides = all(model.jnt_type[first : first + 3] == self.mujoco.mjtJoint.mjJNT_SLIDE)
+        alone = not np.any(model.body_parentid == body)
+        free = abs(np.linalg.det(self.data.xaxis[first : first + 3])) > SQUARE
+        return bool(slides and alone and free and not np.any(model.dof_damping[model.body_dofadr[body] :][:3]))
+
+    def _tendons(self, joints: dict[str, Any], loads: dict[str, Any]) -> None:
+        """Straight tendons between two sites: springs, and distances where an equality keeps their length."""
+        model, kinds = self.model, self.mujoco.mjtEq
+        names = self._names(self.mujoco.mjtObj.mjOBJ_TENDON, model.ntendon, "tendon")
+        kept = {
+            int(model.eq_obj1id[number]): number
+            for number in range(model.neq)
+            if model.eq_type[number] == kinds.mjEQ_TENDON and model.eq_obj2id[number] < 0 and model.eq_active0[number]
+            and not np.any(model.eq_data[number][:5] - [0, 1, 0, 0, 0])
+        }  # fmt: skip
+        for number, name in enumerate(names):
+            first, count = model.tendon_adr[number], model.tendon_num[number]
+            ends = model.wrap_objid[first : first + count]
+            straight = all(model.wrap_type[first : first + count] == self.mujoco.mjtWrap.mjWRAP_SITE) and count == 2
+            low, high = model.tendon_lengthspring[number]
+            plain = low == high and not (model.tendon_limited[number] or model.tendon_frictionloss[number])
+            if not (straight and plain):
+                self.left_out.append(f"tendon {name}: more than a spring between two sites")
+                continue
+            one, other = (self._at(model.site_bodyid[end], self.data.site_xpos[end]) for end in ends)
+            made = {"first": one, "second": other}
+            if number in kept:
+                self.kept.add(kept[number])
+                joints[name if name not in joints else f"{name}-length"] = {"kind": "distance", **made}
+            stiffness = float(np.ravel(model.tendon_stiffness[number])[0])
+            damping = float(np.ravel(model.tendon_damping[number])[0])
+            if stiffness or damping:
+                values = {"stiffness": stiffness, "damping": damping, "length": float(low)}
+                loads[name if name not in loads else f"{name}-tendon"] = {"kind": "spring", **made, **values}
+
+    def _actuators(self, loads: dict[str, Any]) -> None:
+        """Constant forces and torques: actuators at sites that nothing controls."""
+        model = self.model
+        left = 0
+        for number, name in enumerate(self._names(self.mujoco.mjtObj.mjOBJ_ACTUATOR, model.nu, "actuator")):
+            load = self._push(number)
+            if load is None:
+                left += 1
+            else:
+                loads[name if name not in loads else f"{name}-push"] = load
+        if left:
+            self.left_out.append(f"actuators: {left}")
+
+    def _push(self, number: int) -> dict[str, Any] | None:
+        model = self.model
+        constant = (
+            model.actuator_trntype[number] == self.mujoco.mjtTrn.mjTRN_SITE
+            and model.actuator_dyntype[number] == self.mujoco.mjtDyn.mjDYN_NONE
+            and model.actuator_gaintype[number] == self.mujoco.mjtGain.mjGAIN_FIXED
+            and model.actuator_biastype[number] == self.mujoco.mjtBias.mjBIAS_AFFINE
+            and not model.actuator_gainprm[number][0]
+            and not np.any(model.actuator_biasprm[number][1:])
+            and not model.actuator_forcelimited[number]
+        )
+        site, other = model.actuator_trnid[number]
+        size, gear = float(model.actuator_biasprm[number][0]), model.actuator_gear[number]
+        if not constant or (np.any(gear[:3]) and np.any(gear[3:])):
+            return None
+        at = self._at(model.site_bodyid[site], self.data.site_xpos[site])
+        if at["body"] == GROUND:
+            return None
+        if np.any(gear[3:]):
+            if other < 0:
+                return None
+            axis = self.data.site_xmat[other].reshape(3, 3) @ gear[3:]
+            reaction = self._at(model.site_bodyid[other], self.data.site_xpos[other])
+            held = {} if reaction["body"] == GROUND else {"reaction": reaction}
+            torque = size * float(np.linalg.norm(axis))
+            return {"kind": "torque", "at": at, "torque": torque, "axis": _numbers(axis), **held}
+        if other >= 0 and self.owners[model.site_bodyid[other]] != 0:
+            return None
+        axes = self.data.site_xmat[site if other < 0 else other].reshape(3, 3)
+        if other < 0:
+            axes = self.data.xmat[self.owners[model.site_bodyid[site]]].reshape(3, 3).T @ axes
+        force = _numbers(size * (axes @ gear[:3]))
+        return {"kind": "force", "at": at, "force": force, **({"follows": True} if other < 0 else {})}
 
     def _meet(self, own: list[int]) -> bool:
         """Whether joints are in one place."""
         return all(np.allclose(self.data.xanchor[one], self.data.xanchor[own[0]], atol=1e-9) for one in own)
 
-    def _friction(self, own: list[int], made: dict[str, Any], loads: dict[str, Any]) -> None:
+    def _friction(self, body: int, own: list[int], made: dict[str, Any], loads: dict[str, Any]) -> None:
         """Damping, dry friction and springs of joints, and lines for what is left out of them."""
         model = self.model
         for one in own:
             name, dof = self.joint_names[one], model.jnt_dofadr[one]
-            simple = made["kind"] in ("revolute", "slider")
+            words = {"revolute": self.mujoco.mjtJoint.mjJNT_HINGE, "slider": self.mujoco.mjtJoint.mjJNT_SLIDE}
+            simple = words.get(made["kind"]) == self.mujoco.mjtJoint(model.jnt_type[one])
             for what, value, word in (
                 ("damping", float(model.dof_damping[dof]), "friction"),
                 ("frictionloss", float(model.dof_frictionloss[dof]), "coulomb"),
@@ -177,7 +320,13 @@ class _Reading:
             stiffness = float(np.ravel(model.jnt_stiffness[one])[0])
             address = model.jnt_qposadr[one]
             away = float(model.qpos_spring[address] - model.qpos0[address])
-            if stiffness and made["kind"] == "revolute" and away == 0.0:
+            if stiffness and made["kind"] == "revolute":
+                if away:
+                    # As much as a spring at rest at the start and a torque that does not change.
+                    at, reaction = self._at(body, self.data.xanchor[one]), made["first"]
+                    held = {} if reaction["body"] == GROUND else {"reaction": reaction}
+                    torque = {"kind": "torque", "at": at, "torque": stiffness * away, "axis": made["axis"], **held}
+                    loads[f"{name}-preload"] = torque
                 sides = {side: made[side] for side in ("first", "second")}
                 loads[f"{name}-spring"] = {
                     "kind": "torsion-spring",
@@ -186,7 +335,7 @@ class _Reading:
                     "axis": made["axis"],
                 }
             elif stiffness:
-                self.left_out.append(f"joint {name}: its spring of {stiffness:g} about another place or kind of joint")
+                self.left_out.append(f"joint {name}: its spring of {stiffness:g}; a {made['kind']} joint has none")
             if model.jnt_limited[one]:
                 low, high = model.jnt_range[one]
                 self.left_out.append(f"joint {name}: its limits {low:g} to {high:g}")
@@ -198,6 +347,8 @@ class _Reading:
         model, kinds = self.model, self.mujoco.mjtEq
         for number, name in enumerate(self._names(self.mujoco.mjtObj.mjOBJ_EQUALITY, model.neq, "loop")):
             kind, of_bodies = model.eq_type[number], model.eq_objtype[number] == self.mujoco.mjtObj.mjOBJ_BODY
+            if number in self.kept:
+                continue
             word = {kinds.mjEQ_CONNECT: "spherical", kinds.mjEQ_WELD: "weld"}.get(kinds(kind))
             if word is None or not of_bodies or not model.eq_active0[number]:
                 self.left_out.append(f"equality {name}: {kinds(kind).name.removeprefix('mjEQ_').lower()}")
@@ -220,7 +371,9 @@ class _Reading:
             yield f"geoms: {colliding} that touch others; a scene has no contacts"
         if model.ngeom - colliding:
             yield f"geoms: {model.ngeom - colliding} that are only seen"
-        counts = (("tendon", "ntendon"), ("actuator", "nu"), ("sensor", "nsensor"), ("keyframe", "nkey"))
+        if keys := model.nkey - (self.key is not None):
+            yield f"keyframes: {keys}"
+        counts = (("sensor", "nsensor"),)
         for what, count in (*counts, ("camera", "ncam"), ("light", "nlight"), ("flexible body", "nflex")):
             if number := getattr(model, count):
                 yield f"{what}s: {number}" if what != "flexible body" else f"flexible bodies: {number}"

@@ -23,7 +23,7 @@ from shoal.errors import InputError, check_trusted
 )
 @options.verify
 @options.as_json
-@options.out(".html", ".gif", ".png", ".csv", ".json")
+@options.out(".html", ".gif", ".png", ".csv", ".parquet", ".nc", ".json")
 def simulate(
     scene: str,
     engine: str,
@@ -72,7 +72,7 @@ def simulate(
 @click.option("--at", "time", type=float, metavar="T", help="Instant [s]; the scene's duration by default.")
 @options.verify
 @options.as_json
-@options.out(".csv", ".json", ".png")
+@options.out(".csv", ".parquet", ".nc", ".json", ".png")
 def sweep(
     scene: str, vary: Values, engine: str, values: Values, time: float | None, verify: bool, as_json: bool, out: Out
 ) -> None:

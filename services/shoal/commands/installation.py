@@ -1,4 +1,4 @@
-"""Shoal itself: as a service, as a unit in another program, and whether all of it is there."""
+"""Shoal itself: as a service, in other programs, and whether all of it is there."""
 
 from __future__ import annotations
 
@@ -40,13 +40,45 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None, ke
     metavar="PATH",
     help="A number of the scene that a host may set (repeatable); else gravity and the initial angles.",
 )
+@click.option(
+    "--input",
+    "inputs",
+    multiple=True,
+    metavar="PATH",
+    help="A load's scale or torque, or a drive, that a host may change during the run (repeatable).",
+)
 @options.out(".fmu", otherwise="; else the scene's name")
-def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], out: Out) -> None:
+def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], inputs: tuple[str, ...], out: Out) -> None:
     """Write SCENE as an FMI 2.0 unit for co-simulation. A host needs this installation to run it."""
     from shoal.fmu.export import export
     from shoal.scene import load_scene
 
-    click.echo(export(load_scene(scene).with_values(values), parameters, out))
+    click.echo(export(load_scene(scene).with_values(values), parameters, out, inputs=inputs))
+
+
+@click.command()
+@click.argument("scene")
+@click.option(
+    "--to",
+    required=True,
+    type=click.Choice(["exudyn", "mjcf"]),
+    help="exudyn: a Python script that runs by itself; mjcf: MuJoCo's format, of rigid bodies.",
+)
+@options.values
+@click.option("--verify/--no-verify", default=True, show_default=True, help="Run it there and here, and compare.")
+@options.out(".py", ".xml", otherwise="; else the scene's name")
+def export(scene: str, to: str, values: Values, verify: bool, out: Out) -> None:
+    """Write SCENE as a file of another tool. How far its motion is from ours is told on stderr."""
+    from shoal.exported import export
+    from shoal.scene import load_scene
+    from shoal.terminal import screen
+
+    wanted = load_scene(scene).with_values(values)
+    with screen.working(f"exporting {wanted.name}"):
+        done = export(wanted, to, out, verify=verify)
+    if done.distance is not None:
+        click.echo(f"{to}: its motion is within {done.distance:.2g} m of `shoal simulate`", err=True)
+    click.echo(done.file)
 
 
 @click.command("import")

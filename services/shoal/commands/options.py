@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ Values = dict[str, Any]
 """Fields of a scene by path."""
 Times = list[float] | None
 """Instants [s], else the scene's own."""
+NEEDED = {".parquet": "pyarrow", ".nc": "xarray"}
+"""Packages that a form of files asks for."""
 Out = Path | None
 """Where the result is written, if it is."""
 
@@ -162,6 +165,8 @@ def out(*endings: str, default: str | None = None, otherwise: str = "") -> Calla
             raise InputError(f"out: {path} ends in {path.suffix or 'nothing'}; use one of {', '.join(endings)}")
         if not path.absolute().parent.is_dir():
             raise InputError(f"out: the folder {path.absolute().parent} does not exist")
+        if path.suffix in NEEDED and find_spec(NEEDED[path.suffix]) is None:
+            raise InputError(f"out: {path} needs the package {NEEDED[path.suffix]}; install it, or write another form")
         return path
 
     *others, last = endings

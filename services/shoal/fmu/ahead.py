@@ -3,7 +3,8 @@
 The native solver starts at time zero from angles and rates; it cannot be started from the bent shape in which it
 stopped, its functions of time begin at zero, and its checks are those of a whole run. So a motion is computed ahead up
 to the horizon and sampled where the next questions are expected, with the solver's own interpolation. A question that
-was not expected costs a new run from zero; its answer is still the one that `shoal simulate --at` gives.
+was not expected costs a new run from zero; its answer is still the one that `shoal simulate --at` gives. So does an
+input that changes: the run is the one of a scene that has the input as a table.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import ComputationError
 from shoal.fmu.energy import energies
+from shoal.fmu.inputs import Inputs
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
@@ -25,12 +27,23 @@ MOST = 100_000
 
 
 class Ahead:
-    """A scene in motion. stop [s]: up to where it will be asked for, as far as that is known."""
+    """A scene in motion. stop [s]: up to where it will be asked for, as far as that is known.
 
-    def __init__(self, scene: Scene, stop: float | None = None) -> None:
-        self._scene, self._horizon = scene, stop or scene.solver.duration
+    inputs: values by path that change during the run
+    """
+
+    def __init__(self, scene: Scene, stop: float | None = None, inputs: dict[str, float] | None = None) -> None:
+        self._inputs, self._stated = Inputs(inputs or {}), scene
+        self._scene, self._horizon = self._inputs.applied(scene), stop or scene.solver.duration
+        self._fresh = False
         self._run: Trajectory | None = None
         self._energies: Array | None = None
+
+    def take(self, time: float, step: float, values: dict[str, float]) -> None:
+        """What inputs are from a time on [s], for a communication step. Raises InputError."""
+        if self._inputs.take(time, step, values):
+            self._scene = self._inputs.applied(self._stated)
+            self._run, self._energies, self._fresh = None, None, True
 
     def point(self, marker: str, time: float, step: float) -> tuple[float, ...]:
         """A marker [m] at a time [s]; step [s]: the next questions are expected so far apart, if it is finite.
@@ -65,6 +78,9 @@ class Ahead:
         if time > self._horizon * (1 + SAME):
             self._horizon *= math.ceil(time / self._horizon)
         count = math.floor(min(max(self._horizon - time, 0.0) / step + SAME, MOST))
+        if self._fresh:
+            # What has just changed may change again with the next step.
+            count, self._fresh = 0, False
         run = get_engine("gauss").simulate(self._scene, np.append(time, time + step * np.arange(1, count + 1)))
         if not run.ok:
             raise ComputationError(f"{self._scene.name}: the motion up to {run.times[-1]:g} s: {run.message}")

@@ -15,22 +15,31 @@ from pythonfmu.builder import FmuBuilder
 from shoal.engines.swarm_motion import asked_for
 from shoal.errors import InputError
 from shoal.fmu import machine
+from shoal.fmu.inputs import require_input
 from shoal.fmu.unit import CONTENT, identifier
 from shoal.scene import Scene
 from shoal.scene.function import Function
 from shoal.whole import whole
 
 
-def export(scene: Scene, paths: Sequence[str] = (), out: Path | None = None) -> Path:
+def export(scene: Scene, paths: Sequence[str] = (), out: Path | None = None, *, inputs: Sequence[str] = ()) -> Path:
     """Write a unit; returns its file. Raises InputError, and ComputationError if it cannot be written.
 
     paths: fields of the scene that are its parameters, by default gravity and the initial angles; out: by default the
-    scene's name in the working folder
+    scene's name in the working folder; inputs: loads' scales or torques and drives that a host may change in the run
     """
     if asked_for(scene):
         raise InputError(f"solver.acceleration: {scene.solver.acceleration!r} is for studies; a unit needs a solver")
     chosen = list(dict.fromkeys(paths)) or _usual(scene)
-    content = {"scene": scene.model_dump(mode="json"), "parameters": {path: number(scene, path) for path in chosen}}
+    for path in inputs:
+        if path in chosen:
+            raise InputError(f"input: {path} is a parameter as well; it can be one of them")
+        require_input(scene, path)
+    content = {
+        "scene": scene.model_dump(mode="json"),
+        "parameters": {path: number(scene, path) for path in chosen},
+        "inputs": {path: number(scene, path) for path in dict.fromkeys(inputs)},
+    }
     target = out or Path(f"{identifier(scene)}.fmu")
     with tempfile.TemporaryDirectory() as folder, _paths_as_they_were(), whole(target) as unit:
         script, data = Path(folder) / "machine.py", Path(folder) / CONTENT
@@ -53,7 +62,7 @@ def number(scene: Scene, path: str) -> float:
     if isinstance(value, Function):
         value = value.number
     if not isinstance(value, float):
-        raise InputError(f"parameter: {path} is not a real number that stands in the scene")
+        raise InputError(f"{path} is not a real number that stands in the scene")
     scene.with_values({path: value})
     return value
 

@@ -1,4 +1,4 @@
-"""A scene as an FMI 2.0 unit for co-simulation: parameters in, markers and energy out."""
+"""A scene as an FMI 2.0 unit for co-simulation: parameters and inputs in, markers and energy out."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ class SceneUnit(Fmi2Slave):  # type: ignore[misc]
         content = json.loads(text)
         self._scene = Scene.parse(content["scene"], CONTENT)
         self._values: dict[str, float] = content["parameters"]
+        self._inputs: dict[str, float] = content["inputs"]
         solver = self._scene.solver
         self._time, self._step = 0.0, math.inf
         self._stop: float | None = None
@@ -59,6 +60,18 @@ class SceneUnit(Fmi2Slave):  # type: ignore[misc]
                     description="SI units",
                     getter=partial(self._values.get, path),
                     setter=partial(self._values.__setitem__, path),
+                )
+            )
+        for path in self._inputs:
+            self.register_variable(
+                Real(
+                    path,
+                    causality=Fmi2Causality.input,
+                    variability=Fmi2Variability.continuous,
+                    start=self._inputs[path],
+                    description="SI units",
+                    getter=partial(self._inputs.get, path),
+                    setter=partial(self._inputs.__setitem__, path),
                 )
             )
         for marker in self._scene.markers:
@@ -96,10 +109,11 @@ class SceneUnit(Fmi2Slave):  # type: ignore[misc]
 
     def exit_initialization_mode(self) -> None:
         """The parameters are known: the machine stands at its start. Raises InputError."""
-        self._motion = Ahead(self._scene.with_values(self._values), self._stop)
+        self._motion = Ahead(self._scene.with_values(self._values), self._stop, dict(self._inputs))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Go on to current_time + step_size [s]. Raises InputError, ComputationError: hosts log the line and stop."""
+        self._motion.take(current_time, step_size, self._inputs)
         self._time, self._step = current_time + step_size, step_size or self._step
         self._motion.reach(self._time, self._step)
         return True

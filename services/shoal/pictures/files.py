@@ -37,7 +37,7 @@ def save(path: Path, forms: Forms) -> None:
 
 
 def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selection | None = None) -> None:
-    """One lane: a page that moves, a moving picture, the machine at a few instants, a table, or all there is.
+    """One lane: a page that moves, a moving picture, the machine at a few instants, tables, or all there is.
 
     selection: how the model was chosen, for the page. Raises InputError, ComputationError.
     """
@@ -58,7 +58,18 @@ def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selectio
         title = f"{ends(scene.name, moving)}{trust}"
         return gif(moving, title) if moves else png(poses(moving, title))
 
+    def kept() -> bytes:
+        from shoal.pictures.columns import about_motion, of_motion, parquet
+
+        return parquet(of_motion(motion), about_motion(motion, scene))
+
+    def netcdf() -> bytes:
+        from shoal.pictures.columns import motion_to_netcdf
+
+        return motion_to_netcdf(motion, scene)
+
     drawings: Forms = {".html": page, ".gif": lambda: drawn(moves=True), ".png": lambda: drawn(moves=False)}
+    drawings |= {".parquet": kept, ".nc": netcdf}
     save(path, {**drawings, ".csv": lambda: columns(motion, "{:.12g}".format), ".json": _json(motion)})
 
 
@@ -115,7 +126,19 @@ def design(found: Design, path: Path) -> None:
 
 def sweep(result: Sweep, path: Path) -> None:
     """Every point, or the displacement of the last marker."""
-    save(path, {".csv": lambda: rows(result), ".json": _json(result), ".png": lambda: _plotted(result)})
+
+    def kept() -> bytes:
+        from shoal.pictures.columns import about_sweep, of_sweep, parquet
+
+        return parquet(of_sweep(result), about_sweep(result))
+
+    def netcdf() -> bytes:
+        from shoal.pictures.columns import sweep_to_netcdf
+
+        return sweep_to_netcdf(result)
+
+    tables: Forms = {".csv": lambda: rows(result), ".parquet": kept, ".nc": netcdf}
+    save(path, {**tables, ".json": _json(result), ".png": lambda: _plotted(result)})
 
 
 def rows(result: Sweep) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
@@ -79,6 +80,13 @@ class System:
         """Enter an item of Exudyn's class `kind`; its number."""
         family = next(family for family in ("Node", "Object", "Marker", "Load") if kind.startswith(family))
         return getattr(self.mbs, f"Add{family}")(getattr(self.items, kind)(**options))
+
+    def enter(self, what: str) -> None:
+        """What is entered next, by the field of the scene that states it."""
+
+    def function(self, make: Callable[..., Any], *given: Any) -> Any:
+        """A function that Exudyn calls: what `make`, of `user`, makes of numbers and functions."""
+        return make(*given)
 
     def node(self, kind: str, begin: list[Any], rates: list[Any]) -> tuple[Any, list[int]]:
         """Enter a node with its coordinates at the start and their rates; its number and their columns."""

@@ -62,6 +62,7 @@ class Machine:
     """An assembled system and the parts that read its coordinates."""
 
     scene: Scene
+    system: System
     mbs: Any
     container: Any
     """Owns the system; Exudyn frees both when it goes."""
@@ -120,10 +121,10 @@ class Machine:
         return np.asarray(sum((part.damping(q, v) for part in self.parts.values()), power))
 
 
-def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None) -> Machine:
+def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_of: type[System] = System) -> Machine:
     """Enter bodies, gravity, joints and loads at the initial state. Raises InputError for a joint that is open.
 
-    end [s]: of the run, beyond the scene's duration if at all.
+    end [s]: of the run, beyond the scene's duration if at all; system_of: what the items are entered into.
     """
     items = importlib.import_module("exudyn.itemInterface")
     scene = complete(scene).scene
@@ -131,15 +132,18 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None) -> Machi
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     clock = Clock(max(end or 0.0, scene.solver.duration), scene.solver.step)
-    system = System(mbs, items, scene.gravity, clock)
+    system = system_of(mbs, items, scene.gravity, clock)
     parts: dict[str, Part] = {}
     for name, body in scene.bodies.items():
+        system.enter(f"bodies.{name}")
         part = of_kind(PARTS[beam], body.element, f"bodies.{name}.element")
         parts[name] = part.add(system, body, poses[name])
+    system.enter(GROUND)
     ground = GroundPart.add(system)
     places: dict[str, Holder] = {**parts, GROUND: ground}
     for point, path in scene.ground_points.items():
         name = moving(point)
+        system.enter(f"ground_points.{point}")
         places[name] = add_moving_point(system, ground, point, path, poses[name])
     ends = Ends(scene, system, places, poses)
     gaps = [add_joint(ends, name, joint) for name, joint in scene.joints.items()]
@@ -148,4 +152,4 @@ def build(exu: Any, scene: Scene, beam: Beam, end: float | None = None) -> Machi
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    return Machine(scene, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference))
+    return Machine(scene, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference))

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shoal.engines.exudyn import user
+from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.chain import cross
 from shoal.engines.exudyn.ends import Ends
 from shoal.mechanics.fitting import fit_law
@@ -44,29 +46,25 @@ class Law:
         """Whether Exudyn's own linear law is enough; it takes no negative stiffness."""
         return self.stiffness >= 0 and not (self.cubic or self.coulomb or self.elastic)
 
-    def force(self, x: Array, rate: Array) -> Array:
-        """The force that resists x and its rate."""
-        return self.stiffness * x + self.cubic * x**3 + self.resisting(x, rate)
-
     def stored(self, x: Array) -> Array:
         """Energy [J] of the polynomial part."""
         return self.stiffness / 2 * x**2 + self.cubic / 4 * x**4
 
     def resisting(self, x: Array, rate: Array) -> Array:
         """The rest of the force, whose work is followed along the way."""
-        force = self.damping * rate + self.coulomb * np.tanh(rate / self.speed)
-        return force if self.elastic is None else force + self.elastic(x)
+        return np.asarray(user.law_resisting(self.numbers, self.elastic, x, rate))
 
-    def options(self, keyword: str) -> dict[str, Any]:
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The law without its function, by name."""
+        return {key: value for key, value in vars(self).items() if key != "elastic"}
+
+    def options(self, system: System, keyword: str) -> dict[str, Any]:
         """What Exudyn's connectors need to know; keyword: their name for a force in Python."""
         options: dict[str, Any] = {"stiffness": max(self.stiffness, 0.0), "damping": self.damping}
         if not self.linear:
-            # Exudyn gives the measure as it counts it; what it has for an offset comes last.
-            def force(_mbs: Any, _t: float, _item: int, x: float, rate: float, *more: float) -> float:
-                offset = more[2] if keyword == "springTorqueUserFunction" else 0.0
-                return float(self.force(np.array([x - offset]), np.array([rate]))[0])
-
-            options[keyword] = force
+            make = user.spring_torque if keyword == "springTorqueUserFunction" else user.spring_force
+            options[keyword] = system.function(make, self.numbers, self.elastic)
         return options
 
 
@@ -84,7 +82,7 @@ def add_spring(ends: Ends, first: Attachment, second: Attachment, law: Law, leng
         "ObjectConnectorSpringDamper",
         markerNumbers=[ends.hold(first), ends.hold(second)],
         referenceLength=rest,
-        **law.options("springForceUserFunction"),
+        **law.options(ends.system, "springForceUserFunction"),
     )
     return exchange_of(law, lambda q, v: (measure(q, v)[0] - rest, measure(q, v)[1]))
 
@@ -93,7 +91,7 @@ def add_torsion(ends: Ends, first: Attachment, second: Attachment, law: Law, ang
     """Enter a law over the angle between two bodies; angle: where x is 0 [rad], else that of the start."""
     start = ends.start_turn(first, second)
     rest = start if angle is None else angle
-    system, options = ends.system, law.options("springTorqueUserFunction")
+    system, options = ends.system, law.options(ends.system, "springTorqueUserFunction")
     if law.stiffness or law.cubic or law.elastic:
         # A data coordinate lets Exudyn count full turns.
         options |= {
@@ -119,7 +117,7 @@ def add_rail(ends: Ends, first: Attachment, second: Attachment, direction: float
         "ObjectConnectorLinearSpringDamper",
         markerNumbers=[ends.turn(first), ends.turn(second)],
         axisMarker0=[np.cos(direction), np.sin(direction), 0.0],
-        **law.options("springForceUserFunction"),
+        **law.options(ends.system, "springForceUserFunction"),
     )
 
     def measure(q: Array, v: Array) -> tuple[Array, Array]:

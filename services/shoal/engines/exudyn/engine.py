@@ -11,6 +11,7 @@ import numpy as np
 
 from shoal.engines.capabilities import of_kind, require
 from shoal.engines.contract import Capabilities, sampling_times
+from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.build import PARTS, Beam, Machine, build, library, silence
 from shoal.engines.exudyn.checks import judge
 from shoal.engines.exudyn.joints import JOINTS
@@ -123,9 +124,11 @@ class ExudynEngine:
             model=self._model(exu, machine, steps) | facts(scene, machine.scene.initial, machine.span),
         )
 
-    def machine(self, exu: Any, scene: Scene, end: float | None = None) -> Machine:
-        """The scene as a system of Exudyn's, for runs up to `end` [s]. Raises InputError."""
-        return build(exu, scene, self.beam, end) if scene.dimensions == 2 else build_in_space(exu, scene, end)
+    def machine(self, exu: Any, scene: Scene, end: float | None = None, system_of: type[System] = System) -> Machine:
+        """The scene as a system of Exudyn's, for runs up to `end` [s]; system_of: see `build`. Raises InputError."""
+        if scene.dimensions == 3:
+            return build_in_space(exu, scene, end, system_of)
+        return build(exu, scene, self.beam, end, system_of)
 
     def simulate_many(
         self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from shoal.engines.course import Course
+from shoal.engines.exudyn import user
 from shoal.engines.exudyn.bodies import Holder, Motion, Place, RigidPart, System
 from shoal.engines.poses import InitialPose
 from shoal.errors import InputError
@@ -49,7 +50,7 @@ def add_moving_point(system: System, ground: GroundPart, name: str, path: Moving
     part = RigidPart.add(system, PointMass(mass=1.0), pose)
     for axis, f in enumerate((path.x, path.y)):
         drive(system, (ground.node, 0), (part.node, axis), driven(system, f, f"ground_points.{name}"))
-    drive(system, (ground.node, 0), (part.node, 2), system.clock.course(Function(number=0.0)))
+    drive(system, (ground.node, 0), (part.node, 2), system.course(Function(number=0.0), f"ground_points.{name}"))
     return part
 
 
@@ -74,10 +75,9 @@ def _markers(system: System, *coordinates: Coordinate) -> list[Any]:
 def drive(system: System, first: Coordinate, second: Coordinate, course: Course) -> None:
     """Let second - first follow a function of time; Exudyn counts coordinates from the start."""
     markers = _markers(system, first, second)
-    begin = course.value(0.0)
     system.add(
         "ObjectConnectorCoordinate",
         markerNumbers=markers,
-        offsetUserFunction=lambda mbs, t, item, given: course.value(t) - begin,
-        offsetUserFunction_t=lambda mbs, t, item, given: course.slope(t),
+        offsetUserFunction=system.function(user.offset, course.value),
+        offsetUserFunction_t=system.function(user.offset_rate, course.slope),
     )

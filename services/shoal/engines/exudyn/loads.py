@@ -9,7 +9,9 @@ import numpy as np
 
 from shoal.engines.capabilities import of_kind
 from shoal.engines.course import Course
+from shoal.engines.exudyn import user
 from shoal.engines.exudyn.beam import BeamPart
+from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.cable import CablePart
 from shoal.engines.exudyn.chain import gauss
 from shoal.engines.exudyn.connectors import Exchange, Law, add_spring, add_torsion
@@ -20,6 +22,7 @@ from shoal.trajectory import Array
 
 def add_load(ends: Ends, name: str, load: Load) -> Exchange:
     """Enter a load. Raises InputError."""
+    ends.system.enter(f"loads.{name}")
     return of_kind(LOADS, load.kind, f"loads.{name}")(ends, f"loads.{name}", load)
 
 
@@ -39,7 +42,7 @@ def _law(load: Spring | TorsionSpring) -> Law:
 def _add_force(ends: Ends, where: str, load: Force) -> Exchange:
     scale = ends.system.course(load.scale, f"{where}.scale")
     marker = ends.turn(load.at) if load.follows else ends.hold(load.at)
-    options = scaled([*load.force, 0.0], scale)
+    options = scaled(ends.system, [*load.force, 0.0], scale)
     ends.system.add("LoadForceVector", markerNumber=marker, bodyFixed=load.follows, **options)
 
     def power(t: Array, q: Array, v: Array) -> Array:
@@ -57,7 +60,8 @@ def _add_torque(ends: Ends, where: str, load: Torque) -> Exchange:
     torque = ends.system.course(load.torque, f"{where}.torque")
     for side, sign in ((load.at, 1.0), (load.reaction, -1.0)):
         if side is not None:
-            ends.system.add("LoadTorqueVector", markerNumber=ends.turn(side), **scaled([0.0, 0.0, sign], torque))
+            options = scaled(ends.system, [0.0, 0.0, sign], torque)
+            ends.system.add("LoadTorqueVector", markerNumber=ends.turn(side), **options)
 
     def power(t: Array, q: Array, v: Array) -> Array:
         against = 0.0 if load.reaction is None else ends.motion(load.reaction, q, v).rate
@@ -73,7 +77,7 @@ def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange
     force = np.array(load.force)
     if isinstance(part, CablePart | BeamPart):
         for element, mass in zip(part.elements, part.sections.mass, strict=True):
-            options = scaled([*(force / mass), 0.0], scale)
+            options = scaled(system, [*(force / mass), 0.0], scale)
             system.accelerate(element, options.pop("loadVector")[:2], **options)
         places = [((k + (x + 1) / 2) * part.size, 0.0) for k in range(rod.elements) for x in gauss(3)[0]]
         weights = np.tile(gauss(3)[1] * part.size / 2, rod.elements)
@@ -83,7 +87,8 @@ def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange
         weights = weights * rod.length / 2
         middle = weights @ np.array(places) / rod.length
         marker = part.hold(system, (float(middle[0]), float(middle[1])))
-        system.add("LoadForceVector", markerNumber=marker, **scaled([*(force * rod.length), 0.0], scale))
+        options = scaled(system, [*(force * rod.length), 0.0], scale)
+        system.add("LoadForceVector", markerNumber=marker, **options)
 
     def power(t: Array, q: Array, v: Array) -> Array:
         flow = sum(w * part.motion(q, v, place).velocity for w, place in zip(weights, places, strict=True))
@@ -92,16 +97,12 @@ def _add_distributed(ends: Ends, where: str, load: DistributedForce) -> Exchange
     return Exchange(power)
 
 
-def scaled(vector: list[float], scale: Course) -> dict[str, Any]:
+def scaled(system: System, vector: list[float], scale: Course) -> dict[str, Any]:
     """A load vector times a function of time, as Exudyn's options."""
     if scale.function.number is not None:
         return {"loadVector": [scale.function.number * part for part in vector]}
 
-    def load(_mbs: Any, t: float, _given: Any) -> list[float]:
-        factor = scale.value(t)
-        return [factor * part for part in vector]
-
-    return {"loadVector": vector, "loadVectorUserFunction": load}
+    return {"loadVector": vector, "loadVectorUserFunction": system.function(user.scaled_load, vector, scale.value)}
 
 
 LOADS: dict[str, Callable[[Ends, str, Any], Exchange]] = {

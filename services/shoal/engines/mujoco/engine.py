@@ -9,21 +9,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, sampling_times
+from shoal.engines.mujoco.mjcf import Mjcf
 from shoal.engines.one_by_one import one_by_one
-from shoal.engines.tree.description import SpatialChain
-from shoal.engines.tree.scene import SceneTree
 from shoal.errors import InputError
 from shoal.mechanics.reach import span
 from shoal.mechanics.start.start import facts
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 
-JOINTS = {"revolute": "mjJNT_HINGE", "prismatic": "mjJNT_SLIDE", "spherical": "mjJNT_BALL"}
-"""What MuJoCo calls them."""
+STABLE = 1.4
+"""Of rates times step: half of what RK4 bears, as machines are stiffer elsewhere."""
 
 
 def library() -> Any:
@@ -61,15 +59,19 @@ class MujocoEngine:
         except InputError as error:
             soft = "; MuJoCo's are soft and open" if "closed loops" in str(error) else ""
             raise InputError(f"{error}{soft}") from None
-        mujoco, tree = library(), SceneTree(scene)
-        model = _model(mujoco, tree.chain)
-        data = mujoco.MjData(model)
-        data.qvel[:] = _rates(tree.chain)
+        return self.run(Mjcf(scene), wanted, started)
+
+    def run(self, machine: Mjcf, wanted: Array, started: float | None = None) -> Trajectory:
+        """Run what MJCF says, soft constraints and all: their energy and the work of loads are not followed."""
+        started = time.perf_counter() if started is None else started
+        mujoco, scene = library(), machine.scene
+        model, data = _loaded(mujoco, machine)
+        followed = not (model.neq or model.nu or scene.loads or np.any(model.dof_frictionloss))
         points, angles, drift, steps = _march(mujoco, model, data, scene, wanted)
         status, message = Status.OK, ""
         if not np.all(np.isfinite(points)):
             status, message = Status.DIVERGED, "the motion is not finite; use a smaller solver.step"
-        elif not drift <= scene.solver.energy_tolerance:
+        elif followed and not drift <= scene.solver.energy_tolerance:
             status, message = Status.ENERGY, f"energy is off by {drift:.3g}; reduce solver.step"
         return Trajectory(
             engine=self.name,
@@ -78,13 +80,13 @@ class MujocoEngine:
             points=points[..., : scene.dimensions, None],
             angles=angles[..., None],
             status=(status,),
-            energy_drift=np.array([drift]),
+            energy_drift=np.array([drift if followed else np.nan]),
             constraint_drift=np.zeros(1),
             steps=steps,
             wall_s=time.perf_counter() - started,
             message=message,
-            model={"mujoco": mujoco.__version__, "unknowns": int(model.nv), "constraints": 0, "integrator": "rk4",
-                   "step": scene.solver.step} | facts(scene, tree.initial, span(scene)),
+            model={"mujoco": mujoco.__version__, "unknowns": int(model.nv), "constraints": int(model.neq),
+                   "integrator": "rk4", "step": scene.solver.step} | facts(scene, machine.initial, span(scene)),
         )  # fmt: skip
 
     def simulate_many(
@@ -94,50 +96,41 @@ class MujocoEngine:
         return one_by_one(self, scene, values, times)
 
 
-def _model(mujoco: Any, chain: SpatialChain) -> Any:
-    """The chain in MuJoCo's terms; its joints' coordinates are zero at the start."""
-    spec = mujoco.MjSpec()
-    spec.option.gravity = chain.gravity
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    spec.option.enableflags = mujoco.mjtEnableBit.mjENBL_ENERGY
-    made = {"ground": spec.worldbody}
-    for name in chain.order:
-        joint = chain.joints[name]
-        on, own = joint.on_parent, joint.on_body
-        turn = Rotation.from_rotvec(on.rotation) * Rotation.from_rotvec(own.rotation).inv()
-        body = chain.bodies[joint.body]
-        moments, axes = np.linalg.eigh(np.array(body.inertia))
-        axes[:, 2] *= np.linalg.det(axes)
-        made[joint.body] = link = made[joint.parent].add_body(
-            name=joint.body,
-            pos=np.array(on.position) - turn.apply(own.position),
-            quat=turn.as_quat(scalar_first=True),
-            mass=body.mass,
-            ipos=body.centre_of_mass,
-            iquat=Rotation.from_matrix(axes).as_quat(scalar_first=True),
-            inertia=moments,
-            explicitinertial=True,
-        )
-        if joint.kind in JOINTS:
-            axis = (0.0, 0.0, 1.0) if joint.axis is None else Rotation.from_rotvec(own.rotation).apply(joint.axis)
-            kind = getattr(mujoco.mjtJoint, JOINTS[joint.kind])
-            link.add_joint(name=name, type=kind, pos=own.position, axis=axis, damping=[joint.damping, 0.0, 0.0])
-    for name, place in chain.points.items():
-        made[place.body].add_site(name=name, pos=place.position)
-    return spec.compile()
+def _loaded(mujoco: Any, machine: Mjcf) -> tuple[Any, Any]:
+    """The model and its state at the start."""
+    model = mujoco.MjModel.from_xml_string(machine.text)
+    data = mujoco.MjData(model)
+    data.qvel[:] = machine.rates
+    return model, data
 
 
-def _rates(chain: SpatialChain) -> Array:
-    """Rates of the joints at the start, in MuJoCo's order: of ball joints in the frame of the body."""
-    rates: list[float] = []
-    for name in chain.order:
-        joint, state = chain.joints[name], chain.initial[name]
-        rate = np.array(state.rate or ())
-        rates += (
-            Rotation.from_rotvec(joint.on_body.rotation).apply(rate) if joint.kind == "spherical" else rate
-        ).tolist()
-    return np.array(rates)
+def stepped(scene: Scene) -> Mjcf:
+    """A scene as MJCF, with half its step, and again, until springs and dampers are not too stiff for it at the start.
+
+    Raises InputError that names what MJCF has not.
+    """
+    mujoco, machine = library(), Mjcf(scene)
+    model, data = _loaded(mujoco, machine)
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    start, rest = data.qpos.copy(), data.qfrc_passive.copy()
+    stiff, damped = np.zeros_like(mass), np.zeros_like(mass)
+    for column, unit in enumerate(np.eye(model.nv)):
+        data.qvel[:] = machine.rates + unit
+        mujoco.mj_forward(model, data)
+        damped[:, column] = rest - data.qfrc_passive
+        data.qvel[:] = machine.rates
+        mujoco.mj_integratePos(model, data.qpos, unit, 1e-6)
+        mujoco.mj_forward(model, data)
+        stiff[:, column] = (rest - data.qfrc_passive) / 1e-6
+        data.qpos[:] = start
+    fastest = max(
+        float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(mass, damped))), initial=0.0)),
+        float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(mass, stiff))), initial=0.0)) ** 0.5,
+    )
+    halvings = max(0, math.ceil(math.log2(max(fastest * scene.solver.step / STABLE, 1e-9))))
+    return machine if halvings == 0 else Mjcf(scene.with_values({"solver.step": scene.solver.step / 2**halvings}))
 
 
 def _march(mujoco: Any, model: Any, data: Any, scene: Scene, wanted: Array) -> tuple[Array, Array, float, int]:

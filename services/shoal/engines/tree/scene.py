@@ -30,7 +30,7 @@ from shoal.trajectory import Array
 
 
 @dataclass(frozen=True)
-class _Begin:
+class Begin:
     """Origin [m], axes as columns, velocity [m/s] and spin [rad/s] of a body at the start, (3,), (3, 3), (3,), (3,)."""
 
     origin: Array
@@ -39,12 +39,15 @@ class _Begin:
     spin: Array
 
     def point(self, place: Array) -> Array:
+        """Where a place of the body is [m]."""
         return self.origin + self.axes @ place
 
     def speed(self, point: Array) -> Array:
+        """Velocity [m/s] of what of the body is at a point."""
         return self.velocity + np.cross(self.spin, point - self.origin)
 
     def back(self, point: Array) -> Array:
+        """The place of the body that is at a point [m]."""
         return np.asarray(self.axes.T @ (point - self.origin))
 
 
@@ -57,7 +60,7 @@ class SceneTree:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self._begin, self._axis, self.initial = _started(scene)
+        self._begin, self._axis, self.initial = started(scene)
         joints: dict[str, Any] = {}
         states: dict[str, Any] = {}
         for name, parent, child in _links(scene):
@@ -135,16 +138,16 @@ def _body(body: Any, size: float) -> SpatialBody:
     )
 
 
-def _started(scene: Scene) -> tuple[dict[str, _Begin], Any, dict[str, InitialState]]:
+def started(scene: Scene) -> tuple[dict[str, Begin], Any, dict[str, InitialState]]:
     """The start of every body, and what tells where an axis that a joint states points then."""
-    still = _Begin(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+    still = Begin(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
     found = {GROUND: still}
     if scene.dimensions == 2:
         initial = {}
         for name, pose in initial_poses(scene).items():
             axes = Rotation.from_rotvec([0.0, 0.0, pose.angle]).as_matrix()
             origin, velocity = np.array([*pose.origin, 0.0]), np.array([*pose.velocity, 0.0])
-            found[name] = _Begin(origin, axes, velocity, np.array([0.0, 0.0, pose.rate]))
+            found[name] = Begin(origin, axes, velocity, np.array([0.0, 0.0, pose.rate]))
             if name != GROUND:
                 initial[name] = InitialState(
                     angle=pose.angle, rate=pose.rate, position=tuple(pose.origin), velocity=tuple(pose.velocity)
@@ -157,7 +160,7 @@ def _started(scene: Scene) -> tuple[dict[str, _Begin], Any, dict[str, InitialSta
         axes = Rotation.from_rotvec(begin.rotation or (0.0, 0.0, 0.0)).as_matrix()
         parts = (np.array(part, dtype=float) for part in (begin.position, begin.velocity, begin.spin or (0, 0, 0)))
         origin, velocity, spin = parts
-        found[name] = _Begin(origin, axes, velocity, spin)
+        found[name] = Begin(origin, axes, velocity, spin)
 
     def pointing(side: Attachment, axis: Any) -> Array:
         return np.asarray(found[side.body].axes @ placement.attitudes.image(side.body, axis)[:, 0])

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from shoal.engines.exudyn.bodies import Energy, Part, Place, System
 from shoal.engines.exudyn.cable import CablePart, add_cables
 from shoal.engines.exudyn.ground import GroundPart
+from shoal.engines.exudyn.user import rotation, rotation_slope
 from shoal.engines.sections import Sections
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine
@@ -40,22 +41,10 @@ class Motion(NamedTuple):
 
 
 class Side(NamedTuple):
-    """A node, how many coordinates it has, and the linear or quadratic vectors of them that constraints speak of."""
+    """A node, and how many coordinates it has: none of the ground, 6 of a cable, 7 of a rigid body."""
 
     node: Any
     size: int
-    cable: bool
-
-    def vector(self, q: Array, image: Array) -> tuple[Array, Array]:
-        """A direction (3,) that the body's frame has as `image`, at its coordinates, and its derivative (3, size)."""
-        if self.size == 0:
-            return image, np.zeros((3, 0))
-        slope = np.zeros((3, self.size))
-        if self.cable:
-            slope[:, 3:] = np.eye(3)
-            return q[3:6], slope
-        slope[:, 3:] = np.einsum("ijk,j->ik", rotation_slope(q[3:7]), image)
-        return rotation(q[None, 3:7])[0] @ image, slope
 
 
 class SpatialHolder(Protocol):
@@ -150,7 +139,7 @@ class SolidPart(Framed, Part):
 
     def side(self, place: Place) -> Side:
         """See SpatialHolder."""
-        return Side(self.node, 7, False)
+        return Side(self.node, 7)
 
     def motion(self, q: Array, v: Array, place: Place) -> Any:
         """See Part."""
@@ -212,7 +201,7 @@ class SpatialCablePart(CablePart):
             raise InputError(
                 f"joints: engine exudyn holds the direction of a cable at its nodes only, not at {place[0]:g} m"
             )
-        return Side(self.nodes[round(node)], 6, True)
+        return Side(self.nodes[round(node)], 6)
 
     def motion(self, q: Array, v: Array, place: Place) -> Any:
         """See Part."""
@@ -246,37 +235,13 @@ class SpatialGround(Framed, GroundPart):
 
     def side(self, place: Place) -> Side:
         """See SpatialHolder."""
-        return Side(self.node, 0, False)
+        return Side(self.node, 0)
 
     def motion(self, q: Array, v: Array, place: Place) -> Any:
         """See SpatialHolder."""
         rows = len(q)
         still = np.zeros((rows, 3, 3))
         return Motion(np.tile(np.array(place, dtype=float), (rows, 1)), still[:, 0], still + np.eye(3), still)
-
-
-def rotation(turn: Array) -> Array:
-    """The matrix (rows, 3, 3) that Exudyn makes of Euler parameters (rows, 4), which need not be of unit length."""
-    s, x, y, z = turn.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - s * z), 2 * (x * z + s * y)],
-        [2 * (x * y + s * z), 1 - 2 * (x * x + z * z), 2 * (y * z - s * x)],
-        [2 * (x * z - s * y), 2 * (y * z + s * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
-
-
-def rotation_slope(turn: Array) -> Array:
-    """Its derivative by the Euler parameters, (..., 3, 3, 4)."""
-    s, x, y, z = np.moveaxis(turn, -1, 0)
-    none = 0.0 * s
-    by = [
-        [[none, -z, y], [z, none, -x], [-y, x, none]],
-        [[none, y, z], [y, -2 * x, -s], [z, s, -2 * x]],
-        [[-2 * y, x, s], [x, none, z], [-s, z, -2 * y]],
-        [[-2 * z, -s, x], [s, -2 * z, y], [x, y, none]],
-    ]
-    return np.asarray(2 * np.moveaxis(np.array(by), (0, 1, 2), (-1, -3, -2)))
 
 
 def local_rates(turn: Array) -> Array:

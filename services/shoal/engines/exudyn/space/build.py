@@ -28,26 +28,32 @@ DEPENDENT = 1e-9
 """Singular values of Exudyn's constraints that are zero, relative to the largest."""
 
 
-def build_in_space(exu: Any, scene: Scene, end: float | None = None) -> Machine:
-    """Enter bodies, gravity, joints and loads at the initial state. Raises InputError."""
+def build_in_space(exu: Any, scene: Scene, end: float | None = None, system_of: type[System] = System) -> Machine:
+    """Enter bodies, gravity, joints and loads at the initial state. Raises InputError.
+
+    end, system_of: as of `build`
+    """
     items = importlib.import_module("exudyn.itemInterface")
     placement = place_started(scene)
     q, v = stacked(placement.positions)[:, 0], stacked(placement.velocities)[:, 0]
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     clock = Clock(max(end or 0.0, scene.solver.duration), scene.solver.step)
-    system = System(mbs, items, padded(scene.gravity, 3), clock)
+    system = system_of(mbs, items, padded(scene.gravity, 3), clock)
     parts: dict[str, Any] = {}
     for name, body in scene.bodies.items():
+        system.enter(f"bodies.{name}")
         frame = placement.frames[name]
         if isinstance(frame, BeamFrame):
             assert isinstance(body, Rod)
             parts[name] = SpatialCablePart.enter(system, body, frame, q, v)
         else:
             parts[name] = SolidPart.add(system, body, frame, q, v)
+    system.enter(GROUND)
     ground = SpatialGround.add(system)
     places: dict[str, Any] = {**parts, GROUND: ground}
     for point, path in scene.ground_points.items():
+        system.enter(f"ground_points.{point}")
         # A point of the ground that moves is a body whose place is driven, so its mass is idle.
         frame = PointFrame(point, placement.drivers[moving(point)])
         part = places[moving(point)] = SolidPart.add(system, PointMass(mass=1.0), frame, q, v)
@@ -63,7 +69,9 @@ def build_in_space(exu: Any, scene: Scene, end: float | None = None) -> Machine:
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
     started = scene.model_copy(update={"initial": begun(placement.frames, scene, q, v)})
     dependent = _dependent(exu, mbs) if any(loops(scene)) else 0
-    return Machine(started, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent)
+    return Machine(
+        started, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent
+    )
 
 
 def _dependent(exu: Any, mbs: Any) -> int:

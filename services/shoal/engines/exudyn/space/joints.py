@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.engines.exudyn import user
 from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.connectors import Exchange, Law, exchange_of
 from shoal.engines.exudyn.ground import driven
@@ -26,6 +27,7 @@ SPATIAL_JOINTS = frozenset(JOINT_KINDS) - {"coupling"}
 
 def add_joint(exu: Any, ends: SpatialEnds, name: str, joint: Joint) -> list[Gap]:
     """Enter a joint without its friction; how far each of its conditions is open. Raises InputError."""
+    ends.system.enter(f"joints.{name}")
     return [CONDITIONS[type(one)](exu, ends, f"joints.{name}", one) for one in conditions(joint, 3)]
 
 
@@ -33,6 +35,7 @@ def add_friction(ends: SpatialEnds, name: str, joint: Joint) -> Exchange | None:
     """Enter the friction of a joint, if it has any. Raises InputError."""
     if not isinstance(joint, Revolute | Slider) or not (joint.friction or joint.coulomb):
         return None
+    ends.system.enter(f"joints.{name}.friction")
     law = Law(damping=joint.friction, coulomb=joint.coulomb, speed=joint.coulomb_speed)
     if isinstance(joint, Revolute):
         return add_twist(ends, f"joints.{name}.friction", joint.first, joint.second, joint.axis, law, None)
@@ -53,7 +56,7 @@ def add_twist(
     one, other = (frame_about(ends.image(side, axis)) for side in (first, second))
     begin = _angle(ends.start_axes(first)[None] @ one, ends.start_axes(second)[None] @ other)[0]
     origin = begin if rest is None else rest
-    options = law.options("springTorqueUserFunction")
+    options = law.options(ends.system, "springTorqueUserFunction")
     if law.stiffness or law.cubic or law.elastic:
         # A data coordinate lets Exudyn count full turns.
         counter = ends.system.add("NodeGenericData", initialCoordinates=[begin], numberOfDataCoordinates=1)
@@ -98,7 +101,7 @@ def _add_rail(ends: SpatialEnds, where: str, joint: Slider, law: Law) -> Exchang
         "ObjectConnectorLinearSpringDamper",
         markerNumbers=[ends.turn(joint.first), ends.turn(joint.second)],
         axisMarker0=line.tolist(),
-        **law.options("springForceUserFunction"),
+        **law.options(ends.system, "springForceUserFunction"),
     )
 
     def measure(q: Array, v: Array) -> tuple[Array, Array]:
@@ -244,15 +247,8 @@ def _hinged(exu: Any, ends: SpatialEnds, where: str, one: Hinged) -> Gap:
     course = driven(ends.system, one.angle, f"{where}.angle")
     here, there = (frame_about(ends.image(side, one.axis)) for side in (one.first, one.second))
 
-    def cosine(t: float) -> tuple[float, float]:
-        angle, rate = course.value(t), course.slope(t)
-        return np.cos(angle), -np.sin(angle) * rate
-
-    def sine(t: float) -> tuple[float, float]:
-        angle, rate = course.value(t), course.slope(t)
-        return np.sin(angle), np.cos(angle) * rate
-
-    rows = [Row(here[:, 0], there[:, 0], cosine), Row(here[:, 1], there[:, 0], sine)]
+    wanted = [ends.system.function(make, course.value, course.slope) for make in (user.cosine, user.sine)]
+    rows = [Row(here[:, axis], there[:, 0], one) for axis, one in enumerate(wanted)]
     add_rows(exu, ends.system, ends.side(one.first), ends.side(one.second), rows)
     return lambda q, v: np.zeros(len(q))
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from shoal.engines.capabilities import of_kind
+from shoal.engines.exudyn import user
 from shoal.engines.exudyn.chain import gauss
 from shoal.engines.exudyn.connectors import Exchange, Law, add_spring
 from shoal.engines.exudyn.loads import scaled
@@ -23,6 +24,7 @@ from shoal.trajectory import Array
 
 def add_load(ends: SpatialEnds, name: str, load: Load) -> Exchange:
     """Enter a load. Raises InputError."""
+    ends.system.enter(f"loads.{name}")
     return of_kind(LOADS, load.kind, f"loads.{name}")(ends, f"loads.{name}", load)
 
 
@@ -57,7 +59,7 @@ def _add_force(ends: SpatialEnds, where: str, load: Force) -> Exchange:
     scale = ends.system.course(load.scale, f"{where}.scale")
     vector = np.array(padded(load.force, 3), dtype=float)
     marker = ends.turn(load.at) if load.follows else ends.hold(load.at)
-    options = scaled(vector.tolist(), scale)
+    options = scaled(ends.system, vector.tolist(), scale)
     ends.system.add("LoadForceVector", markerNumber=marker, bodyFixed=load.follows, **options)
 
     def power(t: Array, q: Array, v: Array) -> Array:
@@ -75,13 +77,10 @@ def _add_torque(ends: SpatialEnds, where: str, load: Torque) -> Exchange:
     torque = ends.system.course(load.torque, f"{where}.torque")
     axes = frame_about(ends.image(holder, load.axis))
 
-    def against(_mbs: Any, t: float, *_: Any) -> float:
-        return -torque.value(t)
-
     ends.system.add(
         "ObjectConnectorTorsionalSpringDamper",
         markerNumbers=[ends.framed(holder, axes), ends.turn(load.at)],
-        springTorqueUserFunction=against,
+        springTorqueUserFunction=ends.system.function(user.torque_against, torque.value),
     )
 
     def power(t: Array, q: Array, v: Array) -> Array:
@@ -99,14 +98,14 @@ def _add_distributed(ends: SpatialEnds, where: str, load: DistributedForce) -> E
     force = np.array(padded(load.force, 3), dtype=float)
     if isinstance(part, SpatialCablePart):
         for element, mass in zip(part.elements, part.sections.mass, strict=True):
-            options = scaled((force / mass).tolist(), scale)
+            options = scaled(system, (force / mass).tolist(), scale)
             system.accelerate(element, tuple(options.pop("loadVector")), **options)
         along = [(k + (x + 1) / 2) * part.size for k in range(rod.elements) for x in gauss(3)[0]]
         weights = np.tile(gauss(3)[1] * part.size / 2, rod.elements)
     else:
         along, weights = [np.float64(0.5 * rod.length)], np.array([rod.length])
         marker = part.hold(system, (0.5 * rod.length, 0.0, 0.0))
-        system.add("LoadForceVector", markerNumber=marker, **scaled((force * rod.length).tolist(), scale))
+        system.add("LoadForceVector", markerNumber=marker, **scaled(system, (force * rod.length).tolist(), scale))
 
     def power(t: Array, q: Array, v: Array) -> Array:
         ways = (part.motion(q, v, (s, 0.0, 0.0)).velocity for s in along)

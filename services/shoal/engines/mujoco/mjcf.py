@@ -1,0 +1,454 @@
+"""A scene of rigid bodies as MJCF, MuJoCo's own format. The engine runs this text, and `shoal export` writes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from shoal.engines.capabilities import check_acceleration
+from shoal.engines.tree.scene import Begin, started
+from shoal.errors import InputError
+from shoal.mechanics.assembly.masses import second_moments
+from shoal.mechanics.reach import span
+from shoal.scene import (
+    GROUND,
+    Attachment,
+    Distance,
+    Force,
+    PointMass,
+    Revolute,
+    Rod,
+    Scene,
+    Slider,
+    Spherical,
+    Spring,
+    Torque,
+    TorsionSpring,
+    Weld,
+)
+from shoal.scene.dimensions import padded
+from shoal.scene.joints import Cylindrical, Planar, Universal
+from shoal.scene.sections import Tube
+from shoal.trajectory import Array
+
+THINNEST = 1e-14
+"""Of mass times size squared: the least moment of inertia, of which MuJoCo needs one about every axis."""
+LEAST = 2e-15
+"""The same [kg m^2]: MuJoCo refuses 1e-15."""
+STIFF = 2.0
+"""Time constant of a soft constraint, in steps: the least that MuJoCo takes."""
+START = "start"
+"""The keyframe with the rates of the start, which MJCF has no other place for."""
+
+Freedom = tuple[str, Array]
+"""slide, hinge or ball, and its axis (3,) at the start."""
+
+
+@dataclass
+class _Link:
+    """A body, what it hangs on, and how: by a joint of the scene from a place of the parent, or free."""
+
+    name: str
+    parent: str
+    joint: str = ""
+    freedoms: list[Freedom] = field(default_factory=list)
+    place: Array = field(default_factory=lambda: np.zeros(3))
+    """Of the joint at the start [m]."""
+
+
+class Mjcf:
+    """A scene as MJCF at its start. Raises InputError that names what MJCF has not.
+
+    text: the file; rates: of MuJoCo's joints at the start; soft: joints and the like that its soft constraints keep
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        check_acceleration(scene)
+        self.scene = scene
+        self._refuse()
+        self._begin, self._axis, self.initial = started(scene)
+        self.soft: list[str] = []
+        self.rates: list[float] = []
+        self._sites: dict[str, list[tuple[str, Any]]] = {}
+        self._springs: dict[str, list[tuple[float, float, float]]] = {}
+        links = list(self._links())
+        self._hung = {link.joint: link for link in links if link.joint}
+        parts = self._tendons_and_actuators()
+        for name, at in scene.markers.items():
+            self._site(name, at)
+        root = _element("mujoco", model=scene.name)
+        said = f"{scene.description.rstrip('.')}. " if scene.description else ""
+        root.append(ElementTree.Comment(f" {said}SI units, at its start. Written by Shoal. ".replace("--", "- -")))
+        _under(root, "compiler", angle="radian", autolimits="false")
+        options = {
+            "gravity": _numbers(padded(scene.gravity, 3)),
+            "timestep": repr(scene.solver.step),
+            "iterations": "200",
+        }
+        option = _under(root, "option", **options, integrator="RK4", tolerance="1e-14")
+        _under(option, "flag", contact="disable", energy="enable")
+        world = _under(root, "worldbody")
+        self._grow(world, GROUND, links)
+        for part, entries in parts.items():
+            if entries:
+                element = _under(root, part)
+                if part == "equality":
+                    element.append(ElementTree.Comment(" constraints of MuJoCo are soft: these give way a little "))
+                element.extend(entries)
+        if any(self.rates):
+            keys = _under(root, "keyframe")
+            keys.append(ElementTree.Comment(" load this one: the rates of the start have no other place "))
+            _under(keys, "key", name=START, qvel=_numbers(self.rates))
+        ElementTree.indent(root)
+        self.text = ElementTree.tostring(root, encoding="unicode") + "\n"
+
+    def _refuse(self) -> None:
+        scene = self.scene
+        for name, body in scene.bodies.items():
+            if name == "world":
+                raise InputError("bodies.world: MJCF calls the ground so; give the body another name")
+            if body.element != "rigid":
+                raise InputError(f"bodies.{name}.element: MJCF has no {body.element}; rigid bodies only")
+        if scene.starts_at_rest:
+            raise InputError("initial.from: MJCF states a start; it has no statics")
+        for name in scene.ground_points:
+            raise InputError(f"ground_points.{name}: MJCF has no functions of time")
+        for name, joint in scene.joints.items():
+            if joint.kind in ("driven-angle", "gear", "coupling", "parallel", "perpendicular"):
+                raise InputError(f"joints.{name}: MJCF has no {joint.kind}")
+            if isinstance(joint, Distance) and joint.length is not None and joint.length.number is None:
+                raise InputError(f"joints.{name}.length: MJCF has no functions of time")
+        for name, load in scene.loads.items():
+            where = f"loads.{name}"
+            if load.kind == "distributed-force":
+                raise InputError(f"{where}: MJCF has no distributed-force")
+            for key in ("cubic", "elastic"):
+                if getattr(load, key, None):
+                    raise InputError(f"{where}.{key}: MJCF has linear springs only")
+            for key in ("scale", "torque"):
+                if (f := getattr(load, key, None)) is not None and f.number is None:
+                    raise InputError(f"{where}.{key}: MJCF has no functions of time")
+
+    def _links(self) -> Iterator[_Link]:
+        """Bodies from the ground outwards; what MuJoCo's constraints can close as well is cut first."""
+        joints: dict[str, Any] = {name: joint for name, joint in self.scene.joints.items() if self._hangs(joint)}
+        order = sorted(joints, key=lambda name: isinstance(joints[name], Revolute | Spherical | Weld))
+        group = {name: name for name in (GROUND, *self.scene.bodies)}
+        tree: dict[str, list[str]] = {name: [] for name in group}
+        for name in order:
+            first, second = (group[side.body] for side in (joints[name].first, joints[name].second))
+            if first != second:
+                group = {body: second if owner == first else owner for body, owner in group.items()}
+                for side in (joints[name].first, joints[name].second):
+                    tree[side.body].append(name)
+        reached: set[str] = set()
+        for root in (GROUND, *self.scene.bodies):
+            if root in reached:
+                continue
+            if root != GROUND:
+                yield self._free(root)
+            waiting = [root]
+            reached.add(root)
+            while waiting:
+                parent = waiting.pop(0)
+                for name in tree[parent]:
+                    sides = joints[name].first, joints[name].second
+                    child = sides[1] if sides[0].body == parent else sides[0]
+                    if child.body not in reached:
+                        yield self._hang(name, parent, child)
+                        reached.add(child.body)
+                        waiting.append(child.body)
+
+    def _hangs(self, joint: Any) -> bool:
+        """Whether a body may hang on another by a joint."""
+        sides = (getattr(joint, "first", None), getattr(joint, "second", None))
+        masses = any(side is None or isinstance(self.scene.bodies.get(side.body), PointMass) for side in sides)
+        return not (masses or isinstance(joint, Distance))
+
+    def _free(self, body: str) -> _Link:
+        begin, flat = self._begin[body], self.scene.dimensions == 2
+        if isinstance(self.scene.bodies[body], PointMass):
+            return _Link(body, GROUND, "", [("slide", axis) for axis in np.eye(3)[: 2 if flat else 3]], begin.origin)
+        if flat:
+            freedoms = [("slide", np.eye(3)[0]), ("slide", np.eye(3)[1]), ("hinge", np.eye(3)[2])]
+            return _Link(body, GROUND, "", freedoms, begin.origin)
+        return _Link(body, GROUND, "", [("free", np.zeros(3))], begin.origin)
+
+    def _hang(self, name: str, parent: str, child: Attachment) -> _Link:
+        joint: Any = self.scene.joints[name]
+        freedoms = list(self._freedoms(name, joint))
+        if joint.first.body != parent:
+            freedoms.reverse()
+        # Where the second place slides on a line or a plane of the first body, turns are about the second one.
+        turned = joint.second if isinstance(joint, Slider | Cylindrical | Planar) else child
+        return _Link(child.body, parent, name, freedoms, self._where(turned))
+
+    def _freedoms(self, name: str, joint: Any) -> Iterator[Freedom]:
+        """From the first body to the second."""
+        z, flat = np.array([0.0, 0.0, 1.0]), self.scene.dimensions == 2
+        turn: Freedom = ("hinge", z) if flat else ("ball", z)
+        if isinstance(joint, Revolute):
+            yield "hinge", self._axis(joint.first, joint.axis)
+        elif isinstance(joint, Spherical):
+            yield "ball", z
+        elif isinstance(joint, Universal):
+            yield "hinge", self._axis(joint.first, joint.axis)
+            yield "hinge", self._axis(joint.second, joint.second_axis)
+        elif isinstance(joint, Slider):
+            if joint.axis is None:
+                line = np.array([np.cos(joint.direction), np.sin(joint.direction), 0.0])
+                yield "slide", self._begin[joint.first.body].axes @ line
+            else:
+                yield "slide", self._axis(joint.first, joint.axis)
+            if joint.rotation == "free":
+                yield turn
+        elif isinstance(joint, Cylindrical):
+            axis = self._axis(joint.first, joint.axis)
+            yield from (("slide", axis), ("hinge", axis))
+        elif isinstance(joint, Planar):
+            axis = self._axis(joint.first, joint.axis)
+            across = np.linalg.svd(axis[None])[2][1:]
+            yield from (("slide", one) for one in across)
+            if joint.rotation != "locked":
+                yield ("hinge", axis) if joint.rotation == "axis" else turn
+        else:
+            assert isinstance(joint, Weld), name
+
+    def _grow(self, element: ElementTree.Element, body: str, links: list[_Link]) -> None:
+        """The sites of a body and the bodies that hang on it."""
+        begin = self._begin[body]
+        for name, place in self._sites.get(body, []):
+            _under(element, "site", name=name, pos=_numbers(place))
+        for link in links:
+            if link.parent != body:
+                continue
+            own = self._begin[link.name]
+            turn = Rotation.from_matrix(begin.axes.T @ own.axes)
+            child = _under(
+                element, "body", name=link.name, pos=_numbers(begin.back(own.origin)), quat=_quaternion(turn)
+            )
+            self._inertia(child, link.name)
+            for number, freedom in enumerate(link.freedoms):
+                self._joint(child, link, number, freedom)
+            self._shapes(child, link.name)
+            self._grow(child, link.name, links)
+
+    def _inertia(self, element: ElementTree.Element, name: str) -> None:
+        body = self.scene.bodies[name]
+        least = max(THINNEST * body.mass * span(self.scene) ** 2, LEAST)
+        centre, turn = (0.0, 0.0, 0.0), Rotation.identity()
+        if isinstance(body, PointMass):
+            moments = np.full(3, least)
+        else:
+            second = np.array(second_moments(body), dtype=float)
+            centre, inertia = padded(body.centre_of_mass, 3), np.trace(second) * np.eye(3) - second
+            if self.scene.dimensions == 2:
+                moments = np.full(3, max(inertia[2, 2], least))
+            else:
+                moments, axes = np.linalg.eigh(inertia)
+                axes[:, 2] *= np.linalg.det(axes)
+                turn, moments = Rotation.from_matrix(axes), moments + (least if moments[0] < least else 0.0)
+        options = {"pos": _numbers(centre), "mass": repr(float(body.mass)), "diaginertia": _numbers(moments)}
+        _under(element, "inertial", **options, quat=_quaternion(turn))
+
+    def _joint(self, element: ElementTree.Element, link: _Link, number: int, freedom: Freedom) -> None:
+        kind, axis = freedom
+        own, parent = self._begin[link.name], self._begin[link.parent]
+        turning = own.spin - parent.spin
+        name = link.joint or f"{link.name}-free"
+        name += "" if number == 0 else f"-{number + 1}"
+        if kind == "free":
+            _under(element, "freejoint", name=name)
+            self.rates += [*own.velocity, *(own.axes.T @ own.spin)]
+            return
+        options = {"name": name, "type": kind, "pos": _numbers(own.back(link.place))}
+        if kind != "ball":
+            options["axis"] = _numbers(own.axes.T @ axis)
+        joint: Any = self.scene.joints.get(link.joint)
+        if (kind == "hinge" and isinstance(joint, Revolute)) or (kind == "slide" and isinstance(joint, Slider)):
+            options |= self._forces(link, joint)
+        _under(element, "joint", **options)
+        speed = own.speed(link.place) - parent.speed(link.place)
+        self.rates += {"slide": [speed @ axis], "hinge": [turning @ axis], "ball": [*(own.axes.T @ turning)]}[kind]
+
+    def _forces(self, link: _Link, joint: Any) -> dict[str, str]:
+        """Friction of a joint, and the torsion springs that act in it."""
+        springs = self._springs.get(link.joint, [])
+        stiffness = sum(spring[0] for spring in springs)
+        moment = sum(spring[0] * spring[2] for spring in springs)
+        found = {
+            "damping": joint.friction + sum(spring[1] for spring in springs),
+            "frictionloss": joint.coulomb,
+            "stiffness": stiffness,
+            "springref": moment / stiffness if stiffness else 0.0,
+        }
+        return {name: repr(float(value)) for name, value in found.items() if value}
+
+    def _shapes(self, element: ElementTree.Element, name: str) -> None:
+        """What is seen of a body and touches nothing: a rod's cuboid, or lines from a body's centre to its points."""
+        body, seen = self.scene.bodies[name], {"contype": "0", "conaffinity": "0", "mass": "0"}
+        if isinstance(body, Rod) and not body.curvature:
+            section = body.section_at(0.5)
+            middle = _numbers([body.length / 2, 0.0, 0.0])
+            if isinstance(section, Tube):
+                size, axis = [section.height / 2, body.length / 2], _numbers([0.0, np.pi / 2, 0.0])
+                _under(element, "geom", type="cylinder", pos=middle, euler=axis, size=_numbers(size), **seen)
+            else:
+                size = [body.length / 2, section.height / 2, section.width / 2]
+                _under(element, "geom", type="box", pos=middle, size=_numbers(size), **seen)
+            return
+        thick = repr(0.01 * span(self.scene))
+        if isinstance(body, PointMass):
+            _under(element, "geom", type="sphere", size=thick, **seen)
+            return
+        centre = np.array(padded(body.centre_of_mass, 3), dtype=float)
+        places = [self._local(at) for at in self._attached(name)]
+        for place in {tuple(place): place for place in places}.values():
+            if np.linalg.norm(place - centre) > 1e-9 * span(self.scene):
+                ends = _numbers([*centre, *place])
+                _under(element, "geom", type="capsule", fromto=ends, size=thick, **seen)
+
+    def _attached(self, body: str) -> Iterator[Attachment]:
+        items = [*self.scene.joints.values(), *self.scene.loads.values()]
+        sides = (getattr(item, side, None) for item in items for side in ("first", "second", "at"))
+        yield from (at for at in (*sides, *self.scene.markers.values()) if at is not None and at.body == body)
+
+    def _tendons_and_actuators(self) -> dict[str, list[ElementTree.Element]]:
+        """What is not in the tree: loads, and joints that close loops."""
+        found: dict[str, list[ElementTree.Element]] = {"tendon": [], "equality": [], "actuator": []}
+        for name, load in self.scene.loads.items():
+            if isinstance(load, Spring):
+                rest = self._apart(load.first, load.second) if load.length is None else load.length
+                more = {"stiffness": load.stiffness, "damping": load.damping, "springlength": rest}
+                found["tendon"].append(self._tendon(name, load.first, load.second, more))
+            elif isinstance(load, TorsionSpring):
+                self._spiral(name, load)
+            else:
+                assert isinstance(load, Force | Torque)
+                found["actuator"].append(self._push(name, load))
+        for name, joint in self.scene.joints.items():
+            if name in self._hung:
+                continue
+            self.soft.append(f"joints.{name}")
+            assert not isinstance(joint, list)
+            if isinstance(joint, Distance):
+                found["tendon"].append(self._tendon(name, joint.first, joint.second, {}))
+                found["equality"].append(_element("tendon", name=name, tendon1=name, **self._stiff()))
+            else:
+                found["equality"] += self._closing(name, joint)
+        return found
+
+    def _closing(self, name: str, joint: Any) -> Iterator[ElementTree.Element]:
+        """A joint that closes a loop, by constraints."""
+        bodies = {"body1": _called(joint.first.body), "body2": _called(joint.second.body)}
+        masses = any(isinstance(self.scene.bodies.get(side.body), PointMass) for side in (joint.first, joint.second))
+        if getattr(joint, "friction", 0.0) or getattr(joint, "coulomb", 0.0):
+            raise InputError(f"joints.{name}.friction: MJCF has none in a joint that closes a loop")
+        if isinstance(joint, Weld) and not masses:
+            anchor = _numbers(self._local(joint.second))
+            yield _element("weld", name=name, **bodies, anchor=anchor, **self._stiff())
+        elif isinstance(joint, Revolute | Spherical | Weld):
+            place = self._where(joint.first)
+            places = [place]
+            if isinstance(joint, Revolute) and self.scene.dimensions == 3 and not masses:
+                places.append(place + 0.2 * span(self.scene) * self._axis(joint.first, joint.axis))
+            for number, one in enumerate(places):
+                anchor = _numbers(self._begin[joint.first.body].back(one))
+                own = name if number == 0 else f"{name}-{number + 1}"
+                yield _element("connect", name=own, **bodies, anchor=anchor, **self._stiff())
+        else:
+            raise InputError(f"joints.{name}: closes a loop, as in MJCF only revolute, spherical and weld joints can")
+
+    def _stiff(self) -> dict[str, str]:
+        return {"solref": _numbers([STIFF * self.scene.solver.step, 1.0]), "solimp": "0.9999 0.9999 0.001 0.5 2"}
+
+    def _tendon(self, name: str, first: Attachment, second: Attachment, more: dict[str, float]) -> ElementTree.Element:
+        tendon = _element("spatial", name=name, **{key: repr(float(value)) for key, value in more.items()})
+        for end, at in (("first", first), ("second", second)):
+            _under(tendon, "site", site=self._site(f"{name}-{end}", at))
+        return tendon
+
+    def _spiral(self, name: str, load: TorsionSpring) -> None:
+        """A torsion spring in the joint that has its axis. Raises InputError where there is none."""
+        flat = self.scene.dimensions == 2
+        for joint, link in self._hung.items():
+            sides = [load.first.body, load.second.body]
+            if sorted(sides) != sorted((link.parent, link.name)) or [kind for kind, _ in link.freedoms] != ["hinge"]:
+                continue
+            axis = link.freedoms[0][1]
+            about = axis if flat else self._axis(load.first, load.axis)
+            if np.linalg.norm(np.cross(axis, about)) > 1e-9:
+                continue
+            away = 0.0
+            if load.angle is not None:
+                if not flat:
+                    raise InputError(f"loads.{name}.angle: MJCF's springs of machines in space rest at the start")
+                begin = [self._angle(side) for side in sides]
+                away = (load.angle - (begin[1] - begin[0])) * (1.0 if link.name == load.second.body else -1.0)
+            self._springs.setdefault(joint, []).append((load.stiffness, load.damping, away))
+            return
+        raise InputError(f"loads.{name}: MJCF has torsion springs in revolute joints only, about their axis")
+
+    def _angle(self, body: str) -> float:
+        """The angle of a body in the plane at the start, over full turns [rad]."""
+        return 0.0 if body == GROUND else float(self.initial[body].angle or 0.0)
+
+    def _push(self, name: str, load: Force | Torque) -> ElementTree.Element:
+        """A constant force or torque, by an actuator that nothing controls."""
+        options = {"name": name, "site": self._site(name + "-at", load.at)}
+        if isinstance(load, Force):
+            size = float(load.scale.number or 0.0)
+            gear = [*padded(load.force, 3), 0.0, 0.0, 0.0]
+            if not load.follows:
+                options["refsite"] = self._site(name + "-from", Attachment(body=GROUND, point=(0.0, 0.0, 0.0)))
+        else:
+            size = float(load.torque.number or 0.0)
+            holder = load.reaction or Attachment(body=GROUND, point=(0.0, 0.0, 0.0))
+            options["refsite"] = self._site(name + "-from", holder)
+            axis = np.array([0.0, 0.0, 1.0]) if self.scene.dimensions == 2 else self._axis(holder, load.axis)
+            gear = [0.0, 0.0, 0.0, *(self._begin[holder.body].axes.T @ axis)]
+        return _element("general", **options, gear=_numbers(gear), biastype="affine", gainprm="0", biasprm=repr(size))
+
+    def _site(self, name: str, at: Attachment) -> str:
+        """A place under a name, which no other has."""
+        taken = {known for sites in self._sites.values() for known, _ in sites}
+        while name in taken:
+            name += "-"
+        self._sites.setdefault(at.body, []).append((name, self._local(at)))
+        return name
+
+    def _local(self, at: Attachment) -> Array:
+        place = at.point if at.body == GROUND else self.scene.location(at)
+        return np.array([float(x) for x in padded(place, 3)])
+
+    def _where(self, at: Attachment) -> Array:
+        begin: Begin = self._begin[at.body]
+        return begin.point(self._local(at))
+
+    def _apart(self, first: Attachment, second: Attachment) -> float:
+        return float(np.linalg.norm(self._where(second) - self._where(first)))
+
+
+def _element(tag: str, **attributes: str) -> ElementTree.Element:
+    return ElementTree.Element(tag, attributes)
+
+
+def _under(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
+    return ElementTree.SubElement(parent, tag, attributes)
+
+
+def _called(body: str) -> str:
+    return "world" if body == GROUND else body
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def _quaternion(turn: Rotation) -> str:
+    return _numbers(turn.as_quat(scalar_first=True))

@@ -1,0 +1,59 @@
+"""`shoal export`: files of other tools, compared before they are written."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from shoal.cli import main
+
+
+def test_an_exported_script_is_compared_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("exudyn")
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["export", "single-pendulum", "--to", "exudyn", "--set", "solver.duration=0.2"])
+    assert done.exit_code == 0, done.output
+    assert done.stdout == "single-pendulum.py\n"
+    told, distance = done.stderr.split("within ")
+    assert told.startswith("exudyn: its motion is ")
+    assert 0 < float(distance.split()[0]) < 1e-5
+    assert "endTime = 0.2" in (tmp_path / "single-pendulum.py").read_text()
+
+
+def test_an_exported_machine_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["export", "andrews-squeezer", "--to", "mjcf"])
+    assert done.exit_code == 0, done.output
+    assert done.stdout == "andrews-squeezer.xml\n"
+    assert re.fullmatch(r"mjcf: its motion is within \S+e-09 m of `shoal simulate`\n", done.stderr)
+    back = CliRunner().invoke(main, ["import", "andrews-squeezer.xml"])
+    assert back.exit_code == 0, back.output
+    assert back.stderr == "left out: geoms: 15 that are only seen\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        ("single-pendulum --to exudyn --out x.xml", 2, "out: x.xml ends in .xml; exudyn has .py"),
+        ("single-pendulum --to adams", 2, "'adams' is not .*"),
+        ("flexible-double-pendulum --to exudyn --set bodies.AB.element=ancf-full", 2,
+         "bodies.AB.element: engine exudyn cannot do ancf-full$"),
+        ("flexible-double-pendulum --to mjcf", 2, "bodies.OA.element: MJCF has no ancf-cable; rigid bodies only$"),
+        ("parallelogram --to exudyn --set solver.step=1e-2 --set solver.duration=4", 3,
+         "parallelogram: exudyn: .*--no-verify writes the file all the same"),
+    ],
+)  # fmt: skip
+def test_what_is_not_exported(
+    arguments: str, status: int, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("exudyn")
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["export", *arguments.split()])
+
+    assert done.exit_code == status, done.output
+    assert re.search(message, done.stderr.strip()), done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
