@@ -36,10 +36,13 @@ def ring(element: str = "ancf-cable", elements: int = 24, **fields: Any) -> Scen
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("element", ["ancf-cable", "ancf-quintic"])
-def test_a_ring_rings_as_hoppe_says(element: str) -> None:
-    """w^2 = EI/(rho A R^4) k^2 (k^2 - 1)^2/(k^2 + 1), each twice, of a ring that does not stretch."""
-    found = [mode.frequency for mode in modes(ring(element), count=9).modes]
+@pytest.mark.parametrize(("element", "elements"), [("ancf-cable", 96), ("ancf-quintic", 12)])
+def test_a_ring_rings_as_hoppe_says(element: str, elements: int) -> None:
+    """w^2 = EI/(rho A R^4) k^2 (k^2 - 1)^2/(k^2 + 1), each twice, of a ring that does not stretch.
+
+    Cubic elements resist bending of a thin arc at first and need more of them.
+    """
+    found = [mode.frequency for mode in modes(ring(element, elements), count=9).modes]
     told = [
         np.sqrt(BENDING / (LINE * RADIUS**4) * k**2 * (k * k - 1) ** 2 / (k * k + 1)) / (2 * np.pi) for k in (2, 3, 4)
     ]
@@ -52,7 +55,7 @@ def test_a_ring_that_is_pulled_apart_gives_way_as_its_bending_lets_it() -> None:
     force = 1e-4
     pull = {"kind": "force", "at": {"body": "ring", "point": [LENGTH / 2, 0.0]}, "force": [0.0, force]}
     foot = {"kind": "weld", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "ring"}}
-    scene = ring(loads={"pull": pull})
+    scene = ring("ancf-quintic", 12, loads={"pull": pull})
     found = statics(scene.with_values({"joints": {**scene.model_dump(mode="json")["joints"], "foot": foot}}))
     assert found.balanced, found.message
     told = force * RADIUS**3 / BENDING * (np.pi / 4 - 2 / np.pi)
