@@ -90,3 +90,14 @@ def test_an_arc_that_does_not_close_is_refused() -> None:
 def test_a_closed_rod_is_for_the_plane() -> None:
     with pytest.raises(InputError, match="closes 'ring' upon itself; that is for the plane"):
         ring(dimensions=3)
+
+
+@pytest.mark.parametrize("at", [0.25, 0.5, 1.0])
+def test_a_curved_rod_may_hang_from_any_place_of_it(at: float) -> None:
+    """It starts where its arc has that place, however far along the rod that is."""
+    pin = {"first": {"body": "ground", "point": [0.3, 0.2]}, "second": {"body": "ring", "point": [at * LENGTH, 0.0]}}
+    scene = ring(joints={"pin": pin}, initial={"ring": {"angle": 0.4}})
+    run = get_engine("gauss").simulate(scene.with_values({"solver.duration": 1e-3}), [0.0])
+    turn = 2 * np.pi * at
+    origin = 0.3 + 0.2j - np.exp(0.4j) * RADIUS * (np.sin(turn) + 1j * (1 - np.cos(turn)))
+    assert run.marker("seam")[0] == pytest.approx([origin.real, origin.imag], abs=1e-12)

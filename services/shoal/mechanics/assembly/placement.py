@@ -27,7 +27,7 @@ from shoal.mechanics.assembly.groups import (
 )
 from shoal.mechanics.assembly.holding import hold
 from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
-from shoal.mechanics.assembly.rods import place_rod
+from shoal.mechanics.assembly.rods import place_rod, rod_axis
 from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.frames import Place, PointFrame, RigidFrame
 from shoal.mechanics.joints import Along
@@ -134,6 +134,9 @@ def _pose(scene: Scene, name: str, mine: list[JointPoint], turning: Orientations
         rail = _rail(scene, name, result)
         assert rail is not None
         position, velocity, p = rail
+    body = scene.bodies[name]
+    if isinstance(body, Rod) and body.element != "rigid" and body.curvature:
+        p = rod_axis(body, p[0])  # on a flexible rod the arc length tells a place
     return Pose(position - arm(directors, p), directors, velocity - arm(spin, p), spin)
 
 
