@@ -64,8 +64,8 @@ def driven(system: System, f: Function, field: str) -> Course:
 
 def mesh(system: System, first: Coordinate, second: Coordinate, ratio: float) -> None:
     """Let second be `ratio` times first; Exudyn counts coordinates from the start."""
-    # Its constraint is factorValue1 times the coordinate of marker 1, less that of marker 0.
-    system.add("ObjectConnectorCoordinate", markerNumbers=_markers(system, second, first), factorValue1=ratio)
+    # Its constraint is factor1 times the coordinate of marker 1, less that of marker 0.
+    system.add("ObjectConnectorCoordinate", markerNumbers=_markers(system, second, first), factor1=ratio)
 
 
 def _markers(system: System, *coordinates: Coordinate) -> list[Any]:
