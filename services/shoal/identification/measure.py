@@ -15,7 +15,7 @@ from shoal.identification.recording.computed import kept
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import camera, observe
 from shoal.identification.recording.plausible import check_units
-from shoal.identification.recording.reading import described, read
+from shoal.identification.recording.reading import described, sampled
 from shoal.identification.recording.source import Channel, EngineSource, FileSource
 from shoal.scene import Scene
 from shoal.scene.load import unknown
@@ -102,7 +102,8 @@ def _recorded(problem: Problem, scene: Scene, source: FileSource, path: Path) ->
     source = FileSource.model_validate(described(source.model_dump(exclude_unset=True), path))
     channels = problem.channels_of(source)
     problem.check_channels(channels, scene, path.name)
-    found = read(source, channels)
+    found, source = sampled(source, channels)
+    channels = found.channels
     sized = any(parameter.path == f"{RESERVED}.scale" for parameter in problem.parameters.values())
     check_units(source, channels, found.times, found.values, scene, sized)
     notes = (*found.notes, *_without_scale(problem, source, channels))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -26,6 +26,11 @@ SI: dict[str, float] = {
 """Metres or radians in a unit; of a picture element the recording's `scale` tells the size."""
 
 
+def units_of(quantity: str) -> tuple[str, ...]:
+    """The units in which a column of that quantity may be; a rate is in them per second."""
+    return get_args(LengthUnit if quantity in ("x", "y", "z") else AngleUnit)
+
+
 class Channel(Record):
     """One measured signal: a marker's x, y, in space z [m], angle [rad] or rate of its angle [rad/s].
 
@@ -47,9 +52,8 @@ class Channel(Record):
 
     @model_validator(mode="after")
     def _unit_of_its_quantity(self) -> Self:
-        lengths = self.quantity in ("x", "y", "z")
-        if self.unit is not None and lengths != (self.unit in LengthUnit.__args__):  # type: ignore[attr-defined]
-            right = LengthUnit.__args__ if lengths else AngleUnit.__args__  # type: ignore[attr-defined]
+        right = units_of(self.quantity)
+        if self.unit is not None and self.unit not in right:
             raise ValueError(f"unit: {self.quantity} is measured in one of {', '.join(right)}, found {self.unit!r}")
         return self
 
