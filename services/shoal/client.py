@@ -176,10 +176,11 @@ def _by_name(data: Any, single: str = "recording") -> Answer:
     return dict(data) if isinstance(data, Mapping) else {single: data}
 
 
-def _recording(source: FileSource, given: Any, channels: tuple[Channel, ...]) -> tuple[Answer, Any]:
+def _recording(source: FileSource, given: Any, channels: tuple[Channel, ...] | None = None) -> tuple[Answer, Any]:
     """The fields of a source without where it lies, and its table, or the name of a recording of the service.
 
-    given: a file, a table, or such a name; channels: those of the source. Raises InputError.
+    given: a file, a table, or such a name; channels: those of the source, None where only the
+        service knows them. Raises InputError.
     """
     frames = None
     if not isinstance(given, str | Path):
@@ -191,8 +192,12 @@ def _recording(source: FileSource, given: Any, channels: tuple[Channel, ...]) ->
         source = FileSource.model_validate(fields)
         table = load_table(Path(fields["path"]), source.columns)
         columns, frames = _numbers(table), table.frames
-        if table.units:
-            source, channels, _ = with_units(source, tuple(source.channels or channels), table)
+        if table.units is not None and channels is None and not source.channels:
+            raise InputError(
+                f"data: {given} has a line of units; give the problem as a file, which states them with it"
+            )
+        if table.units is not None:
+            source, channels, _ = with_units(source, tuple(source.channels or channels or ()), table.units)
             source = source.model_copy(update={"channels": list(channels)})
     if frames is not None and len(frames):
         # A line that is blank is a frame too.

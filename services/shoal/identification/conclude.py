@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from shoal.identification.adapt import Stage
+from shoal.identification.carried import fitted
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
@@ -120,6 +121,7 @@ def conclude(
     # Away from the minimum the mesh is not what limits the fit.
     limits = judgement.verdict is not Verdict.UNFINISHED and not stages
     names = [model.names[k] for k in curved]
+    carried, left = fitted(model.parameters, point)
     notes = [judgement.message or outcome.message]
     notes += remarks(values, profiled, names, tests, mesh if limits else None, theory)
     return Estimate(
@@ -159,6 +161,8 @@ def conclude(
         predicted=predicted,
         measurement=measurement,
         covariance=intervals.covariance(model, point, at),
+        values=carried,
+        left_out=left,
     )
 
 

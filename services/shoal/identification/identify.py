@@ -6,6 +6,7 @@ import hashlib
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification.adapt import Stage, Stopped, coarse_to_fine
+from shoal.identification.carried import Carried
 from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
@@ -40,6 +42,7 @@ def identify(
     data: str | Mapping[str, str] | None = None,
     engine: str = "gauss",
     values: Mapping[str, Any] | None = None,
+    fitted: Carried | None = None,
     seed: int = 0,
     measurement: Measurement | None = None,
     tolerance: float | None = None,
@@ -51,7 +54,8 @@ def identify(
     """Find the parameters of a problem.
 
     method: one of METHODS, else the problem's; data: recordings instead of the problem's own (see `measure`);
-    values: fields of the scene to set; measurement: one made earlier, to share it between methods;
+    values: fields of the scene to set; fitted: values found before, starts of what is sought here, else set unless
+    `values` sets them; measurement: one made earlier, to share it between methods;
     tolerance: error [m] that the model may have at the markers, for which elements, integrator and step are chosen
     instead of taken from the scene (coarse while searching);
     time_limit [s]: of everything but data that are computed and kernels that are compiled; then the best so far is the
@@ -63,6 +67,9 @@ def identify(
     search = get_method(name)
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
+    notes: list[str] = []
+    if fitted is not None:
+        problem, values, notes = fitted.into(problem, values)
     scene = problem.load_scene(values)
     deadline = None if time_limit is None else Deadline(time_limit)
     computed = any(isinstance(source, EngineSource) for source in problem.sources.values())
@@ -81,7 +88,8 @@ def identify(
         begin = time.perf_counter()
         model, outcome, stages = _search(model, search, np.random.default_rng(seed), tolerance, progress)
         wall = time.perf_counter() - begin
-        return conclude(model, outcome, name, seed, wall, stages, wishes)
+        estimate = conclude(model, outcome, name, seed, wall, stages, wishes)
+        return replace(estimate, notes=[*notes, *estimate.notes])
 
 
 def _search(

@@ -68,7 +68,9 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
     """As `read`, and the source with what its table says of the unit of time."""
     path = Path(source.path or "")
     table = load_table(path, source.columns)
-    source, channels, of_units = with_units(source, channels, table)
+    of_units: list[str] = []
+    if table.units is not None:
+        source, channels, of_units = with_units(source, channels, table.units)
     for column in (source.time, *(c.column for c in channels))[bool(source.rate) :]:
         table.require(column)
     times = _times(source, table)

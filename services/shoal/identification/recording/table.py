@@ -8,7 +8,6 @@ import io
 import re
 import warnings
 import zlib
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shoal.errors import InputError
-from shoal.identification.recording.unit_line import is_unit_line, of_columns
+from shoal.identification.recording.unit_line import Units, is_unit_line, of_columns
 from shoal.trajectory import Array
 
 Mask = NDArray[np.bool_]
@@ -38,7 +37,7 @@ class Table:
 
     rows: the line of the file that each row stands on, (rows,); decimal: how its text writes the decimal mark
     comments: lines that are no rows, increasing
-    units: of the columns, by their names, as the line `unit_row` of the file states them
+    units: of the columns, as a line of the file states them
     """
 
     path: Path
@@ -46,8 +45,7 @@ class Table:
     rows: NDArray[np.intp]
     decimal: str = "."
     comments: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
-    units: Mapping[str, str] = field(default_factory=dict)
-    unit_row: int = 0
+    units: Units | None = None
 
     @property
     def frames(self) -> NDArray[np.intp]:
@@ -175,8 +173,9 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
         raise InputError(f"data: {path} is not CSV: {_short(str(error))}") from None
     rows = np.arange(len(frame)) + 1 + skipped
     filled = frame.notna().any(axis=1).to_numpy()
-    units = of_columns(names, next(csv.reader([head.units], delimiter=separator), []))
-    return Table(path, frame[filled], rows[filled], decimal, comments, units, head.unit_row)
+    cells = next(csv.reader([head.units], delimiter=separator), [])
+    units = of_columns(path, head.unit_row, names, cells) if head.units else None
+    return Table(path, frame[filled], rows[filled], decimal, comments, units)
 
 
 class _Head(NamedTuple):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from pathlib import Path
 
 from shoal.errors import InputError
 from shoal.identification.recording.source import Channel, FileSource, units_of
-
-if TYPE_CHECKING:
-    from shoal.identification.recording.table import Table
 
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 """Seconds in a unit of time."""
@@ -28,6 +26,15 @@ _ALSO = {
 _BRACKETED = re.compile(r"\[[^\[\]]*\]|\([^()]*\)|<[^<>]*>")
 _NONE = ("", "-", "–", "none", "n/a", "na")
 """What a cell without a unit holds."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """What the line `row` of a file says of its columns, by their names; nothing where there is no such line."""
+
+    path: Path
+    row: int = 0
+    of: Mapping[str, str] = field(default_factory=dict)
 
 
 def is_unit_line(cells: Sequence[str]) -> bool:
@@ -50,17 +57,17 @@ def bare(cell: str) -> str:
 
 
 def with_units(
-    source: FileSource, channels: tuple[Channel, ...], table: Table
+    source: FileSource, channels: tuple[Channel, ...], units: Units
 ) -> tuple[FileSource, tuple[Channel, ...], list[str]]:
     """What a recording states, completed by the units of its table, and a note for each that they contradict.
 
     What is stated wins. Raises InputError for a unit that is not known, or that of another kind of quantity.
     """
-    if not table.units:
+    if not units.of:
         return source, channels, []
     notes: list[str] = []
-    if source.rate is None and (unit := table.units.get(source.time, "")):
-        where = f"{table.path}: row {table.unit_row}, column {source.time!r}: "
+    if source.rate is None and (unit := units.of.get(source.time, "")):
+        where = f"{units.path}: row {units.row}, column {source.time!r}: "
         if "time_scale" not in source.model_fields_set:
             if unit not in TIMES:
                 raise InputError(f"{where}unit {unit!r} is none of {', '.join(TIMES)}; state `time_scale`")
@@ -71,7 +78,7 @@ def with_units(
             )
     found = []
     for channel in channels:
-        unit = _unit(channel, table)
+        unit = _unit(channel, units)
         if unit and channel.unit is None:
             channel = channel.model_copy(update={"unit": unit})
         elif unit and unit != channel.unit:
@@ -81,12 +88,12 @@ def with_units(
     return source, tuple(found), notes
 
 
-def _unit(channel: Channel, table: Table) -> str:
+def _unit(channel: Channel, units: Units) -> str:
     """The unit of a channel's column, as a channel states it; empty where its table names none."""
     allowed = units_of(channel.quantity)
     found = []
     for column in (channel.column, channel.origin):
-        text = table.units.get(column, "") if column else ""
+        text = units.of.get(column, "") if column else ""
         unit = _of_quantity(text, channel.quantity)
         if text and unit not in allowed:
             if channel.unit is not None:
@@ -94,13 +101,13 @@ def _unit(channel: Channel, table: Table) -> str:
             else:
                 known = ", ".join(f"{name}/s" if channel.quantity == "rate" else name for name in allowed)
                 raise InputError(
-                    f"{table.path}: row {table.unit_row}, column {column!r}: unit {text!r} of {channel.quantity} is "
+                    f"{units.path}: row {units.row}, column {column!r}: unit {text!r} of {channel.quantity} is "
                     f"none of {known}; state `unit` and `scale` of the channel"
                 )
         found.append(unit)
     if channel.unit is None and channel.origin and found[0] != found[1]:
         raise InputError(
-            f"{table.path}: row {table.unit_row}: column {channel.column!r} is in {found[0] or 'no unit'}, its origin "
+            f"{units.path}: row {units.row}: column {channel.column!r} is in {found[0] or 'no unit'}, its origin "
             f"{channel.origin!r} in {found[1] or 'no unit'}; one unit is needed"
         )
     return found[0]
@@ -129,6 +136,6 @@ def _is_number(word: str) -> bool:
     return word.lower().strip("+-") not in ("nan", "inf", "infinity")
 
 
-def of_columns(names: Sequence[str], cells: Sequence[str]) -> Mapping[str, str]:
-    """Units by the name of their column."""
-    return {name: unit for name, cell in zip(names, cells, strict=False) if (unit := bare(cell))}
+def of_columns(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -> Units:
+    """The units of columns, from the cells of that line."""
+    return Units(path, row, {name: unit for name, cell in zip(names, cells, strict=False) if (unit := bare(cell))})
