@@ -26,6 +26,13 @@ if TYPE_CHECKING:
     callback=options.recordings,
     help="A recording (CSV, Parquet, or a YAML that describes one) instead of the problem's own, or one of several.",
 )
+@click.option(
+    "--hold-out",
+    multiple=True,
+    metavar="[NAME=]FROM:TO",
+    callback=options.windows,
+    help="Seconds of the recording that are predicted instead of fitted (repeatable).",
+)
 @options.method
 @click.option("--seed", default=0, show_default=True, help="Seed of the random numbers.")
 @options.engine

@@ -85,6 +85,23 @@ def recordings(
     return found or None
 
 
+def windows(
+    context: click.Context, parameter: click.Parameter, given: tuple[str, ...]
+) -> list[tuple[float, float]] | dict[str, list[tuple[float, float]]] | None:
+    """[NAME=]FROM:TO, once or more."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    for one in given:
+        name, _, span = one.rpartition("=")
+        try:
+            begin, end = map(float, span.split(":"))
+        except ValueError:
+            raise click.BadParameter(f"{one!r} is not FROM:TO in s, such as 1.5:2, nor NAME=FROM:TO") from None
+        found.setdefault(name, []).append((begin, end))
+    if "" in found and len(found) > 1:
+        raise click.BadParameter("NAME=FROM:TO is needed for all of several recordings")
+    return found.get("", found or None)
+
+
 def times_list(context: click.Context, parameter: click.Parameter, text: str | None) -> Times:
     """T,T,... as numbers."""
     if text is None:

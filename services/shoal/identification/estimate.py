@@ -12,6 +12,7 @@ from shoal.identification.judge.suspects import Suspect
 from shoal.identification.judge.verdict import Verdict
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.spread.bootstrap import Bootstrap
+from shoal.identification.spread.prediction import Prediction
 from shoal.identification.spread.profiles import Profile
 from shoal.identification.spread.value import Value
 from shoal.scene import Scene
@@ -34,6 +35,7 @@ class Estimate:
     scenes: the identified machine, by recording; predicted: its channels at the samples of each recording
     covariance: of the parameters, in the products of their units, (parameters, parameters)
     values: the fields of the scene that were found, by path, ties evaluated; left_out: what is not among them, and why
+    prediction: of the windows that were held out
     """
 
     problem: str
@@ -74,6 +76,7 @@ class Estimate:
     theory_error_rms: float | None = None
     values: dict[str, float] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
+    prediction: list[Prediction] = field(default_factory=list)
 
     @property
     def scene(self) -> Scene:
@@ -127,6 +130,7 @@ class Estimate:
             "parameters": {**values(self.parameters), **values(self.quantities)},
             "values": plain(self.values),
             "left_out": self.left_out,
+            "prediction": [one.to_json() for one in self.prediction],
             "combinations": self.combinations,
             "fitness": plain(self.fitness),
             "rms": plain(self.rms),

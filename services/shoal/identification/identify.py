@@ -21,7 +21,7 @@ from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.mirrors import with_mirror_images
-from shoal.identification.measure import measure
+from shoal.identification.measure import Windows, measure
 from shoal.identification.methods import Method, Outcome, get_method
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.problem import Problem
@@ -43,6 +43,7 @@ def identify(
     engine: str = "gauss",
     values: Mapping[str, Any] | None = None,
     fitted: Carried | None = None,
+    hold_out: Windows | Mapping[str, Windows] | None = None,
     seed: int = 0,
     measurement: Measurement | None = None,
     tolerance: float | None = None,
@@ -58,6 +59,7 @@ def identify(
     `values` sets them; measurement: one made earlier, to share it between methods;
     tolerance: error [m] that the model may have at the markers, for which elements, integrator and step are chosen
     instead of taken from the scene (coarse while searching);
+    hold_out: windows that are predicted instead of fitted (see `measure`);
     time_limit [s]: of everything but data that are computed and kernels that are compiled; then the best so far is the
     answer; checkpoint: file of evaluations, which a run that was broken off finds when it is started again;
     wishes: what is to be known beyond the answer;
@@ -76,7 +78,7 @@ def identify(
     if measurement is None:
         # Data are computed with the problem's values, not the user's.
         with deadline.paused() if deadline is not None and computed else nullcontext():
-            measurement = measure(problem, problem.load_scene(), data)
+            measurement = measure(problem, problem.load_scene(), data, hold_out)
     model = ForwardModel(problem, scene, get_engine(engine), measurement, deadline)
     if deadline is not None:
         with deadline.paused():

@@ -96,7 +96,10 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
     origin = f"{path.name}, {_span(times[chosen])}, {len(chosen)} samples"
     unknown = np.full(len(channels), np.nan)
     found = Recording(times[chosen] - begin, channels, values[chosen], origin, unknown, notes=tuple(notes))
-    return found, source
+    try:
+        return found.holding(source.hold_out, begin), source
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _times(source: FileSource, table: Table) -> Array:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from shoal.scene.record import NonNegative, Positive, Record
 
@@ -63,6 +64,25 @@ class Channel(Record):
         return self.quantity in ("x", "y", "z")
 
 
+def _windows(value: Any) -> Any:
+    """A single window is a list of one."""
+    return [value] if isinstance(value, list | tuple) and value and not isinstance(value[0], list | tuple) else value
+
+
+def _apart(windows: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    for begin, end in windows:
+        if not begin < end:
+            raise ValueError(f"a window is [from, to], the later last, found [{begin:g}, {end:g}]")
+    for (_, end), (begin, _) in pairwise(sorted(windows)):
+        if begin < end:
+            raise ValueError(f"windows overlap: one ends at {end:g} s, another begins at {begin:g} s")
+    return windows
+
+
+Windows = Annotated[list[tuple[float, float]], BeforeValidator(_windows), AfterValidator(_apart)]
+"""Spans of time [s]: [from, to], or several of them."""
+
+
 class Clocked(Record):
     """What a recording of any kind says: the motion's time is recorded time / clock + delay [s] after its start.
 
@@ -71,6 +91,7 @@ class Clocked(Record):
     clock, delay, scale, x, y and tilt may be parameters, with the paths `measurement.clock` and so on.
     known: fields of the scene that are different in this recording
     channels: instead of those of the problem
+    hold_out: windows [from, to] in seconds of the recording's clock that are predicted instead of fitted
     """
 
     clock: Positive = 1.0
@@ -81,6 +102,7 @@ class Clocked(Record):
     tilt: float = 0.0
     known: dict[str, Any] = {}
     channels: Annotated[list[Channel], Field(min_length=1)] | None = None
+    hold_out: Windows = []
 
     def as_stated(self) -> Clocked:
         """What it says of clock, camera and scene, without where the data come from."""
