@@ -90,9 +90,10 @@ def _recording(scene: Scene, expected: ExpectedRecording, document: Path) -> Que
     source = FileSource.model_validate(described({}, path))
     channels = tuple(source.channels or _called_so(scene, source))
     for channel in channels:
-        if channel.marker not in scene.markers:
-            known = ", ".join(scene.markers)
-            raise InputError(f"path: {expected.path}: channels: no marker {channel.marker!r}; there are {known}")
+        for marker in (channel.marker, channel.to):
+            if marker is not None and marker not in scene.markers:
+                known = ", ".join(scene.markers)
+                raise InputError(f"path: {expected.path}: channels: no marker {marker!r}; there are {known}")
     found, source = sampled(source, channels)
     check_units(source, found.channels, found.times, found.values, scene, sized=False)
     instants = found.times / source.clock + source.delay

@@ -15,7 +15,7 @@ from shoal.errors import ComputationError, InputError
 from shoal.identification.problem import RESERVED, Problem
 from shoal.identification.recording.computed import kept
 from shoal.identification.recording.measurement import Measurement, Recording
-from shoal.identification.recording.observation import camera, observe
+from shoal.identification.recording.observation import camera, observe, without_turns
 from shoal.identification.recording.plausible import check_units
 from shoal.identification.recording.reading import described, sampled
 from shoal.identification.recording.source import Channel, Clocked, EngineSource, FileSource
@@ -120,7 +120,7 @@ def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) 
         trajectory = get_engine(source.engine).simulate(truth, instants)
         if not trajectory.ok:
             raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
-        return np.asarray(observe(trajectory, channels, camera(source))[0])
+        return np.asarray(without_turns(observe(trajectory, channels, camera(source)), channels)[0])
 
     values = kept(source.engine, truth, instants, (channels, camera(source)), simulated)
     values = values + source.noise * np.random.default_rng(source.seed).standard_normal(values.shape)

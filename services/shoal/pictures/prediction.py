@@ -28,7 +28,7 @@ def prediction(estimate: Estimate) -> Figure:
         one, k = found[number]
         channel = estimate.measurement.recordings[one.recording].channels[k]
         several = len(estimate.measurement.recordings) > 1
-        name = f"{one.recording}: " * several + f"{channel.quantity} of {channel.marker}"
+        name = f"{one.recording}: " * several + channel.name
         _signal(row[0], one, k, f"{name}\n[{of_channel(channel)}]")
         _error(row[1], one, k, of_channel(channel))
     for panel in axes[-1]:

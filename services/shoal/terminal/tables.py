@@ -316,7 +316,7 @@ def _predictions(estimate: Estimate) -> None:
             limit = "-" if channel.inside is None else f"{channel.limit:.2g}"
             table.add_row(
                 escape(f"{where}{one.window[0]:g} to {one.window[1]:g}"),
-                escape(f"{channel.quantity} of {channel.marker} [{channel.unit}]"),
+                escape(f"{channel.name} [{channel.unit}]"),
                 *(f"{channel.rms:.2g}", limit, inside),
             )
     screen.out.print(table)

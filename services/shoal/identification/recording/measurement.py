@@ -74,7 +74,7 @@ class Recording:
     @property
     def things(self) -> int:
         """How many things are observed: positions (x and y count as one) and angles."""
-        return len({(c.marker, "position" if c.is_position else c.quantity) for c in self.channels})
+        return len({(c.marker, c.to, "position" if c.is_position else c.quantity) for c in self.channels})
 
     def until(self, end: float) -> Recording:
         """The samples up to a time [s]."""

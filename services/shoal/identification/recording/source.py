@@ -35,6 +35,9 @@ def units_of(quantity: str) -> tuple[str, ...]:
 class Channel(Record):
     """One measured signal: a marker's x, y, in space z [m], angle [rad] or rate of its angle [rad/s].
 
+    With `to`, an angle or rate is that of the marker's body less that of the body at another marker: of a joint between
+    them, what its encoder shows. Neither tilts with the camera.
+
     The signal is offset + scale * unit * (column - origin); where the y axis grows down, y, angle and rate change sign
     before `offset` is added.
     column, origin: names of columns; origin is that of a point that stands still, such as a tracked pivot
@@ -44,6 +47,7 @@ class Channel(Record):
 
     marker: str
     quantity: Quantity
+    to: str | None = None
     column: str = ""
     scale: float = 1.0
     offset: float = 0.0
@@ -57,6 +61,19 @@ class Channel(Record):
         if self.unit is not None and self.unit not in right:
             raise ValueError(f"unit: {self.quantity} is measured in one of {', '.join(right)}, found {self.unit!r}")
         return self
+
+    @model_validator(mode="after")
+    def _between_two(self) -> Self:
+        if self.to is not None and self.is_position:
+            raise ValueError(f"to: an angle or a rate is measured between two markers, found {self.quantity}")
+        if self.to == self.marker:
+            raise ValueError(f"to: another marker than {self.marker} is needed")
+        return self
+
+    @property
+    def name(self) -> str:
+        """What is measured, in words."""
+        return f"{self.quantity} of {self.marker}{f' against {self.to}' if self.to else ''}"
 
     @property
     def is_position(self) -> bool:

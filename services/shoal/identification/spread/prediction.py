@@ -39,12 +39,13 @@ _MOST = 0.5
 
 @dataclass(frozen=True)
 class Foretold:
-    """One channel over a window, in SI units.
+    """One channel over a window, in SI units. name: of it in words.
 
     rms: of model minus measurement; expected: what noise and the parameters' covariance predict for it; limit: what it
     stays below in 95 % of windows, model error included, nan where that cannot be told; inside: whether it does
     """
 
+    name: str
     marker: str
     quantity: str
     unit: str
@@ -91,9 +92,7 @@ class Prediction:
         """The outcome in words; named: whether the recording has to be."""
         begin, end = self.window
         known = self.inside is not None
-        off = ", ".join(
-            f"{c.quantity} of {c.marker} {c.rms:.2g} {c.unit}" + f", limit {c.limit:.2g}" * known for c in self.channels
-        )
+        off = ", ".join(f"{c.name} {c.rms:.2g} {c.unit}" + f", limit {c.limit:.2g}" * known for c in self.channels)
         where = f" of {self.recording}" if named else ""
         held = {True: "as well as the estimate states", False: "worse than the estimate states", None: self.why}
         return f"held out from {begin:g} s to {end:g} s{where}: predicted {held[self.inside]} (RMS: {off})"
@@ -182,7 +181,7 @@ def _predicted(
                 expected[k], limit[k] = told.expected, allowance * told.limit + extra
                 half[np.isfinite(held.values[:, k]), k] = allowance * told.half + np.abs(bias[rows])
     told_of = [
-        Foretold(c.marker, c.quantity, of_channel(c), *map(float, numbers))
+        Foretold(c.name, c.marker, c.quantity, of_channel(c), *map(float, numbers))
         for c, *numbers in zip(channels, rms, expected, limit, strict=True)
         if np.isfinite(numbers[0])
     ]
