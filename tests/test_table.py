@@ -52,10 +52,90 @@ def test_encodings(tmp_path: Path, encoding: str) -> None:
     np.testing.assert_array_equal(seen(tmp_path / "run.csv", data).values[:, 0], [1, 2, 4, 3])
 
 
-@pytest.mark.parametrize("units", ["s,m", "[s],[mm]", "(ms),(px)", "s,m/s"])
-def test_a_line_of_units_is_named_as_that(tmp_path: Path, units: str) -> None:
-    with pytest.raises(InputError, match="row 2 holds units"):
-        seen(tmp_path / "run.csv", f"t,x\n{units}\n{ROWS}")
+@pytest.mark.parametrize(
+    ("units", "time", "length"),
+    [
+        ("s,m", 1.0, 1.0),
+        ("[s],[mm]", 1.0, 1e-3),
+        ("(ms), (cm)", 1e-3, 1e-2),
+        ("µs;Inches", 1e-6, 0.0254),
+        ("Seconds,", 1.0, 1.0),
+        ("-,[px]", 1.0, 1.0),
+    ],
+)
+@pytest.mark.parametrize("above", ["", "# a rig\n"])
+@pytest.mark.parametrize("below", ["", "% warm\n\n"])
+def test_a_line_of_units_states_them(
+    tmp_path: Path, units: str, time: float, length: float, above: str, below: str
+) -> None:
+    separator = ";" if ";" in units else ","
+    text = f"{above}t,x\n".replace(",", separator) + f"{units}\n{below}" + ROWS.replace(",", separator)
+    found = seen(tmp_path / "run.csv", text)
+    np.testing.assert_allclose(found.times, np.array([0.0, 0.1, 0.2, 0.3]) * time)
+    np.testing.assert_allclose(found.values[:, 0], np.array([1, 2, 4, 3]) * length)
+    assert not found.notes
+
+
+def test_units_in_a_comment_under_the_names(tmp_path: Path) -> None:
+    found = seen(tmp_path / "run.csv", f"# a rig\n# t, x\n# ms, mm\n{ROWS}")
+    np.testing.assert_allclose(found.times, [0.0, 1e-4, 2e-4, 3e-4])
+    np.testing.assert_allclose(found.values[:, 0], [1e-3, 2e-3, 4e-3, 3e-3])
+
+
+def test_a_line_of_units_is_no_frame(tmp_path: Path) -> None:
+    found = seen(tmp_path / "run.csv", "x\nmm\n1\n2\n\n4\n", rate=10.0)
+    np.testing.assert_allclose(found.times, [0.0, 0.1, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "factor"),
+    [
+        ("angle", "deg", np.pi / 180),
+        ("angle", "°", np.pi / 180),
+        ("rate", "rev/s", 2 * np.pi),
+        ("rate", "deg s^-1", np.pi / 180),
+    ],
+)
+def test_units_of_angles_and_rates(tmp_path: Path, quantity: str, unit: str, factor: float) -> None:
+    (path := tmp_path / "run.csv").write_text(f"t,x\ns,{unit}\n{ROWS}")
+    channel = Channel.model_validate({"marker": "A", "quantity": quantity, "column": "x"})
+    values = read(FileSource(path=str(path)), (channel,)).values[:, 0]
+    np.testing.assert_allclose(np.diff(values), np.diff([1, 2, 4, 3]) * factor)
+
+
+def test_what_is_stated_wins_over_the_line_of_units_with_a_note(tmp_path: Path) -> None:
+    (path := tmp_path / "run.csv").write_text(f"t,x\nms,mm\n{ROWS}")
+    metres = (Channel(marker="A", quantity="x", column="x", unit="m"),)
+    found = read(FileSource(path=str(path), time_scale=1.0), metres)
+    assert (found.times[-1], found.values[-1, 0]) == (0.3, 3.0)
+    assert found.notes == (
+        "times: the table says ms, the recording time_scale 1, which is taken",
+        "A x: the table says mm, the recording m, which is taken",
+    )
+    agreed = (Channel(marker="A", quantity="x", column="x", unit="mm"),)
+    assert not read(FileSource(path=str(path), time_scale=1e-3), agreed).notes
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("t,x\ns,furlong\n", "row 2, column 'x': unit 'furlong' of x is none of m, cm, mm"),
+        ("t,x\ns,deg\n", "row 2, column 'x': unit 'deg' of x"),
+        ("t,x\ns,m/s\n", "row 2, column 'x': unit 'm/s' of x"),
+        ("# a rig\nt,x\nframe,m\n", "row 3, column 't': unit 'frame' is none of s, ms"),
+        ("t,x\nnobody,knows\n", "row 2, column 't': 'nobody' is not a number"),
+    ],
+)
+def test_an_unknown_unit_is_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(InputError, match=words) as refusal:
+        seen(tmp_path / "run.csv", text + ROWS)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_column_and_its_origin_have_one_unit(tmp_path: Path) -> None:
+    (path := tmp_path / "run.csv").write_text("t,x,o\ns,mm,cm\n0,1,1\n1,2,1\n2,3,1\n")
+    with pytest.raises(InputError, match="'x' is in mm, its origin 'o' in cm"):
+        read(FileSource(path=str(path)), (Channel(marker="A", quantity="x", column="x", origin="o"),))
 
 
 def test_of_too_many_samples_every_nth_is_taken_with_a_note(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,8 @@ from shoal.engines.remote import RemoteEngine, trajectory_of
 from shoal.errors import ComputationError, InputError
 from shoal.identification import Problem, load_problem
 from shoal.identification.recording.reading import YAML, described
-from shoal.identification.recording.source import FileSource
+from shoal.identification.recording.source import Channel, FileSource
+from shoal.identification.recording.unit_line import with_units
 from shoal.mechanics.analysis.joint_reactions import JointReaction, Reactions
 from shoal.scene import Scene, load_scene
 from shoal.shelf import NAME
@@ -161,7 +162,7 @@ def _problem(given: Problem | str, data: Any) -> tuple[Any, Answer]:
     found = _by_name(data, next(iter(problem.sources)))
     for name, source in problem.sources.items():
         if isinstance(source, FileSource) and (path := found.get(name, source.path)) is not None:
-            fields, found[name] = _recording(source, path)
+            fields, found[name] = _recording(source, path, problem.channels_of(source))
             if problem.recordings:
                 stated["recordings"][name] = fields
             else:
@@ -175,10 +176,11 @@ def _by_name(data: Any, single: str = "recording") -> Answer:
     return dict(data) if isinstance(data, Mapping) else {single: data}
 
 
-def _recording(source: FileSource, given: Any) -> tuple[Answer, Any]:
+def _recording(source: FileSource, given: Any, channels: tuple[Channel, ...] | None = None) -> tuple[Answer, Any]:
     """The fields of a source without where it lies, and its table, or the name of a recording of the service.
 
-    given: a file, a table, or such a name. Raises InputError.
+    given: a file, a table, or such a name; channels: those of the source, None where only the
+        service knows them. Raises InputError.
     """
     frames = None
     if not isinstance(given, str | Path):
@@ -190,6 +192,13 @@ def _recording(source: FileSource, given: Any) -> tuple[Answer, Any]:
         source = FileSource.model_validate(fields)
         table = load_table(Path(fields["path"]), source.columns)
         columns, frames = _numbers(table), table.frames
+        if table.units is not None and channels is None and not source.channels:
+            raise InputError(
+                f"data: {given} has a line of units; give the problem as a file, which states them with it"
+            )
+        if table.units is not None:
+            source, channels, _ = with_units(source, tuple(source.channels or channels or ()), table.units)
+            source = source.model_copy(update={"channels": list(channels)})
     if frames is not None and len(frames):
         # A line that is blank is a frame too.
         blank = np.full((len(columns), frames[-1] + 1), np.nan)

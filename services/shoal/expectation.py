@@ -13,7 +13,7 @@ from shoal.engines.capabilities import require
 from shoal.errors import ComputationError, InputError
 from shoal.identification.recording.observation import camera, observe
 from shoal.identification.recording.plausible import check_units
-from shoal.identification.recording.reading import described, read
+from shoal.identification.recording.reading import described, sampled
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.scene import Scene
 from shoal.scene.expect import Expectation, ExpectedEngine, ExpectedRecording, ExpectedValue
@@ -90,11 +90,12 @@ def _recording(scene: Scene, expected: ExpectedRecording, document: Path) -> Que
     source = FileSource.model_validate(described({}, path))
     channels = tuple(source.channels or _called_so(scene, source))
     for channel in channels:
-        if channel.marker not in scene.markers:
-            known = ", ".join(scene.markers)
-            raise InputError(f"path: {expected.path}: channels: no marker {channel.marker!r}; there are {known}")
-    found = read(source, channels)
-    check_units(source, channels, found.times, found.values, scene, sized=False)
+        for marker in (channel.marker, channel.to):
+            if marker is not None and marker not in scene.markers:
+                known = ", ".join(scene.markers)
+                raise InputError(f"path: {expected.path}: channels: no marker {marker!r}; there are {known}")
+    found, source = sampled(source, channels)
+    check_units(source, found.channels, found.times, found.values, scene, sized=False)
     instants = found.times / source.clock + source.delay
     if (first := float(instants[0])) < 0:
         raise InputError(f"path: {expected.path}: delay: the first sample would be {-first:g} s before the motion")

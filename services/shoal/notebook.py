@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from shoal.engines.prepared import Prepared
     from shoal.engines.sweep import Sweep
     from shoal.identification import Estimate, Problem
+    from shoal.identification.carried import Carried
     from shoal.identification.design import Design
     from shoal.mechanics.analysis.equilibrium import Equilibrium
     from shoal.mechanics.analysis.joint_reactions import Reactions
@@ -34,7 +35,8 @@ if TYPE_CHECKING:
     from shoal.response import Response
     from shoal.selection import Selection
 
-Values = Mapping[str, Any]
+Values: TypeAlias = "Mapping[str, Any] | Estimate | str | Path"
+"""Fields of a scene by dotted path, or what was found before: an estimate, or the JSON file of one."""
 Times = Sequence[float] | npt.NDArray[np.float64]
 Data: TypeAlias = "str | Path | pd.DataFrame | Mapping[str, str] | None"
 
@@ -258,7 +260,8 @@ def identify(
 
     data: a file, or a table whose columns are those that the problem's channels name, instead of the problem's own
     recording; for several recordings a mapping from their names to files; method: one of `METHODS`, else the problem's;
-    values: fields of the scene to set; tolerance: error [m] that the model may have, for which it is chosen;
+    values: fields of the scene to set, or an estimate or its JSON file: what is sought starts from there, what else it
+    found is set; tolerance: error [m] that the model may have, for which it is chosen;
     time_limit: of all of it [s]; profiles: the profile likelihood of every parameter; bootstrap: how many draws;
     options: further ones of `shoal.identification.identify` (progress, measurement, checkpoint, wishes).
     Raises InputError, ComputationError.
@@ -268,7 +271,10 @@ def identify(
 
     setattr(Estimate, _HTML, _html)
     options = {"wishes": Wishes(profiles=profiles, bootstrap=bootstrap), **options}
-    options |= {"method": method, "values": values, "seed": seed, "engine": engine, "tolerance": tolerance}
+    stated, carried = _values(values)
+    if carried is not None:
+        options["fitted"] = carried
+    options |= {"method": method, "values": stated, "seed": seed, "engine": engine, "tolerance": tolerance}
     with _files(data) as files:
         return identify(_problem(problem), data=files, time_limit=time_limit, **options)
 
@@ -293,11 +299,14 @@ def design(
     """
     from shoal.identification.design import about_answer, design, has_data
 
-    wanted, how = _problem(problem), dict[str, Any](noise=noise, angle_noise=angle_noise, duration=duration, rate=rate)
+    (stated, carried), wanted = _values(values), _problem(problem)
+    if carried is not None:
+        wanted, stated, _ = carried.into(wanted)
+    how = dict[str, Any](noise=noise, angle_noise=angle_noise, duration=duration, rate=rate)
     if about == "answer" or (about is None and (data is not None or has_data(wanted))):
         with _files(data) as files:
-            return about_answer(wanted, data=files, values=values, parameter=parameter, **how)
-    return design(wanted, values=values, parameter=parameter, **how)
+            return about_answer(wanted, data=files, values=stated, parameter=parameter, **how)
+    return design(wanted, values=stated, parameter=parameter, **how)
 
 
 def plot(result: Scene | Trajectory | Estimate | Sweep | Comparison) -> Picture:
@@ -309,7 +318,19 @@ def plot(result: Scene | Trajectory | Estimate | Sweep | Comparison) -> Picture:
 
 def _scene(given: Scene | str, values: Values | None) -> Scene:
     scene = load_scene(given) if isinstance(given, str) else given
-    return scene.with_values(values) if values else scene
+    stated, carried = _values(values)
+    if carried is not None:
+        return carried.set_in(scene)
+    return scene.with_values(stated) if stated else scene
+
+
+def _values(given: Values | None) -> tuple[Mapping[str, Any] | None, Carried | None]:
+    """Fields to set as they are stated, or what was found before."""
+    if given is None or isinstance(given, Mapping):
+        return given, None
+    from shoal.identification.carried import of_estimate, read_values
+
+    return None, read_values(given) if isinstance(given, str | Path) else of_estimate(given)
 
 
 def _problem(given: Problem | str) -> Problem:

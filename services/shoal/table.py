@@ -10,12 +10,13 @@ import warnings
 import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shoal.errors import InputError
+from shoal.table_units import Units, is_unit_line, of_columns
 from shoal.trajectory import Array
 
 Mask = NDArray[np.bool_]
@@ -24,8 +25,6 @@ LARGEST = 200_000_000
 """Bytes of a table, unpacked; more are refused."""
 _MOST_COLUMNS = 2000
 _COMMENT = re.compile(rb"^[ \t]*[#%][^\r\n]*", re.MULTILINE)
-_UNITS = re.compile(r"\W*(m?s|sec|seconds?|[cmu]?m|in|px|pixels?|rad|deg|degrees|rev|°|Hz)(/m?s)?\W*", re.IGNORECASE)
-"""A cell of a line of units under the header."""
 _MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 """First bytes of a text by its encoding."""
 _EMPTY = ("", "nan", "na", "n/a", "null", "none", "<na>", "nat")
@@ -38,6 +37,7 @@ class Table:
 
     rows: the line of the file that each row stands on, (rows,); decimal: how its text writes the decimal mark
     comments: lines that are no rows, increasing
+    units: of the columns, as a line of the file states them
     """
 
     path: Path
@@ -45,6 +45,7 @@ class Table:
     rows: NDArray[np.intp]
     decimal: str = "."
     comments: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+    units: Units | None = None
 
     @property
     def frames(self) -> NDArray[np.intp]:
@@ -74,11 +75,6 @@ class Table:
         if np.any(bad):
             k = int(np.argmax(bad))
             found = str(self.frame[column].iloc[k])
-            if k == 0 and _UNITS.fullmatch(found):
-                raise InputError(
-                    f"{self.path}: row {self.rows[k]} holds units ({column!r}: {_short(found)}); take the line out, "
-                    "and state `unit` of the channels and `time_scale`"
-                )
             raise InputError(f"{self.path}: row {self.rows[k]}, column {column!r}: {_short(found)} {why}")
 
 
@@ -143,7 +139,8 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     import pandas
 
     try:
-        first, skipped, data, comments = _header(data, columns is not None)
+        head = _units(_header(data, columns is not None))
+        first, skipped, comments = head.first, head.skipped, head.comments
         separator = next((mark for mark in (";", "\t") if mark in first), ",")
         decimal = "," if separator == ";" else "."
         if first.count(separator) >= _MOST_COLUMNS or len(columns or ()) > _MOST_COLUMNS:
@@ -161,7 +158,7 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
             # A row with more cells than the header would else be cut off with a mere warning.
             warnings.simplefilter("error", pandas.errors.ParserWarning)
             frame = pandas.read_csv(
-                io.BytesIO(data),
+                io.BytesIO(head.data),
                 sep=separator,
                 decimal=decimal,
                 header=None,
@@ -176,34 +173,74 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
         raise InputError(f"data: {path} is not CSV: {_short(str(error))}") from None
     rows = np.arange(len(frame)) + 1 + skipped
     filled = frame.notna().any(axis=1).to_numpy()
-    return Table(path, frame[filled], rows[filled], decimal, comments)
+    cells = next(csv.reader([head.units], delimiter=separator), [])
+    units = of_columns(path, head.unit_row, names, cells) if head.units else None
+    return Table(path, frame[filled], rows[filled], decimal, comments, units)
 
 
-def _header(data: bytes, named: bool) -> tuple[str, int, bytes, NDArray[np.intp]]:
-    """The header line, how many lines to skip, the text with comments blanked, and the lines that these stood on.
+class _Head(NamedTuple):
+    """The line that names the columns, how many lines to skip, the text without comments, and where these stood.
+
+    units: the line of units, if there is one; unit_row: its number in the file
+    """
+
+    first: str
+    skipped: int
+    data: bytes
+    comments: NDArray[np.intp]
+    units: str = ""
+    unit_row: int = 0
+
+
+def _units(head: _Head) -> _Head:
+    """With the line of units under the header, which is no row."""
+    if head.units:
+        return head
+    number, begin, data = 0, 0, head.data
+    while begin < len(data):
+        end = data.find(b"\n", begin)
+        end = len(data) if end < 0 else end
+        number += 1
+        if number > head.skipped and (line := data[begin:end].strip()):
+            text = line.decode()
+            if not is_unit_line(re.split(r"\t" if b"\t" in line else "[,;]", text)):
+                return head
+            comments = np.sort(np.append(head.comments, number))
+            return head._replace(data=data[:begin] + data[end:], comments=comments, units=text, unit_row=number)
+        begin = end + 1
+    return head
+
+
+def _header(data: bytes, named: bool) -> _Head:
+    """The header line and what else is above the numbers.
 
     named: whether the columns are named elsewhere; then the first line of data tells how cells are separated. A
-    comment that has as many words as the numbers below it is their header, as `numpy.savetxt` writes it.
+    comment that has as many words as the numbers below it is their header, as `numpy.savetxt` writes it; where that is
+    a line of units, the comment above it is.
     """
     if not data.lstrip(b" \t\r\n").startswith((b"#", b"%")) and not _COMMENT.search(data):
         first = data.split(b"\n", 1)[0].decode().strip("\r")
-        return first, 0 if named else 1, data, np.zeros(0, np.intp)
+        return _Head(first, 0 if named else 1, data, np.zeros(0, np.intp))
     lines = data.splitlines()
     comments = np.array([k for k, line in enumerate(lines, start=1) if _COMMENT.match(line)], dtype=np.intp)
     data = _COMMENT.sub(b"", data)
     begin = next((k for k, line in enumerate(lines, start=1) if line.strip() and k not in set(comments[:1000])), 0)
     if not begin:
-        return "", 0, data, comments
+        return _Head("", 0, data, comments)
     first = lines[begin - 1].decode()
     if named:
-        return first, begin - 1, data, comments
+        return _Head(first, begin - 1, data, comments)
     cells = re.split(r"[,;\t]", first)
     above = [k for k in comments if k < begin]
     if above and all(np.isfinite(_float(cell.strip(), "," if ";" in first else ".")) for cell in cells):
-        words = lines[above[-1] - 1].decode().lstrip(" \t#%")
-        if len(re.split(r"[,;\t]", words)) == len(cells):
-            return words, begin - 1, data, comments
-    return first, begin, data, comments
+        words = [(k, lines[k - 1].decode().lstrip(" \t#%")) for k in above[-2:]]
+        fitting = [(k, text) for k, text in words if len(re.split(r"[,;\t]", text)) == len(cells)]
+        row, last = fitting[-1] if fitting else (0, "")
+        if len(fitting) == 2 and is_unit_line(re.split(r"[,;\t]", last)):
+            return _Head(fitting[0][1], begin - 1, data, comments, last, int(row))
+        if row == above[-1]:
+            return _Head(last, begin - 1, data, comments)
+    return _Head(first, begin, data, comments)
 
 
 def _float(text: str, decimal: str) -> float:

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 from shoal.cli import main
 from shoal.commands import options
-from shoal.identification.recording.table import load_table
 from shoal.scene import Scene, load_scene
+from shoal.table import load_table
 
 ASKED = ["simulate", "single-pendulum", "--set", "solver.duration=0.5", "--set", "solver.samples=5"]
 

@@ -49,6 +49,17 @@ def test_a_crank_follows_its_encoder(tmp_path: Path) -> None:
     assert run.marker("tip") == pytest.approx(0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1), abs=1e-8)
 
 
+def test_a_line_of_units_tells_the_scales(tmp_path: Path) -> None:
+    text = "t,angle\n[ms],[deg]\n0,0\n500,90\n1000,180\n"
+    scene = load_scene(written(tmp_path, {"column": "angle"}, text))
+    table = scene.joints["motor"].angle.table
+    assert np.array(table) == pytest.approx(np.array([[0.0, 0.0], [0.5, np.pi / 2], [1.0, np.pi]]), rel=1e-12)
+    stated = load_scene(written(tmp_path, {"column": "angle", "scale": 2.0, "time_scale": 1.0}, text))
+    assert stated.joints["motor"].angle.table[1] == (500.0, 180.0)
+    with pytest.raises(InputError, match="column 'angle': unit 'furlong' is not known here; state `scale`"):
+        load_scene(written(tmp_path, {"column": "angle"}, text.replace("[deg]", "[furlong]")))
+
+
 def test_what_is_kept_of_the_scene_has_the_numbers(tmp_path: Path) -> None:
     scene = load_scene(written(tmp_path, STATED))
     (tmp_path / "encoder.csv").unlink()

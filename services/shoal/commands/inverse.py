@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from shoal.commands import options
 from shoal.commands.options import Out
 from shoal.errors import check_trusted
+
+if TYPE_CHECKING:
+    from shoal.identification.carried import Carried
 
 
 @click.command()
@@ -23,10 +26,18 @@ from shoal.errors import check_trusted
     callback=options.recordings,
     help="A recording (CSV, Parquet, or a YAML that describes one) instead of the problem's own, or one of several.",
 )
+@click.option(
+    "--hold-out",
+    multiple=True,
+    metavar="[NAME=]FROM:TO",
+    callback=options.windows,
+    help="Seconds of the recording that are predicted instead of fitted (repeatable).",
+)
 @options.method
 @click.option("--seed", default=0, show_default=True, help="Seed of the random numbers.")
 @options.engine
-@options.values
+@options.set_only
+@options.fitted
 @click.option(
     "--tolerance",
     type=float,
@@ -57,7 +68,9 @@ def identify(
         how["progress"] = lambda _, best, __, count: tell(
             f"{wanted.name}: best fitness {best:.3e}, {count} evaluations"
         )
-        screen.compile_for(how["engine"], [1, 2], wanted.load_scene(how["values"]))
+        carried = how["fitted"]
+        starting, values = (wanted, how["values"]) if carried is None else carried.into(wanted, how["values"])[:2]
+        screen.compile_for(how["engine"], [1, 2], starting.load_scene(values))
         estimate = identify(wanted, checkpoint=checkpoint, wishes=wishes, **how)
     if out is not None:
         files.estimate(estimate, wanted, out)
@@ -74,7 +87,8 @@ def identify(
 @click.option("--duration", type=float, metavar="SECONDS", help="Of the measurement; else that of the data.")
 @click.option("--rate", type=float, metavar="HERTZ", help="Samples per second; else that of the data.")
 @click.option("--parameter", metavar="NAME", help="To be sharpened; else the weakest.")
-@options.values
+@options.set_only
+@options.fitted
 @options.as_json
 @options.out(".json", ".png")
 def design(
@@ -83,6 +97,7 @@ def design(
     about: Literal["answer", "start"] | None,
     as_json: bool,
     out: Out,
+    fitted: Carried | None,
     **how: Any,
 ) -> None:
     """Say what to measure to know the parameters of PROBLEM best. Which marker, how long and how often."""
@@ -92,6 +107,10 @@ def design(
     from shoal.terminal import screen, tables
 
     wanted = load_problem(problem)
+    if fitted is not None:
+        wanted, how["values"], notes = fitted.into(wanted, how["values"])
+        for note in notes:
+            click.echo(f"shoal: note: {note}", err=True)
     with screen.working(f"designing a measurement for {wanted.name}"):
         found = design(wanted, data, about=about, **how)
     if out is not None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from shoal.errors import InputError
+
+if TYPE_CHECKING:
+    from shoal.identification.carried import Carried
 
 Values = dict[str, Any]
 """Fields of a scene by path."""
@@ -19,6 +22,8 @@ NEEDED = {".parquet": "pyarrow", ".nc": "xarray"}
 """Packages that a form of files asks for."""
 Out = Path | None
 """Where the result is written, if it is."""
+_VALUES = "shoal.values"
+"""Where a command's context keeps what an estimate's file carries."""
 
 
 def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, str]:
@@ -83,6 +88,23 @@ def recordings(
     return found or None
 
 
+def windows(
+    context: click.Context, parameter: click.Parameter, given: tuple[str, ...]
+) -> list[tuple[float, float]] | dict[str, list[tuple[float, float]]] | None:
+    """[NAME=]FROM:TO, once or more."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    for one in given:
+        name, _, span = one.rpartition("=")
+        try:
+            begin, end = map(float, span.split(":"))
+        except ValueError:
+            raise click.BadParameter(f"{one!r} is not FROM:TO in s, such as 1.5:2, nor NAME=FROM:TO") from None
+        found.setdefault(name, []).append((begin, end))
+    if "" in found and len(found) > 1:
+        raise click.BadParameter("NAME=FROM:TO is needed for all of several recordings")
+    return found.get("", found or None)
+
+
 def times_list(context: click.Context, parameter: click.Parameter, text: str | None) -> Times:
     """T,T,... as numbers."""
     if text is None:
@@ -91,6 +113,28 @@ def times_list(context: click.Context, parameter: click.Parameter, text: str | N
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise click.BadParameter(f"{text!r} is not a list of times in s, such as 0.1,0.2,0.5") from None
+
+
+def _carried(context: click.Context, parameter: click.Parameter, path: Path | None) -> Carried | None:
+    """What an estimate's file carries."""
+    if path is None:
+        return None
+    from shoal.identification.carried import read_values
+
+    return read_values(path)
+
+
+def _remember(context: click.Context, parameter: click.Parameter, path: Path | None) -> None:
+    if (found := _carried(context, parameter, path)) is None:
+        return
+    for note in found.notes():
+        click.echo(f"shoal: note: {note}", err=True)
+    context.meta[_VALUES] = found
+
+
+def _with_carried(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, Any]:
+    found: Carried | None = context.meta.get(_VALUES)
+    return {**({} if found is None else found.values), **field_values(context, parameter, pairs)}
 
 
 class LateHelp(click.Option):
@@ -137,14 +181,31 @@ class EngineName(click.ParamType):  # type: ignore[type-arg]  # click 8.1 has no
         return click.Choice(list(ENGINES))
 
 
-values = click.option(
-    "--set",
-    "values",
-    multiple=True,
-    metavar="PATH=VALUE",
-    callback=field_values,
-    help="Set any field of the scene, such as bodies.OA.elements=16, solver.step=1e-5 (repeatable).",
-)
+_set: dict[str, Any] = {
+    "multiple": True,
+    "metavar": "PATH=VALUE",
+    "help": "Set any field of the scene, such as bodies.OA.elements=16, solver.step=1e-5 (repeatable).",
+}
+_values: dict[str, Any] = {
+    "type": click.Path(path_type=Path, dir_okay=False),
+    "metavar": "FILE",
+    "help": "Values that `shoal identify --out FILE.json` found; --set goes before them.",
+}
+set_only = click.option("--set", "values", callback=field_values, **_set)
+"""Fields of a problem's scene; see `fitted`."""
+fitted = click.option("--values", "fitted", callback=_carried, **_values)
+"""What a problem starts from, or takes as known."""
+
+
+def values(command: Any) -> Any:
+    """--set and --values of a scene, together the fields to set."""
+    # Eager, so that it is known when --set is read.
+    command = click.option("--values", "fitted", callback=_remember, is_eager=True, expose_value=False, **_values)(
+        command
+    )
+    return click.option("--set", "values", callback=_with_carried, **_set)(command)
+
+
 at = click.option("--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s].")
 verify = click.option("--verify/--no-verify", default=True, show_default=True, help="Estimate errors by more runs.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")

@@ -34,7 +34,7 @@ def stated(context: click.Context, parameter: click.Parameter, given: str) -> st
         return given
     fields = studies.fields(data, given)
     options = {name.removeprefix("--"): one for one in context.command.params for name in one.opts if name[:2] == "--"}
-    for unfit in ("json", "help"):
+    for unfit in ("json", "help", "values"):
         options.pop(unfit, None)
     context.default_map = {}
     for field, value in fields.items():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from shoal.identification.adapt import Stage
+from shoal.identification.carried import fitted
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
@@ -22,6 +23,7 @@ from shoal.identification.spread.bootstrap import bootstrap
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.curvature import bent, by_profile
 from shoal.identification.spread.model_error import ModelError, model_error, rms_of
+from shoal.identification.spread.prediction import Prediction, predictions
 from shoal.identification.spread.profiles import Profile, profiles
 from shoal.identification.spread.rank import combinations
 from shoal.identification.spread.sensitivity import Sensitivity, believed
@@ -120,8 +122,15 @@ def conclude(
     # Away from the minimum the mesh is not what limits the fit.
     limits = judgement.verdict is not Verdict.UNFINISHED and not stages
     names = [model.names[k] for k in curved]
+    carried, left = fitted(model.parameters, point)
+    foretold: list[Prediction] = unless_late(
+        lambda: predictions(model, point, seen if known else None, at, blocks, error), []
+    )
     notes = [judgement.message or outcome.message]
     notes += remarks(values, profiled, names, tests, mesh if limits else None, theory)
+    several = len(measurement.recordings) > 1
+    notes += [one.sentence(named=several) for one in foretold]
+    beyond = ["look for what the model leaves out: a prediction is worse than the estimate states"]
     return Estimate(
         problem=model.problem.name,
         method=method,
@@ -129,7 +138,7 @@ def conclude(
         seed=seed,
         verdict=judgement.verdict,
         message="; ".join(note for note in notes if note),
-        advice=judgement.advice,
+        advice=judgement.advice + beyond * any(one.inside is False for one in foretold),
         choice=outcome.choice,
         parameters=values,
         quantities=intervals.spanning([intervals.quantities(model, end, at, correction, curved) for end in ends]),
@@ -159,6 +168,9 @@ def conclude(
         predicted=predicted,
         measurement=measurement,
         covariance=intervals.covariance(model, point, at),
+        values=carried,
+        left_out=left,
+        prediction=foretold,
     )
 
 

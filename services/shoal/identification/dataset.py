@@ -60,8 +60,9 @@ def _signals(recording: Recording, predicted: Array) -> xr.Dataset:
     columns: dict[str, Any] = {}
     for k, channel in enumerate(recording.channels):
         measured, fitted = recording.values[:, k], predicted[:, k]
+        quantity = channel.quantity + (f"_against_{channel.to}" if channel.to else "")
         parts = {"measured": measured, "predicted": fitted, "residual": fitted - measured}
         for part, signal in parts.items():
             empty = (("time", "marker"), np.full(shape, np.nan), {"units": of_channel(channel)})
-            columns.setdefault(f"{part}_{channel.quantity}", empty)[1][:, markers.index(channel.marker)] = signal
+            columns.setdefault(f"{part}_{quantity}", empty)[1][:, markers.index(channel.marker)] = signal
     return xr.Dataset(columns, {"time": ("time", recording.times, {"units": "s"}), "marker": markers})

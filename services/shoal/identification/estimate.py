@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from shoal.errors import InputError
@@ -12,6 +12,7 @@ from shoal.identification.judge.suspects import Suspect
 from shoal.identification.judge.verdict import Verdict
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.spread.bootstrap import Bootstrap
+from shoal.identification.spread.prediction import Prediction
 from shoal.identification.spread.profiles import Profile
 from shoal.identification.spread.value import Value
 from shoal.scene import Scene
@@ -33,6 +34,8 @@ class Estimate:
     sensitivity_doubt: relative difference of derivatives by two step sizes; profiles, bootstrap: where wished for
     scenes: the identified machine, by recording; predicted: its channels at the samples of each recording
     covariance: of the parameters, in the products of their units, (parameters, parameters)
+    values: the fields of the scene that were found, by path, ties evaluated; left_out: what is not among them, and why
+    prediction: of the windows that were held out
     """
 
     problem: str
@@ -71,6 +74,9 @@ class Estimate:
     measurement: Measurement
     covariance: Array | None = None
     theory_error_rms: float | None = None
+    values: dict[str, float] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
+    prediction: list[Prediction] = field(default_factory=list)
 
     @property
     def scene(self) -> Scene:
@@ -122,6 +128,9 @@ class Estimate:
             "engine": self.engine,
             "seed": self.seed,
             "parameters": {**values(self.parameters), **values(self.quantities)},
+            "values": plain(self.values),
+            "left_out": self.left_out,
+            "prediction": [one.to_json() for one in self.prediction],
             "combinations": self.combinations,
             "fitness": plain(self.fitness),
             "rms": plain(self.rms),

@@ -19,7 +19,7 @@ from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization
 from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement
-from shoal.identification.recording.observation import Camera, observe
+from shoal.identification.recording.observation import Camera, observe, without_turns
 from shoal.identification.recording.rows import Rows
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.memory import Memory
@@ -177,8 +177,10 @@ class ForwardModel:
         """One call of the engine; lanes that it refuses are found by halving and stay nan."""
         lanes = len(next(iter(values.values()))) if values else len(np.atleast_1d(view.x))
         channels = self.measurement.recordings[name].channels
+        # Whole turns between two bodies are counted from the start.
+        between = times[0] > 0.0 and any(channel.to is not None for channel in channels)
         try:
-            trajectory = self._run(scene, values, times, lanes)
+            trajectory = self._run(scene, values, np.append(0.0, times) if between else times, lanes)
         except InputError as error:
             asked = self.whole or self
             self.refusal = asked.refusal = asked.refusal or str(error)
@@ -189,7 +191,7 @@ class ForwardModel:
             whole = [np.broadcast_to(number, lanes) for number in view]
             parts = [({path: x[half] for path, x in values.items()}, [x[half] for x in whole]) for half in halves]
             return np.concatenate([self._simulate(scene, v, times, Camera(*x), name) for v, x in parts])
-        seen = observe(trajectory, channels, view)
+        seen = without_turns(observe(trajectory, channels, view), channels)[:, int(between) :]
         failed = np.array([status is not Status.OK for status in trajectory.status])
         seen[np.broadcast_to(failed, len(seen))] = np.nan
         return seen

@@ -6,6 +6,7 @@ import hashlib
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,13 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification.adapt import Stage, Stopped, coarse_to_fine
+from shoal.identification.carried import Carried
 from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.mirrors import with_mirror_images
-from shoal.identification.measure import measure
+from shoal.identification.measure import Windows, measure
 from shoal.identification.methods import Method, Outcome, get_method
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.problem import Problem
@@ -40,6 +42,8 @@ def identify(
     data: str | Mapping[str, str] | None = None,
     engine: str = "gauss",
     values: Mapping[str, Any] | None = None,
+    fitted: Carried | None = None,
+    hold_out: Windows | Mapping[str, Windows] | None = None,
     seed: int = 0,
     measurement: Measurement | None = None,
     tolerance: float | None = None,
@@ -51,9 +55,11 @@ def identify(
     """Find the parameters of a problem.
 
     method: one of METHODS, else the problem's; data: recordings instead of the problem's own (see `measure`);
-    values: fields of the scene to set; measurement: one made earlier, to share it between methods;
+    values: fields of the scene to set; fitted: values found before, starts of what is sought here, else set unless
+    `values` sets them; measurement: one made earlier, to share it between methods;
     tolerance: error [m] that the model may have at the markers, for which elements, integrator and step are chosen
     instead of taken from the scene (coarse while searching);
+    hold_out: windows that are predicted instead of fitted (see `measure`);
     time_limit [s]: of everything but data that are computed and kernels that are compiled; then the best so far is the
     answer; checkpoint: file of evaluations, which a run that was broken off finds when it is started again;
     wishes: what is to be known beyond the answer;
@@ -63,13 +69,16 @@ def identify(
     search = get_method(name)
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
+    notes: list[str] = []
+    if fitted is not None:
+        problem, values, notes = fitted.into(problem, values)
     scene = problem.load_scene(values)
     deadline = None if time_limit is None else Deadline(time_limit)
     computed = any(isinstance(source, EngineSource) for source in problem.sources.values())
     if measurement is None:
         # Data are computed with the problem's values, not the user's.
         with deadline.paused() if deadline is not None and computed else nullcontext():
-            measurement = measure(problem, problem.load_scene(), data)
+            measurement = measure(problem, problem.load_scene(), data, hold_out)
     model = ForwardModel(problem, scene, get_engine(engine), measurement, deadline)
     if deadline is not None:
         with deadline.paused():
@@ -81,7 +90,8 @@ def identify(
         begin = time.perf_counter()
         model, outcome, stages = _search(model, search, np.random.default_rng(seed), tolerance, progress)
         wall = time.perf_counter() - begin
-        return conclude(model, outcome, name, seed, wall, stages, wishes)
+        estimate = conclude(model, outcome, name, seed, wall, stages, wishes)
+        return replace(estimate, notes=[*notes, *estimate.notes])
 
 
 def _search(

@@ -2,40 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.identification.problem import RESERVED, Problem
 from shoal.identification.recording.computed import kept
 from shoal.identification.recording.measurement import Measurement, Recording
-from shoal.identification.recording.observation import camera, observe
+from shoal.identification.recording.observation import camera, observe, without_turns
 from shoal.identification.recording.plausible import check_units
-from shoal.identification.recording.reading import described, read
-from shoal.identification.recording.source import Channel, EngineSource, FileSource
+from shoal.identification.recording.reading import described, sampled
+from shoal.identification.recording.source import Channel, Clocked, EngineSource, FileSource
 from shoal.scene import Scene
 from shoal.scene.load import unknown
+from shoal.scene.record import one_line
 from shoal.shelf import NAME, located, shelf
 from shoal.trajectory import Array
 
+Windows = Sequence[tuple[float, float]]
+"""Spans [from, to] in seconds of a recording's clock."""
 
-def measure(problem: Problem, scene: Scene, data: str | Mapping[str, str] | None = None) -> Measurement:
+
+def measure(
+    problem: Problem,
+    scene: Scene,
+    data: str | Mapping[str, str] | None = None,
+    hold_out: Windows | Mapping[str, Windows] | None = None,
+) -> Measurement:
     """The measurement of a problem. Raises InputError, ComputationError.
 
     data: a file (CSV, Parquet, or a recording's YAML) or a recording of the library instead of the problem's own, or
         one for each recording by name
+    hold_out: windows that are predicted instead of fitted, in place of those that the recordings state; by name where
+        there are several
     """
-    files = _named(problem, data)
+    files, windows = _named(problem, data), _held(problem, hold_out)
     recordings, truth = {}, dict[str, float]()
     for name, source in problem.sources.items():
         where = name if problem.recordings else problem.name
         if isinstance(source, EngineSource):
             if name in files:
                 raise InputError(f"data: {where} computes its data; it takes no file")
+            if name in windows:
+                source = source.model_copy(update=windows[name])
             recordings[name], known = _computed(problem, source, scene, where)
             prefix = f"{name}." if problem.recordings else ""
             truth |= {(f"{prefix}{n}" if problem.parameters[n].own else n): x for n, x in known.items()}
@@ -45,7 +60,7 @@ def measure(problem: Problem, scene: Scene, data: str | Mapping[str, str] | None
             raise InputError(
                 f"data: {where} needs a recording; give one as data=FILE (on the command line: --data FILE)"
             )
-        recordings[name] = _recorded(problem, scene, source, _file(path))
+        recordings[name] = _recorded(problem, scene, source, _file(path), windows.get(name, {}))
     return Measurement(recordings, truth)
 
 
@@ -61,6 +76,29 @@ def _named(problem: Problem, data: str | Mapping[str, str] | None) -> dict[str, 
         if name not in names:
             raise InputError(f"data: no recording {name!r} in {problem.name}; there are {', '.join(names)}")
     return dict(data)
+
+
+def _held(problem: Problem, given: Windows | Mapping[str, Windows] | None) -> dict[str, dict[str, Any]]:
+    """Windows by the recording, as changes of its source. Raises InputError."""
+    if not given:
+        return {}
+    names = list(problem.sources)
+    if not isinstance(given, Mapping):
+        if len(names) > 1:
+            raise InputError(
+                f"hold_out: {problem.name} has several recordings; give NAME=FROM:TO for {', '.join(names)}"
+            )
+        given = {names[0]: given}
+    found = {}
+    for name, windows in given.items():
+        if name not in names:
+            raise InputError(f"hold_out: no recording {name!r} in {problem.name}; there are {', '.join(names)}")
+        try:
+            stated = Clocked.model_validate({"hold_out": [list(window) for window in windows]})
+        except ValidationError as error:
+            raise one_line(error, name) from None
+        found[name] = {"hold_out": stated.hold_out}
+    return found
 
 
 def _file(given: str) -> Path:
@@ -82,13 +120,14 @@ def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) 
         trajectory = get_engine(source.engine).simulate(truth, instants)
         if not trajectory.ok:
             raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
-        return np.asarray(observe(trajectory, channels, camera(source))[0])
+        return np.asarray(without_turns(observe(trajectory, channels, camera(source)), channels)[0])
 
     values = kept(source.engine, truth, instants, (channels, camera(source)), simulated)
     values = values + source.noise * np.random.default_rng(source.seed).standard_normal(values.shape)
     origin = ", ".join([source.engine, *(f"{path}={value}" for path, value in source.values.items())])
     origin = origin if source.noise == 0 else f"{origin}, noise {source.noise:g}"
     recording = Recording(times, channels, values, origin, _noise(problem, channels), source.as_stated())
+    recording = recording.holding(source.hold_out)
     paths = {name: parameter.path for name, parameter in problem.parameters.items()}
     return recording, {name: _true(truth, source, path) for name, path in paths.items() if path}
 
@@ -98,11 +137,12 @@ def _true(scene: Scene, source: EngineSource, path: str) -> float:
     return float(getattr(source, rest) if head == RESERVED else scene.value(path))
 
 
-def _recorded(problem: Problem, scene: Scene, source: FileSource, path: Path) -> Recording:
-    source = FileSource.model_validate(described(source.model_dump(exclude_unset=True), path))
+def _recorded(problem: Problem, scene: Scene, source: FileSource, path: Path, windows: Mapping[str, Any]) -> Recording:
+    source = FileSource.model_validate({**described(source.model_dump(exclude_unset=True), path), **windows})
     channels = problem.channels_of(source)
     problem.check_channels(channels, scene, path.name)
-    found = read(source, channels)
+    found, source = sampled(source, channels)
+    channels = found.channels
     sized = any(parameter.path == f"{RESERVED}.scale" for parameter in problem.parameters.values())
     check_units(source, channels, found.times, found.values, scene, sized)
     notes = (*found.notes, *_without_scale(problem, source, channels))

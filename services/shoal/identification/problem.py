@@ -186,9 +186,10 @@ class Problem(Record):
         if not channels:
             raise InputError(f"{where}: channels: none are stated, neither by the problem nor by the recording")
         for channel in channels:
-            if channel.marker not in scene.markers:
-                known = ", ".join(scene.markers)
-                raise InputError(f"{where}: channels: no marker {channel.marker!r}; there are {known}")
+            for marker in (channel.marker, channel.to):
+                if marker is not None and marker not in scene.markers:
+                    known = ", ".join(scene.markers)
+                    raise InputError(f"{where}: channels: no marker {marker!r}; there are {known}")
             if (channel.quantity == "z") > (scene.dimensions == 3):
                 raise InputError(f"{where}: channels: z is measured in space; {scene.name} is a scene in the plane")
             if channel.quantity in ("angle", "rate") and scene.dimensions == 3:

@@ -15,6 +15,7 @@ from shoal.pictures.landscape import has_ellipse, landscape, survey
 from shoal.pictures.motion import Motion, motion
 from shoal.pictures.overlay import follows, overlay
 from shoal.pictures.poses import poses
+from shoal.pictures.prediction import prediction, told
 from shoal.pictures.profiles import profiles
 from shoal.pictures.residuals import residuals, white
 from shoal.pictures.signals import gaps, signals
@@ -31,6 +32,8 @@ def gallery(answer: Answer, moving: list[Motion]) -> list[Drawn]:
     """Every picture that this identification has something to show in."""
     estimate = answer.estimate
     drawn = [_overlay(answer), *(_poses(answer, one) for one in moving[:1]), _residuals(answer)]
+    if estimate.prediction:
+        drawn.append(_prediction(answer))
     if len(estimate.history[0]) > 1:
         drawn.append(_convergence(answer))
     if estimate.minima:
@@ -83,7 +86,8 @@ def _around(answer: Answer) -> list[Drawn]:
 def _overlay(answer: Answer) -> Drawn:
     figure = overlay(answer.estimate)
     alt = f"Measured values as circles with the fitted model as a line. Overall, {follows(answer.estimate)}."
-    grey = " Where nothing was measured it is grey." if any(gaps(one) for one in signals(answer.estimate)) else ""
+    what = "fitted" if answer.estimate.prediction else "measured"
+    grey = f" Where nothing was {what} it is grey." if any(gaps(one) for one in signals(answer.estimate)) else ""
     return Drawn("overlay", figure, alt, f"The fitted model (red) over the data.{grey}")
 
 
@@ -100,6 +104,13 @@ def _convergence(answer: Answer) -> Drawn:
     figure = convergence({estimate.method: estimate}, titles.pays(estimate.problem, {estimate.method: estimate}))
     alt = f"Best fitness against counted evaluations, both axes logarithmic; it ends at {estimate.fitness:.3g}."
     return Drawn("convergence", figure, alt, "What the search paid for what it found; the marker is its end.")
+
+
+def _prediction(answer: Answer) -> Drawn:
+    figure = prediction(answer.estimate)
+    alt = f"Samples that were not fitted, with the prediction, and its error. Here {told(answer.estimate)}."
+    caption = "What was held out of the fit. The band is what the estimate states; 95 % of the points should lie in it."
+    return Drawn("prediction", figure, alt, caption)
 
 
 def _residuals(answer: Answer) -> Drawn:

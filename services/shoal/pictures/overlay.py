@@ -27,7 +27,7 @@ def overlay(estimate: Estimate, title: str = "") -> Figure:
     figure, axes = canvas(1.5 + 1.6 * len(shown), nrows=len(shown), squeeze=False)
     one_clock = len({signal.recording for signal in shown}) == 1
     for panel, signal in zip(axes[:, 0], shown, strict=True):
-        _draw(panel, signal)
+        _draw(panel, signal, "not fitted" if estimate.prediction else "no data")
         if not (one_clock and panel is not axes[-1, 0]):
             panel.set_xlabel("time [s]")
         else:
@@ -55,10 +55,10 @@ def follows(estimate: Estimate) -> str:
     return f"the model {how} {' and '.join(parts)} (RMS)"
 
 
-def _draw(panel: Axes, signal: Signal) -> None:
+def _draw(panel: Axes, signal: Signal, gap: str) -> None:
     many = len(signal.times) > _MANY
     for k, (begin, end) in enumerate(gaps(signal)):
-        panel.axvspan(begin, end, color="#EEEEEE", zorder=0, label="no data" if k == 0 else None)
+        panel.axvspan(begin, end, color="#EEEEEE", zorder=0, label=gap if k == 0 else None)
     panel.plot(
         signal.times,
         signal.measured,

@@ -103,6 +103,13 @@ def _remarks(estimate: Estimate) -> list[str]:
         f"{stage['evaluations']} simulations."
         for stage in estimate.model.get("selection", ())
     ]
+    remarks += [
+        f"Held out {one.window[0]:g} s to {one.window[1]:g} s, {c.name}: predicted to "
+        f"{power(c.rms, 2)} {c.unit} (RMS)"
+        + ("." if c.inside is None else f"; 95 % of such windows stay below {power(c.limit, 2)} {c.unit}.")
+        for one in estimate.prediction
+        for c in one.channels
+    ]
     if estimate.bootstrap is not None:
         for name in estimate.parameters:
             low, high = estimate.bootstrap.interval(name)

@@ -61,7 +61,7 @@ def signals(estimate: Estimate) -> list[Signal]:
     for name, recording in recordings.items():
         noise = noise_of(recording)
         for k, channel in enumerate(recording.channels):
-            what = f"{channel.quantity} of {channel.marker}"
+            what = channel.name
             found.append(
                 Signal(
                     f"{name}: {what}" if len(recordings) > 1 else what,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,12 @@ from pydantic import ValidationError
 from shoal.errors import InputError
 from shoal.scene.record import Positive, Record, one_line
 from shoal.shelf import LARGEST
+from shoal.table_units import SI, TIMES, Units
 
 PARTS = ("joints", "loads", "ground_points")
 """Parts of a scene whose members have functions of time: PART.NAME.FIELD."""
+_COHERENT = ("N", "Nm", "N m", "N*m", "N/m", "-")
+"""Units of forces and torques, which are SI's."""
 
 
 class Signal(Record):
@@ -41,8 +44,19 @@ class Signal(Record):
         found = load_table(folder / self.path, largest=LARGEST)
         times, values = found.numbers(self.time), found.numbers(self.column)
         told = np.isfinite(times) & np.isfinite(values)
-        rows = np.column_stack([self.time_scale * times - self.start, self.scale * values])[told]
+        pace = self._factor("time_scale", self.time, found.units, TIMES)
+        factor = self._factor("scale", self.column, found.units, SI | dict.fromkeys(_COHERENT, 1.0))
+        rows = np.column_stack([pace * times - self.start, factor * values])[told]
         return {"table": rows.tolist(), "smooth": self.smooth}
+
+    def _factor(self, field: str, column: str, units: Units | None, known: Mapping[str, float]) -> float:
+        """What is stated, or else what the table says of a column."""
+        unit = units.of.get(column, "") if units else ""
+        if field in self.model_fields_set or units is None or not unit:
+            return float(getattr(self, field))
+        if unit not in known:
+            raise InputError(f"row {units.row}, column {column!r}: unit {unit!r} is not known here; state `{field}`")
+        return known[unit]
 
 
 def with_signals(data: Any, folder: Path, source: str) -> Any:

@@ -299,8 +299,27 @@ def estimate_table(estimate: Estimate) -> None:
         for name in estimate.parameters:
             low, high = estimate.bootstrap.interval(name)
             screen.say(f"bootstrap of {name}, {len(estimate.bootstrap.draws)} draws: {low:.6g} to {high:.6g}")
+    _predictions(estimate)
     _effort(estimate)
     screen.say(*(f"next: {step}" for step in estimate.advice))
+
+
+def _predictions(estimate: Estimate) -> None:
+    """What was held out: how far off the prediction is, and how far off it may be."""
+    if not estimate.prediction:
+        return
+    table = screen.table("predicted, not fitted", "held out [s]", "channel", "RMS", "limit (95 %)", "inside")
+    for one in estimate.prediction:
+        where = f"{one.recording} " if len(estimate.measurement.recordings) > 1 else ""
+        for channel in one.channels:
+            inside = {True: "yes", False: "NO", None: "-"}[channel.inside]
+            limit = "-" if channel.inside is None else f"{channel.limit:.2g}"
+            table.add_row(
+                escape(f"{where}{one.window[0]:g} to {one.window[1]:g}"),
+                escape(f"{channel.name} [{channel.unit}]"),
+                *(f"{channel.rms:.2g}", limit, inside),
+            )
+    screen.out.print(table)
 
 
 def _minima(estimate: Estimate) -> None:

@@ -12,7 +12,8 @@ from shoal.errors import InputError
 from shoal.identification import Recording
 from shoal.identification.recording.reading import described
 from shoal.identification.recording.reading import read as read_source
-from shoal.identification.recording.source import SI, Channel, FileSource
+from shoal.identification.recording.source import Channel, FileSource
+from shoal.table_units import SI
 
 ANGLE = (Channel(marker="A", quantity="angle", column="theta"),)
 TIP = (Channel(marker="A", quantity="x", column="x"), Channel(marker="A", quantity="y", column="y"))

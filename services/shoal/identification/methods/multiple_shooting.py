@@ -281,6 +281,7 @@ def _check(model: ForwardModel) -> None:
         "takes no functions of time": bool(scene.ground_points) or any(map(_driven, scene.loads.values())),
         "needs the rest length or angle of every spring": any(map(_rests_at_start, scene.loads.values())),
         "takes clock and delay as known": any(p in ("measurement.clock", "measurement.delay") for p in paths),
+        "counts no turns between two bodies": any(channel.to for channel in model.measurement.first.channels),
         "takes no ties of an initial state": any(path.startswith("initial.") for path in model.problem.ties),
     }
     for reason, holds in reasons.items():

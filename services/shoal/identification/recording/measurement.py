@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,6 +10,22 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.identification.recording.source import Channel, Clocked
 from shoal.trajectory import Array
+
+_FEWEST = 3
+"""Samples, without which there is no motion."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """Samples of a window that is predicted instead of fitted.
+
+    window [s]: as it is stated, by the clock of the table; times [s], (samples,), and values, (samples, channels): as
+    those of the recording
+    """
+
+    window: tuple[float, float]
+    times: Array
+    values: Array
 
 
 @dataclass(frozen=True)
@@ -20,6 +36,7 @@ class Recording:
     noise: standard deviation of each channel, (channels,), nan where it is not stated
     stated: clock, position of the camera, fields of the scene of this run
     origin: where the data come from; notes: what was found and mended in them
+    held: windows that are not fitted, whose samples are not among the others
     """
 
     times: Array
@@ -29,11 +46,35 @@ class Recording:
     noise: Array
     stated: Clocked = field(default_factory=Clocked)
     notes: tuple[str, ...] = ()
+    held: tuple[Held, ...] = ()
+
+    def holding(self, windows: Sequence[tuple[float, float]], begin: float = 0.0) -> Recording:
+        """With the samples of these windows [s] held out; begin [s]: the motion's start by their clock.
+
+        Raises InputError for a window without a sample, and where too few are left to be fitted.
+        """
+        fitted, held = np.ones(len(self.times), dtype=bool), []
+        for window in sorted(windows):
+            low, high = window[0] - begin - 1e-9, window[1] - begin + 1e-9
+            inside = fitted & (self.times >= low) & (self.times <= high)
+            if not np.any(np.isfinite(self.values[inside])):
+                span = f"{self.times[0] + begin:g} s to {self.times[-1] + begin:g} s"
+                raise InputError(
+                    f"hold_out: no sample from {window[0]:g} s to {window[1]:g} s; the recording covers {span}"
+                )
+            held.append(Held(window, self.times[inside], self.values[inside]))
+            fitted &= ~inside
+        left = np.isfinite(self.values[fitted]).sum(axis=0)
+        if not np.all(left) or np.count_nonzero(fitted) < _FEWEST:
+            raise InputError(f"hold_out: {np.count_nonzero(fitted)} samples are left to fit; hold out less")
+        count = len(self.times) - np.count_nonzero(fitted)
+        origin = f"{self.origin}, {count} of them held out" if held else self.origin
+        return replace(self, times=self.times[fitted], values=self.values[fitted], held=tuple(held), origin=origin)
 
     @property
     def things(self) -> int:
         """How many things are observed: positions (x and y count as one) and angles."""
-        return len({(c.marker, "position" if c.is_position else c.quantity) for c in self.channels})
+        return len({(c.marker, c.to, "position" if c.is_position else c.quantity) for c in self.channels})
 
     def until(self, end: float) -> Recording:
         """The samples up to a time [s]."""

@@ -28,18 +28,32 @@ def camera(stated: Clocked) -> Camera:
     return Camera(stated.scale, stated.x, stated.y, stated.tilt)
 
 
+def without_turns(seen: Array, channels: tuple[Channel, ...]) -> Array:
+    """Channels (lanes, samples, channels), angles between two bodies less their whole turns at the first sample.
+
+    What a recording shows of them has lost these.
+    """
+    between = [channel.to is not None and channel.quantity == "angle" for channel in channels]
+    if not any(between):
+        return seen
+    first = np.where(between, seen[:, :1], 0.0)
+    return np.asarray(seen - 2 * np.pi * np.round(first / (2 * np.pi)))
+
+
 def observe(trajectory: Trajectory, channels: tuple[Channel, ...], seen_by: Camera = STRAIGHT) -> Array:
     """The channels of a trajectory, (lanes, samples, channels). Raises InputError if its engine tells no rates."""
     columns = []
     c, s = np.cos(seen_by.tilt), np.sin(seen_by.tilt)
     for channel in channels:
         index = trajectory.markers.index(channel.marker)
+        against = None if channel.to is None else trajectory.markers.index(channel.to)
         if channel.quantity == "angle":
-            columns.append(trajectory.angles[:, index] - seen_by.tilt)
+            zero = seen_by.tilt if against is None else trajectory.angles[:, against]
+            columns.append(trajectory.angles[:, index] - zero)
         elif channel.quantity == "rate":
             if trajectory.rates is None:
                 raise InputError(f"channels: engine {trajectory.engine} tells no rates; use gauss, or no rate")
-            columns.append(trajectory.rates[:, index])
+            columns.append(trajectory.rates[:, index] - (0.0 if against is None else trajectory.rates[:, against]))
         elif channel.quantity == "z":
             columns.append(trajectory.points[:, index, 2] / seen_by.scale)
         elif channel.is_position:

@@ -12,11 +12,13 @@ from pydantic import ValidationError
 from shoal.errors import InputError
 from shoal.identification.recording.measurement import Recording
 from shoal.identification.recording.noise import differences
-from shoal.identification.recording.source import SI, Channel, FileSource
+from shoal.identification.recording.source import Channel, FileSource
 from shoal.identification.recording.swaps import mend
+from shoal.identification.recording.unit_line import with_units
 from shoal.scene.load import read_yaml
 from shoal.scene.record import one_line
 from shoal.table import Mask, Table, load_table
+from shoal.table_units import SI
 from shoal.trajectory import Array
 
 YAML = (".yaml", ".yml")
@@ -60,8 +62,16 @@ def described(fields: Mapping[str, Any], path: Path) -> dict[str, Any]:
 
 def read(source: FileSource, channels: tuple[Channel, ...]) -> Recording:
     """The recording that a source describes, without what is stated of it. Raises InputError."""
+    return sampled(source, channels)[0]
+
+
+def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recording, FileSource]:
+    """As `read`, and the source with what its table says of the unit of time."""
     path = Path(source.path or "")
     table = load_table(path, source.columns)
+    of_units: list[str] = []
+    if table.units is not None:
+        source, channels, of_units = with_units(source, channels, table.units)
     for column in (source.time, *(c.column for c in channels))[bool(source.rate) :]:
         table.require(column)
     times = _times(source, table)
@@ -69,7 +79,7 @@ def read(source: FileSource, channels: tuple[Channel, ...]) -> Recording:
     inside = _window(source, times, begin, path)
     columns = {name: table.numbers(name) for c in channels for name in (c.column, c.origin) if name is not None}
     notes = [f"the motion's time is zero at {begin:g} s, the first sample"] if source.start is None and begin else []
-    notes += _mend(times, columns, channels) if source.swaps else []
+    notes = of_units + notes + (_mend(times, columns, channels) if source.swaps else [])
     signals = []
     for channel in channels:
         signal, note = _signal(source, channel, columns, times, inside)
@@ -86,7 +96,11 @@ def read(source: FileSource, channels: tuple[Channel, ...]) -> Recording:
         chosen = chosen[::part]
     origin = f"{path.name}, {_span(times[chosen])}, {len(chosen)} samples"
     unknown = np.full(len(channels), np.nan)
-    return Recording(times[chosen] - begin, channels, values[chosen], origin, unknown, notes=tuple(notes))
+    found = Recording(times[chosen] - begin, channels, values[chosen], origin, unknown, notes=tuple(notes))
+    try:
+        return found.holding(source.hold_out, begin), source
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _times(source: FileSource, table: Table) -> Array:

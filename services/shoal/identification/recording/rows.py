@@ -61,8 +61,9 @@ class Rows:
         """Standard deviation of the weighted data about the mean of each channel."""
         parts = []
         for recording in self.measurement.recordings.values():
-            deviation = recording.values - np.nanmean(recording.values, axis=0)
-            parts.append(deviation[np.isfinite(recording.values)])
+            known = np.isfinite(recording.values)
+            mean = np.sum(recording.values, axis=0, where=known) / np.maximum(np.sum(known, axis=0), 1)
+            parts.append((recording.values - mean)[known])
         return float(np.sqrt(np.mean((np.concatenate(parts) * self.weight) ** 2)))
 
     @cached_property

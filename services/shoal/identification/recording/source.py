@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from shoal.scene.record import NonNegative, Positive, Record
+from shoal.table_units import AngleUnit, LengthUnit
 
 Quantity = Literal["x", "y", "z", "angle", "rate"]
-LengthUnit = Literal["m", "cm", "mm", "um", "in", "px"]
-AngleUnit = Literal["rad", "deg", "rev"]
 
-SI: dict[str, float] = {
-    "m": 1.0,
-    "cm": 1e-2,
-    "mm": 1e-3,
-    "um": 1e-6,
-    "in": 0.0254,
-    "px": 1.0,
-    "rad": 1.0,
-    "deg": 0.017453292519943295,
-    "rev": 6.283185307179586,
-}
-"""Metres or radians in a unit; of a picture element the recording's `scale` tells the size."""
+
+def units_of(quantity: str) -> tuple[str, ...]:
+    """The units in which a column of that quantity may be; a rate is in them per second."""
+    return get_args(LengthUnit if quantity in ("x", "y", "z") else AngleUnit)
 
 
 class Channel(Record):
     """One measured signal: a marker's x, y, in space z [m], angle [rad] or rate of its angle [rad/s].
+
+    With `to`, an angle or rate is that of the marker's body less that of the body at another marker: of a joint between
+    them, what its encoder shows. Neither tilts with the camera.
 
     The signal is offset + scale * unit * (column - origin); where the y axis grows down, y, angle and rate change sign
     before `offset` is added.
@@ -38,6 +33,7 @@ class Channel(Record):
 
     marker: str
     quantity: Quantity
+    to: str | None = None
     column: str = ""
     scale: float = 1.0
     offset: float = 0.0
@@ -47,16 +43,47 @@ class Channel(Record):
 
     @model_validator(mode="after")
     def _unit_of_its_quantity(self) -> Self:
-        lengths = self.quantity in ("x", "y", "z")
-        if self.unit is not None and lengths != (self.unit in LengthUnit.__args__):  # type: ignore[attr-defined]
-            right = LengthUnit.__args__ if lengths else AngleUnit.__args__  # type: ignore[attr-defined]
+        right = units_of(self.quantity)
+        if self.unit is not None and self.unit not in right:
             raise ValueError(f"unit: {self.quantity} is measured in one of {', '.join(right)}, found {self.unit!r}")
         return self
+
+    @model_validator(mode="after")
+    def _between_two(self) -> Self:
+        if self.to is not None and self.is_position:
+            raise ValueError(f"to: an angle or a rate is measured between two markers, found {self.quantity}")
+        if self.to == self.marker:
+            raise ValueError(f"to: another marker than {self.marker} is needed")
+        return self
+
+    @property
+    def name(self) -> str:
+        """What is measured, in words."""
+        return f"{self.quantity} of {self.marker}{f' against {self.to}' if self.to else ''}"
 
     @property
     def is_position(self) -> bool:
         """Whether it is a coordinate of a marker, in metres."""
         return self.quantity in ("x", "y", "z")
+
+
+def _windows(value: Any) -> Any:
+    """A single window is a list of one."""
+    return [value] if isinstance(value, list | tuple) and value and not isinstance(value[0], list | tuple) else value
+
+
+def _apart(windows: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    for begin, end in windows:
+        if not begin < end:
+            raise ValueError(f"a window is [from, to], the later last, found [{begin:g}, {end:g}]")
+    for (_, end), (begin, _) in pairwise(sorted(windows)):
+        if begin < end:
+            raise ValueError(f"windows overlap: one ends at {end:g} s, another begins at {begin:g} s")
+    return windows
+
+
+Windows = Annotated[list[tuple[float, float]], BeforeValidator(_windows), AfterValidator(_apart)]
+"""Spans of time [s]: [from, to], or several of them."""
 
 
 class Clocked(Record):
@@ -67,6 +94,7 @@ class Clocked(Record):
     clock, delay, scale, x, y and tilt may be parameters, with the paths `measurement.clock` and so on.
     known: fields of the scene that are different in this recording
     channels: instead of those of the problem
+    hold_out: windows [from, to] in seconds of the recording's clock that are predicted instead of fitted
     """
 
     clock: Positive = 1.0
@@ -77,6 +105,7 @@ class Clocked(Record):
     tilt: float = 0.0
     known: dict[str, Any] = {}
     channels: Annotated[list[Channel], Field(min_length=1)] | None = None
+    hold_out: Windows = []
 
     def as_stated(self) -> Clocked:
         """What it says of clock, camera and scene, without where the data come from."""

@@ -1,0 +1,152 @@
+"""The fitted values of one recording carried to another scene or problem."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.scene import expression
+
+if TYPE_CHECKING:
+    from shoal.identification.estimate import Estimate
+    from shoal.identification.parametrization import Parametrization
+    from shoal.identification.problem import Problem
+    from shoal.scene import Scene
+    from shoal.trajectory import Array
+
+LARGEST = 200_000_000
+"""Bytes of a file of values; a larger one is none."""
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What an estimate found, for use elsewhere.
+
+    values: by path in the scene, ties evaluated; parameters: by name; left: what is not carried, and why
+    source: where it comes from; trusted: whether its verdict is an answer
+    """
+
+    values: Mapping[str, float]
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    left: Mapping[str, str] = field(default_factory=dict)
+    source: str = "values"
+    trusted: bool = True
+
+    def notes(self) -> list[str]:
+        """What has to be said wherever they are set."""
+        notes = []
+        if not self.trusted:
+            notes.append(f"{self.source}: the verdict on these values is that they cannot be trusted")
+        if self.left:
+            notes.append(f"{self.source}: left out: {', '.join(f'{name} ({why})' for name, why in self.left.items())}")
+        return notes
+
+    def set_in(self, scene: Scene, values: Mapping[str, Any] | None = None) -> Scene:
+        """The scene with them set, then with `values`, which win. Raises InputError that names the source."""
+        found = {path: number for path, number in self.values.items() if path not in (values or {})}
+        try:
+            scene = scene.with_values(found) if found else scene
+        except InputError as error:
+            raise InputError(f"values: {self.source}: {error}") from None
+        return scene.with_values(values) if values else scene
+
+    def into(
+        self, problem: Problem, values: Mapping[str, Any] | None = None
+    ) -> tuple[Problem, dict[str, Any], list[str]]:
+        """A problem that starts from them, the fields of its scene to set, `values` among them, and notes.
+
+        What the problem seeks becomes its start, within its bounds; what it ties it computes. Raises InputError.
+        """
+        sought, started, notes = dict(problem.parameters), [], self.notes()
+        for name, parameter in problem.parameters.items():
+            known = self.parameters.get(name) if parameter.path is None else self.values.get(parameter.path)
+            if known is None or (parameter.path or "") in (values or {}):
+                continue
+            start = float(np.clip(known, parameter.lower, parameter.upper))
+            if start != known:
+                notes.append(
+                    f"{self.source}: {name} = {known:.6g} is beyond its bounds; the search starts at {start:g}"
+                )
+            sought[name] = parameter.model_copy(update={"start": start})
+            started.append(name)
+        fitted = {parameter.path for parameter in problem.parameters.values()} | {*problem.ties}
+        fixed = {p: x for p, x in self.values.items() if p not in fitted and p not in (values or {})}
+        self_named = Carried(fixed, source=self.source)
+        self_named.set_in(problem.load_scene())
+        if started:
+            notes.append(f"{self.source}: the search starts from {', '.join(started)}")
+        if fixed:
+            listed = ", ".join(f"{path} = {number:.6g}" for path, number in fixed.items())
+            notes.append(f"{self.source}: taken as known: {listed}")
+        if not started and not fixed and self.values:
+            notes.append(f"{self.source}: nothing of it is used")
+        return problem.model_copy(update={"parameters": sought}), {**fixed, **(values or {})}, notes
+
+
+def fitted(parameters: Parametrization, point: Array) -> tuple[dict[str, float], dict[str, str]]:
+    """The fields of the scene that an answer sets in any recording, by path, and what it leaves out, with the reason.
+
+    point: (components,)
+    """
+    problem, left = parameters.problem, dict[str, str]()
+    own = {entry.key for entry in parameters.entries.values() if entry.recording is not None}
+    for name, entry in parameters.entries.items():
+        if entry.recording is not None:
+            left[name] = f"of recording {entry.recording}"
+        elif entry.parameter.of_measurement:
+            left[name] = "of the measurement"
+    for path, text in problem.ties.items():
+        if used := sorted(expression.names(text) & own):
+            left[path] = f"depends on {used[0]} of each recording"
+    paths = {parameter.path for name, parameter in problem.parameters.items() if name in own} | {
+        path for path in problem.ties if path in left
+    }
+    found = parameters.scene_values(point[None], parameters.recordings[0])
+    return {path: float(numbers[0]) for path, numbers in found.items() if path not in paths}, left
+
+
+def of_estimate(estimate: Estimate) -> Carried:
+    """What an estimate carries."""
+    known = {name: value.value for name, value in estimate.parameters.items()}
+    return Carried(
+        estimate.values, known, estimate.left_out, f"estimate of {estimate.problem}", estimate.verdict.trusted
+    )
+
+
+def read_values(path: Path | str) -> Carried:
+    """What an estimate written by `shoal identify --json` or `--out FILE.json` carries. Raises InputError."""
+    path = Path(path)
+    try:
+        if path.stat().st_size > LARGEST:
+            raise InputError(f"values: {path} is no estimate: it is too large")
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"values: {path} cannot be read: {error.strerror or error}") from None
+    except (ValueError, RecursionError):
+        raise InputError(f"values: {path} is no JSON; give what `shoal identify --out FILE.json` wrote") from None
+    if not isinstance(data, dict) or not isinstance(data.get("parameters"), dict) or "verdict" not in data:
+        raise InputError(f"values: {path} is no estimate; give what `shoal identify --out FILE.json` wrote")
+    values, left = data.get("values"), data.get("left_out")
+    if not isinstance(values, dict) or not isinstance(left, dict):
+        raise InputError(f"values: {path} holds no `values`, an older version wrote it; identify once more")
+    for name, number in values.items():
+        if not _is_number(number):
+            raise InputError(f"values: {path}: {name}: a finite number is needed, found {str(number)[:60]!r}")
+    known = {
+        str(name): float(value["value"])
+        for name, value in data["parameters"].items()
+        if isinstance(value, dict) and _is_number(value.get("value"))
+    }
+    numbers = {str(name): float(number) for name, number in values.items()}
+    reasons = {str(name): str(why) for name, why in left.items()}
+    return Carried(numbers, known, reasons, path.name, data.get("status") == "ok")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
