@@ -182,6 +182,12 @@ def test_what_exudyn_has_not_is_named(values: dict[str, Any], message: str) -> N
         script(load_scene("flexible-double-pendulum").with_values(values))
 
 
+def test_a_drive_whose_rate_jumps_is_named() -> None:
+    jumping = DRIVEN.with_values({"joints.drive.angle": "0.5 + abs(t - 0.2) - 0.2"})
+    with pytest.raises(InputError, match=r"joints.drive.angle: .* a drive whose rate jumps, at t = 0.2$"):
+        script(jumping)
+
+
 EXPRESSIONS = (
     "2*t - (1 - t) - (t - 3)", "t**3/(1 + t)/(2 + t)", "-t**2", "(-t)**2", "2**-t", "(1 + t)**(t + 0.5)",
     "exp(-t)*log(1 + t)",
