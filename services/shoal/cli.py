@@ -38,7 +38,7 @@ has threads of its own. Read when numpy is imported."""
 EXTRAS = {
     "pipeline": ("prefect", "mlflow"),
     "services": ("fastapi", "starlette", "uvicorn", "pydantic_settings", "orjson"),
-    "fmu": ("pythonfmu",),
+    "fmu": ("pythonfmu", "pythonfmu3"),
     "mujoco": ("mujoco",),
 }
 """Modules that only an extra of the package brings."""

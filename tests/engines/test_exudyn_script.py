@@ -27,7 +27,7 @@ GROUND = {"body": "ground", "point": [0.0, 0.0]}
 CABLE = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 2700.0, "youngs_modulus": 7e9,
          "element": "ancf-cable", "elements": 4}  # fmt: skip
 LINK = {"kind": "rigid-body", "mass": 1.0, "inertia": 0.1, "named_points": {"end": [1.0, 0.0]}}
-SOLVER = {"duration": 0.4, "samples": 8, "step": 1e-3}
+SOLVER = {"duration": 0.2, "samples": 4, "step": 1e-3}
 GUST = "step(t - 0.123)*exp(-t)*sin(9*t)"
 TABLE = {"table": [[0.0, 0.0], [0.1, 0.3], [0.25, -0.2], [0.4, 0.1]]}
 
@@ -180,6 +180,12 @@ def test_rods_are_loops_and_bodies_have_their_names() -> None:
 def test_what_exudyn_has_not_is_named(values: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=f"^{message}$"):
         script(load_scene("flexible-double-pendulum").with_values(values))
+
+
+def test_a_drive_whose_rate_jumps_is_named() -> None:
+    jumping = DRIVEN.with_values({"joints.drive.angle": "0.5 + abs(t - 0.1) - 0.1"})
+    with pytest.raises(InputError, match=r"joints.drive.angle: .* a drive whose rate jumps, at t = 0.1$"):
+        script(jumping)
 
 
 EXPRESSIONS = (

@@ -129,6 +129,15 @@ def test_every_joint_moves_as_in_the_native_solver_there_and_back(kind: str, tmp
     assert back < 1e-9
 
 
+def test_dry_friction_sticks_in_mujoco_and_creeps_here(tmp_path: Path) -> None:
+    """The nearer, the slower it creeps; what is read back creeps as usual."""
+    far, back = distances(machine({**JOINTS["hinge"], "coulomb": 0.3}), tmp_path)
+    near, _ = distances(machine({**JOINTS["hinge"], "coulomb": 0.3, "coulomb_speed": 1e-3}), tmp_path)
+    assert back < 1e-9
+    assert far < 5e-4
+    assert near < 0.2 * far
+
+
 @pytest.mark.parametrize("scene", [LOADED, FLAT], ids=["space", "plane"])
 def test_loads_and_free_bodies(scene: Scene, tmp_path: Path) -> None:
     theirs, back = distances(scene, tmp_path)

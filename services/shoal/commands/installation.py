@@ -47,13 +47,16 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None, ke
     metavar="PATH",
     help="A load's scale or torque, or a drive, that a host may change during the run (repeatable).",
 )
+@click.option("--fmi", type=click.Choice(["2", "3"]), default="2", show_default=True, help="Version: 2.0 or 3.0.")
 @options.out(".fmu", otherwise="; else the scene's name")
-def export_fmu(scene: str, values: Values, parameters: tuple[str, ...], inputs: tuple[str, ...], out: Out) -> None:
-    """Write SCENE as an FMI 2.0 unit for co-simulation. A host needs this installation to run it."""
+def export_fmu(
+    scene: str, values: Values, parameters: tuple[str, ...], inputs: tuple[str, ...], fmi: str, out: Out
+) -> None:
+    """Write SCENE as an FMI unit for co-simulation. A host needs this installation to run it."""
     from shoal.fmu.export import export
     from shoal.scene import load_scene
 
-    click.echo(export(load_scene(scene).with_values(values), parameters, out, inputs=inputs))
+    click.echo(export(load_scene(scene).with_values(values), parameters, out, inputs=inputs, fmi=fmi))
 
 
 @click.command()

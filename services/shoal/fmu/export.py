@@ -1,4 +1,4 @@
-"""A scene as a file that FMI 2.0 hosts load."""
+"""A scene as a file that hosts of FMI 2.0 or 3.0 load."""
 
 from __future__ import annotations
 
@@ -9,24 +9,25 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-
-from pythonfmu.builder import FmuBuilder
+from typing import Any
 
 from shoal.engines.swarm_motion import asked_for
 from shoal.errors import InputError
-from shoal.fmu import machine
 from shoal.fmu.inputs import require_input
-from shoal.fmu.unit import CONTENT, identifier
+from shoal.fmu.running import CONTENT, identifier
 from shoal.scene import Scene
 from shoal.scene.function import Function
 from shoal.whole import whole
 
 
-def export(scene: Scene, paths: Sequence[str] = (), out: Path | None = None, *, inputs: Sequence[str] = ()) -> Path:
+def export(
+    scene: Scene, paths: Sequence[str] = (), out: Path | None = None, *, inputs: Sequence[str] = (), fmi: str = "2"
+) -> Path:
     """Write a unit; returns its file. Raises InputError, and ComputationError if it cannot be written.
 
     paths: fields of the scene that are its parameters, by default gravity and the initial angles; out: by default the
-    scene's name in the working folder; inputs: loads' scales or torques and drives that a host may change in the run
+    scene's name in the working folder; inputs: loads' scales or torques and drives that a host may change in the run;
+    fmi: version, 2 or 3
     """
     if asked_for(scene):
         raise InputError(f"solver.acceleration: {scene.solver.acceleration!r} is for studies; a unit needs a solver")
@@ -42,11 +43,27 @@ def export(scene: Scene, paths: Sequence[str] = (), out: Path | None = None, *, 
     }
     target = out or Path(f"{identifier(scene)}.fmu")
     with tempfile.TemporaryDirectory() as folder, _paths_as_they_were(), whole(target) as unit:
-        script, data = Path(folder) / "machine.py", Path(folder) / CONTENT
-        shutil.copy(str(machine.__file__), script)
+        builder, name = _builder(fmi)
+        script, data = Path(folder) / name, Path(folder) / CONTENT
+        shutil.copy(str(Path(__file__).with_name(name)), script)
         data.write_text(json.dumps(content), encoding="utf-8")
-        FmuBuilder.build_FMU(script, unit, [data])
+        made = builder.build_FMU(script, unit if fmi == "2" else folder, [data])
+        if fmi == "3":
+            shutil.copy(made, unit)
     return target
+
+
+def _builder(fmi: str) -> tuple[Any, str]:
+    """What builds units of a version of FMI, and the script inside."""
+    if fmi == "2":
+        from pythonfmu.builder import FmuBuilder
+
+        return FmuBuilder, "machine.py"
+    if fmi == "3":
+        from pythonfmu3.builder import FmuBuilder as FmuBuilder3
+
+        return FmuBuilder3, "machine3.py"
+    raise InputError(f"fmi: there are versions 2 and 3, found {fmi}")
 
 
 def _usual(scene: Scene) -> list[str]:

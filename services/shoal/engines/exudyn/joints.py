@@ -39,8 +39,8 @@ Gap = Callable[[Array, Array], Array]
 
 def add_joint(ends: Ends, name: str, joint: Joint) -> Gap:
     """Enter a joint without its friction. Raises InputError."""
-    ends.system.enter(f"joints.{name}")
     enter, gap = of_kind(JOINTS, joint.kind, f"joints.{name}")
+    ends.system.enter(f"joints.{name}")
     enter(ends, f"joints.{name}", joint)
     return partial(gap, ends, joint)
 
@@ -51,8 +51,8 @@ def add_friction(ends: Ends, name: str, joint: Joint) -> Exchange | None:
     if not (viscous or coulomb):
         return None
     where = f"joints.{name}.friction"
-    ends.system.enter(where)
     rub = of_kind(FRICTION, joint.kind, where)
+    ends.system.enter(where)
     return rub(ends, where, joint, Law(damping=viscous, coulomb=coulomb, speed=getattr(joint, "coulomb_speed", 1.0)))
 
 

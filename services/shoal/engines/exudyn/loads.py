@@ -22,8 +22,9 @@ from shoal.trajectory import Array
 
 def add_load(ends: Ends, name: str, load: Load) -> Exchange:
     """Enter a load. Raises InputError."""
+    enter = of_kind(LOADS, load.kind, f"loads.{name}")
     ends.system.enter(f"loads.{name}")
-    return of_kind(LOADS, load.kind, f"loads.{name}")(ends, f"loads.{name}", load)
+    return enter(ends, f"loads.{name}", load)
 
 
 def _add_spring(ends: Ends, where: str, load: Spring) -> Exchange:

@@ -31,11 +31,16 @@ def script(scene: Scene) -> str:
 
     It needs exudyn and numpy. Raises InputError that names what Exudyn has not.
     """
-    engine = ExudynEngine()
     try:
-        require(engine, scene)
+        return _written(scene)
     except InputError as error:
+        # Which engine could run it is no help to who wants to go on in Exudyn.
         raise InputError(str(error).split("; use ")[0]) from None
+
+
+def _written(scene: Scene) -> str:
+    engine = ExudynEngine()
+    require(engine, scene)
     exu = library()
     wanted = sampling_times(scene, None)
     machine = engine.machine(exu, scene, system_of=Recorder)

@@ -287,7 +287,8 @@ class Mjcf:
             "stiffness": stiffness,
             "springref": moment / stiffness if stiffness else 0.0,
         }
-        return {name: repr(float(value)) for name, value in found.items() if value}
+        sticking = {"solreffriction": self._stiff()["solref"]} if joint.coulomb else {}
+        return {name: repr(float(value)) for name, value in found.items() if value} | sticking
 
     def _shapes(self, element: ElementTree.Element, name: str) -> None:
         """What is seen of a body and touches nothing: a rod's cuboid, or lines from a body's centre to its points."""

@@ -24,8 +24,9 @@ from shoal.trajectory import Array
 
 def add_load(ends: SpatialEnds, name: str, load: Load) -> Exchange:
     """Enter a load. Raises InputError."""
+    enter = of_kind(LOADS, load.kind, f"loads.{name}")
     ends.system.enter(f"loads.{name}")
-    return of_kind(LOADS, load.kind, f"loads.{name}")(ends, f"loads.{name}", load)
+    return enter(ends, f"loads.{name}", load)
 
 
 def _law(load: Spring | TorsionSpring) -> Law:
