@@ -119,7 +119,9 @@ class Mjcf:
         for name in scene.ground_points:
             raise InputError(f"ground_points.{name}: MJCF has no functions of time")
         for name, joint in scene.joints.items():
-            if joint.kind in ("driven-angle", "gear", "coupling", "parallel", "perpendicular"):
+            if joint.kind == "gear":
+                raise InputError(f"joints.{name}: a gear is not written as MJCF; there its teeth would give way")
+            if joint.kind in ("driven-angle", "coupling", "parallel", "perpendicular"):
                 raise InputError(f"joints.{name}: MJCF has no {joint.kind}")
             if isinstance(joint, Distance) and joint.length is not None and joint.length.number is None:
                 raise InputError(f"joints.{name}.length: MJCF has no functions of time")
