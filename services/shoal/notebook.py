@@ -263,7 +263,7 @@ def identify(
     values: fields of the scene to set, or an estimate or its JSON file: what is sought starts from there, what else it
     found is set; tolerance: error [m] that the model may have, for which it is chosen;
     time_limit: of all of it [s]; profiles: the profile likelihood of every parameter; bootstrap: how many draws;
-    options: further ones of `shoal.identification.identify` (progress, measurement, checkpoint, wishes).
+    options: further ones of `shoal.identification.identify` (hold_out, progress, measurement, checkpoint, wishes).
     Raises InputError, ComputationError.
     """
     from shoal.identification import Estimate, identify

@@ -72,12 +72,18 @@ def on_markers_of_the_scene() -> list[Sensor]:
     return [candidate for candidate, _ in designed().ranked if candidate.name in ("A", "B")]
 
 
-@pytest.mark.parametrize("place", range(4))
+@pytest.mark.parametrize("place", range(5))
 def test_predicted_deviation_is_the_scatter_of_fits(place: int) -> None:
     # 50 draws know a standard deviation to 10 %, so that 30 % is three of its own.
     candidate = on_markers_of_the_scene()[place]
     predicted = next(found.std for other, found in designed().ranked if other == candidate)
     assert scatter(candidate) == pytest.approx(predicted, rel=0.3)
+
+
+def test_the_encoder_of_the_joint_between_two_bodies_is_a_candidate() -> None:
+    (encoder,) = [candidate for candidate, _ in designed().ranked if candidate.to is not None]
+    assert encoder.label == "B against A, angle"
+    assert "A" in [row["to"] for row in designed().to_json()["ranked"]]
 
 
 def test_the_recommended_marker_really_scatters_less() -> None:

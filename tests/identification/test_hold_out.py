@@ -180,3 +180,42 @@ def test_right_models_predict_19_of_20_windows(noise: float | None) -> None:
 def test_real_machines_are_predicted(name: str, file: str, window: tuple[float, float]) -> None:
     found = identify(load_problem(name), data=str(DATA / file), hold_out=[window])
     assert found.prediction[0].inside
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not DATA.is_dir(), reason="the recordings are not here")
+@pytest.mark.parametrize("end", [2.0, 3.0, 4.0, 5.0])
+def test_a_pendulum_of_adams_is_predicted(tmp_path: Path, end: float) -> None:
+    """Its table is rounded to six digits: where a coordinate is small, so is its noise."""
+    scene = {
+        "name": "pendulum",
+        "gravity": [0.0, -9.80665],
+        "bodies": {"OA": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.3, "centre_of_mass": [2.0, 0.0]}},
+        "joints": {
+            "O": {
+                **{"kind": "revolute", "first": {"body": "ground", "point": [0.0, 0.0]}},
+                "second": {"body": "OA", "point": [0.0, 0.0]},
+            }
+        },
+        "markers": {"C": {"body": "OA", "point": [2.0, 0.0]}},
+        "initial": {"OA": {"angle": 0.0}},
+        "solver": {"duration": 5.0, "step": 1e-3, "samples": 500},
+    }
+    problem = {
+        "name": "adams",
+        "scene": str(tmp_path / "pendulum.yaml"),
+        "parameters": {
+            "angle": {"path": "initial.OA.angle", "lower": -1.0, "upper": 1.0, "start": 0.1},
+            "inertia": {"path": "bodies.OA.inertia", "lower": 0.01, "upper": 2.0, "start": 0.3},
+        },
+        "channels": [
+            {"marker": "C", "quantity": "x", "column": "X_Pos"},
+            {"marker": "C", "quantity": "y", "column": "Z_Pos"},
+        ],
+        "source": {"kind": "file", "time": "Time", "start": 0.0, "duration": end, "hold_out": [end - 0.995, end]},
+    }
+    (tmp_path / "pendulum.yaml").write_text(json.dumps(scene))
+    file = DATA / "adams_joints" / "Revolute_Case01_ADAMS_Pos.txt.gz"
+    found = identify(Problem.parse(problem, "adams"), data=str(file))
+    assert found.parameters["inertia"].value == pytest.approx(0.1, abs=1e-5)
+    assert found.prediction[0].inside

@@ -32,7 +32,6 @@ def _changed(*changes: tuple[str, Any]) -> dict[str, Any]:
 
 
 ROD = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 1000.0}
-SELF = {"kind": "revolute", "first": {"body": "OA"}, "second": {"body": "OA", "point": "end"}}
 GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "ground", "point": [1.0, 0.0]}}
 
 
@@ -75,7 +74,6 @@ GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": 
         pytest.param(("joints.O", GONE), "bodies.OA", "no chain of joints", id="chain-that-hangs-on-nothing"),
         pytest.param(("joints.A.second.body", "XY"), "joints.A.second.body", "no body 'XY'", id="missing-body"),
         pytest.param(("joints.A.first.point", "tip"), "joints.A.first.point", "no point 'tip'", id="missing-point"),
-        pytest.param(("joints.A", SELF), "joints.A", "joins 'OA' to itself", id="joint-with-itself"),
         pytest.param(("joints.A", GROUNDS), "joints.A", "joins 'ground' to itself", id="ground-to-ground"),
         pytest.param(("joints.O.first.point", "start"), "joints.O.first.point", r"\[x, y\]", id="name-on-the-ground"),
         pytest.param(("joints.A.first.point", [0.5, 0.01]), "joints.A.first.point", "axis of OA", id="joint-off-axis"),

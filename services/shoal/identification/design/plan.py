@@ -74,7 +74,8 @@ class Design:
 
         def rows(found: list[tuple[Sensor, Precision]]) -> list[dict[str, Any]]:
             return [
-                {"marker": c.name, "body": c.body, "point": c.point, "quantity": c.quantity} | told(p) for c, p in found
+                {"marker": c.name, "to": c.to, "body": c.body, "point": c.point, "quantity": c.quantity} | told(p)
+                for c, p in found
             ]
 
         stated = ("problem", "values", "noise", "angle_noise", "duration", "rate")

@@ -33,6 +33,8 @@ _HIDDEN = 1e-3
 """Share of a derivative along directions that the data leave open, from which on a prediction is not known."""
 _PARTS = np.array([1.0, 1.25, 1.5, 1.75, 2.0])
 """Lengths of a window from the end of the fit to where parts are left out that try the stated error."""
+_FEWEST_PARTS = 4
+"""Of a fit, at least, in which the size of its residual is compared."""
 _MOST = 0.5
 """Of a fit: no longer part is left out."""
 
@@ -176,7 +178,8 @@ def _predicted(
                     continue
                 weight = float(model.rows.weight[fit.blocks[block].rows[0]])
                 level = 1.0 - (1.0 - LEVEL) / len(channels)
-                told = _stated(slopes[rows], fit.at, block, weight, level)
+                uneven = _unevenness(fit.seen.residual[fit.blocks[block].rows], int(np.sum(rows)))
+                told = _stated(slopes[rows], fit.at, block, weight, level, uneven)
                 extra = float(np.sqrt(np.mean(bias[rows] ** 2)))
                 expected[k], limit[k] = told.expected, allowance * told.limit + extra
                 half[np.isfinite(held.values[:, k]), k] = allowance * told.half + np.abs(bias[rows])
@@ -242,11 +245,25 @@ class _Stated:
     half: Array
 
 
-def _stated(slopes: Array, at: Linearisation, block: int, weight: float, level: float) -> _Stated:
+def _unevenness(residual: Array, count: int) -> float:
+    """Variance of the mean square of so many neighbouring residuals, relative to its square, as parts of the fit show.
+
+    Noise that is larger at times, or has outliers, makes it larger than its memory does.
+    """
+    length = min(count, len(residual) // _FEWEST_PARTS)
+    power = float(np.mean(residual**2)) if len(residual) else 0.0
+    if length < 1 or power <= 0.0:
+        return 0.0
+    parts = [np.mean(residual[k : k + length] ** 2) for k in range(0, len(residual) - length + 1, max(1, length // 2))]
+    return float(np.var(parts, ddof=1)) / power**2
+
+
+def _stated(slopes: Array, at: Linearisation, block: int, weight: float, level: float, uneven: float = 0.0) -> _Stated:
     """What an estimate says of an RMS over samples with derivatives (samples, parameters), all in SI units.
 
     The mean square of the error is a sum of squares of normal numbers with different variances: by its mean and its
     variance it is taken for a multiple of chi-square (Satterthwaite 1946). What is systematic adds to it.
+    uneven: relative variance of the mean square that the fit shows, where it is more than that of such noise
     """
     noise, count = at.noise[block], len(slopes)
     variance = noise.variance / weight**2
@@ -254,7 +271,7 @@ def _stated(slopes: Array, at: Linearisation, block: int, weight: float, level: 
     power = np.linalg.svd(slopes @ root, compute_uv=False) ** 2 / count
     independent = max(1.0, count * (1.0 - noise.rho**2) / (1.0 + noise.rho**2))
     mean = variance + float(np.sum(power))
-    spread = variance**2 / independent + float(np.sum(power**2))
+    spread = variance**2 * max(1.0 / independent, 0.5 * uneven) + float(np.sum(power**2))
     freedom = mean**2 / spread
     shares = np.maximum(np.einsum("ni,bij,nj->b", slopes, at.parts, slopes) / count, 0.0)
     shares[block] += variance
@@ -345,6 +362,6 @@ def _too_small(model: ForwardModel, number: int, out: Mask, kept: Mask, fit: _Fi
         weight = float(model.rows.weight[rows[0]])
         slopes = fit.seen.jacobian[rows] / weight
         error = (fit.seen.residual[rows] - fit.seen.jacobian[rows] @ step) / weight
-        told = _stated(slopes, at, mine, weight, LEVEL)
+        told = _stated(slopes, at, mine, weight, LEVEL, _unevenness(left[blocks[mine].rows], len(rows)))
         worst = max(worst, float(np.sqrt(np.mean(error**2))) / max(told.limit, 1e-300))
     return worst
