@@ -121,7 +121,12 @@ TURNED = Scene.parse({
 
 
 @pytest.mark.parametrize(
-    ("machine", "within"), [(LOADED, 2e-4), (DRIVEN, 1e-4), (TURNED, 1e-3)], ids=["loaded", "driven", "in-space"]
+    ("machine", "within"),
+    [
+        pytest.param(LOADED, 2e-4, id="loaded"),
+        pytest.param(DRIVEN, 1e-4, id="driven"),
+        pytest.param(TURNED, 1e-3, id="in-space", marks=pytest.mark.slow),
+    ],
 )
 def test_scripts_move_as_both_engines(
     machine: Scene, within: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]

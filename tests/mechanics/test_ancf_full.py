@@ -142,7 +142,7 @@ def test_mass_is_positive_exact_and_keeps_mass_and_moments() -> None:
     moments = [whole, whole * LENGTH / 2, whole * LENGTH**2 / 3, whole * HEIGHT**2 / 12, 0, 0]
     found = [one @ mass @ one, one @ mass @ x, x @ mass @ x, y @ mass @ y, one @ mass @ y, x @ mass @ y]
     np.testing.assert_allclose(found, moments, rtol=1e-14, atol=1e-15)
-    np.testing.assert_allclose(ancf_full.weight(DENSITY, LENGTH, HEIGHT, WIDTH), mass @ one, rtol=1e-14)
+    np.testing.assert_allclose(ancf_full.weight(DENSITY * HEIGHT * WIDTH, LENGTH), mass @ one, rtol=1e-14)
     points, weights = np.polynomial.legendre.leggauss(4)
     expected = np.zeros((6, 6))
     for a, wa in zip(points, weights, strict=True):

@@ -9,10 +9,10 @@ import pytest
 from shoal.errors import InputError
 from shoal.mechanics.analysis.modes import modes
 from shoal.scene import Scene
-from shoal.scene.sections import SECTIONS, Beam, Rectangle, Round, Section, Tube
+from shoal.scene.sections import SECTIONS, IBeam, Rectangle, Round, Section, Tube
 
 EXAMPLES = [Rectangle(0.03, 0.05), Round.of(0.04, None, None, None, None), Tube(0.04, 0.04, 0.006),
-            Beam(0.2, 0.1, 0.0056, 0.0085)]  # fmt: skip
+            IBeam(0.2, 0.1, 0.0056, 0.0085)]  # fmt: skip
 
 
 def inside(section: Section, y: Any, z: Any) -> Any:
@@ -21,7 +21,7 @@ def inside(section: Section, y: Any, z: Any) -> Any:
         radius = np.hypot(y, z)
         return (radius <= section.height / 2) & (radius >= section.height / 2 - section.wall)
     whole = (np.abs(y) <= section.height / 2) & (np.abs(z) <= section.width / 2)
-    if isinstance(section, Beam):
+    if isinstance(section, IBeam):
         return whole & ((np.abs(z) <= section.web / 2) | (np.abs(y) >= section.height / 2 - section.flange))
     return whole
 
@@ -55,7 +55,7 @@ def test_coefficients_of_shear_are_cowpers() -> None:
     """At nu = 0.3: rectangle 0.850, circle 0.886, thin tube 0.531; an I without flanges is a rectangle."""
     for section, tabled in ((EXAMPLES[0], 0.850), (EXAMPLES[1], 0.886), (Tube(1.0, 1.0, 1e-4), 0.531)):
         assert section.shear(0.3) == pytest.approx(tabled, abs=1e-3)
-    assert Beam(0.2, 0.1, 0.005, 1e-9).shear(0.3) == pytest.approx(EXAMPLES[0].shear(0.3), rel=1e-5)
+    assert IBeam(0.2, 0.1, 0.005, 1e-9).shear(0.3) == pytest.approx(EXAMPLES[0].shear(0.3), rel=1e-5)
 
 
 def test_a_section_may_lie_and_may_vary_by_lane() -> None:

@@ -166,7 +166,7 @@ class Round(Tube):
 
 
 @dataclass(frozen=True)
-class Beam(Section):
+class IBeam(Section):
     """An I: two flanges of the width at the height's ends, and the web between them.
 
     Torsion and shear are those of thin walls; the ends warp freely.
@@ -220,5 +220,5 @@ class Beam(Section):
         return 10 * (1 + poisson) * (1 + 3 * m) ** 2 / (bending + flanges)
 
 
-SECTIONS: Mapping[str, type[Section]] = {"rectangle": Rectangle, "round": Round, "tube": Tube, "i-beam": Beam}
+SECTIONS: Mapping[str, type[Section]] = {"rectangle": Rectangle, "round": Round, "tube": Tube, "i-beam": IBeam}
 """By the name that a scene gives them."""
