@@ -104,5 +104,7 @@ def test_a_wrong_signal_is_one_line(signal: dict[str, Any], text: str | None, to
 
 
 def test_a_scene_that_is_no_file_states_its_tables() -> None:
-    with pytest.raises(InputError, match=r"'encoder.csv' is read where the scene is one; here state its table"):
+    with pytest.raises(
+        InputError, match=r"'encoder.csv' is read from beside the YAML file of a scene; here state its table"
+    ):
         Scene.parse(CRANK)

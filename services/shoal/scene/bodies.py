@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -152,17 +153,17 @@ class Rod(Record):
 
     def section_at(self, x: Any) -> Section:
         """The section at the fraction x of the length."""
-        height, width = (
-            here if here is None or there is None else here + (there - here) * x
-            for here, there in ((self.height, self.end_height), (self.width, self.end_width))
-        )
-        return SECTIONS[self.section].of(height, width, self.wall, self.web, self.flange)
+        return self._section_by(lambda here, there: here + (there - here) * x)
 
     @property
     def thinnest(self) -> Section:
         """A section that no place of the rod falls below in any length."""
+        return self._section_by(np.minimum)
+
+    def _section_by(self, tapered: Callable[[Any, Any], Any]) -> Section:
+        """The section whose height and width follow from those at both ends, where these differ."""
         height, width = (
-            here if here is None or there is None else np.minimum(here, there)
+            here if here is None or there is None else tapered(here, there)
             for here, there in ((self.height, self.end_height), (self.width, self.end_width))
         )
         return SECTIONS[self.section].of(height, width, self.wall, self.web, self.flange)

@@ -39,7 +39,9 @@ class Function(Record):
         if isinstance(data, int | float) and not isinstance(data, bool):
             return {"number": data}
         if isinstance(data, dict) and "path" in data:
-            raise ValueError(f"the file {data['path']!r} is read where the scene is one; here state its table")
+            raise ValueError(
+                f"{str(data['path'])[:80]!r} is read from beside the YAML file of a scene; here state its table"
+            )
         if not isinstance(data, dict | Function):
             raise ValueError('a function of time is a number, an expression such as "0.1*sin(3*t)", or a table')
         return data
