@@ -121,6 +121,12 @@ def test_a_new_kind_touches_few_files(kind: str) -> None:
     assert len({*new, *changed}) <= FILES[kind]
 
 
+@pytest.mark.parametrize("kind", FILES)
+def test_the_changes_of_a_page_apply(kind: str, tmp_path: Path) -> None:
+    shutil.copytree(DOCS.parent / "services", tmp_path / "services", ignore=shutil.ignore_patterns("__pycache__"))
+    assert extend(f"extend/{kind}.md", tmp_path)
+
+
 def used(page: str, room: str, folder: Path, wanted: str) -> Any:
     """What the code of a page finds with a copy of a room that has its changes and goes before that of the package.
 

@@ -139,7 +139,7 @@ def test_lists_of_the_scene_and_of_the_mechanics_name_the_same() -> None:
 
 @pytest.mark.parametrize("element", get_args(Element))
 def test_of_every_element_it_is_known_whether_it_shears(element: str) -> None:
-    assert ROD.model_copy(update={"element": element}).shears == (element == "ancf-full")
+    assert ROD.model_copy(update={"element": element}).shears == (element in ("ancf-full", "simo-reissner"))
 
 
 def test_the_mechanics_knows_every_joint_and_load_of_the_scene() -> None:

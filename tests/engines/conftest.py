@@ -402,6 +402,7 @@ ONLY_NATIVE = [
     DIRECTOR,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
+    pendulum("shear", CABLE | {"element": "simo-reissner"}),
     scene(
         "ring",
         {"A": CABLE | {"curvature": [2 * np.pi / CABLE["length"]], "elements": 6}},

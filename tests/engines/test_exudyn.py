@@ -9,6 +9,7 @@ from shoal.engines.exudyn.build import build, library
 from shoal.engines.exudyn.cable import CablePart
 from shoal.engines.exudyn.checks import judge
 from shoal.engines.exudyn.record import Record, Steps, choose_steps
+from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Status
@@ -133,6 +134,16 @@ def test_geometrically_exact_beam_is_the_second_opinion():
     # Another three-node geometrically exact code at 16/32 elements: (2.645967, 0.572268).
     beam = tip(BEAM, meshed("flexible-double-pendulum", 16, solver_step=2e-4))
     np.testing.assert_allclose(beam, (2.645967, 0.572268), atol=8e-6)
+
+
+def test_rods_with_shear_end_where_geometrically_exact_beams_do():
+    scene = meshed("flexible-double-pendulum", 16, bodies_OA_height=0.1, bodies_AB_height=0.1)
+    shear = scene.with_values({f"bodies.{rod}.element": "simo-reissner" for rod in ("OA", "AB")})
+    native = tip(GaussEngine(), shear.with_values({"solver.integrator": "leapfrog", "solver.step": 2e-5}))
+    beam = tip(BEAM, shear.with_values({"solver.step": 2e-4}))
+    np.testing.assert_allclose(native, beam, atol=3e-5)
+    cable = tip(GaussEngine(), scene.with_values({"solver.integrator": "leapfrog", "solver.step": 2e-5}))
+    assert np.abs(cable - beam).max() > 3e-4
 
 
 def test_full_and_modified_newton_agree():

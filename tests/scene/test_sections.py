@@ -129,5 +129,5 @@ def test_what_no_section_can_be_is_one_line(fields: dict[str, Any], told: str) -
 
 
 def test_ancf_full_knows_rectangles_only() -> None:
-    with pytest.raises(InputError, match="that of ancf-full is a rectangle, found round; use ancf-cable"):
+    with pytest.raises(InputError, match="that of ancf-full is a rectangle, found round; use simo-reissner"):
         cantilever("ancf-full", height=0.02, section="round")

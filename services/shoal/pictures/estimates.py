@@ -16,7 +16,8 @@ def estimates(verification: Mapping[str, Any]) -> Iterator[str]:
     if verification.get("theory_error") is not None:
         yield (
             "left out by the theory of slender rods: shear and rotary inertia of the section, about "
-            f"{verification['theory_error']:.1e} m (rotary_inertia: true counts it in rigid rods, ancf-full has both)"
+            f"{verification['theory_error']:.1e} m (rotary_inertia: true counts it in rigid rods, "
+            "simo-reissner has both)"
         )
     if verification.get("friction_error") is not None:
         yield (

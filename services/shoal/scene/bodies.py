@@ -11,12 +11,19 @@ from pydantic import Field, model_validator
 from shoal.scene.record import NonNegative, Positive, Record, Vector, Vector3
 from shoal.scene.sections import SECTIONS, Section
 
-Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full", "director-rod"]
+Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full", "simo-reissner", "director-rod"]
 Quadrature = Literal["full", "reduced"]
 Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
 SectionName = Literal["rectangle", "round", "tube", "i-beam"]
 
-_SHEARS = {"rigid": False, "ancf-cable": False, "ancf-quintic": False, "ancf-full": True, "director-rod": False}
+_SHEARS = {
+    "rigid": False,
+    "ancf-cable": False,
+    "ancf-quintic": False,
+    "director-rod": False,
+    "ancf-full": True,
+    "simo-reissner": True,
+}
 _POINTS = 24
 """Quadrature points along a curved rod."""
 _ONLY_FLEXIBLE = {
@@ -32,21 +39,21 @@ _ONLY_FLEXIBLE = {
 class Rod(Record):
     """A homogeneous rod that starts at its body's origin along the x axis.
 
-    Lengths in m, density in kg/m^3, moduli in Pa. `height` is the thickness in the plane of motion, of a `section`
-    that is round or a tube its outer diameter; `width`, `wall` (of a tube), `web` and `flange` (thicknesses, of an
-    i-beam) are stated where the section has them. `element` is the model of the rod, with `elements` elements of
-    equal length: `rigid`, `ancf-cable` (cubic, Bernoulli-Euler), `ancf-quintic` (the same of higher order) or
-    `ancf-full` (with shear and stretch of the section). `rigid` where nothing else is stated that only a flexible
-    rod has. `rotary_inertia`: whether a rigid rod has that of its height; the paper's has not, nor have cables and
-    quintic elements, while ancf-full always has. `quadrature` of a cable is `full` (Gauss, 5 points axial and 3
-    bending) or `reduced` (3 Lobatto points axial, 2 Gauss points bending). `law` is that of ancf-full. `curvature`
-    [1/m, 1/m^2, ...]: polynomial of the curvature of the unstrained axis over its arc length. `end_height`,
-    `end_width`: those at the far end of a tapered rod, along which they change evenly (each element has the section
-    of its middle). `retardation` [s]: Kelvin-Voigt damping, stress E (strain + retardation * strain rate). In space
-    `director-rod` bends about both axes of its section and twists; `torsion_constant` [m^4] overrides that of the
-    section, `side_curvature` [1/m, ...] bends the unstrained axis towards its local z axis and `twist` [rad/m, ...]
-    turns its sections, both polynomials over the arc length. `director`: the axis of the section that its nodes
-    carry, by default the one that a joint can share.
+    Lengths in m, density in kg/m^3, moduli in Pa. `height` is the thickness in the plane of motion, of a `section` that
+    is round or a tube its outer diameter; `width`, `wall` (of a tube), `web` and `flange` (thicknesses, of an i-beam)
+    are stated where the section has them. `element` is the model of the rod, with `elements` elements of equal length:
+    `rigid`, `ancf-cable` (cubic, Bernoulli-Euler), `ancf-quintic` (the same of higher order), `simo-reissner` (with
+    shear) or `ancf-full` (with shear and stretch of the section). `rigid` where nothing else is stated that only a
+    flexible rod has. `rotary_inertia`: whether a rigid rod has that of its height; the paper's has not, nor have cables
+    and quintic elements, while simo-reissner and ancf-full always have. `quadrature` of a cable is `full` (Gauss, 5
+    points axial and 3 bending) or `reduced` (3 Lobatto points axial, 2 Gauss points bending). `law` is that of
+    ancf-full. `curvature` [1/m, 1/m^2, ...]: polynomial of the curvature of the unstrained axis over its arc length.
+    `end_height`, `end_width`: those at the far end of a tapered rod, along which they change evenly (each element has
+    the section of its middle). `retardation` [s]: Kelvin-Voigt damping, stress E (strain + retardation * strain rate).
+    In space `director-rod` bends about both axes of its section and twists; `torsion_constant` [m^4] overrides that of
+    the section, `side_curvature` [1/m, ...] bends the unstrained axis towards its local z axis and `twist` [rad/m, ...]
+    turns its sections, both polynomials over the arc length. `director`: the axis of the section that its nodes carry,
+    by default the one that a joint can share.
     """
 
     kind: Literal["rod"] = "rod"
@@ -85,9 +92,9 @@ class Rod(Record):
                     "ancf-full), or element: rigid"
                 )
             return self
-        if self.rotary_inertia and self.element != "ancf-full":
+        if self.rotary_inertia and not self.shears:
             raise ValueError(
-                f"rotary_inertia: {self.element} has none; use ancf-full, or a rigid rod, or rotary_inertia: false"
+                f"rotary_inertia: {self.element} has none; use simo-reissner, or a rigid rod, or rotary_inertia: false"
             )
         if self.quadrature != "full" and self.element != "ancf-cable":
             raise ValueError(f"quadrature: {self.element} has its own; {self.quadrature} is for ancf-cable")
@@ -113,7 +120,7 @@ class Rod(Record):
         if self.end_width is not None and "width" not in needs:
             raise ValueError(f"end_width: section {self.section} has no width; state end_height, its diameter there")
         if self.element == "ancf-full" and self.section != "rectangle":
-            raise ValueError(f"section: that of ancf-full is a rectangle, found {self.section}; use ancf-cable")
+            raise ValueError(f"section: that of ancf-full is a rectangle, found {self.section}; use simo-reissner")
         for end in (0.0, 1.0):
             if fault := self.section_at(end).fault():
                 raise ValueError(fault)
@@ -129,9 +136,9 @@ class Rod(Record):
             raise ValueError(f"youngs_modulus is missing; element {self.element} needs it (Pa)")
         if self.element == "ancf-full":
             if self.curvature:
-                raise ValueError("curvature: an ancf-full rod is straight; use ancf-cable or ancf-quintic")
+                raise ValueError("curvature: an ancf-full rod is straight; use simo-reissner or ancf-cable")
             if self.retardation:
-                raise ValueError("retardation: ancf-full has no material damping; use ancf-cable or ancf-quintic")
+                raise ValueError("retardation: ancf-full has no material damping; use simo-reissner or ancf-cable")
             if self.poisson_ratio >= 0.5:
                 raise ValueError(f"poisson_ratio {self.poisson_ratio:g} must be below 0.5 for ancf-full")
         return self

@@ -133,7 +133,8 @@ def test_slider_crank_bears_its_load_by_textbook_statics() -> None:
 
 
 @pytest.mark.parametrize(
-    ("element", "more"), [("ancf-cable", {}), ("ancf-quintic", {}), ("ancf-full", {"law": "enhanced"})]
+    ("element", "more"),
+    [("ancf-cable", {}), ("ancf-quintic", {}), ("ancf-full", {"law": "enhanced"}), ("simo-reissner", {})],
 )
 def test_section_forces_of_a_bent_cantilever(element: str, more: dict[str, str]) -> None:
     length, force = 2.0, 3 * 2.07e11 * 1e-4 / 12 / 4

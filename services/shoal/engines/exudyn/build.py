@@ -33,7 +33,7 @@ from shoal.trajectory import Array
 Beam = Literal["ancf-cable", "geometrically-exact"]
 PARTS: dict[Beam, dict[str, Any]] = {
     "ancf-cable": {"rigid": RigidPart, "ancf-cable": CablePart},
-    "geometrically-exact": {"rigid": RigidPart, "ancf-cable": BeamPart},
+    "geometrically-exact": {"rigid": RigidPart, "ancf-cable": BeamPart, "simo-reissner": BeamPart},
 }
 """What stands for a body of each element."""
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from shoal.mechanics.elements import ancf_full, cubic, director, quintic, spatial_cubic, spatial_quintic
+from shoal.mechanics.elements import ancf_full, cubic, director, quintic, simo_reissner, spatial_cubic, spatial_quintic
 from shoal.mechanics.elements.element import Element
 
 ELEMENTS: dict[str, Element] = {
     "ancf-cable": cubic.ELEMENT,
     "ancf-quintic": quintic.ELEMENT,
     "ancf-full": ancf_full.ELEMENT,
+    "simo-reissner": simo_reissner.ELEMENT,
 }
 
 SPATIAL: dict[str, Element] = {

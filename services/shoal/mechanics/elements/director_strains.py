@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.mechanics.numerics.arc import arctangent
 from shoal.mechanics.numerics.simd import root
 from shoal.mechanics.numerics.triples import across, cross, dot, plus, times
 
@@ -17,17 +18,6 @@ STRAINS = 9
 AXIAL = np.array([[0.0, 1 / 6], [0.5, 4 / 6], [1.0, 1 / 6]])
 BENDING = np.array([[0.5 - 0.5 / np.sqrt(3), 0.5], [0.5 + 0.5 / np.sqrt(3), 0.5]])
 """Points and weights."""
-
-
-@njit(error_model="numpy", forceinline=True)
-def _angle(r):  # type: ignore[no-untyped-def]
-    """The angle whose tangent is r, |r| <= 1: halved three times, then by its series."""
-    for _ in range(3):
-        r = r / (1.0 + root(1.0 + r * r))
-    s, v = r * r, 0.0 * r
-    for n in range(10, -1, -1):
-        v = 1.0 / (2.0 * n + 1.0) - s * v
-    return 8.0 * r * v
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -98,7 +88,7 @@ def _between(m1, m2, tm):  # type: ignore[no-untyped-def]
     b = plus(m1, 1.0, m2)
     ib = 1.0 / root(dot(b, b))
     e = times(ib, b)
-    return 2.0 * _angle(s / c), e, cross(tm, e), m12, s, c, ib
+    return 2.0 * arctangent(s / c), e, cross(tm, e), m12, s, c, ib
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -1,0 +1,311 @@
+"""Simo and Reissner's rod in the plane: stretch, shear, bending, and the inertia of sections that turn.
+
+Reissner 1972; Simo 1985. A node has r, r' and d, the unit normal of its section. The centreline is the cubic Hermite
+curve, and the angle from its tangent to the normal of the section changes linearly along an element: with it, uniform
+shear and the bending that goes with it are exact, so that nothing locks, and errors fall with the fourth power of the
+length. Strains are in `simo_reissner_strains`; the rules are those of the reduced cable. Kelvin-Voigt damping adds the
+retardation times the rate to every strain.
+
+The mass is constant: that of the cable, and rho I of a normal that is linear in the coordinates, r' and the line
+through d - r' at both nodes. No constraint holds |d| = 1, but the stiffness kappa G A per length: a section that turns
+at omega makes d longer by rho I omega^2/(kappa G A), and only its own inertia knows.
+
+Coefficients: 1/L [1/m], EA L, kappa G A L, EI/L [N m], retardation [s]; reference: the strains of the unstrained
+element. Rows: x and y of r1, r1', d1, r2, r2', d2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from shoal.mechanics.elements import beam
+from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, put, rest, together
+from shoal.mechanics.elements.element import Element
+from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
+from shoal.mechanics.elements.simo_reissner_strains import (
+    AXIAL,
+    BENDING,
+    STRAINS,
+    change,
+    gradient,
+    rates,
+    strains,
+)
+from shoal.mechanics.numerics.pointers import shift
+from shoal.mechanics.numerics.simd import EIGHT, load, spread, store
+from shoal.mechanics.numerics.tile import Array, Number, Tile
+from shoal.scene import Rod
+from shoal.scene.sections import Section
+
+ROWS, COEFFICIENTS = 12, 5
+ELASTIC, DAMPED = 0, 1
+"""Variants."""
+
+
+class ShearRods(Family):
+    """Simo and Reissner's rods."""
+
+
+@njit(error_model="numpy", forceinline=True)
+def _numbers(tile, family, number, lane):  # type: ignore[no-untyped-def]
+    """Coefficients without the retardation, and reference of elements."""
+    c = COEFFICIENTS
+    stiff = (
+        coefficient(tile, family, number, lane, c, 0),
+        coefficient(tile, family, number, lane, c, 1),
+        coefficient(tile, family, number, lane, c, 2),
+        coefficient(tile, family, number, lane, c, 3),
+    )
+    return stiff, (
+        rest(tile, family, number, lane, 0),
+        rest(tile, family, number, lane, 1),
+        rest(tile, family, number, lane, 2),
+        rest(tile, family, number, lane, 3),
+        rest(tile, family, number, lane, 4),
+        rest(tile, family, number, lane, 5),
+        rest(tile, family, number, lane, 6),
+        rest(tile, family, number, lane, 7),
+    )
+
+
+@njit(error_model="numpy", forceinline=True)
+def _vectors(tile, family, number, lane, k, z):  # type: ignore[no-untyped-def]
+    """Six rows from the k-th on."""
+    a, b = coordinate(tile, family, number, lane, ROWS, k, z), coordinate(tile, family, number, lane, ROWS, k + 1, z)
+    c = coordinate(tile, family, number, lane, ROWS, k + 2, z)
+    d = coordinate(tile, family, number, lane, ROWS, k + 3, z)
+    e = coordinate(tile, family, number, lane, ROWS, k + 4, z)
+    return a, b, c, d, e, coordinate(tile, family, number, lane, ROWS, k + 5, z)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _state(tile, family, number, lane, z):  # type: ignore[no-untyped-def]
+    """All rows."""
+    return (*_vectors(tile, family, number, lane, 0, z), *_vectors(tile, family, number, lane, 6, z))
+
+
+@njit(error_model="numpy", forceinline=True)
+def _kept(w):  # type: ignore[no-untyped-def]
+    """All rows, as the matrices keep them."""
+    e = len(EIGHT)
+    a, b, c = load(EIGHT, w, e), load(EIGHT, w, 2 * e), load(EIGHT, w, 3 * e)
+    d, f, g = load(EIGHT, w, 4 * e), load(EIGHT, w, 5 * e), load(EIGHT, w, 6 * e)
+    h, i, j = load(EIGHT, w, 7 * e), load(EIGHT, w, 8 * e), load(EIGHT, w, 9 * e)
+    return a, b, c, d, f, g, h, i, j, load(EIGHT, w, 10 * e), load(EIGHT, w, 11 * e), load(EIGHT, w, 12 * e)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _weighted(a, k, b):  # type: ignore[no-untyped-def]
+    """a + k b of strains."""
+    return (
+        a[0] + k * b[0],
+        a[1] + k * b[1],
+        a[2] + k * b[2],
+        a[3] + k * b[3],
+        a[4] + k * b[4],
+        a[5] + k * b[5],
+        a[6] + k * b[6],
+        a[7] + k * b[7],
+    )
+
+
+@njit(error_model="numpy", forceinline=True)
+def _lost(stiff, rate):  # type: ignore[no-untyped-def]
+    """Power lost to a retardation of one second."""
+    _, ea, ga, ei = stiff
+    total = spread(EIGHT, 0.0)
+    for k in range(len(AXIAL)):
+        total = total + AXIAL[k, 1] * (ea * rate[2 * k] * rate[2 * k] + ga * rate[2 * k + 1] * rate[2 * k + 1])
+    for k in range(len(BENDING)):
+        total = total + BENDING[k, 1] * ei * rate[6 + k] * rate[6 + k]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array, power: Array, moving: bool) -> None:
+    """See `families.add_force`."""
+    number = 0
+    while number < family.size:
+        count = together(tile, family, number)
+        for lane in range(0, len(tile) - family.spare, len(EIGHT)):
+            stiff, free = _numbers(tile, family, number, lane)
+            state = _state(tile, family, number, lane, z)
+            if moving and family.plan[PLAN * number + VARIANT] == DAMPED:
+                eta = coefficient(tile, family, number, lane, COEFFICIENTS, COEFFICIENTS - 1)
+                rate = rates(state, _state(tile, family, number, lane, zdot), stiff[0])
+                free = _weighted(free, -eta, rate)
+                add_sum(tile, lane, count, w, power, eta * _lost(stiff, rate))
+            _, g = gradient(state, stiff, free)
+            down = -g[0], -g[1], -g[2], -g[3], -g[4], -g[5], -g[6], -g[7], -g[8], -g[9], -g[10], -g[11]
+            add_rows(tile, family, number, lane, count, w, f, down)
+        number += count
+
+
+@njit(cache=True, error_model="numpy")
+def potential(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row: int) -> None:
+    """See `families.add_energy`."""
+    number, total = 0, shift(energy, row * len(tile))
+    while number < family.size:
+        count = together(tile, family, number)
+        for lane in range(0, len(tile), len(EIGHT)):
+            stiff, free = _numbers(tile, family, number, lane)
+            found, _ = gradient(_state(tile, family, number, lane, z), stiff, free)
+            add_sum(tile, lane, count, w, total, found)
+        number += count
+
+
+@njit(error_model="numpy", forceinline=True)
+def _columns(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
+    """Column by column: what a unit of each coordinate changes, or of its rate; viscous is a constant of the call."""
+    number = 0
+    while number < family.size:
+        count = together(tile, family, number)
+        for lane in range(0, len(tile), len(EIGHT)):
+            stiff, free = _numbers(tile, family, number, lane)
+            state = _state(tile, family, number, lane, z)
+            bare = strains(state, stiff[0])
+            eta = coefficient(tile, family, number, lane, COEFFICIENTS, COEFFICIENTS - 1)
+            for column in range(ROWS):
+                for k in range(ROWS):
+                    store(w, len(EIGHT) * (1 + k), spread(EIGHT, 1.0 if k == column else 0.0))
+                unit = _kept(w)
+                if viscous:
+                    # Of the two gradients only the second has the stress of the rates; the director's length has none.
+                    _, g = gradient(state, stiff, _weighted(bare, -eta, rates(state, unit, stiff[0])))
+                    _, h = gradient(state, stiff, bare)
+                    g = _difference(g, h)
+                else:
+                    g = change(state, unit, stiff, free)
+                for k in range(ROWS):
+                    store(w, len(EIGHT) * (1 + ROWS + k), g[k])
+                for k in range(ROWS):
+                    row = first + ROWS * ROWS * number + ROWS * k + column
+                    put(tile, lane, count, w, out, row, ROWS * ROWS, load(EIGHT, w, len(EIGHT) * (1 + ROWS + k)))
+        number += count
+
+
+@njit(error_model="numpy", forceinline=True)
+def _difference(g, h):  # type: ignore[no-untyped-def]
+    """g - h of all rows."""
+    a, b, c = g[0] - h[0], g[1] - h[1], g[2] - h[2]
+    d, e, f = g[3] - h[3], g[4] - h[4], g[5] - h[5]
+    i, j, k = g[6] - h[6], g[7] - h[7], g[8] - h[8]
+    return a, b, c, d, e, f, i, j, k, g[9] - h[9], g[10] - h[10], g[11] - h[11]
+
+
+@njit(cache=True, error_model="numpy")
+def stiffness(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
+    """See `families.tangent`."""
+    _columns(tile, False, family, z, w, out, first)
+
+
+@njit(cache=True, error_model="numpy")
+def viscosity(tile: Tile, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
+    """See `families.damping`."""
+    _columns(tile, True, family, z, w, out, first)
+
+
+implement(
+    ShearRods,
+    Kernel(ROWS, COEFFICIENTS, 1),
+    force=force,
+    potential=potential,
+    stiffness=stiffness,
+    viscosity=viscosity,
+)
+
+
+def _at_rest(length: Number, nodal: list[Number]) -> list[Number]:
+    """The strains of the unstrained element, whose sections are at right angles to its axis."""
+    first, s1, _, second, s2, _ = nodal
+    chord = (second - first) / length
+    found: list[Number] = []
+    for x, _ in AXIAL:
+        p, _ = _curve(x, chord, s1, s2)
+        found += [np.hypot(*p) - 1.0, 0.0]
+    for x, _ in BENDING:
+        p, q = _curve(x, chord, s1, s2)
+        found.append((p[0] * q[1] - p[1] * q[0]) / (p[0] ** 2 + p[1] ** 2))
+    return found
+
+
+def _curve(x: float, chord: Number, s1: Number, s2: Number) -> tuple[Number, Number]:
+    """r' and L r'' at the fraction x, from (r2 - r1)/L and both slopes."""
+    slope, bend = beam.shape(beam.CUBIC, x, 1.0, 1), beam.shape(beam.CUBIC, x, 1.0, 2)
+    return (
+        slope[2] * chord + slope[1] * s1 + slope[3] * s2,
+        bend[2] * chord + bend[1] * s1 + bend[3] * s2,
+    )
+
+
+def entry(
+    young: Number,
+    shearing: Number,
+    area: Number,
+    bending: Number,
+    length: Number,
+    free: list[Number],
+    retardation: Number = 0.0,
+) -> Entry:
+    """One element.
+
+    young: Young's modulus [Pa]; shearing: stiffness kappa G A [N]; area [m^2]; bending: second moment [m^4]; free:
+    strains at rest; retardation [s].
+    """
+    numbers = [1.0 / length, young * area * length, shearing * length, young * bending / length]
+    damped = bool(np.any(retardation))
+    variant = DAMPED if damped else ELASTIC
+    return Entry(BENDING, variant, damped, [*numbers, retardation + 0.0 * length], free)
+
+
+def _part(rod: Rod, section: Section, length: Number, nodal: list[Number]) -> Entry:
+    young: Number = rod.youngs_modulus
+    nu = rod.poisson_ratio
+    shearing = section.shear(nu) * young / (2 * (1 + nu)) * section.area
+    free = _at_rest(length, nodal) if rod.curvature else [0.0] * STRAINS
+    return entry(young, shearing, section.area, section.bending, length, free, rod.retardation)
+
+
+def _nodal_vectors(rod: Rod, s: Number) -> list[Number]:
+    tangent = beam.tangent(rod, s)
+    return [tangent, tangent]
+
+
+def _padded(factors: list[Number]) -> list[Number]:
+    """Those of the cable, and zeros for the sections' normals."""
+    return [*factors[:2], 0.0, *factors[2:], 0.0]
+
+
+def _normal(x: Number, length: Number) -> list[Number]:
+    """The normal of the section: r', and the line through d - r' at both nodes."""
+    first, slope, second, other = beam.shape(beam.CUBIC, x, length, 1)
+    return [first, slope - (1 - x), 1 - x + 0.0 * length, second, other - x, x + 0.0 * length]
+
+
+_POINTS = np.polynomial.legendre.leggauss(3)
+
+
+def _mass(density: Number, section: Section, length: Number) -> list[list[Number]]:
+    """That of the cable, and the inertia of the sections, whose normal is of second degree."""
+    rows = [_padded(row) for row in beam.mass_matrix(beam.CUBIC, density * section.area, length)]
+    full = [*rows[:2], [0.0] * 6, *rows[2:], [0.0] * 6]
+    for xi, weight in zip(*_POINTS, strict=True):
+        normal = _normal((1 + xi) / 2, length)
+        share = density * section.bending * length * weight / 2
+        full = [
+            [m + share * a * b for m, b in zip(row, normal, strict=True)] for row, a in zip(full, normal, strict=True)
+        ]
+    return full
+
+
+ELEMENT = Element(
+    family=ShearRods,
+    nodal_vectors=_nodal_vectors,
+    position_shape=lambda x, y, length: _padded(beam.shape(beam.CUBIC, x, length, 0)),
+    direction_shape=lambda x, y, length: _normal(x, length),
+    mass=_mass,
+    weight=lambda line, length: _padded(beam.weight(beam.CUBIC, line, length)),
+    part=_part,
+    clamped=1,
+)
