@@ -130,6 +130,42 @@ def test_levels_below_are_coarser(limit: str) -> None:
         assert all(ladder.index(coarser) < ladder.index(level) for coarser in below(level, limit))
 
 
+THICK = HEADLINE.with_values(
+    {f"bodies.{rod}.height": 0.1 for rod in ("OA", "AB")} | {"solver.theory": "auto", "solver.duration": 0.3}
+)
+
+
+def test_thick_rods_shear_and_keep_their_word_against_geometrically_exact_beams() -> None:
+    """Exudyn's geometrically exact beams have shear; slender rods end beyond the tolerance from them."""
+    pytest.importorskip("exudyn")
+    from shoal.engines.exudyn import ExudynEngine
+
+    found = select(THICK, 2e-4, [0.15, 0.3])
+    assert found.met
+    assert {level.element for level in found.chosen.levels.values()} == {"simo-reissner"}
+    assert "shear and rotary inertia" in found.reason
+    assert found.shear == 0.0
+    fine = THICK.with_values({"bodies.OA.elements": 16, "bodies.AB.elements": 32, "solver.step": 2e-4})
+    beams = ExudynEngine(beam="geometrically-exact", modified_newton=True).simulate(fine, [0.15, 0.3])
+    assert found.trajectory.distance(beams) < 2e-4
+    slender = select(THICK.with_values({"solver.theory": "slender"}), 2e-4, [0.15, 0.3])
+    assert slender.met
+    assert slender.shear > 2e-4
+    assert slender.trajectory.distance(beams) > 2e-4
+
+
+def test_rigid_rods_get_the_rotary_inertia_that_counts() -> None:
+    """A stiff pendulum of height h: m (L^2 + h^2)/12 about its centre, so that it swings as one of (L + h^2/(4 L))."""
+    stiff = {"bodies.OA.youngs_modulus": 1e14, "bodies.AB.youngs_modulus": 1e14}
+    found = select(THICK.with_values(stiff), 1e-4, [0.3])
+    assert found.met
+    assert {(level.element, level.rotary) for level in found.chosen.levels.values()} == {("rigid", True)}
+    rigid = {f"bodies.{rod}.{field}": value for rod in ("OA", "AB")
+             for field, value in (("element", "rigid"), ("rotary_inertia", True))}  # fmt: skip
+    exact = GaussEngine().simulate(THICK.with_values(rigid | {"solver.integrator": "dop853"}), [0.3])
+    assert found.trajectory.distance(exact) < 1e-4
+
+
 def test_ancf_full_is_a_theory_of_its_own() -> None:
     """Its limit has shear, so that no rod becomes a cable."""
     thick = {f"bodies.{rod}.{key}": value for rod in ("OA", "AB")

@@ -34,10 +34,11 @@ class Solver(Record):
     they may take. `spectral_radius` is rho_infinity of generalized-alpha. `acceleration` is how Gauss's principle
     is solved, `baumgarte` [1/s] the rate of Baumgarte's stabilisation, `project` whether drift is removed after
     every step, `rank_tolerance` how far from a singular position counts as singular. `inertia_cap` lets leapfrog, and
-    no other, take steps that axial vibrations are too fast for: their inertia is raised to suit. `energy_tolerance`
-    is the relative energy error beyond which a run is rejected. The accelerations `afsa`, `iafsa` and `iafsa-printed`
-    let `swarm_size` fish search for `swarm_iterations` iterations in every time step (the paper's section 4.2, with
-    its numbers); `swarm_seed` makes them repeatable.
+    no other, take steps that axial vibrations are too fast for: their inertia is raised to suit. `theory` is what a
+    tolerance is about: of slender rods, or (auto) of rods with shear and rotary inertia where these count.
+    `energy_tolerance` is the relative energy error beyond which a run is rejected. The accelerations `afsa`, `iafsa`
+    and `iafsa-printed` let `swarm_size` fish search for `swarm_iterations` iterations in every time step (the paper's
+    section 4.2, with its numbers); `swarm_seed` makes them repeatable.
     """
 
     duration: Positive = 1.0
@@ -57,6 +58,7 @@ class Solver(Record):
     baumgarte: Positive = 20.0
     project: bool = True
     inertia_cap: bool = False
+    theory: Literal["auto", "slender"] = "auto"
     rank_tolerance: Positive = 1e-5
     energy_tolerance: Positive = 1e-2
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.scene import Scene
-from shoal.selection.levels import REFINEMENTS, RIGID, Level, Levels
+from shoal.selection.levels import REFINEMENTS, Level, Levels
 from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
@@ -20,6 +20,8 @@ REJECTED = 3
 """So many refinements in a row whose run is rejected end the climb."""
 AGREE = 0.5
 """Two neighbours agree when they are closer than this fraction of the tolerance."""
+FINE, GAIN = 16, 3.0
+"""From so many elements on a doubling that gains less than this factor is little."""
 HALF = 0.5 * STEP_MARGIN
 """A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
 UNKNOWN_FALL = 4.0
@@ -77,8 +79,13 @@ class Runs:
         self.progress(rung.name)
 
 
-def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) -> Yardstick | str:
-    """Refine the rods until two neighbours agree; else say why that was not to be had."""
+def climb(
+    runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float, impatient: bool = False
+) -> Yardstick | str:
+    """Refine the rods until two neighbours agree; else say why that was not to be had.
+
+    impatient: also where a doubling of the elements gains little, as where no limit is near.
+    """
     count = dict.fromkeys(rods, REFINEMENTS[0])
     growing, gap, last_gap, rejected = rods, np.inf, np.nan, 0
     levels = {**fixed, **runs.refined(count)}
@@ -103,6 +110,8 @@ def climb(runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float) ->
             fall = np.clip(last_gap / gap, 3.0, 16.0) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
             fine.error = gap / (fall - 1.0)
             return Yardstick(fine, float(fine.error), {**fixed, **runs.refined(base)})
+        if impatient and max(count.values()) >= FINE and last_gap < GAIN * gap:
+            return f"twice as many elements gain a factor of {last_gap / gap:.2g} only"
         count, growing = _next(runs, fine, count, base, growing, tolerance)
 
 
@@ -122,5 +131,5 @@ def _next(
 
 
 def _too_much(levels: Levels, work: float) -> str:
-    words = ", ".join(f"{rod} {level}" for rod, level in levels.items() if level != RIGID)
+    words = ", ".join(f"{rod} {level}" for rod, level in levels.items() if level.element != "rigid")
     return f"the next refinement ({words}) takes {work:.1g} element steps, more than {WORK_LIMIT:.1e}"

@@ -16,10 +16,11 @@ from shoal.scene.dimensions import is_flat
 
 @dataclass(frozen=True)
 class Level:
-    """One rung for one rod: its element and how many of them."""
+    """One rung for one rod: its element and how many of them. rotary: whether a rigid rod's sections have inertia."""
 
     element: str
     elements: int = 1
+    rotary: bool = False
 
     def __str__(self) -> str:
         return "rigid" if self.element == "rigid" else f"{self.elements} {self.element.removeprefix('ancf-')}"
@@ -30,11 +31,13 @@ class Level:
         if self.element != "rigid":
             values[f"bodies.{rod}.elements"] = self.elements
             values[f"bodies.{rod}.quadrature"] = "reduced" if self.element == "ancf-cable" else "full"
-            values[f"bodies.{rod}.rotary_inertia"] = False
+        if self.rotary or self.element != "rigid":
+            values[f"bodies.{rod}.rotary_inertia"] = self.rotary
         return values
 
 
 RIGID = Level("rigid")
+STOUT = Level("rigid", rotary=True)
 
 
 def cable(n: int) -> Level:
@@ -48,12 +51,15 @@ def quintic(n: int) -> Level:
 
 
 COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
+SLENDER, SHEARS = "ancf-quintic", "simo-reissner"
+"""The elements whose limits are the truth of slender rods, and in the plane of those with shear and rotary inertia."""
 LADDERS = {
-    "ancf-quintic": (
+    SLENDER: (
         *(RIGID, cable(1), cable(2), quintic(1), cable(3), cable(4)),
         *(quintic(n) for n in COUNTS if n > 1),
     ),
     "ancf-full": (RIGID, *(Level("ancf-full", n) for n in COUNTS)),
+    SHEARS: (STOUT, *(Level(SHEARS, n) for n in COUNTS)),
     "director-rod": (RIGID, *(Level("director-rod", n) for n in COUNTS)),
 }
 """From coarse to fine, by the element whose limit is the truth."""
@@ -74,16 +80,21 @@ def below(level: Level, limit: str) -> tuple[Level, ...]:
 def open_rods(scene: Scene) -> dict[str, str]:
     """The rods whose model is open, and the element whose limit is their truth: of the scene's theory the finest.
 
-    Bernoulli-Euler's beam, unless the scene names ancf-full, which has shear and stretch of the section, or
-    director-rod, which twists. A rigid rod that leaves the plane may twist.
+    Bernoulli-Euler's beam, unless the scene names simo-reissner or ancf-full, which have shear, or director-rod, which
+    twists. A rigid rod that leaves the plane may twist.
     """
-    finest = dict.fromkeys(("ancf-cable", "ancf-quintic"), "ancf-quintic")
-    finest["rigid"] = "director-rod" if scene.dimensions == 3 and not is_flat(scene) else "ancf-quintic"
+    finest = dict.fromkeys(("ancf-cable", SLENDER), SLENDER)
+    finest["rigid"] = "director-rod" if scene.dimensions == 3 and not is_flat(scene) else SLENDER
     return {
         name: finest.get(body.element, body.element)
         for name, body in scene.bodies.items()
         if isinstance(body, Rod) and body.youngs_modulus is not None
     }
+
+
+def rigid(limits: Mapping[str, str]) -> dict[str, Level]:
+    """All rods rigid, the coarsest of their ladders. limits: the element whose limit is the truth of each."""
+    return {rod: LADDERS[limit][0] for rod, limit in limits.items()}
 
 
 def apply(scene: Scene, levels: Levels) -> Scene:

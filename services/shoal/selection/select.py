@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from shoal.engines.theory import left_out
 from shoal.errors import InputError
 from shoal.scene import Rod, Scene
 from shoal.selection.climb import YARDSTICK, Progress, Runs, climb
-from shoal.selection.levels import RIGID, Levels, open_rods
+from shoal.selection.levels import SHEARS, SLENDER, Levels, open_rods, rigid
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
 from shoal.selection.trim import WITHIN, trim
@@ -25,6 +25,8 @@ GRID = 50
 """The tolerance holds at so many instants spread over the run, beside those that were asked for."""
 SURELY_RIGID = 100.0
 """A rod whose a priori error is below the tolerance by this factor is not modelled any further."""
+COUNTS_FROM = 0.5
+"""What slender rods leave out counts from this fraction of the tolerance on: it is known by order of magnitude."""
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
 """Of the adaptive integrator for rigid machines, from coarse to fine."""
 
@@ -35,7 +37,8 @@ class Selection:
 
     chosen: its scene reproduces the run; trajectory: at the times asked for; met: whether its estimated error is
     within the tolerance [m]; rungs: every run, in order; priors: what was known before; rigid: rods that stay rigid
-    and why; shear: what the theory of the beam leaves out, by order of magnitude [m]
+    and why; limits: the element whose limit is the truth of each rod; shear: what the theory of the beam leaves out, by
+    order of magnitude [m]
     """
 
     tolerance: float
@@ -46,6 +49,7 @@ class Selection:
     rungs: list[Rung]
     priors: dict[str, Prior]
     rigid: dict[str, str]
+    limits: dict[str, str]
     shear: float
     wall_s: float
 
@@ -57,6 +61,7 @@ class Selection:
             "reason": self.reason,
             "estimated_error": self.chosen.error,
             "neglected_shear": self.shear,
+            "truth": self.limits,
             "levels": {rod: vars(level) for rod, level in self.chosen.levels.items()},
             "rigid": self.rigid,
             "priors": {rod: vars(prior) for rod, prior in self.priors.items()},
@@ -86,29 +91,68 @@ def select(
 ) -> Selection:
     """The cheapest model of a scene whose estimated error at the markers is within `tolerance` [m].
 
-    The truth is the converged theory: Bernoulli-Euler's beam for rods with a modulus, whatever element the scene
-    names for them, but for ancf-full and director-rod, which are theories of their own; a rigid rod in space is taken
-    to twist as well as to bend. Integrator, step, element and number of elements
-    are chosen; progress is told every model that is run. Raises InputError.
+    The truth is the converged theory, whatever element the scene names for rods with a modulus: Bernoulli-Euler's beam,
+    or in the plane Simo and Reissner's rod where what the former leaves out is worth more than half of the tolerance,
+    or where the former does not settle. The elements ancf-full, simo-reissner and director-rod are theories of their
+    own; a rigid rod in space is taken to twist as well as to bend; `solver.theory: slender` keeps the former.
+    Integrator, step, element and number of elements are chosen; progress is told every model that is run. Raises
+    InputError.
     """
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
     begin = time.perf_counter()
     asked = sampling_times(scene, times)
     scene = scene.with_values({"solver.duration": float(asked[-1])}) if asked[-1] > 0 else scene
+    limits = open_rods(scene)
+    may_shear = _may_shear(scene, limits)
+    found = _of_theory(scene, tolerance, asked, limits, progress, may_shear)
+    if may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
+        stout = {rod: SHEARS if limit == SLENDER else limit for rod, limit in limits.items()}
+        found = _of_both(found, _of_theory(scene, tolerance, asked, stout, progress))
+    return replace(found, wall_s=time.perf_counter() - begin)
+
+
+def _may_shear(scene: Scene, limits: Mapping[str, str]) -> bool:
+    """Whether any rod can be had with shear and rotary inertia that is without by its element's theory."""
+    return scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
+
+
+def _of_both(slender: Selection, stout: Selection) -> Selection:
+    """What to answer where slender rods leave out too much, or do not settle."""
+    rungs = [*slender.rungs, *stout.rungs]
+    if stout.met:
+        why = f"shear and rotary inertia, worth about {slender.shear:.1g} m, count; " if slender.met else ""
+        return replace(stout, rungs=rungs, reason=why + stout.reason)
+    if not slender.met:
+        return replace(stout if stout.chosen.error < slender.chosen.error else slender, rungs=rungs)
+    reason = f"slender rods leave out about {slender.shear:.1g} m, and with shear and rotary inertia {stout.reason}"
+    trajectory = _rejected(slender.trajectory, slender.shear, reason)
+    return replace(slender, rungs=rungs, met=False, reason=reason, trajectory=trajectory)
+
+
+def _of_theory(
+    scene: Scene,
+    tolerance: float,
+    asked: Array,
+    limits: Mapping[str, str],
+    progress: Progress,
+    impatient: bool = False,
+) -> Selection:
+    """The cheapest model where the truth of each rod is the limit of that element. impatient: see `climb`."""
+    begin = time.perf_counter()
     grid = _grid(asked)
-    limits, rigid = _open(scene)
+    limits, closed = _open(scene, limits)
     rods = tuple(limits)
     priors = estimate(scene, rods) if rods else {}
     surely = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(rods) < tolerance]
-    rigid |= {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
-    fixed: Levels = dict.fromkeys(rods, RIGID)
+    closed |= {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
+    fixed = rigid(limits)
     runs = Runs(scene, grid, limits, progress)
     flexible = tuple(rod for rod in rods if rod not in surely)
     known = sum(priors[rod].error for rod in surely)
     if flexible:
         worst = SURELY_RIGID * sum(prior.error for prior in priors.values())
-        chosen, reason = _flexible(runs, flexible, fixed, tolerance, known, worst)
+        chosen, reason = _flexible(runs, flexible, fixed, tolerance, known, worst, impatient)
     else:
         chosen, reason = _rigid(runs, fixed, tolerance, known)
     met = bool(chosen.error <= tolerance)
@@ -120,15 +164,15 @@ def select(
         trajectory=_at(chosen, grid, asked, met, reason),
         rungs=runs.rungs,
         priors=priors,
-        rigid=rigid,
+        rigid=closed,
+        limits=dict(limits),
         shear=left_out(chosen.trajectory, chosen.scene, GaussEngine()) or 0.0,
         wall_s=time.perf_counter() - begin,
     )
 
 
-def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
+def _open(scene: Scene, limits: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
     """Rods whose model is open with the element of their limit, and the other rods with the reason."""
-    limits = open_rods(scene)
     closed = {
         name: "no youngs_modulus"
         for name, body in scene.bodies.items()
@@ -173,15 +217,21 @@ def _rigid(runs: Runs, levels: Levels, tolerance: float, known: float) -> tuple[
 
 
 def _flexible(
-    runs: Runs, rods: tuple[str, ...], fixed: Levels, tolerance: float, known: float, worst: float
+    runs: Runs,
+    rods: tuple[str, ...],
+    fixed: Levels,
+    tolerance: float,
+    known: float,
+    worst: float,
+    impatient: bool,
 ) -> tuple[Rung, str]:
     """Climb to a yardstick, then trim. worst: what rigid rods may cost a priori, for want of anything better [m]."""
-    yardstick = climb(runs, rods, fixed, tolerance - known)
+    yardstick = climb(runs, rods, fixed, tolerance - known, impatient)
     if isinstance(yardstick, str):
         refined = [rung for rung in runs.rungs if rung.role == YARDSTICK]
         if len(refined) < 2:
-            rigid, _ = _rigid(runs, dict.fromkeys(runs.limits, RIGID), tolerance, worst)
-            return rigid, yardstick
+            stiff, _ = _rigid(runs, rigid(runs.limits), tolerance, worst)
+            return stiff, yardstick
         refined[-1].error = distance(refined[-2].trajectory, refined[-1].trajectory) + known
         return refined[-1], yardstick
     yardstick.error += known
@@ -203,7 +253,10 @@ def _at(rung: Rung, grid: Array, asked: Array, met: bool, reason: str) -> Trajec
     """The run at the times asked for; failed unless it meets the tolerance."""
     index = [int(np.argmin(np.abs(grid - t))) for t in asked]
     run = rung.trajectory
-    status, message = run.status, run.message
-    if run.ok and not met:
-        status, message = (Status.FAILED,), f"tolerance not met, estimated error {rung.error:.2g} m: {reason}"
-    return replace(run, times=asked, points=run.points[index], angles=run.angles[index], status=status, message=message)
+    found = replace(run, times=asked, points=run.points[index], angles=run.angles[index])
+    return _rejected(found, rung.error, reason) if run.ok and not met else found
+
+
+def _rejected(run: Trajectory, error: float, reason: str) -> Trajectory:
+    """A run that is off by more than the tolerance [m]."""
+    return replace(run, status=(Status.FAILED,), message=f"tolerance not met, estimated error {error:.2g} m: {reason}")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from shoal.selection import Selection, select
 from shoal.selection.climb import Runs
-from shoal.selection.levels import LADDERS, RIGID, Level
+from shoal.selection.levels import LADDERS, Level
 from shoal.selection.run import Rung, distance
 
 from shoal_validation.benchmarks.timing import undisturbed
@@ -55,7 +56,9 @@ def study(machine: Draw, exhaustive: bool = False) -> Case:
     """Select, then judge by a finer selection."""
     seconds, chosen = undisturbed(lambda: select(machine.scene, machine.tolerance))
     finer = select(machine.scene, machine.tolerance / FINER)
-    yardstick = min((r for r in finer.rungs if np.isfinite(r.error)), key=lambda r: r.error, default=None)
+    yardstick = min(
+        (r for r in finer.rungs if np.isfinite(r.error) and _of(r, finer.limits)), key=lambda r: r.error, default=None
+    )
     error = distance(chosen.chosen.trajectory, yardstick.trajectory) if yardstick is not None else np.nan
     least, cheapest = (np.nan, "") if not exhaustive or yardstick is None else _cheapest(machine, chosen, yardstick)
     return Case(
@@ -66,7 +69,7 @@ def study(machine: Draw, exhaustive: bool = False) -> Case:
         chosen.met,
         chosen.reason,
         chosen.chosen.name,
-        all(level == RIGID for level in chosen.chosen.levels.values()),
+        all(level.element == "rigid" for level in chosen.chosen.levels.values()),
         chosen.chosen.error,
         error,
         yardstick.error if yardstick is not None else np.nan,
@@ -76,6 +79,11 @@ def study(machine: Draw, exhaustive: bool = False) -> Case:
         cheapest,
         seconds,
     )
+
+
+def _of(rung: Rung, limits: Mapping[str, str]) -> bool:
+    """Whether a model belongs to the theory whose limits are the truth."""
+    return all(level in LADDERS[limits[rod]] for rod, level in rung.levels.items())
 
 
 def _uncapped(chosen: Selection) -> float:
@@ -91,13 +99,12 @@ def _stiffness(machine: Draw) -> float:
 def _cheapest(machine: Draw, chosen: Selection, yardstick: Rung) -> tuple[float, str]:
     """The least work within the tolerance among all combinations of levels, without capped inertia."""
     rods, least = tuple(chosen.chosen.levels), _uncapped(chosen)
-    limits = dict.fromkeys(rods, "ancf-quintic")
-    runs = Runs(chosen.chosen.scene, yardstick.trajectory.times, limits, lambda _: None)
+    runs = Runs(chosen.chosen.scene, yardstick.trajectory.times, chosen.limits, lambda _: None)
     cheaper: list[tuple[float, dict[str, Level]]] = []
-    for levels in product(LADDERS["ancf-quintic"], repeat=len(rods)):
+    for levels in product(*(LADDERS[chosen.limits[rod]] for rod in rods)):
         combination = dict(zip(rods, levels, strict=True))
         work = runs.forecast.work(combination)
-        if 0 < work < least and any(level != RIGID for level in levels):
+        if 0 < work < least and any(level.element != "rigid" for level in levels):
             cheaper.append((work, combination))
     for work, combination in sorted(cheaper, key=lambda pair: pair[0]):
         if distance(runs(combination).trajectory, yardstick.trajectory) <= machine.tolerance:

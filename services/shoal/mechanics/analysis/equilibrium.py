@@ -94,6 +94,7 @@ class Equilibrium:
                 for name in self.markers
             },
             "elements": {name: body.elements for name, body in self.scene.bodies.items() if body.element != "rigid"},
+            "models": {name: body.element for name, body in self.scene.bodies.items()},
             "energy": self.energy,
             "strain_energy": self.strain_energy,
             "residual": self.residual,

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.mechanics import plane
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.mesh_error import finer
 from shoal.mechanics.analysis.statics import statics
@@ -18,6 +19,8 @@ FALLS = (2.0, 4.0)
 """Between these factors the distance of two meshes is taken to fall with each doubling: at most as at order two."""
 UNSEEN = 3.0
 """The factor while only one distance is known."""
+SLENDER = ("ancf-cable", "ancf-quintic")
+"""Elements without shear."""
 SAFE = 2.0
 """By this factor the estimate has to be below the tolerance."""
 
@@ -27,10 +30,42 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
 
     The elements of the scene's flexible rods are doubled together. With d the distance of two meshes in a row and f the
     factor by which it falls, the finer one is d / (f - 1) from the limit: its `mesh_error`. The coarsest mesh whose
-    estimate is safely within the tolerance is returned; there is none where the status is `failed`. Raises InputError.
+    estimate is safely within the tolerance is returned; there is none where the status is `failed`. In the plane, rods
+    with shear take the place of slender ones where that moves a marker by as much as the estimate may be off, unless
+    `solver.theory` is slender. Raises InputError.
     """
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
+    found = _refined(scene, tolerance, time)
+    if (stout := sheared(found.scene)) is None:
+        return found
+    other = statics(stout, time)
+    away = _apart(found, other) if found.ok and other.ok else np.nan
+    if SAFE * away <= tolerance:
+        return found
+    other = _refined(stout, tolerance, time)
+    if other.ok and np.isfinite(away):
+        return replace(other, message=f"with shear, which is worth {away:.1e} m")
+    return other if other.ok or found.ok else found
+
+
+def sheared(scene: Scene) -> Scene | None:
+    """The scene with shear in its slender flexible rods; None if there are none, or `solver.theory` is against it."""
+    if scene.dimensions != plane.DIMENSIONS or scene.solver.theory == "slender":
+        return None
+    rods = [name for name, body in scene.bodies.items() if body.element in SLENDER]
+    fields = {"element": "simo-reissner", "quadrature": "full"}
+    values = {f"bodies.{name}.{field}": value for name in rods for field, value in fields.items()}
+    return scene.with_values(values) if rods else None
+
+
+def _apart(one: Equilibrium, other: Equilibrium) -> float:
+    """The largest distance of a marker [m]."""
+    return float(np.max(np.linalg.norm(one.points - other.points, axis=1)))
+
+
+def _refined(scene: Scene, tolerance: float, time: float) -> Equilibrium:
+    """The coarsest mesh that will do, of the scene's own elements."""
     found, gap = statics(scene, time), np.nan
     for _ in range(DOUBLINGS):
         if (fine := finer(scene)) is None:
@@ -40,7 +75,7 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
         if not (coarse.ok and found.ok):
             gap = np.nan
             continue
-        gap = float(np.max(np.linalg.norm(coarse.points - found.points, axis=1)))
+        gap = _apart(coarse, found)
         fall = np.clip(last / gap, *FALLS) if np.isfinite(last) and gap > 0 else UNSEEN
         error = gap / (float(fall) - 1.0)
         found = replace(found, mesh_error=error)
