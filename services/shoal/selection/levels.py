@@ -50,7 +50,7 @@ def quintic(n: int) -> Level:
     return Level("ancf-quintic", n)
 
 
-COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
+COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
 SLENDER, SHEARS = "ancf-quintic", "simo-reissner"
 """The elements whose limits are the truth of slender rods, and in the plane of those with shear and rotary inertia."""
 LADDERS = {
@@ -64,7 +64,7 @@ LADDERS = {
 }
 """From coarse to fine, by the element whose limit is the truth."""
 
-REFINEMENTS = (1, 2, 4, 8, 16, 32, 64)
+REFINEMENTS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 """Numbers of these elements in the models by which errors are estimated."""
 
 Levels = Mapping[str, Level]

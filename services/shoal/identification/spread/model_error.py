@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shoal.engines import get_engine
+from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import WITH_SHEAR, slender_share
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Rod, Scene
+from shoal.scene.shear import with_shear
 from shoal.trajectory import Array
 
 _STABLE = 0.9
@@ -70,14 +71,14 @@ def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array
         return ModelError(None, None)
     finer = _finer(model.scene, flexible)
     mesh = None if finer is None else _difference(model, point, predicted, finer)
-    slender = {name: rod for name, rod in flexible.items() if rod.element != "ancf-full"}
+    slender = {name: rod for name, rod in flexible.items() if not rod.shears}
     if not slender or model.engine.name in WITH_SHEAR:
         return ModelError(mesh, None)
     theory = _softened(model, point, predicted, slender)
     uncertain = rms_of(residual) / np.sqrt(len(residual))
     matters = theory is None or rms_of(theory) > _MATTERS * max(uncertain, 0.0 if mesh is None else rms_of(mesh))
     if finer is not None and mesh is not None and matters:
-        sheared = _sheared(model, point, predicted, finer)
+        sheared = _sheared(model, point, predicted)
         theory = theory if sheared is None else sheared - mesh
     return ModelError(mesh, theory)
 
@@ -90,12 +91,12 @@ def _softened(
     return _difference(model, point, predicted, model.scene, softer)
 
 
-def _sheared(model: ForwardModel, point: Array, predicted: Mapping[str, Array], finer: Scene) -> Array | None:
-    """By the geometrically exact beams of another engine; None where it is not installed or cannot run the scene."""
-    try:
-        return _difference(replace(model, engine=get_engine(WITH_SHEAR[0])), point, predicted, finer)
-    except (ImportError, InputError):
-        return None
+def _sheared(model: ForwardModel, point: Array, predicted: Mapping[str, Array]) -> Array | None:
+    """By twice as many rods with shear and rotary inertia; None where they cannot be had."""
+    stout = with_shear(model.scene)
+    flexible = {name: body for name, body in model.scene.bodies.items() if isinstance(body, Rod)}
+    finer = None if stout is None else _finer(stout, {name: r for name, r in flexible.items() if r.element != "rigid"})
+    return None if finer is None else _difference(replace(model, engine=GaussEngine()), point, predicted, finer)
 
 
 def _finer(scene: Scene, flexible: Mapping[str, Rod]) -> Scene | None:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import plane
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.mesh_error import finer
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
+from shoal.scene.shear import with_shear
 
 DOUBLINGS = 7
 """So often the elements of all rods are doubled."""
@@ -19,8 +19,6 @@ FALLS = (2.0, 4.0)
 """Between these factors the distance of two meshes is taken to fall with each doubling: at most as at order two."""
 UNSEEN = 3.0
 """The factor while only one distance is known."""
-SLENDER = ("ancf-cable", "ancf-quintic")
-"""Elements without shear."""
 SAFE = 2.0
 """By this factor the estimate has to be below the tolerance."""
 
@@ -37,7 +35,8 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
     found = _refined(scene, tolerance, time)
-    if (stout := sheared(found.scene)) is None:
+    stout = None if scene.solver.theory == "slender" else with_shear(found.scene)
+    if stout is None:
         return found
     other = statics(stout, time)
     away = _apart(found, other) if found.ok and other.ok else np.nan
@@ -47,16 +46,6 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
     if other.ok and np.isfinite(away):
         return replace(other, message=f"with shear, which is worth {away:.1e} m")
     return other if other.ok or found.ok else found
-
-
-def sheared(scene: Scene) -> Scene | None:
-    """The scene with shear in its slender flexible rods; None if there are none, or `solver.theory` is against it."""
-    if scene.dimensions != plane.DIMENSIONS or scene.solver.theory == "slender":
-        return None
-    rods = [name for name, body in scene.bodies.items() if body.element in SLENDER]
-    fields = {"element": "simo-reissner", "quadrature": "full"}
-    values = {f"bodies.{name}.{field}": value for name in rods for field, value in fields.items()}
-    return scene.with_values(values) if rods else None
 
 
 def _apart(one: Equilibrium, other: Equilibrium) -> float:
