@@ -402,6 +402,16 @@ ONLY_NATIVE = [
     DIRECTOR,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
+    scene(
+        "hose",
+        {"A": {"kind": "point-mass", "mass": 1.0}},
+        {"D": joint(GROUND, at("A"), "distance", length=0.5)},
+        {"A": at("A")},
+        initial={"A": {"position": [0.5, 0.0]}},
+        loads={
+            "S": {"kind": "torsion-spring", "first": GROUND, "second": GROUND, "second_to": at("A"), "stiffness": 2.0}
+        },
+    ),
     pendulum("shear", CABLE | {"element": "simo-reissner"}),
     scene(
         "ring",

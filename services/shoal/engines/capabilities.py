@@ -24,6 +24,7 @@ FEATURES = (
     "varying distances",
     "dry friction",
     "nonlinear springs",
+    "angles of places",
     "curved flexible rods",
     "tapered flexible rods",
     "damped flexible rods",
@@ -69,6 +70,8 @@ def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:
     for field, value in item:
         if field == "coulomb" and value:
             yield f"{where}.{field}", "dry friction"
+        if field in ("first_to", "second_to") and value is not None:
+            yield f"{where}.{field}", "angles of places"
         if isinstance(value, Function) and (value.number is None or field == "elastic"):
             yield f"{where}.{field}", _LAWS.get(field, "functions of time")
 

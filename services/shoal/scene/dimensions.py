@@ -36,6 +36,10 @@ def check_dimensions(scene: Any) -> None:
             raise ValueError(f"joints.{name}.kind: {joint.kind} is a joint of the plane; say dimensions: 2")
         if joint.kind != "coupling" and joint.first.body == joint.second.body:
             raise ValueError(f"joints.{name}: closes {joint.first.body!r} upon itself; that is for the plane")
+    for name, load in scene.loads.items():
+        for field in ("first_to", "second_to"):
+            if getattr(load, field, None) is not None:
+                raise ValueError(f"loads.{name}.{field}: is for scenes in the plane; say dimensions: 2")
     flat = is_flat(scene)
     for name, start in scene.initial.items():
         for one, other in (("angle", "rotation"), ("rate", "spin")):

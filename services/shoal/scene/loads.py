@@ -40,9 +40,13 @@ class TorsionSpring(Elastic):
     stiffness [N m/rad], cubic [N m/rad^3], damping [N m s/rad]; angle: relative angle of rest [rad] (default: that of
     the start), counted over full turns; elastic: further elastic torque [N m], a function of the angle from rest [rad]
     called `t`. axis: in space, that the angle is about, as it points at the start; a joint keeps it common to both.
+    first_to, second_to: in the plane, the direction of that side is the way to this place, in the place of the body's;
+    so a point mass has one.
     """
 
     kind: Literal["torsion-spring"] = "torsion-spring"
+    first_to: Attachment | None = None
+    second_to: Attachment | None = None
     axis: Axis = Z
     angle: float | None = None
     elastic: Function | None = None

@@ -378,6 +378,8 @@ class Mjcf:
 
     def _spiral(self, name: str, load: TorsionSpring) -> None:
         """A torsion spring in the joint that has its axis. Raises InputError where there is none."""
+        if load.first_to or load.second_to:
+            raise InputError(f"loads.{name}: MJCF has no springs between directions from place to place")
         flat = self.scene.dimensions == 2
         for joint, link in self._hung.items():
             sides = [load.first.body, load.second.body]

@@ -22,6 +22,7 @@ from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.numerics.tile import Number, index, stacked
+from shoal.mechanics.reach import span
 from shoal.scene import (
     GROUND,
     Attachment,
@@ -86,12 +87,36 @@ class Loads:
         self._measure(name, PLACE, [*ends, line], law, 0.0)
 
     def _torsion_spring(self, name: str, load: TorsionSpring) -> None:
-        rest = self._rest(load) if load.angle is None else load.angle
+        rest = self._rest(name, load) if load.angle is None else load.angle
         law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0]
-        self._angle(name, load.first, load.second, law, load.axis, elastic=load.elastic)
+        if load.first_to is None and load.second_to is None:
+            self._angle(name, load.first, load.second, law, load.axis, elastic=load.elastic)
+        else:
+            self._measure(name, ANGLE, self._ways(name, load), law, self._opening(name, load), elastic=load.elastic)
 
-    def _rest(self, load: TorsionSpring) -> Number:
+    def _ways(self, name: str, load: TorsionSpring) -> list[Affine]:
+        """The directions of both sides: of bodies, or from place to place."""
+        found = []
+        for field, side, to in (("first", load.first, load.first_to), ("second", load.second, load.second_to)):
+            if to is None:
+                self._require_angle(f"loads.{name}.{field}", side)
+                found.append(self.placement.direction(self.scene, side))
+                continue
+            way = self.placement.point(self.scene, to) - self.placement.point(self.scene, side)
+            if np.any(sum(self.placement.start_of(way)[0] ** 2) < (1e-9 * span(self.scene)) ** 2):
+                raise InputError(f"loads.{name}.{field}_to: is where {field} is at the start; no direction leads there")
+            found.append(way)
+        return found
+
+    def _opening(self, name: str, load: TorsionSpring) -> Number:
+        """The angle between places at the start, within half a turn."""
+        first, second = (self.placement.start_of(way)[0] for way in self._ways(name, load))
+        return np.arctan2(plane.cross(first, second), sum(first * second))
+
+    def _rest(self, name: str, load: TorsionSpring) -> Number:
         """The angle at the start."""
+        if load.first_to is not None or load.second_to is not None:
+            return self._opening(name, load)
         if not isinstance(self.placement, SpatialPlacement):
             return self._turn(load.first, load.second)
         a, b, ahead = hinge(self.scene, self.placement, load.first, load.second, load.axis)
@@ -177,8 +202,7 @@ class Loads:
         drive: Function | None = None,
     ) -> None:
         for side in (first, second):
-            if side.body != GROUND and isinstance(self.scene.bodies[side.body], PointMass):
-                raise InputError(f"{name}: {side.body} is a point mass, which has no angle")
+            self._require_angle(name, side)
         if isinstance(self.placement, SpatialPlacement):
             directions = list(hinge(self.scene, self.placement, first, second, axis))
             a, b, ahead = (self.placement.start_of(one)[0] for one in directions)
@@ -187,6 +211,13 @@ class Loads:
             directions = [self.placement.direction(self.scene, side) for side in (first, second)]
             turn = self._turn(first, second)
         self._measure(name, ANGLE, directions, law, turn, elastic=elastic, drive=drive)
+
+    def _require_angle(self, name: str, side: Attachment) -> None:
+        if side.body != GROUND and isinstance(self.scene.bodies[side.body], PointMass):
+            raise InputError(
+                f"{name}: {side.body} is a point mass, which has no angle; of a torsion spring, first_to or second_to "
+                "can tell the place to which its direction leads"
+            )
 
     def _spring(self, name: str, load: Spring) -> None:
         ends = [self.placement.point(self.scene, side) for side in (load.first, load.second)]
