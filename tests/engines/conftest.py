@@ -402,6 +402,7 @@ ONLY_NATIVE = [
     DIRECTOR,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
+    pendulum("dry-pin", joints={"O": PIN["O"] | {"mu": 0.1, "radius": 0.01}}),
     scene(
         "hose",
         {"A": {"kind": "point-mass", "mass": 1.0}},

@@ -23,6 +23,7 @@ FEATURES = (
     "functions of time",
     "varying distances",
     "dry friction",
+    "friction by joint forces",
     "nonlinear springs",
     "angles of places",
     "curved flexible rods",
@@ -70,6 +71,8 @@ def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:
     for field, value in item:
         if field == "coulomb" and value:
             yield f"{where}.{field}", "dry friction"
+        if field == "mu" and value:
+            yield f"{where}.{field}", "friction by joint forces"
         if field in ("first_to", "second_to") and value is not None:
             yield f"{where}.{field}", "angles of places"
         if isinstance(value, Function) and (value.number is None or field == "elastic"):

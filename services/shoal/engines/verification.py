@@ -160,7 +160,9 @@ def _friction_error(trajectory: Trajectory, scene: Scene, second: Second) -> tup
 
     It holds better still where even so it would creep far in the time of the run.
     """
-    rubbing: dict[str, Any] = {n: joint for n, joint in scene.joints.items() if getattr(joint, "coulomb", 0.0)}
+    rubbing: dict[str, Any] = {
+        n: joint for n, joint in scene.joints.items() if getattr(joint, "coulomb", 0.0) or getattr(joint, "mu", 0.0)
+    }
     if not rubbing:
         return None, ""
     sharp, sizes = SHARPER, {"revolute": 1.0, "slider": span(scene)}

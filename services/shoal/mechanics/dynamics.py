@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import literal_unroll, njit
 
-from shoal.mechanics import applied, constraints, forces
+from shoal.mechanics import applied, constraints, forces, rubbing
 from shoal.mechanics.derived import Derived, derive, fold
 from shoal.mechanics.elements import families
 from shoal.mechanics.least import principle
@@ -33,7 +33,7 @@ class Work(NamedTuple):
     beginning of the step. stage: room of four states for integrators. element: room of 64 rows or more. memory: the
     continuous angle of every force element, (forces, lanes). power: dissipated minus supplied power
     [W], (lanes,). energy: kinetic, elastic, potential [J], (3, lanes). until: the last instant [s] before
-    functions of time may jump, (1,); what is asked for later, is asked for then.
+    functions of time may jump, (1,); what is asked for later, is asked for then. rubbing: of friction by joint forces.
     """
 
     home: Array
@@ -48,6 +48,7 @@ class Work(NamedTuple):
     energy: Array
     until: Array
     gauss: least.GaussWork
+    rubbing: Array
 
 
 def work_space(tile: Tile, m: Arrays) -> Work:
@@ -79,6 +80,7 @@ def work_space(tile: Tile, m: Arrays) -> Work:
         energy,
         np.full(1, np.inf),
         least.work_space(width, m),
+        rubbing.room(width, m.rows, m.rubbing.size),
     )
 
 
@@ -158,10 +160,30 @@ def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, t
     if m.gates.sought != 0:
         principle.state(tile, m, w.gauss, t, z, zdot)
         gate.ask(m.gates.sought, t, a)
+    elif m.rubbing.size > 0:
+        _rub(tile, m, w, t, z, zdot, a, tolerance)
     else:
         principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
     if m.driven:
         constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)
+
+
+@njit(cache=True, error_model="numpy")
+def _rub(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, a: Array, tolerance: float) -> None:
+    """The acceleration with friction by the force of joints, see `rubbing`."""
+    width, r = len(tile), m.rubbing
+    rubbing.prepare(tile, r, m.forces, m.derived, m.rows, m.force_rows, z, zdot, w.memory, w.element, a, w.rubbing)
+    rounds, away = 0, 1.0
+    while rounds < rubbing.ROUNDS and away > rubbing.SETTLED:
+        rubbing.load(tile, r, m.unknowns, m.rows, w.gauss.multiplier, w.rubbing, a)
+        principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
+        away, rounds = 0.0, rounds + 1
+        for lane in range(width):
+            away = max(away, rubbing.change(tile, r, lane, m.rows, w.gauss.multiplier, w.rubbing))
+    for lane in range(width):
+        if not rubbing.change(tile, r, lane, m.rows, w.gauss.multiplier, w.rubbing) <= rubbing.LOST:
+            a[lane] = np.nan
+    rubbing.add_power(tile, r, m.rows, w.rubbing, w.power)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -217,7 +217,7 @@ def measure(tile: Tile, forces: Forces, number: int, z: Array, memory: Array, w:
 
 
 @njit(cache=True, error_model="numpy")
-def _rate(tile: Tile, forces: Forces, number: int, zdot: Array, w: Array) -> None:
+def slip(tile: Tile, forces: Forces, number: int, zdot: Array, w: Array) -> None:
     """g' from the gradient in w."""
     rows, rate = side(forces), value_row(forces) + 1
     clear(tile, w, rate)
@@ -259,7 +259,7 @@ def add_force(
         measure(tile, forces, number, z, memory, w)
         drive = 0.0
         if moving:
-            _rate(tile, forces, number, zdot, w)
+            slip(tile, forces, number, zdot, w)
             drive = evaluate(functions, forces.drive[number], t, 0)
         else:
             for lane in range(width):
@@ -388,7 +388,7 @@ def damping(tile: Tile, forces: Forces, z: Array, zdot: Array, w: Array, out: Ar
     width, rows = len(tile), side(forces)
     for number in range(forces.size):
         _gradient(tile, forces, number, z, w)
-        _rate(tile, forces, number, zdot, w)
+        slip(tile, forces, number, zdot, w)
         law = LAW * number * width
         start = (first + rows * rows * number) * width
         for lane in range(width):

@@ -39,10 +39,11 @@ from shoal.scene.record import Vector3
 
 @dataclass(frozen=True)
 class Meet:
-    """Two places coincide."""
+    """Two places coincide. held: by constraints, as somebody wants to know the force."""
 
     first: Attachment
     second: Attachment
+    held: bool = False
 
     @property
     def within(self) -> bool:
@@ -54,17 +55,19 @@ class Meet:
 class Along:
     """The second place stays on a line through the first; direction: of the line in the first body's frame [rad].
 
-    In space the direction may be an axis as it points at the start.
+    In space the direction may be an axis as it points at the start. held: by a constraint, as somebody wants to know
+    the force.
     """
 
     first: Attachment
     second: Attachment
     direction: Number | Vector3
+    held: bool = False
 
     @property
     def is_fixed(self) -> bool:
         """Whether the line rests on the ground."""
-        return self.first.body == GROUND and not isinstance(self.first.point, str)
+        return self.first.body == GROUND and not isinstance(self.first.point, str) and not self.held
 
 
 @dataclass(frozen=True)
@@ -177,7 +180,7 @@ Condition = Meet | Along | Apart | Turned | Geared | Sum
 
 
 def _slider(joint: Slider) -> list[Condition]:
-    line = Along(joint.first, joint.second, joint.direction)
+    line = Along(joint.first, joint.second, joint.direction, bool(np.any(joint.mu)))
     return [line, Turned(joint.first, joint.second)] if joint.rotation == "locked" else [line]
 
 
@@ -189,7 +192,7 @@ def _gear(joint: Gear) -> list[Condition]:
 
 
 CONDITIONS: dict[type, Callable[[Any], list[Condition]]] = {
-    Revolute: lambda joint: [Meet(joint.first, joint.second)],
+    Revolute: lambda joint: [Meet(joint.first, joint.second, bool(np.any(joint.mu)))],
     Weld: lambda joint: [Meet(joint.first, joint.second), Turned(joint.first, joint.second, joint.angle)],
     Slider: _slider,
     Distance: lambda joint: [Apart(joint.first, joint.second, joint.length)],

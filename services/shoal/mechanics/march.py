@@ -258,7 +258,7 @@ def _account(
     if free:
         for x in (LOBATTO, 1.0 - LOBATTO):
             interpolate(tile, scheme, m, w, k.past, x, taken, k.q, k.v)
-            if m.driven:
+            if m.driven or m.rubbing.size > 0:
                 gates.acceleration(tile, m, w, begin + x * taken, k.q, k.v, tolerance, w.stage)
             else:
                 gates.force(tile, m, w, begin + x * taken, k.q, k.v, w.stage)

@@ -26,6 +26,7 @@ from shoal.mechanics.numerics import alike, gate, sparse
 from shoal.mechanics.numerics.alike import Alike
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, Array, Flags, Index, Tile, pack, packed, varies
+from shoal.mechanics.rubbing import Rubbing
 from shoal.mechanics.saddle import Saddle
 from shoal.scene import Scene
 
@@ -77,6 +78,7 @@ class Arrays(NamedTuple):
     functions: Functions
     constraints: Constraints
     saddle: Saddle
+    rubbing: Rubbing
 
 
 @njit(cache=True)
@@ -124,6 +126,7 @@ class Model:
     marker_rows: Index
     method: int
     baumgarte: float
+    rubbing: Rubbing
     slowed: int = 0
     shared_tiles: dict[int, Arrays] = field(default_factory=dict, compare=False, repr=False)
     """Arrays by tile width, where no number but the initial state depends on the lane."""
@@ -131,7 +134,7 @@ class Model:
     @property
     def varies(self) -> bool:
         """Whether lanes differ in more than their initial state."""
-        parts = self.derived, self.elements, self.forces, self.applied, self.constraints
+        parts = self.derived, self.elements, self.forces, self.applied, self.constraints, self.rubbing
         return varies((self.mass_values, self.weight, *parts))
 
     @property
@@ -228,7 +231,7 @@ class Model:
         inverse = factor[: self.unknowns * len(tile)]
         if not np.all((inverse > 0) & np.isfinite(inverse)):
             raise InputError(f"{self.scene.name}: the mass matrix is singular; some coordinate moves no mass")
-        forces = self.elements, self.forces, self.applied, self.functions, self.constraints, self._saddle
+        forces = self.elements, self.forces, self.applied, self.functions, self.constraints, self._saddle, self.rubbing
         nobody = np.zeros(len(self.elements), dtype=np.int64)
         return Arrays(
             gate.home(),

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.mechanics import forces
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.gates import Seek, Sought, ready
@@ -59,6 +60,10 @@ class Workspace:
         seek: Callable[[Arrays, Work], Seek] | None = None,
         spare: int = 0,
     ) -> None:
+        if seek is not None and model.rubbing.size:
+            raise InputError(
+                "solver.acceleration: swarms know no friction by the forces of joints (mu); use projection"
+            )
         self._model, self._part, self._tile = model, part, tile
         arrays, room = at_start(model, tile, part)
         if spare:

@@ -36,6 +36,9 @@ def check_dimensions(scene: Any) -> None:
             raise ValueError(f"joints.{name}.kind: {joint.kind} is a joint of the plane; say dimensions: 2")
         if joint.kind != "coupling" and joint.first.body == joint.second.body:
             raise ValueError(f"joints.{name}: closes {joint.first.body!r} upon itself; that is for the plane")
+    for name, joint in scene.joints.items():
+        if getattr(joint, "mu", 0.0):
+            raise ValueError(f"joints.{name}.mu: is for scenes in the plane; say dimensions: 2, or use coulomb")
     for name, load in scene.loads.items():
         for field in ("first_to", "second_to"):
             if getattr(load, field, None) is not None:

@@ -46,7 +46,8 @@ class Revolute(Tie):
     """Two places stay together; the bodies turn freely but for friction.
 
     axis: in space, that they turn about, as it points at the start. friction: viscous [N m s/rad]; coulomb: dry
-    friction torque [N m], smoothed as tanh(rate / coulomb_speed).
+    friction torque [N m], smoothed as tanh(rate / coulomb_speed); mu: in the plane, coefficient of dry friction at a
+    pin of this radius [m], whose torque is mu * radius times the force of the joint, smoothed alike.
     """
 
     kind: Literal["revolute"] = "revolute"
@@ -54,7 +55,15 @@ class Revolute(Tie):
     friction: NonNegative = 0.0
     coulomb: NonNegative = 0.0
     coulomb_speed: Positive = 1e-2
+    mu: NonNegative = 0.0
+    radius: Positive | None = None
     axis: Axis = Z
+
+    @model_validator(mode="after")
+    def _pin_is_told(self) -> Revolute:
+        if self.mu and self.radius is None:
+            raise ValueError("radius is missing; friction by mu acts at the radius of the pin (m)")
+        return self
 
 
 class Spherical(Tie):
@@ -120,7 +129,8 @@ class Slider(Tie):
 
     direction: angle [rad] of the line in the first body's frame. axis: in space, the line itself, as it points at the
     start, instead. rotation: whether the second body may turn against the first. friction: viscous [N s/m]; coulomb
-    [N], smoothed as tanh(speed / coulomb_speed).
+    [N], smoothed as tanh(speed / coulomb_speed); mu: in the plane, coefficient of dry friction, in proportion to the
+    force across the line, smoothed alike.
     """
 
     kind: Literal["slider"] = "slider"
@@ -131,6 +141,7 @@ class Slider(Tie):
     friction: NonNegative = 0.0
     coulomb: NonNegative = 0.0
     coulomb_speed: Positive = 1e-2
+    mu: NonNegative = 0.0
 
 
 class Distance(Tie):

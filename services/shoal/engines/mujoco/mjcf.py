@@ -280,6 +280,7 @@ class Mjcf:
 
     def _forces(self, link: _Link, joint: Any) -> dict[str, str]:
         """Friction of a joint, and the torsion springs that act in it."""
+        self._refuse_rubbing(link.joint, joint)
         springs = self._springs.get(link.joint, [])
         stiffness = sum(spring[0] for spring in springs)
         moment = sum(spring[0] * spring[2] for spring in springs)
@@ -291,6 +292,10 @@ class Mjcf:
         }
         sticking = {"solreffriction": self._stiff()["solref"]} if joint.coulomb else {}
         return {name: repr(float(value)) for name, value in found.items() if value} | sticking
+
+    def _refuse_rubbing(self, name: str, joint: Any) -> None:
+        if getattr(joint, "mu", 0.0):
+            raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
 
     def _shapes(self, element: ElementTree.Element, name: str) -> None:
         """What is seen of a body and touches nothing: a rod's cuboid, or lines from a body's centre to its points."""
@@ -350,6 +355,7 @@ class Mjcf:
         """A joint that closes a loop, by constraints."""
         bodies = {"body1": _called(joint.first.body), "body2": _called(joint.second.body)}
         masses = any(isinstance(self.scene.bodies.get(side.body), PointMass) for side in (joint.first, joint.second))
+        self._refuse_rubbing(name, joint)
         if getattr(joint, "friction", 0.0) or getattr(joint, "coulomb", 0.0):
             raise InputError(f"joints.{name}.friction: MJCF has none in a joint that closes a loop")
         if isinstance(joint, Weld) and not masses:

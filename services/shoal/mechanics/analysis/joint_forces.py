@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,16 +46,22 @@ Friction = tuple[Array, dict[str, tuple[Array, Array]]]
 
 
 def friction(
-    bodies: FreeBodies, at: Array, rate: Array, rubbing: Callable[[FreeBodies, Revolute | Slider, Array], Rubbing]
+    bodies: FreeBodies,
+    at: Array,
+    rate: Array,
+    rubbing: Callable[[FreeBodies, Revolute | Slider, Array], Rubbing],
+    held: Mapping[str, float],
 ) -> Friction:
-    """Of all joints."""
+    """Of all joints. held: the force of those [N] whose friction depends on it."""
     total = np.zeros(bodies.unknowns)
     each: dict[str, tuple[Array, Array]] = {}
     for name, joint in bodies.scene.joints.items():
-        if isinstance(joint, Revolute | Slider) and (joint.friction or joint.coulomb):
+        if isinstance(joint, Revolute | Slider) and (joint.friction or joint.coulomb or joint.mu):
             gradient, force, torque = rubbing(bodies, joint, at)
             speed = float(gradient @ rate)
-            drag = -joint.friction * speed - joint.coulomb * float(np.tanh(speed / joint.coulomb_speed))
+            arm = joint.radius or 0.0 if isinstance(joint, Revolute) else 1.0
+            dry = joint.coulomb + joint.mu * arm * held.get(name, 0.0)
+            drag = -joint.friction * speed - dry * float(np.tanh(speed / joint.coulomb_speed))
             total += drag * gradient
             each[name] = drag * force, drag * torque
     return total, each

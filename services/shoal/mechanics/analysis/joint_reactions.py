@@ -18,10 +18,11 @@ from shoal.mechanics.analysis import plane_forces, space_forces
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.freedom import Metric
-from shoal.mechanics.analysis.joint_forces import friction, place
+from shoal.mechanics.analysis.joint_forces import Component, friction, place
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
-from shoal.scene import Attachment, Coupling
+from shoal.mechanics.rubbing import ROUNDS, SETTLED
+from shoal.scene import Attachment, Coupling, Scene
 from shoal.scene.joints import places
 from shoal.trajectory import plain
 
@@ -98,21 +99,26 @@ def reactions_of(
     here: Any = plane_forces if bodies.scene.dimensions == plane.DIMENSIONS else space_forces
     told = joints.of_scene(bodies.scene)
     unknown = [part for name, one in told for part in here.components(bodies, name, one, at)]
-    known, rubbed = friction(bodies, at, rate, here.rubbing)
     force = free.at(at, rate, t).force
     inertia = bodies.mass @ change
     displacements = here.displacements(bodies, at, lever)
-    missing = displacements @ (inertia - force - known)
-    scale = max(
-        float(np.linalg.norm(displacements @ part)) for part in (inertia, force, known, force - free.at(at).elastic)
-    )
     count = len(unknown)
     columns = np.zeros((len(displacements), count))
     for k, part in enumerate(unknown):
         columns[:, k] = displacements @ part.gradient * (lever if part.turns else 1.0)
     left, sizes, right = np.linalg.svd(columns, full_matrices=True)
     rank = int(np.sum(sizes > RANK * sizes[0])) if count and len(sizes) else 0
-    solution = right[:rank].T @ ((left[:, :rank].T @ missing) / sizes[:rank])
+    held: dict[str, float] = {}
+    for _ in range(ROUNDS):
+        known, rubbed = friction(bodies, at, rate, here.rubbing, held)
+        missing = displacements @ (inertia - force - known)
+        solution = right[:rank].T @ ((left[:, :rank].T @ missing) / sizes[:rank])
+        last, held = held, _pressed(bodies.scene, unknown, solution)
+        if all(abs(size - last.get(name, 0.0)) <= SETTLED * size for name, size in held.items()):
+            break
+    scale = max(
+        float(np.linalg.norm(displacements @ part)) for part in (inertia, force, known, force - free.at(at).elastic)
+    )
     rest = float(np.linalg.norm(missing - columns @ solution))
     free_play = np.linalg.norm(right[rank:], axis=0) if rank < count else np.zeros(count)
     found = {}
@@ -135,6 +141,16 @@ def reactions_of(
         )
     names = redundant_constraints(evaluator, q, t)
     return Reactions(t, found, count - rank, names, rest / scale if scale > 0 else 0.0)
+
+
+def _pressed(scene: Scene, unknown: list[Component], solution: Array) -> dict[str, float]:
+    """The force [N] of each joint whose friction depends on it."""
+    found = {}
+    for name, joint in scene.joints.items():
+        if getattr(joint, "mu", 0.0):
+            mine = [solution[k] * part.force for k, part in enumerate(unknown) if part.joint == name and not part.turns]
+            found[name] = float(np.linalg.norm(sum(mine)))
+    return found
 
 
 def redundant_constraints(evaluator: Evaluator, q: Array, t: float = 0.0) -> tuple[str, ...]:

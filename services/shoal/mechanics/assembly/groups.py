@@ -55,7 +55,7 @@ def joint_points(scene: Scene) -> list[JointPoint]:
     """Group the places that joints let coincide, or keep on a line of the ground, transitively."""
     groups: list[JointPoint] = []
     for name, condition in joints.of_scene(scene):
-        if isinstance(condition, Meet) and not condition.within:
+        if isinstance(condition, Meet) and not (condition.within or condition.held):
             _merge(groups, JointPoint(name, [place_of(scene, side) for side in (condition.first, condition.second)]))
         elif isinstance(condition, Along) and condition.is_fixed:
             line = name, plane.vector(*scene.location(condition.first)), _direction(scene, condition)

@@ -49,7 +49,7 @@ def _keep(scene: Scene, name: str, condition: Meet | Along | Apart | Sum, result
         terms.dot(name, fixed(axes[0][:, None]), total, 1, drive=condition.value.through("neg"))
     elif not isinstance(condition, Meet):  # which is shared, or a constraint where its loop closes
         raise joints.unknown(condition)
-    elif condition.within:
+    elif condition.within or condition.held:
         terms.vanish(name, result.gap(scene, condition))
 
 

@@ -62,12 +62,16 @@ class Loads:
         self.numbers: list[list[int]] = []
         self.laws: list[Number] = []
         self.angles: list[Number] = []
+        self.rubbing: list[tuple[str, int, Number]] = []
+        """Joints whose friction depends on their force, its element's number, and mu, of a pin times its radius."""
         self.fixed: list[tuple[int, Number, int]] = []
         self.following: list[tuple[list[int], Number, int]] = []
         self.turning: list[tuple[list[int], int]] = []
         self.twisting: list[tuple[list[int], int]] = []
         for name, joint in scene.joints.items():
-            if isinstance(joint, Revolute | Slider) and (np.any(joint.friction) or np.any(joint.coulomb)):
+            if isinstance(joint, Revolute | Slider) and any(
+                np.any(size) for size in (joint.friction, joint.coulomb, joint.mu)
+            ):
                 self._friction(name, joint)
         for name, load in scene.loads.items():
             if type(load) not in LOADS:
@@ -76,6 +80,9 @@ class Loads:
 
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
         law = [0.0, 0.0, joint.friction, 0.0, joint.coulomb, joint.coulomb_speed, 0.0]
+        if np.any(joint.mu):
+            arm: Number = joint.radius if isinstance(joint, Revolute) else 1.0
+            self.rubbing.append((name, len(self.kinds), joint.mu * arm))
         if isinstance(joint, Revolute):
             self._angle(name, joint.first, joint.second, law, joint.axis)
             return

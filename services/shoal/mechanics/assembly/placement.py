@@ -30,7 +30,7 @@ from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
 from shoal.mechanics.assembly.rods import place_rod, rod_axis
 from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.frames import Place, PointFrame, RigidFrame
-from shoal.mechanics.joints import Along
+from shoal.mechanics.joints import Along, Meet
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.start.start import started
 from shoal.scene import GROUND, Function, PointMass, Rod, Scene
@@ -101,13 +101,14 @@ def _next(scene: Scene, waiting: list[str], touching: dict[str, list[JointPoint]
 
 
 def _rail(scene: Scene, name: str, result: Placement) -> tuple[Array, Array, Place] | None:
-    """Initial base point and velocity of a line that the body is on, and the body's place on it."""
-    for _, line in joints.of_scene(scene):
-        if not isinstance(line, Along) or line.second.body != name:
-            continue
-        if line.first.body == GROUND or line.first.body in result.frames:
-            position, velocity = result.start_of(result.point(scene, line.first))
-            return position, velocity, scene.location(line.second)
+    """Initial place and velocity of what constraints hold the body to, a line's point or a pin, and its own place."""
+    for _, held in joints.of_scene(scene):
+        ways = [(held.first, held.second)] if isinstance(held, Along | Meet) else []
+        ways += [(held.second, held.first)] if isinstance(held, Meet) else []
+        for base, mine in ways:
+            if mine.body == name and (base.body == GROUND or base.body in result.frames):
+                position, velocity = result.start_of(result.point(scene, base))
+                return position, velocity, scene.location(mine)
     return None
 
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.mechanics.halts import Halts, halts
 from shoal.mechanics.integrators import (
     dop853,
@@ -35,6 +36,8 @@ INTEGRATORS: dict[str, Any] = {
 }
 
 
+BY_ACCELERATION = ("dop853", "radau5", "rk4", "leapfrog")
+"""Those that know a machine by its acceleration alone, and so whatever that depends on."""
 STRIDES = 100
 """With functions of time, an adaptive integrator takes at least so many steps unless the scene says otherwise."""
 
@@ -58,6 +61,8 @@ def pick(solver: Solver, model: Model, limit: Callable[[Model, Facts], float]) -
 
     limit: largest stable step of a model under an integrator's facts, `stability.step_limit`.
     """
+    if solver.integrator == "auto" and model.rubbing.size:
+        return Choice("dop853", "auto: friction depends on the forces of joints", np.inf)
     if solver.integrator != "auto":
         return Choice(solver.integrator, "named by the scene", limit(model, facts(solver.integrator)))
     if model.flexible == 0:
@@ -76,7 +81,13 @@ def choose(solver: Solver, model: Model, tile: Tile, lanes: slice, name: str | N
     if solver.max_step is None and model.functions.size > 0:
         # A machine at rest must not leap over what a drive does later.
         solver = solver.model_copy(update={"max_step": solver.duration / STRIDES})
-    return INTEGRATORS[name or solver.integrator].settings(solver, model, tile, lanes)
+    name = name or solver.integrator
+    if model.rubbing.size and name not in BY_ACCELERATION:
+        raise InputError(
+            f"solver.integrator: {name} knows no friction by the forces of joints (mu); "
+            f"use {' or '.join(BY_ACCELERATION)}"
+        )
+    return INTEGRATORS[name].settings(solver, model, tile, lanes)
 
 
 def halting(solver: Solver, model: Model, name: str, end: float) -> Halts:
