@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shoal.response.enclosure import Enclosure, enclosure, foretold, widened
+from shoal.response.enclosure import Enclosure, enclosure, foretold
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.methods.bounds import HOPELESS
 from shoal.response.result import Bounds
@@ -35,8 +35,6 @@ def bounds_of(study: Study, found: Found) -> Bounds:
     lower, upper = values.min(axis=0), values.max(axis=0)
     unknown = np.full(len(lower), np.nan)
     told = Enclosure(lower, upper, unknown, unknown, unknown)
-    if found.missed is not None:
-        told = widened(study, found.missed)
     if surrogate is not None and named is not None and error is not None:
         told = (foretold if found.foretold else enclosure)(study, surrogate, named, error)
         at_lower = np.where((told.lower < lower)[:, None], named.at_lower, at_lower)

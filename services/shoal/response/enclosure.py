@@ -75,16 +75,6 @@ def foretold(study: Study, _: Surrogate, found: Extremes, error: Array) -> Enclo
     return Enclosure(lower, upper, low, high, np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0))
 
 
-def widened(study: Study, missed: Array) -> Enclosure:
-    """Attained bounds and what a method says that it may have missed below and above, (2, columns)."""
-    values = study.runs.values
-    lower, upper = values.min(axis=0), values.max(axis=0)
-    width = study.widths(values)
-    beyond = missed.max(axis=0)
-    gap = np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0)
-    return Enclosure(lower, upper, lower - missed[0], upper + missed[1], gap)
-
-
 def _away(wanted: Array, germs: Array, slope: float) -> Array:
     """Share of the full error at each place: the distance to the nearest run times a slope, at most one."""
     nearest = np.full(len(wanted), np.inf)

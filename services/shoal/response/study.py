@@ -91,7 +91,6 @@ class Found:
 
     surrogate: of the answers, if it made one; error: what that is off by at runs it had not seen, (columns,); why: what
     it did, in words; indices: first and total Sobol indices by sampling, (2, parameters, columns);
-    missed: by how much bounds may lie beyond the runs, where no surrogate tells, (2, columns), nan: unknown;
     coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,)
     """
 
@@ -100,7 +99,6 @@ class Found:
     error: Array | None = None
     indices: Array | None = None
     coarse: BoolArray | None = None
-    missed: Array | None = None
     foretold: bool = False
     share: float = 0.0
 

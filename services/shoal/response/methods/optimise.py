@@ -2,8 +2,8 @@
 
 A search polls a star around its best place and follows the parabolas along the axes (pattern search with a local model:
 Torczon, On the convergence of pattern search algorithms, SIAM Journal on Optimization 7, 1997). Searches at one place
-share one star, so that the place of an extremum at one instant is where the search at the next one begins. For
-comparison.
+share one star, so that the place of an extremum at one instant is where the search at the next one begins. What no
+search found, none can tell of: there is no gap. For comparison.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.response.study import SAFETY, Found, Study
+from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 
 STARTS = 3
@@ -31,14 +31,12 @@ CENTRES = 24
 class Searches:
     """Of every goal (lower bounds of all columns, then upper ones, all to be maximised) and start.
 
-    places: (starts, goals, parameters); best: what is reached there; arms: of the next star; last: what the last star
-    gained; all three (starts, goals)
+    places: (starts, goals, parameters); best: what is reached there; arms: of the next star; both (starts, goals)
     """
 
     places: Array
     best: Array
     arms: Array
-    last: Array
 
 
 def optimise(study: Study) -> Found:
@@ -53,11 +51,7 @@ def optimise(study: Study) -> Found:
     while runs.evaluations < most and np.any(searches.arms > FINEST):
         _poll(study, searches, most)
     ended = float(np.mean(searches.arms <= FINEST))
-    why = (
-        f"{STARTS} searches for every bound, {ended:.0%} of which came to their end; "
-        "the gap is how far two from different starts differ, a rule of thumb"
-    )
-    return Found(why, missed=_missed(searches))
+    return Found(f"{STARTS} searches for every bound, {ended:.0%} of which came to their end")
 
 
 def _goals(values: Array) -> Array:
@@ -74,7 +68,7 @@ def _begun(germs: Array, goals: Array) -> Searches:
         among = np.arange(len(germs)) if start == 0 else np.arange(start - 1, len(germs), STARTS - 1)
         at = among[goals[among].argmax(axis=0)]
         places[start], best[start] = germs[at], goals[at, every]
-    return Searches(places, best, np.full(best.shape, WIDEST), np.full(best.shape, np.inf))
+    return Searches(places, best, np.full(best.shape, WIDEST))
 
 
 def _poll(study: Study, searches: Searches, most: int) -> None:
@@ -101,7 +95,6 @@ def _poll(study: Study, searches: Searches, most: int) -> None:
             reached = goals[at, these]
             gain = np.maximum(reached - searches.best[start, these], 0.0)
             searches.places[start, these], searches.best[start, these] = germs[at], reached
-            searches.last[start, these] = gain
             slow = gain <= 1e-3 * arm * size[these]
             searches.arms[start, these[slow]] /= 4
     if len(runs.germs) == made:
@@ -141,12 +134,3 @@ def _tops(study: Study, searches: Searches, centre: Array, arm: float, served: A
     cells = np.round(wanted / (0.1 * arm)).astype(np.int64)
     _, first, count = np.unique(cells, axis=0, return_index=True, return_counts=True)
     return np.asarray(wanted[first[np.argsort(-count, kind="stable")[: 2 * parameters + 2]]])
-
-
-def _missed(searches: Searches) -> Array:
-    """By how much each bound may lie further out, (2, columns): a search that agrees makes it likely, no more."""
-    spread = searches.best.max(axis=0) - searches.best.min(axis=0)
-    left = np.where(searches.arms > FINEST, searches.last, 0.0).max(axis=0)
-    unfinished = np.isinf(left)
-    short = np.where(unfinished, np.nan, spread + SAFETY * left)
-    return short.reshape(2, -1)
