@@ -202,3 +202,28 @@ def test_failed_runs_are_told_of() -> None:
 def test_methods_refuse_what_they_cannot(method: str, known: Marginal) -> None:
     with pytest.raises(InputError, match="vary: method"):
         respond(oscillator, inputs(k=known), 3, method=method)
+
+
+def test_searches_reach_maxima_inside_and_at_corners() -> None:
+    """Two hills of which the lower is the wider, a valley inside and a slope: extremes by hand."""
+
+    def function(v: Mapping[str, Array]) -> Array:
+        x, y = v["x"], v["y"]
+        hills = np.exp(-30 * ((x - 0.6) ** 2 + (y + 0.5) ** 2)) + 0.8 * np.exp(-3 * ((x + 0.5) ** 2 + (y - 0.4) ** 2))
+        return np.stack([hills, (x - 0.3) ** 2 + (y + 0.2) ** 2 + 0.5 * x * y, 2 * x - y], axis=1)
+
+    answer = respond(model(function), inputs(x=Interval(-1.0, 1.0), y=Interval(-1.0, 1.0)), 3, method="optimise")
+    found = answer.bounds
+    assert found is not None
+    # The gradient of the quadratic vanishes at [[2, 0.5], [0.5, 2]]^-1 [0.6, -0.4].
+    inner = np.linalg.solve([[2, 0.5], [0.5, 2]], [0.6, -0.4])
+    least = function({"x": inner[:1], "y": inner[1:]})[0, 1]
+    assert found.lower[1] == pytest.approx(least, abs=1e-6)
+    assert found.at_lower[1] == pytest.approx(inner, abs=2e-3)
+    assert (found.lower[2], found.upper[2]) == pytest.approx((-3.0, 3.0))
+    fine = np.linspace(0.5, 0.7, 401)
+    x, y = np.meshgrid(fine, -fine)
+    top = function({"x": x.ravel(), "y": y.ravel() + 0.1})[:, 0].max()
+    assert found.upper[0] == pytest.approx(top, abs=1e-5)
+    again = function({"x": found.at_upper[:, 0], "y": found.at_upper[:, 1]})
+    assert np.diagonal(again) == pytest.approx(found.upper, abs=1e-14)
