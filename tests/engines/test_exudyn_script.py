@@ -134,7 +134,7 @@ def test_scripts_move_as_both_engines(
     agrees(machine, tmp_path, capsys, within)
 
 
-REPRESENTATIVE = "flexible-double-pendulum", "flexible-spherical-double-pendulum", "andrews-squeezer"
+REPRESENTATIVE = "flexible-double-pendulum", "andrews-squeezer"
 SINGULAR = "equal-slider-crank", "n-four-bar-2", "n-four-bar-40", "parallelogram"
 """Exudyn does not pass their singular positions."""
 

@@ -214,6 +214,7 @@ uncertain: {scene: single-pendulum, vary: {initial.OA.angle: "-0.1:0.1"}, at: [0
 """
 
 
+@pytest.mark.slow
 def test_what_else_there_is_of_a_machine_is_logged() -> None:
     """The cheapest model within a tolerance, its place of rest, a design of a measurement; each can be repeated."""
     duration = "{solver.duration: 0.1}"
@@ -259,6 +260,7 @@ def test_forms_follow_the_library(tmp_path: Path, study: Any) -> None:
             assert ("lever" in offered()) == (command[0] == "add")
 
 
+@pytest.mark.slow
 def test_an_identification_is_repeated_with_all_its_figures(study: Any) -> None:
     again = rerun(study.run_id)
     assert not again.different

@@ -80,6 +80,7 @@ def test_the_same_seed_gives_the_same_answer() -> None:
     assert one.evaluations == other.evaluations == 4040
 
 
+@pytest.mark.slow
 def test_a_rigid_model_of_a_flexible_machine_is_not_passed_off_as_exact() -> None:
     values = {"bodies.OA.element": "rigid", "bodies.AB.element": "rigid", "solver.integrator": "rk4"}
     estimate = run("paper-case-1", "least-squares", values=values)
@@ -117,6 +118,7 @@ def test_unknown_method_is_refused() -> None:
 
 
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recordings are not here")
+@pytest.mark.slow
 def test_real_double_pendulum_gives_the_published_ratios() -> None:
     """Kaheman et al. 2022, arXiv:2205.06231: J2/J1 .5568, C/J1 .4913, G1/J1 58.96, G2/J1 27.90."""
     estimate = identify(load_problem("kaheman-double"), data=str(RECORDINGS / "double_1kHz.csv.gz"))

@@ -189,6 +189,7 @@ def test_force_and_tangent_are_derivatives(vectors: int, axial: int, bending: in
     assert abs(np.imag(np.conj(at) * f).sum()) < 1e-12 * np.abs(force).max()
 
 
+@pytest.mark.slow
 @every_rule
 @pytest.mark.parametrize("seed", range(3))
 def test_damping_takes_the_power_of_its_matrix(vectors: int, axial: int, bending: int, seed: int) -> None:
@@ -211,6 +212,7 @@ def test_damping_takes_the_power_of_its_matrix(vectors: int, axial: int, bending
     )
 
 
+@pytest.mark.slow
 @orders
 def test_lanes_equal_singles(vectors: int) -> None:
     width, rule = len(WIDE), (vectors, 5, 3 if vectors == CUBIC else 5)

@@ -87,6 +87,7 @@ def test_force_and_stiffness_are_derivatives_and_turn_with_the_rod(seed: int) ->
     np.testing.assert_allclose(stiffness, columns.T, atol=1e-7 * np.abs(stiffness).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twist", [1e-3, 0.5, 1.5])
 def test_a_uniform_twist_has_the_energy_of_saint_venant(twist: float) -> None:
     z = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [LENGTH, 0, 0], [1, 0, 0], [0, np.cos(twist), np.sin(twist)]])

@@ -72,6 +72,7 @@ def _state(seed: int) -> Any:
     return np.array(nodes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_force_stiffness_and_damping_are_derivatives_and_turn_with_the_rod(seed: int) -> None:
     z, rate, still = _state(seed), np.random.default_rng(seed + 9).normal(size=(6, 2)), np.zeros((6, 2))

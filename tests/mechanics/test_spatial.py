@@ -129,6 +129,7 @@ def _columns(function: Any, z: Any, h: float) -> Any:
     return np.array([(np.ravel(function(z + unit)) - np.ravel(function(z - unit))) / (2 * h) for unit in units]).T
 
 
+@pytest.mark.slow
 @every
 @pytest.mark.parametrize("seed", range(3))
 def test_force_and_tangent_are_derivatives_of_the_energy(case: str, seed: int) -> None:

@@ -42,6 +42,7 @@ def test_bounds_of_all_coordinates_are_those_of_the_equations() -> None:
         assert upper == pytest.approx(known.max(axis=0)[:, k], abs=1e-7)
 
 
+@pytest.mark.slow
 def test_statistics_and_the_probability_of_a_limit_on_z() -> None:
     bound = float(places(-9.85)[1, 2])
     found = uncertain(PENDULUM, {"gravity.2": "uniform(-9.9, -9.7)"}, TIMES, limits=[f"A.z > {bound:.12f}"])

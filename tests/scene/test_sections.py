@@ -92,7 +92,9 @@ SAID = {
 }
 
 
-@pytest.mark.parametrize("element", ["ancf-cable", "ancf-quintic", "director-rod"])
+@pytest.mark.parametrize(
+    "element", ["ancf-cable", "ancf-quintic", pytest.param("director-rod", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("name", list(SAID))
 def test_a_cantilever_swings_as_its_section_tells(name: str, element: str) -> None:
     """The first frequency of Bernoulli and Euler's cantilever, 1.87510^2 sqrt(EI/(rho A))/(2 pi L^2)."""

@@ -17,6 +17,7 @@ EXUDYN = {"A": [0.677293, -0.321390, -0.661664], "B": [1.920270, 0.149686, -2.13
 """Ends of both rods at 0.5 s, by 32 and 64 cables of Exudyn and 8 and 16 quintic elements, +-1e-6 m."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("element", ["ancf-cable", "director-rod", "rigid"])
 def test_a_spherical_pendulum_of_rods_keeps_its_word_against_exudyn(element: str) -> None:
     """Whatever element the scene names; a rigid one says that the rods may twist, which these do not."""

@@ -14,13 +14,13 @@ from shoal_validation.selection.machines import draw
 from shoal_validation.selection.report import section
 from shoal_validation.selection.study import Case, study
 
-FEW = (1, 9, 11, 14, 21, 24)
+FEW, LONG = (1, 11, 14, 24), (9, 21)
 """Machines of one and two rods, stiff and soft."""
 BENT = (11, 14, 24)
 """Machines whose model is flexible, which Exudyn runs in seconds."""
 
 
-@pytest.mark.parametrize("seed", FEW)
+@pytest.mark.parametrize("seed", [*FEW, *(pytest.param(seed, marks=pytest.mark.slow) for seed in LONG)])
 def test_a_machine_keeps_its_word_at_a_fair_price(seed: int) -> None:
     case = study(draw(seed), exhaustive=True)
     assert case.met, case.reason

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -233,9 +232,8 @@ def _flexible(
         if len(refined) < 2:
             stiff, _ = _rigid(runs, rigid(runs.limits), tolerance, worst)
             return stiff, yardstick
-        for coarse, fine in pairwise(refined):
-            fine.error = distance(coarse.trajectory, fine.trajectory) + known
-        return min(refined[1:], key=lambda rung: rung.error), yardstick
+        refined[-1].error = distance(refined[-2].trajectory, refined[-1].trajectory) + known
+        return refined[-1], yardstick
     yardstick.error += known
     chosen = trim(runs, yardstick, rods, tolerance)
     if chosen is None:

@@ -109,6 +109,7 @@ def test_steps_that_never_agree_are_not_reliable() -> None:
     assert seen.doubt > 1e-2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_intervals_of_a_chaotic_record_rest_on_its_beginning_and_hold(seed: int) -> None:
     """Data by scipy's integrator; derivatives of 10 s, and intervals with them, are off by orders of magnitude."""

@@ -105,6 +105,7 @@ def test_a_twisted_rod_bends_to_the_side() -> None:
     assert found.marker("e")[1:] == pytest.approx([0.01 * ahead, 0.01 * aside], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_narrow_rod_buckles_sideways() -> None:
     """Prandtl's load 4.0126 sqrt(EI GJ)/L^2, raised by the bending before (Timoshenko and Gere, Stability, 6.3)."""
     width = 0.004

@@ -87,7 +87,8 @@ def _of(rung: Rung, limits: Mapping[str, str]) -> bool:
 
 
 def _uncapped(chosen: Selection) -> float:
-    plain = [rung for rung in chosen.rungs if rung.ok and not rung.scene.solver.inertia_cap]
+    mine = (rung for rung in chosen.rungs if _of(rung, chosen.limits))
+    plain = [rung for rung in mine if rung.ok and not rung.scene.solver.inertia_cap]
     return min((rung.work for rung in plain if rung.error <= chosen.tolerance), default=chosen.chosen.work)
 
 
