@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
-
-import httpx
-import pytest
-from shoal.api.settings import Settings
-
-# These modules are imported by workers too, which are fresh processes with the path of this one.
-sys.path.insert(0, str(Path(__file__).parents[1]))
-sys.path.insert(0, str(Path(__file__).parent))
 
 import engines_for_tests
+import httpx
+import pytest
 from one_body import pendulum
 from running import serving
+from shoal.api.settings import Settings
 
 
 @pytest.fixture(scope="session")

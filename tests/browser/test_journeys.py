@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
+from forms import choose
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import problem_names
 from shoal.scene.load import scene_library
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from forms import choose
 
 pytestmark = pytest.mark.slow
 

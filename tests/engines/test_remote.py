@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import socket
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
+from running import serving
 from shoal.api.settings import Settings
 from shoal.engines import get_engine
 from shoal.engines.gauss import GaussEngine
@@ -18,10 +17,6 @@ from shoal.engines.remote import RemoteEngine
 from shoal.engines.verification import verified
 from shoal.errors import ComputationError, InputError
 from shoal.scene import load_scene
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "api"))
-
-from running import serving
 
 
 @pytest.fixture(scope="module")

@@ -14,12 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from deployed import of_home
 from shoal_flows import jobs
 from shoal_flows.jobs import Cell
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "flows"))
-
-from deployed import of_home
 
 METHODS = ("least-squares", "iafsa")
 COMMAND = [sys.executable, "-c", "from shoal.cli import main; main()", "run", "identify", "--json"]

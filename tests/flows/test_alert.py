@@ -14,14 +14,11 @@ from typing import Any
 from urllib.request import urlopen
 
 import pytest
+from deployed import call, free_port
+from receivers import Kept, mail_server, web_hook
 from shoal.errors import InputError
 from shoal_flows import settings
 from shoal_flows.deployment import alert
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from deployed import call, free_port
-from receivers import Kept, mail_server, web_hook
 
 PATIENCE = 120.0
 SAID = 'library/arm, gauss, tip: failed; expected "at most" 1.0e-09 m; found <2.5e-01> m'

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
+from deployed import free_port
 from shoal.engines.pieces import joined, pieces
 from shoal.errors import ComputationError, InputError
 from shoal_flows import cluster, jobs, workers
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from deployed import free_port
 
 SCENE = "flexible-double-pendulum"
 VARY = {"initial.OA.angle": np.linspace(0.0, 1.5, 32), "initial.AB.angle": np.linspace(0.0, 1.5, 16)}

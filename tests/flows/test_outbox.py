@@ -13,6 +13,7 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
+from deployed import free_port
 from mlflow import MlflowClient
 from shoal.engines.compare import Comparison
 from shoal.errors import ComputationError, InputError
@@ -20,10 +21,6 @@ from shoal_flows.rerun import rerun
 from shoal_flows.tracking import outbox, record, store
 from shoal_flows.tracking.engines import log_comparison
 from shoal_flows.tracking.record import LOCAL, Run
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from deployed import free_port
 
 
 def use(monkeypatch: pytest.MonkeyPatch, address: str) -> None:

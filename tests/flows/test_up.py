@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -12,15 +11,6 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
-from shoal import doctor
-from shoal.identification import Measurement
-from shoal_flows import jobs
-from shoal_flows.jobs import Cell, Fit
-from shoal_flows.left import WHY
-from shoal_flows.tracking import outbox, store
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from background import (
     OFTEN,
     automate,
@@ -45,6 +35,12 @@ from deployed import (
     run_deployment,
     running,
 )
+from shoal import doctor
+from shoal.identification import Measurement
+from shoal_flows import jobs
+from shoal_flows.jobs import Cell, Fit
+from shoal_flows.left import WHY
+from shoal_flows.tracking import outbox, store
 
 WITHOUT = [word for name in SERVICES for word in ("--without", name)]
 METHODS = ("least-squares", "iafsa")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,6 @@ from shoal.cli import main
 from shoal.errors import InputError
 from shoal.scene.load import scene_library, scene_names
 from shoal.shelf import shelf
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "faults"))
 from test_hostile_files import HOSTILE, torque
 
 PENDULUM = (scene_library() / "single-pendulum.yaml").read_text(encoding="utf-8")

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
+import element_doors as doors
 import numpy as np
 import pytest
 from numba import njit
@@ -15,10 +14,6 @@ from shoal.mechanics.elements import ancf_full, families
 from shoal.mechanics.elements.ancf_full import LAWS
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-import element_doors as doors
 
 YOUNG, POISSON, SHEAR, LENGTH, HEIGHT, WIDTH, DENSITY = 2e8, 0.3, 0.85, 0.5, 0.06, 0.04, 5540.0
 laws = pytest.mark.parametrize("law", list(LAWS))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
+import element_doors as doors
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -15,10 +14,6 @@ from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import beam, cubic, families, quintic
 from shoal.mechanics.elements.beam import CUBIC, QUINTIC
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-import element_doors as doors
 
 EA, EI, LENGTH, ETA = 1.6e5, 5.3, 0.5, 2e-3
 RULES = [(CUBIC, 5, 3), (QUINTIC, 4, 4), (QUINTIC, 5, 5)]

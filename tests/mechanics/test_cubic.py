@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
+import element_doors as doors
 import numpy as np
 import pytest
 from shoal.engines.casadi.element import cable_element
 from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import beam, cubic, families
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-import element_doors as doors
 
 EA, EI, LENGTH = 1.6e5, 5.3, 0.5
 VARIANTS = {"full": (cubic.FULL, cubic.FULL_RULE), "reduced": (cubic.REDUCED, cubic.REDUCED_RULE)}

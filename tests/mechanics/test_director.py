@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
+import element_doors as doors
 import numpy as np
 import pytest
 from numba import njit
@@ -14,10 +13,6 @@ from shoal.mechanics.elements import director, families
 from shoal.mechanics.numerics.pointers import pointer, raw
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
 from shoal.scene.sections import Rectangle
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-import element_doors as doors
 
 YOUNG, SHEAR, HEIGHT, WIDTH, LENGTH = 2e8, 7.5e7, 0.04, 0.02, 0.5
 SECTION = Rectangle(HEIGHT, WIDTH)

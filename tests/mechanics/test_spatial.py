@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
+import element_doors as doors
 import numpy as np
 import pytest
 from shoal.mechanics.dynamics import ELEMENT_ROOM
 from shoal.mechanics.elements import beam, cubic, families, quintic, spatial_cubic, spatial_quintic
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, packed
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-import element_doors as doors
 
 EA, EI, LENGTH, ETA = 1.6e5, 5.3, 0.5, 2e-3
 Family = Any

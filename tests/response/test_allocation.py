@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +18,6 @@ from shoal.response.inputs import Inputs, Parameter
 from shoal.response.marginals import Frozen, Interval, Normal, Scaled, Uniform
 from shoal.response.worst import worst
 from shoal.scene import Scene, load_scene
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from thrown import ALONG, THROWN, UP
 
 HEIGHT = "initial.P.position.1"

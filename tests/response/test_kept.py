@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,6 @@ from shoal.response import Response, uncertain
 from shoal.response.kept import Keep
 from shoal.response.machine import Machine
 from shoal.scene import Scene
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from thrown import ALONG, THROWN, UP
 
 RANDOM = {UP: "normal(5,0.2)", ALONG: "normal(2,0.1)"}

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,9 +23,6 @@ from shoal.response.read import parameters
 from shoal.response.runs import Answers
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from thrown import ALONG, THROWN, UP
 
 Function = Callable[[Array], Array]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
+import one_body
 import pytest
 from shoal.errors import InputError
 from shoal.response import respond, uncertain
@@ -17,10 +16,6 @@ from shoal.response.runs import Answers
 from shoal.scene import Scene
 from shoal.trajectory import Array
 from shoal_validation.uncertain.problems import Motion, Problem, pendulum, rod, two
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
-import one_body
 
 PENDULUM = one_body.pendulum(
     gravity=[0.0, -9.81 / 0.98],

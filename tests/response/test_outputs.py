@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,6 @@ import pytest
 from shoal.pictures import files
 from shoal.response import Response, uncertain
 from shoal.scene import Scene
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from thrown import ALONG, THROWN, UP
 
 HEIGHT = "initial.P.position.1"

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import shoal
 from click.testing import CliRunner
+from one_body import pendulum
 from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.response import uncertain
 from shoal.scene import Scene, load_scene
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from one_body import pendulum
 
 PENDULUM = pendulum(
     gravity=[0.0, -9.81],

@@ -30,6 +30,13 @@ FEATURES = (
     "tapered flexible rods",
     "damped flexible rods",
 )
+_FIELDS = {
+    "coulomb": "dry friction",
+    "mu": "friction by joint forces",
+    "first_to": "angles of places",
+    "second_to": "angles of places",
+}
+"""Fields of joints and loads that need more than their kind where they are given."""
 _LAWS = {"elastic": "nonlinear springs", "length": "varying distances"}
 """Fields whose functions need more than functions of time."""
 
@@ -69,12 +76,8 @@ def _item(where: str, item: Joint | Load) -> Iterator[tuple[str, str]]:
     """The kind of a joint or a load, and what its fields need beyond that."""
     yield where, item.kind
     for field, value in item:
-        if field == "coulomb" and value:
-            yield f"{where}.{field}", "dry friction"
-        if field == "mu" and value:
-            yield f"{where}.{field}", "friction by joint forces"
-        if field in ("first_to", "second_to") and value is not None:
-            yield f"{where}.{field}", "angles of places"
+        if field in _FIELDS and value:
+            yield f"{where}.{field}", _FIELDS[field]
         if isinstance(value, Function) and (value.number is None or field == "elastic"):
             yield f"{where}.{field}", _LAWS.get(field, "functions of time")
 

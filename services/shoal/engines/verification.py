@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from shoal.mechanics.integrators import facts
 from shoal.mechanics.persist import DAMPED, as_run
 from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import STEP_MARGIN, stable_step
-from shoal.scene import GROUND, Rod, Scene, Solver
+from shoal.scene import GROUND, Revolute, Rod, Scene, Slider, Solver
 from shoal.scene.joints import places
 from shoal.trajectory import Array, Status, Trajectory, plain
 
@@ -160,8 +159,8 @@ def _friction_error(trajectory: Trajectory, scene: Scene, second: Second) -> tup
 
     It holds better still where even so it would creep far in the time of the run.
     """
-    rubbing: dict[str, Any] = {
-        n: joint for n, joint in scene.joints.items() if getattr(joint, "coulomb", 0.0) or getattr(joint, "mu", 0.0)
+    rubbing = {
+        name: joint for name, joint in scene.joints.items() if isinstance(joint, Revolute | Slider) and joint.dry
     }
     if not rubbing:
         return None, ""

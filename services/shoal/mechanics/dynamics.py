@@ -160,30 +160,27 @@ def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, t
     if m.gates.sought != 0:
         principle.state(tile, m, w.gauss, t, z, zdot)
         gate.ask(m.gates.sought, t, a)
-    elif m.rubbing.size > 0:
-        _rub(tile, m, w, t, z, zdot, a, tolerance)
     else:
-        principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
+        _constrain(tile, m, w, t, z, zdot, tolerance, a)
     if m.driven:
         constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)
 
 
-@njit(cache=True, error_model="numpy")
-def _rub(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, a: Array, tolerance: float) -> None:
-    """The acceleration with friction by the force of joints, see `rubbing`."""
-    width, r = len(tile), m.rubbing
-    rubbing.prepare(tile, r, m.forces, m.derived, m.rows, m.force_rows, z, zdot, w.memory, w.element, a, w.rubbing)
-    rounds, away = 0, 1.0
-    while rounds < rubbing.ROUNDS and away > rubbing.SETTLED:
-        rubbing.load(tile, r, m.unknowns, m.rows, w.gauss.multiplier, w.rubbing, a)
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
+    """By the principle: once, or until friction by the forces of joints agrees with them, see `rubbing`."""
+    r, rounds, searching = m.rubbing, 0, True
+    if r.size > 0:
+        rubbing.prepare(tile, r, m.forces, m.derived, m.rows, m.force_rows, z, zdot, w.memory, w.element, a, w.rubbing)
+    while searching:
+        if r.size > 0:
+            rubbing.load(tile, r, m.unknowns, m.rows, w.gauss.multiplier, w.rubbing, a)
         principle.constrain(tile, m, w.gauss, t, z, zdot, a, tolerance)
-        away, rounds = 0.0, rounds + 1
-        for lane in range(width):
-            away = max(away, rubbing.change(tile, r, lane, m.rows, w.gauss.multiplier, w.rubbing))
-    for lane in range(width):
-        if not rubbing.change(tile, r, lane, m.rows, w.gauss.multiplier, w.rubbing) <= rubbing.LOST:
-            a[lane] = np.nan
-    rubbing.add_power(tile, r, m.rows, w.rubbing, w.power)
+        rounds += 1
+        searching = r.size > 0 and rounds < rubbing.ROUNDS
+        searching = searching and rubbing.away(tile, r, m.rows, w.gauss.multiplier, w.rubbing) > rubbing.SETTLED
+    if r.size > 0:
+        rubbing.finish(tile, r, m.rows, w.gauss.multiplier, w.rubbing, a, w.power)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

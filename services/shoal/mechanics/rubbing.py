@@ -86,6 +86,15 @@ def prepare(
         fold(tile, d, unit, force_rows)
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _held(tile: Tile, r: Rubbing, k: int, lane: int, multiplier: Array) -> float:
+    """The force of a joint in a lane, by its multipliers."""
+    square = 0.0
+    for c in range(r.first[k], r.first[k] + r.parts[k]):
+        square += multiplier[c * len(tile) + lane] * multiplier[c * len(tile) + lane]
+    return np.sqrt(square)  # type: ignore[no-any-return]
+
+
 @njit(cache=True, error_model="numpy")
 def load(tile: Tile, r: Rubbing, unknowns: int, rows: int, multiplier: Array, out: Array, a: Array) -> None:
     """All forces into `a`, with the friction by the joints' forces as the multipliers say them."""
@@ -94,10 +103,7 @@ def load(tile: Tile, r: Rubbing, unknowns: int, rows: int, multiplier: Array, ou
         copy(tile, a, row, out, row)
     for k in range(r.size):
         for lane in range(width):
-            square = 0.0
-            for c in range(r.first[k], r.first[k] + r.parts[k]):
-                square += multiplier[c * width + lane] * multiplier[c * width + lane]
-            held = np.sqrt(square)
+            held = _held(tile, r, k, lane, multiplier)
             if not np.isfinite(held):
                 held = 0.0
             out[(end + k) * width + lane] = held
@@ -107,24 +113,32 @@ def load(tile: Tile, r: Rubbing, unknowns: int, rows: int, multiplier: Array, ou
 
 
 @njit(cache=True, error_model="numpy")
-def change(tile: Tile, r: Rubbing, lane: int, rows: int, multiplier: Array, out: Array) -> float:
+def _change(tile: Tile, r: Rubbing, lane: int, rows: int, multiplier: Array, out: Array) -> float:
     """How far the joints' forces in a lane are from those that the friction was loaded with, over the largest."""
-    width, end = len(tile), (r.size + 1) * rows
+    end = (r.size + 1) * rows
     most, largest = 0.0, 0.0
     for k in range(r.size):
-        square = 0.0
-        for c in range(r.first[k], r.first[k] + r.parts[k]):
-            square += multiplier[c * width + lane] * multiplier[c * width + lane]
-        held = np.sqrt(square)
-        most = max(most, abs(held - out[(end + k) * width + lane]))
+        held = _held(tile, r, k, lane, multiplier)
+        most = max(most, abs(held - out[(end + k) * len(tile) + lane]))
         largest = max(largest, held)
     return most / largest if largest > 0.0 else most
 
 
 @njit(cache=True, error_model="numpy")
-def add_power(tile: Tile, r: Rubbing, rows: int, out: Array, power: Array) -> None:
-    """Add what the friction takes up [W] to power (lanes,)."""
+def away(tile: Tile, r: Rubbing, rows: int, multiplier: Array, out: Array) -> float:
+    """The largest `_change` of all lanes."""
+    most = 0.0
+    for lane in range(len(tile)):
+        most = max(most, _change(tile, r, lane, rows, multiplier, out))
+    return most
+
+
+@njit(cache=True, error_model="numpy")
+def finish(tile: Tile, r: Rubbing, rows: int, multiplier: Array, out: Array, a: Array, power: Array) -> None:
+    """No acceleration where the forces did not settle; what the friction takes up [W] is added to power (lanes,)."""
     width, end = len(tile), (r.size + 1) * rows
-    for k in range(r.size):
-        for lane in range(width):
+    for lane in range(width):
+        if not _change(tile, r, lane, rows, multiplier, out) <= LOST:
+            a[lane] = np.nan
+        for k in range(r.size):
             power[lane] += out[(end + r.size + k) * width + lane] * out[(end + 2 * r.size + k) * width + lane]

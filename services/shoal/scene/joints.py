@@ -65,6 +65,16 @@ class Revolute(Tie):
             raise ValueError("radius is missing; friction by mu acts at the radius of the pin (m)")
         return self
 
+    @property
+    def share(self) -> float:
+        """Torque of the friction by mu per force of the joint [m]."""
+        return self.mu * self.radius if self.radius is not None else 0.0
+
+    @property
+    def dry(self) -> bool:
+        """Whether it has dry friction of either kind."""
+        return bool(self.coulomb or self.mu)
+
 
 class Spherical(Tie):
     """Two places stay together; the bodies turn freely about any axis. In space only."""
@@ -142,6 +152,16 @@ class Slider(Tie):
     coulomb: NonNegative = 0.0
     coulomb_speed: Positive = 1e-2
     mu: NonNegative = 0.0
+
+    @property
+    def share(self) -> float:
+        """Friction by mu per force of the joint."""
+        return self.mu
+
+    @property
+    def dry(self) -> bool:
+        """Whether it has dry friction of either kind."""
+        return bool(self.coulomb or self.mu)
 
 
 class Distance(Tie):

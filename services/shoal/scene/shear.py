@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
+from shoal.scene.bodies import Rod
 from shoal.scene.scene import Scene
-
-SLENDER = ("ancf-cable", "ancf-quintic")
-"""Elements that leave shear and the rotary inertia of sections out."""
 
 
 def with_shear(scene: Scene) -> Scene | None:
@@ -13,7 +11,8 @@ def with_shear(scene: Scene) -> Scene | None:
 
     None if there are none, or in space, which has no such element.
     """
-    rods = [name for name, body in scene.bodies.items() if body.element in SLENDER]
+    flexible = {name: rod for name, rod in scene.bodies.items() if isinstance(rod, Rod) and rod.element != "rigid"}
+    rods = [name for name, rod in flexible.items() if not rod.shears]
     fields = {"element": "simo-reissner", "quadrature": "full"}
     values = {f"bodies.{name}.{field}": value for name in rods for field, value in fields.items()}
     return scene.with_values(values) if rods and scene.dimensions == 2 else None

@@ -9,7 +9,7 @@ import numpy as np
 
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.scene import Scene
-from shoal.selection.levels import REFINEMENTS, Level, Levels
+from shoal.selection.levels import REFINEMENTS, Level, Levels, words
 from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
@@ -110,7 +110,7 @@ def climb(
             fall = np.clip(last_gap / gap, 3.0, 16.0) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
             fine.error = gap / (fall - 1.0)
             return Yardstick(fine, float(fine.error), {**fixed, **runs.refined(base)})
-        if impatient and max(count.values()) >= FINE and last_gap < GAIN * gap:
+        if impatient and max(count.values()) >= FINE and last_gap < GAIN * gap < np.inf:
             return f"twice as many elements gain a factor of {last_gap / gap:.2g} only"
         count, growing = _next(runs, fine, count, base, growing, tolerance)
 
@@ -131,5 +131,5 @@ def _next(
 
 
 def _too_much(levels: Levels, work: float) -> str:
-    words = ", ".join(f"{rod} {level}" for rod, level in levels.items() if level.element != "rigid")
-    return f"the next refinement ({words}) takes {work:.1g} element steps, more than {WORK_LIMIT:.1e}"
+    flexible = words({rod: level for rod, level in levels.items() if level.element != "rigid"})
+    return f"the next refinement ({flexible}) takes {work:.1g} element steps, more than {WORK_LIMIT:.1e}"

@@ -13,6 +13,8 @@ from typing import Any
 from shoal.scene import Rod, Scene
 from shoal.scene.dimensions import is_flat
 
+_SHORT = {"ancf-cable": "cable", "ancf-quintic": "quintic", "ancf-full": "full", "simo-reissner": "reissner"}
+
 
 @dataclass(frozen=True)
 class Level:
@@ -21,9 +23,6 @@ class Level:
     element: str
     elements: int = 1
     rotary: bool = False
-
-    def __str__(self) -> str:
-        return "rigid" if self.element == "rigid" else f"{self.elements} {self.element.removeprefix('ancf-')}"
 
     def fields(self, rod: str) -> dict[str, Any]:
         """The fields of the scene that say so."""
@@ -34,6 +33,19 @@ class Level:
         if self.rotary or self.element != "rigid":
             values[f"bodies.{rod}.rotary_inertia"] = self.rotary
         return values
+
+
+Levels = Mapping[str, Level]
+"""Of every rod whose model is open; the other bodies stay as the scene states them."""
+
+
+def words(levels: Levels) -> str:
+    """Such as `upper 1, lower 2 quintic, third rigid`: rods of one element together."""
+    rods: dict[str, list[str]] = {}
+    for rod, level in levels.items():
+        counted = rod if level.element == "rigid" else f"{rod} {level.elements}"
+        rods.setdefault(level.element, []).append(counted)
+    return ", ".join(f"{', '.join(named)} {_SHORT.get(element, element)}" for element, named in rods.items())
 
 
 RIGID = Level("rigid")
@@ -66,9 +78,6 @@ LADDERS = {
 
 REFINEMENTS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 """Numbers of these elements in the models by which errors are estimated."""
-
-Levels = Mapping[str, Level]
-"""Of every rod whose model is open; the other bodies stay as the scene states them."""
 
 
 def below(level: Level, limit: str) -> tuple[Level, ...]:

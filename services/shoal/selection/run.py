@@ -10,7 +10,7 @@ from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Scene
-from shoal.selection.levels import RIGID, Level, Levels, apply, open_rods
+from shoal.selection.levels import RIGID, Level, Levels, apply, open_rods, words
 from shoal.selection.work import INTEGRATOR
 from shoal.trajectory import Array, Trajectory
 
@@ -35,8 +35,8 @@ class Rung:
     @property
     def name(self) -> str:
         """Levels in words."""
-        levels = [f"{rod} {level}" for rod, level in self.levels.items()] or ["as stated"]
-        return ", ".join([*levels, *(["inertia capped"] if self.scene.solver.inertia_cap else [])])
+        said = words(self.levels) or "as stated"
+        return f"{said}, inertia capped" if self.scene.solver.inertia_cap else said
 
 
 def flexible_scene(scene: Scene, levels: Levels, fraction: float) -> Scene:

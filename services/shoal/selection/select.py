@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,7 +38,7 @@ class Selection:
     chosen: its scene reproduces the run; trajectory: at the times asked for; met: whether its estimated error is
     within the tolerance [m]; rungs: every run, in order; priors: what was known before; rigid: rods that stay rigid
     and why; limits: the element whose limit is the truth of each rod; shear: what the theory of the beam leaves out, by
-    order of magnitude [m]
+    order of magnitude [m]; wall_s: of all runs
     """
 
     tolerance: float
@@ -51,7 +51,7 @@ class Selection:
     rigid: dict[str, str]
     limits: dict[str, str]
     shear: float
-    wall_s: float
+    wall_s: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
         """The ladder, which `shoal simulate --tolerance --json` prints below `selection`."""
@@ -103,18 +103,25 @@ def select(
     begin = time.perf_counter()
     asked = sampling_times(scene, times)
     scene = scene.with_values({"solver.duration": float(asked[-1])}) if asked[-1] > 0 else scene
-    limits = open_rods(scene)
-    may_shear = _may_shear(scene, limits)
-    found = _of_theory(scene, tolerance, asked, limits, progress, may_shear)
+    limits, closed = _open(scene)
+    task = _Task(scene, tolerance, asked, estimate(scene, tuple(limits)) if limits else {}, closed, progress)
+    may_shear = scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
+    found = _of_theory(task, limits, impatient=may_shear)
     if may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
         stout = {rod: SHEARS if limit == SLENDER else limit for rod, limit in limits.items()}
-        found = _of_both(found, _of_theory(scene, tolerance, asked, stout, progress))
+        found = _of_both(found, _of_theory(task, stout))
     return replace(found, wall_s=time.perf_counter() - begin)
 
 
-def _may_shear(scene: Scene, limits: Mapping[str, str]) -> bool:
-    """Whether any rod can be had with shear and rotary inertia that is without by its element's theory."""
-    return scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
+class _Task(NamedTuple):
+    """What is asked for, and what is known before any theory is chosen, see `Selection`. closed: see `_open`."""
+
+    scene: Scene
+    tolerance: float
+    asked: Array
+    priors: dict[str, Prior]
+    closed: dict[str, str]
+    progress: Progress
 
 
 def _of_both(slender: Selection, stout: Selection) -> Selection:
@@ -126,29 +133,19 @@ def _of_both(slender: Selection, stout: Selection) -> Selection:
     if not slender.met:
         return replace(stout if stout.chosen.error < slender.chosen.error else slender, rungs=rungs)
     reason = f"slender rods leave out about {slender.shear:.1g} m, and with shear and rotary inertia {stout.reason}"
-    trajectory = _rejected(slender.trajectory, slender.shear, reason)
+    slender.chosen.error += slender.shear / COUNTS_FROM
+    trajectory = _rejected(slender.trajectory, slender.chosen.error, reason)
     return replace(slender, rungs=rungs, met=False, reason=reason, trajectory=trajectory)
 
 
-def _of_theory(
-    scene: Scene,
-    tolerance: float,
-    asked: Array,
-    limits: Mapping[str, str],
-    progress: Progress,
-    impatient: bool = False,
-) -> Selection:
+def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) -> Selection:
     """The cheapest model where the truth of each rod is the limit of that element. impatient: see `climb`."""
-    begin = time.perf_counter()
-    grid = _grid(asked)
-    limits, closed = _open(scene, limits)
-    rods = tuple(limits)
-    priors = estimate(scene, rods) if rods else {}
-    surely = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(rods) < tolerance]
-    closed |= {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
+    tolerance, priors, grid = task.tolerance, task.priors, _grid(task.asked)
+    surely = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
+    closed = task.closed | {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
     fixed = rigid(limits)
-    runs = Runs(scene, grid, limits, progress)
-    flexible = tuple(rod for rod in rods if rod not in surely)
+    runs = Runs(task.scene, grid, limits, task.progress)
+    flexible = tuple(rod for rod in limits if rod not in surely)
     known = sum(priors[rod].error for rod in surely)
     if flexible:
         worst = SURELY_RIGID * sum(prior.error for prior in priors.values())
@@ -161,23 +158,23 @@ def _of_theory(
         met=met,
         reason=reason,
         chosen=chosen,
-        trajectory=_at(chosen, grid, asked, met, reason),
+        trajectory=_at(chosen, grid, task.asked, met, reason),
         rungs=runs.rungs,
         priors=priors,
         rigid=closed,
         limits=dict(limits),
         shear=left_out(chosen.trajectory, chosen.scene, GaussEngine()) or 0.0,
-        wall_s=time.perf_counter() - begin,
     )
 
 
-def _open(scene: Scene, limits: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
+def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
     """Rods whose model is open with the element of their limit, and the other rods with the reason."""
     closed = {
         name: "no youngs_modulus"
         for name, body in scene.bodies.items()
         if isinstance(body, Rod) and body.youngs_modulus is None
     }
+    limits = open_rods(scene)
     for rod, limit in limits.items():
         body = scene.bodies[rod]
         assert isinstance(body, Rod)

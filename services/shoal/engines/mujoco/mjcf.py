@@ -123,12 +123,16 @@ class Mjcf:
                 raise InputError(f"joints.{name}: a gear is not written as MJCF; there its teeth would give way")
             if joint.kind in ("driven-angle", "coupling", "parallel", "perpendicular"):
                 raise InputError(f"joints.{name}: MJCF has no {joint.kind}")
+            if isinstance(joint, Revolute | Slider) and joint.share:
+                raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
             if isinstance(joint, Distance) and joint.length is not None and joint.length.number is None:
                 raise InputError(f"joints.{name}.length: MJCF has no functions of time")
         for name, load in scene.loads.items():
             where = f"loads.{name}"
             if load.kind == "distributed-force":
                 raise InputError(f"{where}: MJCF has no distributed-force")
+            if isinstance(load, TorsionSpring) and (load.first_to or load.second_to):
+                raise InputError(f"{where}: MJCF has no springs between directions from place to place")
             for key in ("cubic", "elastic"):
                 if getattr(load, key, None):
                     raise InputError(f"{where}.{key}: MJCF has linear springs only")
@@ -280,7 +284,6 @@ class Mjcf:
 
     def _forces(self, link: _Link, joint: Any) -> dict[str, str]:
         """Friction of a joint, and the torsion springs that act in it."""
-        self._refuse_rubbing(link.joint, joint)
         springs = self._springs.get(link.joint, [])
         stiffness = sum(spring[0] for spring in springs)
         moment = sum(spring[0] * spring[2] for spring in springs)
@@ -292,10 +295,6 @@ class Mjcf:
         }
         sticking = {"solreffriction": self._stiff()["solref"]} if joint.coulomb else {}
         return {name: repr(float(value)) for name, value in found.items() if value} | sticking
-
-    def _refuse_rubbing(self, name: str, joint: Any) -> None:
-        if getattr(joint, "mu", 0.0):
-            raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
 
     def _shapes(self, element: ElementTree.Element, name: str) -> None:
         """What is seen of a body and touches nothing: a rod's cuboid, or lines from a body's centre to its points."""
@@ -355,7 +354,6 @@ class Mjcf:
         """A joint that closes a loop, by constraints."""
         bodies = {"body1": _called(joint.first.body), "body2": _called(joint.second.body)}
         masses = any(isinstance(self.scene.bodies.get(side.body), PointMass) for side in (joint.first, joint.second))
-        self._refuse_rubbing(name, joint)
         if getattr(joint, "friction", 0.0) or getattr(joint, "coulomb", 0.0):
             raise InputError(f"joints.{name}.friction: MJCF has none in a joint that closes a loop")
         if isinstance(joint, Weld) and not masses:
@@ -384,8 +382,6 @@ class Mjcf:
 
     def _spiral(self, name: str, load: TorsionSpring) -> None:
         """A torsion spring in the joint that has its axis. Raises InputError where there is none."""
-        if load.first_to or load.second_to:
-            raise InputError(f"loads.{name}: MJCF has no springs between directions from place to place")
         flat = self.scene.dimensions == 2
         for joint, link in self._hung.items():
             sides = [load.first.body, load.second.body]

@@ -78,7 +78,7 @@ def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array
     uncertain = rms_of(residual) / np.sqrt(len(residual))
     matters = theory is None or rms_of(theory) > _MATTERS * max(uncertain, 0.0 if mesh is None else rms_of(mesh))
     if finer is not None and mesh is not None and matters:
-        sheared = _sheared(model, point, predicted)
+        sheared = _sheared(model, point, predicted, flexible)
         theory = theory if sheared is None else sheared - mesh
     return ModelError(mesh, theory)
 
@@ -91,11 +91,12 @@ def _softened(
     return _difference(model, point, predicted, model.scene, softer)
 
 
-def _sheared(model: ForwardModel, point: Array, predicted: Mapping[str, Array]) -> Array | None:
+def _sheared(
+    model: ForwardModel, point: Array, predicted: Mapping[str, Array], flexible: Mapping[str, Rod]
+) -> Array | None:
     """By twice as many rods with shear and rotary inertia; None where they cannot be had."""
     stout = with_shear(model.scene)
-    flexible = {name: body for name, body in model.scene.bodies.items() if isinstance(body, Rod)}
-    finer = None if stout is None else _finer(stout, {name: r for name, r in flexible.items() if r.element != "rigid"})
+    finer = None if stout is None else _finer(stout, flexible)
     return None if finer is None else _difference(replace(model, engine=GaussEngine()), point, predicted, finer)
 
 

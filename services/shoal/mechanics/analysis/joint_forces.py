@@ -56,11 +56,10 @@ def friction(
     total = np.zeros(bodies.unknowns)
     each: dict[str, tuple[Array, Array]] = {}
     for name, joint in bodies.scene.joints.items():
-        if isinstance(joint, Revolute | Slider) and (joint.friction or joint.coulomb or joint.mu):
+        if isinstance(joint, Revolute | Slider) and (joint.friction or joint.dry):
             gradient, force, torque = rubbing(bodies, joint, at)
             speed = float(gradient @ rate)
-            arm = joint.radius or 0.0 if isinstance(joint, Revolute) else 1.0
-            dry = joint.coulomb + joint.mu * arm * held.get(name, 0.0)
+            dry = joint.coulomb + joint.share * held.get(name, 0.0)
             drag = -joint.friction * speed - dry * float(np.tanh(speed / joint.coulomb_speed))
             total += drag * gradient
             each[name] = drag * force, drag * torque

@@ -22,7 +22,7 @@ from shoal.mechanics.analysis.joint_forces import Component, friction, place
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import ROUNDS, SETTLED
-from shoal.scene import Attachment, Coupling, Scene
+from shoal.scene import Attachment, Coupling, Revolute, Scene, Slider
 from shoal.scene.joints import places
 from shoal.trajectory import plain
 
@@ -147,7 +147,7 @@ def _pressed(scene: Scene, unknown: list[Component], solution: Array) -> dict[st
     """The force [N] of each joint whose friction depends on it."""
     found = {}
     for name, joint in scene.joints.items():
-        if getattr(joint, "mu", 0.0):
+        if isinstance(joint, Revolute | Slider) and joint.share:
             mine = [solution[k] * part.force for k, part in enumerate(unknown) if part.joint == name and not part.turns]
             found[name] = float(np.linalg.norm(sum(mine)))
     return found

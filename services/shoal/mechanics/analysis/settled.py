@@ -42,7 +42,7 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
     away = _apart(found, other) if found.ok and other.ok else np.nan
     if SAFE * away <= tolerance:
         return found
-    other = _refined(stout, tolerance, time)
+    other = _refined(stout, tolerance, time, other)
     if other.ok and np.isfinite(away):
         return replace(other, message=f"with shear, which is worth {away:.1e} m")
     return other if other.ok or found.ok else found
@@ -53,9 +53,9 @@ def _apart(one: Equilibrium, other: Equilibrium) -> float:
     return float(np.max(np.linalg.norm(one.points - other.points, axis=1)))
 
 
-def _refined(scene: Scene, tolerance: float, time: float) -> Equilibrium:
-    """The coarsest mesh that will do, of the scene's own elements."""
-    found, gap = statics(scene, time), np.nan
+def _refined(scene: Scene, tolerance: float, time: float, begun: Equilibrium | None = None) -> Equilibrium:
+    """The coarsest mesh that will do, of the scene's own elements. begun: the equilibrium of the scene, if known."""
+    found, gap = begun or statics(scene, time), np.nan
     for _ in range(DOUBLINGS):
         if (fine := finer(scene)) is None:
             return found

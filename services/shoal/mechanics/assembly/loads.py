@@ -70,7 +70,7 @@ class Loads:
         self.twisting: list[tuple[list[int], int]] = []
         for name, joint in scene.joints.items():
             if isinstance(joint, Revolute | Slider) and any(
-                np.any(size) for size in (joint.friction, joint.coulomb, joint.mu)
+                np.any(size) for size in (joint.friction, joint.coulomb, joint.share)
             ):
                 self._friction(name, joint)
         for name, load in scene.loads.items():
@@ -80,9 +80,8 @@ class Loads:
 
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
         law = [0.0, 0.0, joint.friction, 0.0, joint.coulomb, joint.coulomb_speed, 0.0]
-        if np.any(joint.mu):
-            arm: Number = joint.radius if isinstance(joint, Revolute) else 1.0
-            self.rubbing.append((name, len(self.kinds), joint.mu * arm))
+        if np.any(joint.share):
+            self.rubbing.append((name, len(self.kinds), joint.share))
         if isinstance(joint, Revolute):
             self._angle(name, joint.first, joint.second, law, joint.axis)
             return
@@ -94,12 +93,15 @@ class Loads:
         self._measure(name, PLACE, [*ends, line], law, 0.0)
 
     def _torsion_spring(self, name: str, load: TorsionSpring) -> None:
-        rest = self._rest(name, load) if load.angle is None else load.angle
+        places = load.first_to is not None or load.second_to is not None
+        ways = self._ways(name, load) if places else []
+        start = self._opening(ways) if places else self._rest(load)
+        rest = start if load.angle is None else load.angle
         law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0]
-        if load.first_to is None and load.second_to is None:
-            self._angle(name, load.first, load.second, law, load.axis, elastic=load.elastic)
+        if places:
+            self._measure(name, ANGLE, ways, law, start, elastic=load.elastic)
         else:
-            self._measure(name, ANGLE, self._ways(name, load), law, self._opening(name, load), elastic=load.elastic)
+            self._angle(name, load.first, load.second, law, load.axis, elastic=load.elastic)
 
     def _ways(self, name: str, load: TorsionSpring) -> list[Affine]:
         """The directions of both sides: of bodies, or from place to place."""
@@ -115,15 +117,13 @@ class Loads:
             found.append(way)
         return found
 
-    def _opening(self, name: str, load: TorsionSpring) -> Number:
-        """The angle between places at the start, within half a turn."""
-        first, second = (self.placement.start_of(way)[0] for way in self._ways(name, load))
+    def _opening(self, ways: list[Affine]) -> Number:
+        """The angle between two directions at the start, within half a turn."""
+        first, second = (self.placement.start_of(way)[0] for way in ways)
         return np.arctan2(plane.cross(first, second), sum(first * second))
 
-    def _rest(self, name: str, load: TorsionSpring) -> Number:
-        """The angle at the start."""
-        if load.first_to is not None or load.second_to is not None:
-            return self._opening(name, load)
+    def _rest(self, load: TorsionSpring) -> Number:
+        """The angle between two bodies at the start."""
         if not isinstance(self.placement, SpatialPlacement):
             return self._turn(load.first, load.second)
         a, b, ahead = hinge(self.scene, self.placement, load.first, load.second, load.axis)

@@ -22,6 +22,7 @@ of every point. `cubic` and `quintic` hold the families and their forces, `beam_
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -136,6 +137,11 @@ def _on_nodes(unit: Array, factor: Number, length: Number) -> list[list[Number]]
         [factor * length ** float(i % order + j % order) * value for j, value in enumerate(row)]
         for i, row in enumerate(unit)
     ]
+
+
+def padded(factors: list[Any]) -> list[Any]:
+    """Those of the cubic element's vectors, where each node has one vector more that takes no part."""
+    return [*factors[:2], 0.0, *factors[2:], 0.0]
 
 
 def weight(vectors: int, mass_per_length: Number, length: Number) -> list[Number]:

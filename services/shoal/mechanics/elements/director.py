@@ -25,14 +25,15 @@ from numba import njit
 
 from shoal.mechanics.elements import beam
 from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, put, rest, together
-from shoal.mechanics.elements.director_strains import AXIAL, BENDING, STRAINS, curve, gradient, strains
+from shoal.mechanics.elements.director_strains import AXIAL, BENDING, STRAINS, gradient, strains
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
+from shoal.mechanics.elements.hermite import curve
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.numerics.pointers import pointer, shift
 from shoal.mechanics.numerics.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Number, Tile
-from shoal.mechanics.numerics.triples import dot, plus, times
+from shoal.mechanics.numerics.tuples import dot, plus, times
 from shoal.scene import Rod
 from shoal.scene.sections import Section
 
@@ -298,32 +299,27 @@ def _nodal_vectors_across(rod: Rod, s: Number) -> list[Number]:
     return [axes[:, 0], axes[:, 2]]
 
 
-def _padded(factors: list[Number]) -> list[Number]:
-    """Those of the cable, and zeros for the directors."""
-    return [*factors[:2], 0.0, *factors[2:], 0.0]
-
-
 def _mass(density: Number, section: Section, length: Number) -> list[list[Number]]:
     """That of the cable, and the polar inertia of the section on the directors, which are linear in between."""
     cable = beam.mass_matrix(beam.CUBIC, density * section.area, length)
     polar = density * section.polar * length
-    rows = [_padded(row) for row in cable]
+    rows = [beam.padded(row) for row in cable]
     first, second = [0.0, 0.0, polar / 3, 0.0, 0.0, polar / 6], [0.0, 0.0, polar / 6, 0.0, 0.0, polar / 3]
     return [*rows[:2], first, *rows[2:], second]
 
 
 def _stretching(axial: Number, length: Number) -> list[list[Number]]:
-    rows = [_padded(row) for row in beam.stretching(beam.CUBIC, axial, length)]
+    rows = [beam.padded(row) for row in beam.stretching(beam.CUBIC, axial, length)]
     return [*rows[:2], [0.0] * 6, *rows[2:], [0.0] * 6]
 
 
 ALONG_Z = Element(
     family=DirectorRods,
     nodal_vectors=_nodal_vectors_across,
-    position_shape=lambda x, y, length: _padded(beam.shape(beam.CUBIC, x, length, 0)),
-    direction_shape=lambda x, y, length: _padded(beam.shape(beam.CUBIC, x, length, 1)),
+    position_shape=lambda x, y, length: beam.padded(beam.shape(beam.CUBIC, x, length, 0)),
+    direction_shape=lambda x, y, length: beam.padded(beam.shape(beam.CUBIC, x, length, 1)),
     mass=_mass,
-    weight=lambda line, length: _padded(beam.weight(beam.CUBIC, line, length)),
+    weight=lambda line, length: beam.padded(beam.weight(beam.CUBIC, line, length)),
     part=lambda rod, section, length, nodal: _part(rod, section, length, nodal, across=True),
     stretching=_stretching,
     products=((1, 1, 1.0), (0, 1, 0.0)),

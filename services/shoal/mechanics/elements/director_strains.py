@@ -10,9 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.mechanics.elements.hermite import collect, curve
 from shoal.mechanics.numerics.arc import arctangent
 from shoal.mechanics.numerics.simd import root
-from shoal.mechanics.numerics.triples import across, cross, dot, plus, times
+from shoal.mechanics.numerics.triples import across, cross
+from shoal.mechanics.numerics.tuples import dot, plus, times
 
 STRAINS = 9
 AXIAL = np.array([[0.0, 1 / 6], [0.5, 4 / 6], [1.0, 1 / 6]])
@@ -43,34 +45,6 @@ def _carry_back(m, d, t, tm, v, j):  # type: ignore[no-untyped-def]
     """Derivatives by d, t and tm of what has the derivative m by the carried director."""
     s, most = (dot(m, t) + dot(m, tm)) * j, times(-v, m)
     return plus(m, -s, tm), plus(most, s * v, tm), plus(plus(most, -s, d), s * v, t)
-
-
-@njit(error_model="numpy", forceinline=True)
-def _shapes(x):  # type: ignore[no-untyped-def]
-    """Factors of D = (r2 - r1)/L, r1' and r2' in r' and in L r''."""
-    return (
-        6.0 * x * (1.0 - x),
-        1.0 - 4.0 * x + 3.0 * x * x,
-        3.0 * x * x - 2.0 * x,
-        6.0 - 12.0 * x,
-        6.0 * x - 4.0,
-        6.0 * x - 2.0,
-    )
-
-
-@njit(error_model="numpy", forceinline=True)
-def curve(x, chord, s1, s2):  # type: ignore[no-untyped-def]
-    """r' and L r'' at x."""
-    a, b, c, d, e, f = _shapes(x)
-    p = plus(plus(times(a, chord), b, s1), c, s2)
-    return p, plus(plus(times(d, chord), e, s1), f, s2)
-
-
-@njit(error_model="numpy", forceinline=True)
-def _collect(x, p, c, g, g1, g2):  # type: ignore[no-untyped-def]
-    """Add to the derivatives by D, r1' and r2' those of a point: p by r', c by L r''."""
-    i, j, k, m, n, o = _shapes(x)
-    return plus(plus(g, i, p), m, c), plus(plus(g1, j, p), n, c), plus(plus(g2, k, p), o, c)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -148,7 +122,7 @@ def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
         n = root(dot(p, p))
         strain = n - 1.0 - free[6 + k]
         energy = energy + 0.5 * w * ea * strain * strain
-        g, g1, g2 = _collect(x, times(w * ea * strain / n, p), zero, g, g1, g2)
+        g, g1, g2 = collect(x, times(w * ea * strain / n, p), zero, g, g1, g2)
     pm, _ = curve(0.5, chord, s1, s2)
     im, tm = _slope(pm)
     i1, t1 = _slope(s1)
@@ -176,7 +150,7 @@ def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
         by_f = plus(by_f, my * sa + mz * ca, kk)
         along = dot(t, by_h)
         by_t = plus(plus(by_t, -tc * ip, by_h), -along * ip, curl)
-        g, g1, g2 = _collect(
+        g, g1, g2 = collect(
             x, plus(across(by_t, t, ip), -dot(h, by_h) * ip, t), times(ip, plus(by_h, -along, t)), g, g1, g2
         )
     by_e = plus(by_e, 1.0, cross(by_f, tm))
@@ -190,7 +164,7 @@ def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
     n1, a1, c1 = _carry_back(by_m1, d1, t1, tm, v1, j1)
     n2, a2, c2 = _carry_back(by_m2, d2, t2, tm, v2, j2)
     by_tm = plus(plus(by_tm, 1.0, c1), 1.0, c2)
-    g, g1, g2 = _collect(0.5, across(by_tm, tm, im), zero, g, g1, g2)
+    g, g1, g2 = collect(0.5, across(by_tm, tm, im), zero, g, g1, g2)
     g1 = plus(g1, 1.0, across(a1, t1, i1))
     g2 = plus(g2, 1.0, across(a2, t2, i2))
     ends = times(inverse, g)

@@ -164,17 +164,17 @@ def _columns(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out:
         for lane in range(0, len(tile), len(EIGHT)):
             stiff, free = _numbers(tile, family, number, lane)
             state = _state(tile, family, number, lane, z)
-            bare = strains(state, stiff[0])
-            eta = coefficient(tile, family, number, lane, COEFFICIENTS, COEFFICIENTS - 1)
+            if viscous:
+                bare = strains(state, stiff[0])
+                eta = coefficient(tile, family, number, lane, COEFFICIENTS, COEFFICIENTS - 1)
+                _, still = gradient(state, stiff, bare)  # without stress, but for the director's length
             for column in range(ROWS):
                 for k in range(ROWS):
                     store(w, len(EIGHT) * (1 + k), spread(EIGHT, 1.0 if k == column else 0.0))
                 unit = _kept(w)
                 if viscous:
-                    # Of the two gradients only the second has the stress of the rates; the director's length has none.
                     _, g = gradient(state, stiff, _weighted(bare, -eta, rates(state, unit, stiff[0])))
-                    _, h = gradient(state, stiff, bare)
-                    g = _difference(g, h)
+                    g = _difference(g, still)
                 else:
                     g = change(state, unit, stiff, free)
                 for k in range(ROWS):
@@ -216,27 +216,16 @@ implement(
 )
 
 
+_RULE = beam.lobatto(beam.CUBIC, len(BENDING))
+
+
 def _at_rest(length: Number, nodal: list[Number]) -> list[Number]:
     """The strains of the unstrained element, whose sections are at right angles to its axis."""
-    first, s1, _, second, s2, _ = nodal
-    chord = (second - first) / length
-    found: list[Number] = []
-    for x, _ in AXIAL:
-        p, _ = _curve(x, chord, s1, s2)
-        found += [np.hypot(*p) - 1.0, 0.0]
-    for x, _ in BENDING:
-        p, q = _curve(x, chord, s1, s2)
-        found.append((p[0] * q[1] - p[1] * q[0]) / (p[0] ** 2 + p[1] ** 2))
-    return found
-
-
-def _curve(x: float, chord: Number, s1: Number, s2: Number) -> tuple[Number, Number]:
-    """r' and L r'' at the fraction x, from (r2 - r1)/L and both slopes."""
-    slope, bend = beam.shape(beam.CUBIC, x, 1.0, 1), beam.shape(beam.CUBIC, x, 1.0, 2)
-    return (
-        slope[2] * chord + slope[1] * s1 + slope[3] * s2,
-        bend[2] * chord + bend[1] * s1 + bend[3] * s2,
-    )
+    first, slope, _, second, other, _ = nodal
+    told = beam.reference(beam.CUBIC, _RULE, [first, slope, second, other], length)
+    relaxed, angles = told[0::2], told[1::2]
+    stretches = [strain for inverse in relaxed[: len(AXIAL)] for strain in (1.0 / inverse - 1.0, 0.0 * inverse)]
+    return [*stretches, *angles[len(AXIAL) :]]
 
 
 def entry(
@@ -272,11 +261,6 @@ def _nodal_vectors(rod: Rod, s: Number) -> list[Number]:
     return [tangent, tangent]
 
 
-def _padded(factors: list[Number]) -> list[Number]:
-    """Those of the cable, and zeros for the sections' normals."""
-    return [*factors[:2], 0.0, *factors[2:], 0.0]
-
-
 def _normal(x: Number, length: Number) -> list[Number]:
     """The normal of the section: r', and the line through d - r' at both nodes."""
     first, slope, second, other = beam.shape(beam.CUBIC, x, length, 1)
@@ -288,7 +272,7 @@ _POINTS = np.polynomial.legendre.leggauss(3)
 
 def _mass(density: Number, section: Section, length: Number) -> list[list[Number]]:
     """That of the cable, and the inertia of the sections, whose normal is of second degree."""
-    rows = [_padded(row) for row in beam.mass_matrix(beam.CUBIC, density * section.area, length)]
+    rows = [beam.padded(row) for row in beam.mass_matrix(beam.CUBIC, density * section.area, length)]
     full = [*rows[:2], [0.0] * 6, *rows[2:], [0.0] * 6]
     for xi, weight in zip(*_POINTS, strict=True):
         normal = _normal((1 + xi) / 2, length)
@@ -302,10 +286,10 @@ def _mass(density: Number, section: Section, length: Number) -> list[list[Number
 ELEMENT = Element(
     family=ShearRods,
     nodal_vectors=_nodal_vectors,
-    position_shape=lambda x, y, length: _padded(beam.shape(beam.CUBIC, x, length, 0)),
+    position_shape=lambda x, y, length: beam.padded(beam.shape(beam.CUBIC, x, length, 0)),
     direction_shape=lambda x, y, length: _normal(x, length),
     mass=_mass,
-    weight=lambda line, length: _padded(beam.weight(beam.CUBIC, line, length)),
+    weight=lambda line, length: beam.padded(beam.weight(beam.CUBIC, line, length)),
     part=_part,
     clamped=1,
 )

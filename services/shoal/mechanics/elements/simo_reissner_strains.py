@@ -13,42 +13,17 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from shoal.mechanics.elements.hermite import collect, curve
 from shoal.mechanics.numerics.arc import arctangent
-from shoal.mechanics.numerics.pairs import cross, dot, plus, quarter, times
+from shoal.mechanics.numerics.pairs import cross, quarter
 from shoal.mechanics.numerics.simd import root
+from shoal.mechanics.numerics.tuples import dot, plus, times
 
 STRAINS = 8
 """Stretch and shear of each point of Lobatto, then bending at both of Gauss."""
 AXIAL = np.array([[0.0, 1 / 6], [0.5, 4 / 6], [1.0, 1 / 6]])
 BENDING = np.array([[0.5 - 0.5 / np.sqrt(3), 0.5], [0.5 + 0.5 / np.sqrt(3), 0.5]])
 """Points and weights."""
-
-
-@njit(error_model="numpy", forceinline=True)
-def _shapes(x):  # type: ignore[no-untyped-def]
-    """Factors of D = (r2 - r1)/L, r1' and r2' in r' and in L r''."""
-    return (
-        6.0 * x * (1.0 - x),
-        1.0 - 4.0 * x + 3.0 * x * x,
-        3.0 * x * x - 2.0 * x,
-        6.0 - 12.0 * x,
-        6.0 * x - 4.0,
-        6.0 * x - 2.0,
-    )
-
-
-@njit(error_model="numpy", forceinline=True)
-def _curve(x, chord, s1, s2):  # type: ignore[no-untyped-def]
-    """r' and L r'' at x."""
-    a, b, c, d, e, f = _shapes(x)
-    return plus(plus(times(a, chord), b, s1), c, s2), plus(plus(times(d, chord), e, s1), f, s2)
-
-
-@njit(error_model="numpy", forceinline=True)
-def _collect(x, p, c, g, g1, g2):  # type: ignore[no-untyped-def]
-    """Add to the derivatives by D, r1' and r2' those of a point: p by r', c by L r''."""
-    i, j, k, m, n, o = _shapes(x)
-    return plus(plus(g, i, p), m, c), plus(plus(g1, j, p), n, c), plus(plus(g2, k, p), o, c)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -93,11 +68,11 @@ def strains(z, inverse):  # type: ignore[no-untyped-def]
     """The strains of elements; inverse: 1/L."""
     chord, s1, s2 = _chord(z, inverse), z[2:4], z[8:10]
     apart, c, n = _angles(z)
-    pm, _ = _curve(AXIAL[1, 0], chord, s1, s2)
+    pm, _ = curve(AXIAL[1, 0], chord, s1, s2)
     n1, nm, n2 = root(dot(s1, s1)), root(dot(pm, pm)), root(dot(s2, s2))
-    p, q = _curve(BENDING[0, 0], chord, s1, s2)
+    p, q = curve(BENDING[0, 0], chord, s1, s2)
     first = cross(p, q) / dot(p, p) + apart
-    p, q = _curve(BENDING[1, 0], chord, s1, s2)
+    p, q = curve(BENDING[1, 0], chord, s1, s2)
     second = cross(p, q) / dot(p, p) + apart
     ends = n2 * c[2] - 1.0, -n2 * n[2]
     return (n1 * c[0] - 1.0, -n1 * n[0], nm * c[1] - 1.0, -nm * n[1], *ends, first, second)
@@ -124,14 +99,14 @@ def rates(z, v, inverse):  # type: ignore[no-untyped-def]
     chord, s1, s2, moving = _chord(z, inverse), z[2:4], z[8:10], _chord(v, inverse)
     _, c, n = _angles(z)
     w1, w2 = _turning(z, v)
-    pm, _ = _curve(AXIAL[1, 0], chord, s1, s2)
-    um, _ = _curve(AXIAL[1, 0], moving, v[2:4], v[8:10])
-    p, q = _curve(BENDING[0, 0], chord, s1, s2)
-    u, a = _curve(BENDING[0, 0], moving, v[2:4], v[8:10])
+    pm, _ = curve(AXIAL[1, 0], chord, s1, s2)
+    um, _ = curve(AXIAL[1, 0], moving, v[2:4], v[8:10])
+    p, q = curve(BENDING[0, 0], chord, s1, s2)
+    u, a = curve(BENDING[0, 0], moving, v[2:4], v[8:10])
     _, by_p, by_q = _bend(p, q)
     first = dot(by_p, u) + dot(by_q, a) + w2 - w1
-    p, q = _curve(BENDING[1, 0], chord, s1, s2)
-    u, a = _curve(BENDING[1, 0], moving, v[2:4], v[8:10])
+    p, q = curve(BENDING[1, 0], chord, s1, s2)
+    u, a = curve(BENDING[1, 0], moving, v[2:4], v[8:10])
     _, by_p, by_q = _bend(p, q)
     second = dot(by_p, u) + dot(by_q, a) + w2 - w1
     one, two = _drawn(s1, v[2:4], c[0], n[0], w1), _drawn(pm, um, c[1], n[1], 0.5 * (w1 + w2))
@@ -162,23 +137,23 @@ def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
     s1, d1, s2, d2 = z[2:4], z[4:6], z[8:10], z[10:12]
     chord = _chord(z, inverse)
     apart, c, n = _angles(z)
-    pm, _ = _curve(AXIAL[1, 0], chord, s1, s2)
+    pm, _ = curve(AXIAL[1, 0], chord, s1, s2)
     wa, wm = AXIAL[0, 1], AXIAL[1, 1]
     u1, f1, by1 = _section(s1, c[0], n[0], wa * ea, wa * ga, free[0], free[1])
     um, fm, bym = _section(pm, c[1], n[1], wm * ea, wm * ga, free[2], free[3])
     u2, f2, by2 = _section(s2, c[2], n[2], wa * ea, wa * ga, free[4], free[5])
     energy = u1 + um + u2
     none = times(0.0, s1)
-    g, g1, g2 = _collect(AXIAL[1, 0], times(fm / root(dot(pm, pm)), pm), none, none, none, none)
+    g, g1, g2 = collect(AXIAL[1, 0], times(fm / root(dot(pm, pm)), pm), none, none, none, none)
     by_apart = 0.0 * inverse
     for k in range(len(BENDING)):
-        p, q = _curve(BENDING[k, 0], chord, s1, s2)
+        p, q = curve(BENDING[k, 0], chord, s1, s2)
         psi, by_p, by_q = _bend(p, q)
         angle = psi + apart - free[6 + k]
         m = BENDING[k, 1] * ei * angle
         energy = energy + 0.5 * m * angle
         by_apart = by_apart + m
-        g, g1, g2 = _collect(BENDING[k, 0], times(m, by_p), times(m, by_q), g, g1, g2)
+        g, g1, g2 = collect(BENDING[k, 0], times(m, by_p), times(m, by_q), g, g1, g2)
     by1, by2 = by1 + 0.5 * bym - by_apart, by2 + 0.5 * bym + by_apart
     g1 = plus(plus(g1, f1 / root(dot(s1, s1)), s1), -by1, _by_angle(s1))
     g2 = plus(plus(g2, f2 / root(dot(s2, s2)), s2), -by2, _by_angle(s2))
@@ -228,18 +203,18 @@ def change(z, v, stiff, free):  # type: ignore[no-untyped-def]
     chord, moving = _chord(z, inverse), _chord(v, inverse)
     apart, c, n = _angles(z)
     w1, w2 = _turning(z, v)
-    pm, _ = _curve(AXIAL[1, 0], chord, s1, s2)
-    um, _ = _curve(AXIAL[1, 0], moving, v1, v2)
+    pm, _ = curve(AXIAL[1, 0], chord, s1, s2)
+    um, _ = curve(AXIAL[1, 0], moving, v1, v2)
     wa, wm = AXIAL[0, 1], AXIAL[1, 1]
     p1, by1, turn1 = _section_change(s1, v1, c[0], n[0], w1, wa * ea, wa * ga, free[0], free[1])
     p2, by2, turn2 = _section_change(s2, v2, c[2], n[2], w2, wa * ea, wa * ga, free[4], free[5])
     p, bym, turnm = _section_change(pm, um, c[1], n[1], 0.5 * (w1 + w2), wm * ea, wm * ga, free[2], free[3])
     none = times(0.0, s1)
-    g, g1, g2 = _collect(AXIAL[1, 0], p, none, none, none, none)
+    g, g1, g2 = collect(AXIAL[1, 0], p, none, none, none, none)
     by_apart, turn = 0.0 * inverse, 0.0 * inverse
     for k in range(len(BENDING)):
-        p, q = _curve(BENDING[k, 0], chord, s1, s2)
-        u, a = _curve(BENDING[k, 0], moving, v1, v2)
+        p, q = curve(BENDING[k, 0], chord, s1, s2)
+        u, a = curve(BENDING[k, 0], moving, v1, v2)
         psi, by_p, by_q = _bend(p, q)
         square = 1.0 / dot(p, p)
         grown, psidot = 2.0 * dot(p, u) * square, dot(by_p, u) + dot(by_q, a)
@@ -249,7 +224,7 @@ def change(z, v, stiff, free):  # type: ignore[no-untyped-def]
         first = plus(plus(times(-square, quarter(a)), -2.0 * psidot * square, p), -2.0 * psi * square, u)
         second = plus(times(square, quarter(u)), -grown, by_q)
         first = plus(first, -grown, by_p)
-        g, g1, g2 = _collect(
+        g, g1, g2 = collect(
             BENDING[k, 0], plus(times(more, by_p), m, first), plus(times(more, by_q), m, second), g, g1, g2
         )
     by1, by2 = by1 + 0.5 * bym - by_apart, by2 + 0.5 * bym + by_apart
