@@ -23,6 +23,7 @@ from shoal.ports import PORTS
 _PACKAGES = {
     "pipeline": ("prefect", "mlflow"),
     "services": ("fastapi", "uvicorn", "orjson"),
+    "sample": ("emcee",),
 }
 """What the extras bring that has no check of its own."""
 _PORTS = {"MLflow": 5000, "Prefect": 4200, **PORTS}

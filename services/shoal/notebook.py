@@ -254,6 +254,7 @@ def identify(
     time_limit: float | None = None,
     profiles: bool = False,
     bootstrap: int = 0,
+    sample: int = 0,
     **options: Any,
 ) -> Estimate:
     """Find the parameters of a problem from measured motion.
@@ -263,6 +264,7 @@ def identify(
     values: fields of the scene to set, or an estimate or its JSON file: what is sought starts from there, what else it
     found is set; tolerance: error [m] that the model may have, for which it is chosen;
     time_limit: of all of it [s]; profiles: the profile likelihood of every parameter; bootstrap: how many draws;
+    sample: how many effective draws from the posterior;
     options: further ones of `shoal.identification.identify` (hold_out, progress, measurement, checkpoint, wishes).
     Raises InputError, ComputationError.
     """
@@ -270,7 +272,7 @@ def identify(
     from shoal.identification.conclude import Wishes
 
     setattr(Estimate, _HTML, _html)
-    options = {"wishes": Wishes(profiles=profiles, bootstrap=bootstrap), **options}
+    options = {"wishes": Wishes(profiles=profiles, bootstrap=bootstrap, sample=sample), **options}
     stated, carried = _values(values)
     if carried is not None:
         options["fitted"] = carried

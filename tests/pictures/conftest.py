@@ -12,6 +12,7 @@ import pytest
 from shoal.engines import get_engine
 from shoal.engines.verification import verified
 from shoal.identification import Estimate, Measurement, Problem, identify, load_problem, measure
+from shoal.identification.conclude import Wishes
 from shoal.pictures.answer import Answer
 from shoal.pictures.report import report
 from shoal.pictures.simulation import simulation
@@ -77,7 +78,7 @@ def flexible(estimates: dict[str, Estimate]) -> Answer:
 
 @pytest.fixture(scope="session")
 def several() -> Answer:
-    """Two recordings of five channels in all with noise, a gap, a slow clock and a camera that stands askew."""
+    """Two recordings of five channels in all with noise, a gap, a slow clock and a camera askew, with a posterior."""
     angle = {"lower": -3.3, "upper": 3.3, "own": True}
     source: dict[str, Any] = {"kind": "engine", "engine": "casadi", "noise": 0.003}
     tip = [{"marker": "B", "quantity": "x"}, {"marker": "B", "quantity": "y"}]
@@ -113,7 +114,7 @@ def several() -> Answer:
     values = high.values.copy()
     values[20:30, 0] = np.nan
     gappy = Measurement({**measured.recordings, "high": replace(high, values=values)}, measured.truth)
-    return Answer(problem, identify(problem, method="least-squares", measurement=gappy))
+    return Answer(problem, identify(problem, method="least-squares", measurement=gappy, wishes=Wishes(sample=100)))
 
 
 @pytest.fixture(scope="session")

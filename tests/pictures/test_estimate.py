@@ -34,7 +34,16 @@ def test_every_picture_is_drawn_without_warnings_labelled_and_described(several:
             assert png(one.figure).startswith(b"\x89PNG")
     names = [one.name for one in drawn]
     assert len(set(names)) == len(names)
-    assert {"overlay", "poses", "residuals", "convergence", "landscape", "landscape-zoom", "correlations"} <= set(names)
+    assert {
+        "overlay",
+        "poses",
+        "residuals",
+        "convergence",
+        "landscape",
+        "landscape-zoom",
+        "correlations",
+        "posterior",
+    } <= set(names)
     for one in drawn:
         assert one.figure.get_suptitle()
         assert len(one.alt) > 30

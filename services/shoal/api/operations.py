@@ -186,6 +186,7 @@ class Identify(OfProblem):
     time_limit: Positive | None = None
     profiles: bool = False
     bootstrap: Annotated[int, Field(ge=0, le=10_000)] = 0
+    sample: Annotated[int, Field(ge=0, le=100_000)] = 0
 
 
 class Design(OfProblem):

@@ -11,7 +11,7 @@ import click
 
 from shoal.commands import options
 from shoal.commands.options import Out
-from shoal.errors import check_trusted
+from shoal.errors import InputError, check_trusted
 
 if TYPE_CHECKING:
     from shoal.identification.carried import Carried
@@ -52,10 +52,26 @@ if TYPE_CHECKING:
 )
 @click.option("--profiles", is_flag=True, help="The profile likelihood of every parameter.")
 @click.option("--bootstrap", type=click.IntRange(min=0), default=0, metavar="N", help="Draws of a bootstrap.")
+@click.option(
+    "--sample",
+    type=click.IntRange(min=0),
+    default=0,
+    is_flag=False,
+    flag_value=1000,
+    metavar="[N]",
+    help="Draw from the posterior until N draws are effective.  [N: 1000]",
+)
 @options.as_json
-@options.out(".html", ".png", ".gif", ".json")
+@options.out(".html", ".png", ".gif", ".json", ".nc")
 def identify(
-    problem: str, checkpoint: Path | None, profiles: bool, bootstrap: int, as_json: bool, out: Out, **how: Any
+    problem: str,
+    checkpoint: Path | None,
+    profiles: bool,
+    bootstrap: int,
+    sample: int,
+    as_json: bool,
+    out: Out,
+    **how: Any,
 ) -> None:
     """Find the parameters of PROBLEM from measured motion. With intervals and a verdict."""
     from shoal.identification import identify, load_problem
@@ -63,7 +79,9 @@ def identify(
     from shoal.pictures import files
     from shoal.terminal import screen, tables
 
-    wanted, wishes = load_problem(problem), Wishes(profiles=profiles, bootstrap=bootstrap)
+    if out is not None and out.suffix == ".nc" and not sample:
+        raise InputError("out: .nc holds draws from the posterior; add --sample")
+    wanted, wishes = load_problem(problem), Wishes(profiles=profiles, bootstrap=bootstrap, sample=sample)
     with _interruptible(checkpoint), screen.working(f"{wanted.name}: preparing the data") as tell:
         how["progress"] = lambda _, best, __, count: tell(
             f"{wanted.name}: best fitness {best:.3e}, {count} evaluations"

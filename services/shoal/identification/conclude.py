@@ -23,6 +23,7 @@ from shoal.identification.spread.bootstrap import bootstrap
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.curvature import bent, by_profile
 from shoal.identification.spread.model_error import ModelError, model_error, rms_of
+from shoal.identification.spread.posterior import Posterior, news, posterior
 from shoal.identification.spread.prediction import Prediction, predictions
 from shoal.identification.spread.profiles import Profile, profiles
 from shoal.identification.spread.rank import combinations
@@ -41,11 +42,13 @@ _ROUNDS = 2
 class Wishes:
     """What a user wants to know beyond the answer.
 
-    profiles: whether every parameter gets its profile likelihood; bootstrap: how many draws
+    profiles: whether every parameter gets its profile likelihood; bootstrap: how many draws; sample: how many effective
+    draws from the posterior
     """
 
     profiles: bool = False
     bootstrap: int = 0
+    sample: int = 0
 
 
 NOTHING = Wishes()
@@ -126,8 +129,17 @@ def conclude(
     foretold: list[Prediction] = unless_late(
         lambda: predictions(model, point, seen if known else None, at, blocks, error), []
     )
+    square, minimum = float(residual @ residual), judgement.verdict not in (Verdict.FAILED, Verdict.UNFINISHED)
+    drawn: Posterior | None = None
+    if wishes.sample and minimum:
+        drawn = unless_late(lambda: posterior(model, point, at, blocks, square, wishes.sample, seed), None)
     notes = [judgement.message or outcome.message]
     notes += remarks(values, profiled, names, tests, mesh if limits else None, theory)
+    if drawn is not None:
+        notes += [drawn.sentence(), *news(drawn, values)]
+    elif wishes.sample:
+        why = "no time was left" if minimum else f"'{judgement.verdict}' is no minimum to draw about"
+        notes.append(f"no posterior was drawn: {why}")
     several = len(measurement.recordings) > 1
     notes += [one.sentence(named=several) for one in foretold]
     beyond = ["look for what the model leaves out: a prediction is worse than the estimate states"]
@@ -157,6 +169,7 @@ def conclude(
         suspects=judgement.suspects,
         profiles=profiled,
         bootstrap=bootstrap(model, point, predicted, correlation, draws, rng) if draws else None,
+        posterior=drawn,
         sensitivity_doubt=seen.doubt,
         model_error_rms=_by_thing(model, error.mesh),
         theory_error_rms=_by_thing(model, error.theory),

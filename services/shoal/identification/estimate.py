@@ -12,6 +12,7 @@ from shoal.identification.judge.suspects import Suspect
 from shoal.identification.judge.verdict import Verdict
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.spread.bootstrap import Bootstrap
+from shoal.identification.spread.posterior import Posterior
 from shoal.identification.spread.prediction import Prediction
 from shoal.identification.spread.profiles import Profile
 from shoal.identification.spread.value import Value
@@ -31,7 +32,8 @@ class Estimate:
     evaluations: simulations; work: simulated time over that of one run of all recordings
     choice: which method was taken, and why; notes: what was found and mended in the recordings
     advice: what to do next; suspects: properties of the measurement that would explain the misfit
-    sensitivity_doubt: relative difference of derivatives by two step sizes; profiles, bootstrap: where wished for
+    sensitivity_doubt: relative difference of derivatives by two step sizes
+    profiles, bootstrap, posterior: where wished for
     scenes: the identified machine, by recording; predicted: its channels at the samples of each recording
     covariance: of the parameters, in the products of their units, (parameters, parameters)
     values: the fields of the scene that were found, by path, ties evaluated; left_out: what is not among them, and why
@@ -63,6 +65,7 @@ class Estimate:
     suspects: list[Suspect]
     profiles: dict[str, Profile]
     bootstrap: Bootstrap | None
+    posterior: Posterior | None
     sensitivity_doubt: float
     model_error_rms: float | None
     truth: dict[str, float]
@@ -145,6 +148,7 @@ class Estimate:
             "suspects": [plain(vars(suspect)) for suspect in self.suspects],
             "profiles": {name: found.to_json() for name, found in self.profiles.items()},
             "bootstrap": None if self.bootstrap is None else self.bootstrap.to_json(),
+            "posterior": None if self.posterior is None else self.posterior.to_json(),
             "sensitivity_doubt": plain(self.sensitivity_doubt),
             "model_error_rms": plain(self.model_error_rms),
             "theory_error_rms": plain(self.theory_error_rms),

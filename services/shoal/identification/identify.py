@@ -28,6 +28,7 @@ from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.plausible import check_constant
 from shoal.identification.recording.source import EngineSource
+from shoal.identification.spread.posterior import require_sampler
 from shoal.memory import Memory
 from shoal.versions import versions
 
@@ -69,6 +70,8 @@ def identify(
     search = get_method(name)
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
+    if wishes.sample:
+        require_sampler()
     notes: list[str] = []
     if fitted is not None:
         problem, values, notes = fitted.into(problem, values)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.trajectory import json_text
 from shoal.whole import whole
 
@@ -97,8 +98,13 @@ def estimate(found: Estimate, problem: Problem, path: Path) -> None:
 
         return json_text(archived(Answer(problem, found)), indent=1)
 
+    def draws() -> bytes:
+        if found.posterior is None:
+            raise InputError(f"out: no posterior was drawn, so {path} has nothing to hold")
+        return bytes(found.posterior.to_xarray().to_netcdf(engine="scipy"))
+
     moves = {".gif": lambda: moving_picture(Answer(problem, found))}
-    save(path, {".html": page, ".png": lambda: _plotted(found), **moves, ".json": kept})
+    save(path, {".html": page, ".png": lambda: _plotted(found), **moves, ".json": kept, ".nc": draws})
 
 
 def moving_picture(answer: Answer) -> bytes:

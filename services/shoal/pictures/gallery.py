@@ -15,6 +15,7 @@ from shoal.pictures.landscape import has_ellipse, landscape, survey
 from shoal.pictures.motion import Motion, motion
 from shoal.pictures.overlay import follows, overlay
 from shoal.pictures.poses import poses
+from shoal.pictures.posterior import posterior, says, shown
 from shoal.pictures.prediction import prediction, told
 from shoal.pictures.profiles import profiles
 from shoal.pictures.residuals import residuals, white
@@ -47,6 +48,13 @@ def gallery(answer: Answer, moving: list[Motion]) -> list[Drawn]:
             "The interval ends where the profile crosses the dashed line; the dotted parabola is its approximation."
         )
         drawn.append(Drawn("profiles", profiles(estimate, answer.problem), alt, caption))
+    if estimate.posterior is not None:
+        alt = f"Draws of {', '.join(shown(estimate.posterior))}, each by itself and every two. {says(estimate)}."
+        caption = (
+            "Where draws and intervals end at the same places, the intervals tell all. A bent or a long cloud is what "
+            "they cannot tell."
+        )
+        drawn.append(Drawn("posterior", posterior(estimate, answer.problem), alt, caption))
     if len(answer.names) > 1 and np.all(np.isfinite(answer.point)):
         drawn += _around(answer)
     if estimate.model.get("selection"):

@@ -115,6 +115,12 @@ def _remarks(estimate: Estimate) -> list[str]:
             low, high = estimate.bootstrap.interval(name)
             draws = len(estimate.bootstrap.draws)
             remarks.append(f"Bootstrap of {name}, {draws} draws: 95 % between {low:.6g} and {high:.6g}.")
+    if estimate.posterior is not None:
+        remarks += [
+            f"Posterior of {name}: median {rounded(one.median, one.sd)}, 95 % between {rounded(one.lower, one.sd)} and "
+            f"{rounded(one.upper, one.sd)}; {one.size:.0f} effective draws, R-hat {one.r_hat:.3f}."
+            for name, one in estimate.posterior.marginals.items()
+        ]
     for other in sorted(estimate.minima, key=lambda minimum: minimum["fitness"])[:_ENDS]:
         values = ", ".join(f"{name} {value:.4g}" for name, value in other.items() if name != "fitness")
         fit = f"{power(other['fitness'], 2)} {units.fitness_unit(estimate)}"

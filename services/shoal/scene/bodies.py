@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -34,6 +35,13 @@ _ONLY_FLEXIBLE = {
     "retardation": 0.0,
 }
 """Fields that a rigid rod has no use for, and what they are where nobody states them."""
+
+
+@cache
+def _gauss(points: int) -> tuple[tuple[float, float], ...]:
+    """Nodes and weights of Gauss's rule on (0, 1)."""
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    return tuple(zip(((nodes + 1) / 2).tolist(), (weights / 2).tolist(), strict=True))
 
 
 class Rod(Record):
@@ -210,18 +218,15 @@ class Rod(Record):
         """The sections of the pieces."""
         return [self.section_at(x) for x, _ in self._rule()]
 
-    def _rule(self) -> list[tuple[float, float]]:
+    def _rule(self) -> tuple[tuple[float, float], ...]:
         """Nodes as fractions of the length, and weights."""
-        nodes, weights = np.polynomial.legendre.leggauss(_POINTS if self.curvature else 3)
-        return list(zip((nodes + 1) / 2, weights / 2, strict=True))
+        return _gauss(_POINTS if self.curvature else 3)
 
     def axis(self, s: Any) -> Any:
         """Point x + iy [m] of the unstrained axis at the arc length s."""
         if not self.curvature:
             return s + 0j
-        nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
-        along = zip((nodes + 1) / 2, weights / 2, strict=True)
-        return sum(weight * s * np.exp(1j * self.turn(x * s)) for x, weight in along)
+        return sum(weight * s * np.exp(1j * self.turn(x * s)) for x, weight in _gauss(_POINTS))
 
     def turn(self, s: Any) -> Any:
         """Angle [rad] of the unstrained axis at the arc length s."""

@@ -299,9 +299,26 @@ def estimate_table(estimate: Estimate) -> None:
         for name in estimate.parameters:
             low, high = estimate.bootstrap.interval(name)
             screen.say(f"bootstrap of {name}, {len(estimate.bootstrap.draws)} draws: {low:.6g} to {high:.6g}")
+    _posterior(estimate)
     _predictions(estimate)
     _effort(estimate)
     screen.say(*(f"next: {step}" for step in estimate.advice))
+
+
+def _posterior(estimate: Estimate) -> None:
+    """What draws say of each parameter, and what they are worth."""
+    found = estimate.posterior
+    if found is None:
+        return
+    title = f"posterior, {found.noise}: {len(found.flat)} draws in {found.wall_s:.1f} s"
+    table = screen.table(title, "parameter", "median", "central 95 %", "effective", "tails", "R-hat")
+    for name, one in found.marginals.items():
+        ends = f"{rounded(one.lower, one.sd)} to {rounded(one.upper, one.sd)}"
+        sizes = f"{one.size:.0f}", f"{one.tail:.0f}", f"{one.r_hat:.3f}"
+        table.add_row(escape(name), rounded(one.median, one.sd), ends, *sizes)
+    screen.out.print(table)
+    lost = f", {found.failed} could not be simulated" if found.failed else ""
+    screen.say(f"{found.evaluations} simulations, {100 * found.accepted:.0f} % of the proposals accepted{lost}")
 
 
 def _predictions(estimate: Estimate) -> None:
