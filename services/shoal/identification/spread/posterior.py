@@ -24,7 +24,6 @@ from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
 from shoal.identification.spread.chances import student_above
 from shoal.identification.spread.covariance import Block
-from shoal.identification.spread.mixing import bulk_size, r_hat, tail_size
 from shoal.identification.spread.uncertainty import ABSORBED, LEVEL, Linearisation
 from shoal.identification.spread.value import Value
 from shoal.trajectory import Array, plain
@@ -390,5 +389,7 @@ def _told(
 def _marginal(draws: Array) -> Marginal:
     """Of one parameter's draws (ensembles, steps, walkers)."""
     lower, median, upper = (float(x) for x in np.quantile(draws, [0.5 - LEVEL / 2, 0.5, 0.5 + LEVEL / 2]))
+    from shoal.identification.spread.mixing import bulk_size, r_hat, tail_size
+
     sizes = bulk_size(draws), tail_size(draws), r_hat(draws)
     return Marginal(float(draws.mean()), float(draws.std(ddof=1)), median, lower, upper, *sizes)
