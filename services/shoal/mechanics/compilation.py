@@ -27,13 +27,14 @@ if sys.platform != "win32":
     import fcntl
 
 SECONDS = {
-    "loop": 16.0,
-    "_constrain": 15.0,
-    "_force": 6.0,
-    "_motion": 5.0,
-    "_settle": 4.0,
-    "_stiffness": 3.0,
-    "_energies": 1.5,
+    "_constrain": 28.0,
+    "loop": 20.0,
+    "_settle": 15.0,
+    "_motion": 14.0,
+    "_stiffness": 11.0,
+    "_energies": 9.0,
+    "_force": 8.0,
+    "_energy": 3.0,
 }
 """What large kernels take on one core of a server: for the order, and to say how long it will take."""
 _WORTH_A_LINE = 1.0

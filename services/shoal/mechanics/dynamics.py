@@ -142,7 +142,7 @@ def add_mean_force(tile: Tile, m: Arrays, w: Work, before: Array, after: Array, 
         families.add_mean_force(tile, family, before, after, f, w.element)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy", inline="always")
 def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """Turn all of the force in `a` into the acceleration by Gauss's principle, valid on the unknowns."""
     if m.constraints.size > 0 or m.gates.sought != 0:
@@ -154,7 +154,7 @@ def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
         sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy", inline="always")
 def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """`accelerate` where there are constraints, or somebody else who seeks the acceleration."""
     if m.gates.sought != 0:
@@ -166,7 +166,7 @@ def constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, t
         constraints.add_power(tile, m.constraints, m.functions, t, w.gauss.multiplier, w.power)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy", inline="always")
 def _constrain(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, tolerance: float, a: Array) -> None:
     """By the principle: once, or until friction by the forces of joints agrees with them, see `rubbing`."""
     r, rounds, searching = m.rubbing, 0, True

@@ -2,7 +2,8 @@
 
 Each function here does what the one of the same name does that its gate calls, a few lines below; `numerics.gate` says
 why. `ready` compiles what a model calls, or takes it from the cache: constraints where there are some, and the families
-of elements that it has.
+of elements that it has. What merely leads from a gate to its work is put into it by Numba (`inline="always"`): LLVM
+optimises all that a function calls once more for every function above it.
 """
 
 from __future__ import annotations

@@ -40,8 +40,8 @@ def cantilever(element: str, **more: Any) -> Scene:
         ("ancf-cable", {}, 1e-2),
         ("ancf-cable", {}, 1e-5),
         ("ancf-quintic", {}, 1e-5),
-        ("ancf-cable", {"dimensions": 3}, 1e-4),
-        ("director-rod", {"dimensions": 3}, 1e-3),
+        pytest.param("ancf-cable", {"dimensions": 3}, 1e-4, marks=pytest.mark.slow),
+        pytest.param("director-rod", {"dimensions": 3}, 1e-3, marks=pytest.mark.slow),
     ],
 )
 def test_the_tolerance_is_kept_against_the_elastica(element: str, more: dict[str, Any], tolerance: float) -> None:

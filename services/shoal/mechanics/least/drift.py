@@ -17,7 +17,7 @@ SETTLING = 100.0
 """Drift is removed along fewer directions than accelerations are held: those this much farther from singular."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def project(
     tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, tolerance: float, iterations: int
 ) -> None:

@@ -44,7 +44,7 @@ def state(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array) -> 
     constraints.bias(tile, m.constraints, m.functions, t, v, w.gap)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, a: Array, tolerance: float) -> None:
     """Turn the forces Q in `a` into the true acceleration; the multipliers go into w.multiplier.
 
