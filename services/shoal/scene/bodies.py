@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -34,6 +35,12 @@ _ONLY_FLEXIBLE = {
     "retardation": 0.0,
 }
 """Fields that a rigid rod has no use for, and what they are where nobody states them."""
+
+
+@cache
+def _gauss(count: int) -> tuple[Any, Any]:
+    """Nodes from -1 to 1 and weights of Gauss's quadrature."""
+    return np.polynomial.legendre.leggauss(count)
 
 
 class Rod(Record):
@@ -212,14 +219,14 @@ class Rod(Record):
 
     def _rule(self) -> list[tuple[float, float]]:
         """Nodes as fractions of the length, and weights."""
-        nodes, weights = np.polynomial.legendre.leggauss(_POINTS if self.curvature else 3)
+        nodes, weights = _gauss(_POINTS if self.curvature else 3)
         return list(zip((nodes + 1) / 2, weights / 2, strict=True))
 
     def axis(self, s: Any) -> Any:
         """Point x + iy [m] of the unstrained axis at the arc length s."""
         if not self.curvature:
             return s + 0j
-        nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
+        nodes, weights = _gauss(_POINTS)
         along = zip((nodes + 1) / 2, weights / 2, strict=True)
         return sum(weight * s * np.exp(1j * self.turn(x * s)) for x, weight in along)
 
