@@ -11,10 +11,12 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.capabilities import require
 from shoal.errors import ComputationError, InputError
+from shoal.identification.recording.felt import check_felt, equipped, from_start
 from shoal.identification.recording.observation import camera, observe
 from shoal.identification.recording.plausible import check_units
 from shoal.identification.recording.reading import described, sampled
 from shoal.identification.recording.source import Channel, FileSource
+from shoal.identification.recording.units import QUANTITIES as UNITS
 from shoal.scene import Scene
 from shoal.scene.expect import Expectation, ExpectedEngine, ExpectedRecording, ExpectedValue
 from shoal.shelf import located
@@ -91,22 +93,25 @@ def _recording(scene: Scene, expected: ExpectedRecording, document: Path) -> Que
     channels = tuple(source.channels or _called_so(scene, source))
     for channel in channels:
         for marker in (channel.marker, channel.to):
-            if marker is not None and marker not in scene.markers:
+            if marker and marker not in scene.markers:
                 known = ", ".join(scene.markers)
                 raise InputError(f"path: {expected.path}: channels: no marker {marker!r}; there are {known}")
+    own = scene.with_values(source.known)
+    check_felt(own, channels)
     found, source = sampled(source, channels)
     check_units(source, found.channels, found.times, found.values, scene, sized=False)
     instants = found.times / source.clock + source.delay
     if (first := float(instants[0])) < 0:
         raise InputError(f"path: {expected.path}: delay: the first sample would be {-first:g} s before the motion")
 
-    def away(trajectory: Trajectory) -> float:
-        squares = np.square(observe(trajectory, channels, camera(source))[0] - found.values)
-        return float(np.sqrt(np.nanmean(squares, axis=0).max()))
+    wanted = from_start(instants, channels)
 
-    units = {"m" if channel.is_position else "rad" for channel in channels}
-    unit = units.pop() if len(units) == 1 else "m or rad"
-    return Question(scene.with_values(source.known), instants, f"recording {expected.path}", unit, away)
+    def away(trajectory: Trajectory) -> float:
+        seen = observe(trajectory, channels, camera(source), own)[0, len(wanted) - len(instants) :]
+        return float(np.sqrt(np.nanmean(np.square(seen - found.values), axis=0).max()))
+
+    unit = " or ".join(dict.fromkeys(UNITS[channel.quantity] for channel in channels))
+    return Question(equipped(own, channels), wanted, f"recording {expected.path}", unit, away)
 
 
 def _called_so(scene: Scene, source: FileSource) -> list[Channel]:

@@ -10,6 +10,10 @@ from typing import Literal, get_args
 
 LengthUnit = Literal["m", "cm", "mm", "um", "in", "px"]
 AngleUnit = Literal["rad", "deg", "rev"]
+AccelerationUnit = Literal["m/s^2", "g"]
+ForceUnit = Literal["N", "kN", "mN"]
+TorqueUnit = Literal["N m", "mN m", "N mm"]
+StrainUnit = Literal["m/m", "um/m", "%"]
 SI: dict[str, float] = {
     "m": 1.0,
     "cm": 1e-2,
@@ -20,8 +24,12 @@ SI: dict[str, float] = {
     "rad": 1.0,
     "deg": 0.017453292519943295,
     "rev": 6.283185307179586,
+    **{"m/s^2": 1.0, "g": 9.80665},
+    **{"N": 1.0, "kN": 1e3, "mN": 1e-3},
+    **{"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3},
+    **{"m/m": 1.0, "um/m": 1e-6, "%": 1e-2},
 }
-"""Metres or radians in a unit; of a picture element the recording's `scale` tells the size."""
+"""What a unit is in those of SI; of a picture element the recording's `scale` tells the size."""
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 """Seconds in a unit of time."""
 ALSO = {
@@ -33,6 +41,10 @@ ALSO = {
     **dict.fromkeys(("degree", "degrees", "°"), "deg"),
     **dict.fromkeys(("radian", "radians"), "rad"),
     **dict.fromkeys(("turn", "turns", "revolution", "revolutions"), "rev"),
+    **dict.fromkeys(("Nm", "N*m", "N·m"), "N m"),
+    **dict.fromkeys(("Nmm", "N*mm", "N·mm"), "N mm"),
+    **dict.fromkeys(("mNm", "mN*m", "mN·m"), "mN m"),
+    **dict.fromkeys(("microstrain", "ustrain"), "um/m"),
 }
 """Other words for a unit."""
 _BRACKETED = re.compile(r"\[[^\[\]]*\]|\([^()]*\)|<[^<>]*>")
@@ -69,7 +81,8 @@ def bare(cell: str) -> str:
     head, slash, tail = word.partition("/")
     if not slash and re.fullmatch(r".*[ ·*]?s(\^-1|⁻¹|-1)", word):
         head, slash, tail = re.sub(r"[ ·*]?s(\^-1|⁻¹|-1)$", "", word), "/", "s"
-    found = ALSO.get(head.strip().lower(), head.strip()) + slash + tail.strip()
+    head = head.strip()
+    found = ALSO.get(head, ALSO.get(head.lower(), head)) + slash + tail.strip().replace("²", "^2").replace("s2", "s^2")
     return "" if found.lower() in _NONE else found
 
 
@@ -77,7 +90,7 @@ def _known(word: str) -> bool:
     unit = bare(word)
     names = (*get_args(LengthUnit), *get_args(AngleUnit))
     head, slash, tail = unit.partition("/")
-    return unit in TIMES or unit == "Hz" or (head in names and (not slash or tail.split("^")[0] in TIMES))
+    return unit in TIMES or unit in SI or unit == "Hz" or (head in names and (not slash or tail.split("^")[0] in TIMES))
 
 
 def _is_number(word: str) -> bool:

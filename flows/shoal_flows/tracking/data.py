@@ -33,7 +33,7 @@ def of_measurement(measurement: Measurement) -> list[Data]:
 
 
 def _of(name: str, recording: Recording) -> Data:
-    channels = [f"{channel.marker}.{channel.quantity}" for channel in recording.channels]
+    channels = [channel.signal for channel in recording.channels]
     digest = hashlib.sha256(repr((channels, recording.values.shape)).encode())
     digest.update(recording.times.tobytes() + recording.values.tobytes())
     columns = [{"type": "double", "name": column, "required": True} for column in ("t", *channels)]

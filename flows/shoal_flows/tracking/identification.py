@@ -102,7 +102,7 @@ def log_fit(fit: Fit, album: Album, study: str) -> str:
         _log_result(run, fit)
         for name, recording in estimate.measurement.recordings.items():
             prefix = f"{name}/" if len(fit.motions) > 1 else ""
-            log_motion(run, fit.motions[name], recording.channels[0].marker, prefix)
+            log_motion(run, fit.motions[name], recording.channels[0].marker or fit.motions[name].markers[-1], prefix)
         for name, picture in album.pictures.items():
             run.picture(picture, name)
         run.text(album.page, "report.html")
@@ -132,7 +132,7 @@ def _log_result(run: Run, fit: Fit) -> None:
     run.metric("final/trusted", float(estimate.verdict.trusted))
     run.metric("final/residual_autocorrelation", estimate.residual_autocorrelation)
     for signal in signals(estimate):
-        run.metric(f"rms/{signal.recording}/{signal.channel.marker}.{signal.channel.quantity}", signal.rms)
+        run.metric(f"rms/{signal.recording}/{signal.channel.signal}", signal.rms)
     for name, value in {**estimate.parameters, **estimate.quantities}.items():
         run.metric(f"final/{name}", value.value)
         run.metric(f"interval/{name}/lower", value.lower)

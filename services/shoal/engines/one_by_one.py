@@ -52,11 +52,21 @@ def _refused(engine: Engine, scene: Scene, wanted: Array, message: str) -> Traje
 
 def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
     """Runs of one lane each as the lanes of one trajectory; only what may be believed keeps its numbers."""
-    believed = [run if run.ok else replace(run, points=run.points * np.nan, angles=run.angles * np.nan) for run in runs]
+
+    def together(parts: Sequence[Array]) -> Array:
+        return np.concatenate([x if run.ok else np.nan * x for x, run in zip(parts, runs, strict=True)], axis=-1)
+
+    def known(parts: Sequence[Array | None]) -> Array | None:
+        # A lane that was refused tells nothing, not even whether its engine knows velocities.
+        one = next((part for part in parts if part is not None), None)
+        return None if one is None else together([np.nan * one if part is None else part for part in parts])
+
     return replace(
         runs[0],
-        points=np.concatenate([run.points for run in believed], axis=-1),
-        angles=np.concatenate([run.angles for run in believed], axis=-1),
+        points=together([run.points for run in runs]),
+        angles=together([run.angles for run in runs]),
+        velocities=known([run.velocities for run in runs]),
+        rates=known([run.rates for run in runs]),
         status=tuple(run.status[0] for run in runs),
         energy_drift=np.concatenate([run.energy_drift for run in runs]),
         constraint_drift=np.concatenate([run.constraint_drift for run in runs]),

@@ -55,14 +55,13 @@ def _parameters(values: Mapping[str, Value], covariance: Array | None) -> xr.Dat
 def _signals(recording: Recording, predicted: Array) -> xr.Dataset:
     import xarray as xr
 
-    markers = list(dict.fromkeys(channel.marker for channel in recording.channels))
+    markers = list(dict.fromkeys(channel.place for channel in recording.channels))
     shape = (len(recording.times), len(markers))
     columns: dict[str, Any] = {}
     for k, channel in enumerate(recording.channels):
         measured, fitted = recording.values[:, k], predicted[:, k]
-        quantity = channel.quantity + (f"_against_{channel.to}" if channel.to else "")
         parts = {"measured": measured, "predicted": fitted, "residual": fitted - measured}
         for part, signal in parts.items():
             empty = (("time", "marker"), np.full(shape, np.nan), {"units": of_channel(channel)})
-            columns.setdefault(f"{part}_{quantity}", empty)[1][:, markers.index(channel.marker)] = signal
+            columns.setdefault(f"{part}_{channel.kind}", empty)[1][:, markers.index(channel.place)] = signal
     return xr.Dataset(columns, {"time": ("time", recording.times, {"units": "s"}), "marker": markers})

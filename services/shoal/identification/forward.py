@@ -18,7 +18,8 @@ from shoal.identification.deadline import Deadline, TimeIsUp
 from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization
 from shoal.identification.problem import Problem
-from shoal.identification.recording.measurement import Measurement
+from shoal.identification.recording.felt import equipped, from_start
+from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import Camera, observe, without_turns
 from shoal.identification.recording.rows import Rows
 from shoal.mechanics.numerics.tile import WIDE
@@ -177,10 +178,10 @@ class ForwardModel:
         """One call of the engine; lanes that it refuses are found by halving and stay nan."""
         lanes = len(next(iter(values.values()))) if values else len(np.atleast_1d(view.x))
         channels = self.measurement.recordings[name].channels
-        # Whole turns between two bodies are counted from the start.
-        between = times[0] > 0.0 and any(channel.to is not None for channel in channels)
+        instants = from_start(times, channels)
         try:
-            trajectory = self._run(scene, values, np.append(0.0, times) if between else times, lanes)
+            trajectory = self._run(equipped(scene, channels), values, instants, lanes)
+            seen = observe(trajectory, channels, view, scene, values)
         except InputError as error:
             asked = self.whole or self
             self.refusal = asked.refusal = asked.refusal or str(error)
@@ -191,7 +192,7 @@ class ForwardModel:
             whole = [np.broadcast_to(number, lanes) for number in view]
             parts = [({path: x[half] for path, x in values.items()}, [x[half] for x in whole]) for half in halves]
             return np.concatenate([self._simulate(scene, v, times, Camera(*x), name) for v, x in parts])
-        seen = without_turns(observe(trajectory, channels, view), channels)[:, int(between) :]
+        seen = without_turns(seen, channels)[:, len(instants) - len(times) :]
         failed = np.array([status is not Status.OK for status in trajectory.status])
         seen[np.broadcast_to(failed, len(seen))] = np.nan
         return seen
@@ -223,14 +224,23 @@ class ForwardModel:
         return np.asarray(self.observe(self.parameters.start[None], name)[0])
 
     def poses(self, points: Array, name: str | None = None) -> Array:
-        """Channels at time zero, (points, channels). No motion is simulated, so nothing is counted as an evaluation."""
+        """Channels at time zero, (points, channels), nan of those that sensors feel, which no pose shows.
+
+        No motion is simulated, so nothing is counted as an evaluation.
+        """
         (self.whole or self).placements += len(points)
-        return self._native.observe(points, name, np.zeros(1))[:, 0]
+        recordings = self.measurement.recordings
+        channels = recordings[next(iter(recordings)) if name is None else name].channels
+        shown = [not channel.is_felt for channel in channels]
+        found = np.full((len(points), len(channels)), np.nan)
+        if any(shown):
+            found[:, shown] = self._native.observe(points, name, np.zeros(1))[:, 0]
+        return found
 
     @cached_property
     def _native(self) -> ForwardModel:
         """Placing bodies is the same for every engine, and the native one places all points in one call."""
-        return replace(self, engine=get_engine("gauss"))
+        return replace(self, engine=get_engine("gauss"), measurement=self.measurement.changed(_not_felt))
 
     def scene_at(self, point: Array, name: str | None = None) -> Scene:
         """The scene of a point, in a recording (else the first). Raises InputError."""
@@ -326,6 +336,13 @@ class ForwardModel:
         values = self.parameters.to_values(points)
         rows = [(values[:, k] - prior.mean) / prior.std for k, prior in self.parameters.priors]
         return (self.rows.noise or 1.0) * np.array(rows).reshape(len(rows), len(points)).T
+
+
+def _not_felt(recording: Recording) -> Recording:
+    """Without the channels that sensors feel."""
+    shown = [k for k, channel in enumerate(recording.channels) if not channel.is_felt]
+    channels = tuple(recording.channels[k] for k in shown)
+    return replace(recording, channels=channels, values=recording.values[:, shown], noise=recording.noise[shown])
 
 
 def _distinct(rows: Array) -> tuple[Array, npt.NDArray[np.intp]]:

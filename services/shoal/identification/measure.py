@@ -14,6 +14,7 @@ from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.identification.problem import RESERVED, Problem
 from shoal.identification.recording.computed import kept
+from shoal.identification.recording.felt import equipped, from_start
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import camera, observe, without_turns
 from shoal.identification.recording.plausible import check_units
@@ -117,10 +118,12 @@ def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) 
     instants = times / source.clock + source.delay
 
     def simulated() -> Array:
-        trajectory = get_engine(source.engine).simulate(truth, instants)
+        wanted = from_start(instants, channels)
+        trajectory = get_engine(source.engine).simulate(equipped(truth, channels), wanted)
         if not trajectory.ok:
             raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
-        return np.asarray(without_turns(observe(trajectory, channels, camera(source)), channels)[0])
+        seen = without_turns(observe(trajectory, channels, camera(source), truth), channels)
+        return np.asarray(seen[0, len(wanted) - len(times) :])
 
     values = kept(source.engine, truth, instants, (channels, camera(source)), simulated)
     values = values + source.noise * np.random.default_rng(source.seed).standard_normal(values.shape)

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
+from shoal.identification.recording.felt import check_felt
 from shoal.identification.recording.source import Channel, EngineSource, FileSource, Source
 from shoal.scene import Scene, expression, load_scene
 from shoal.scene.load import names, read_named
@@ -18,7 +19,7 @@ from shoal.scene.record import Positive, Record, one_line
 from shoal.scene.scene import Name
 from shoal.shelf import NAME, located, shelf
 
-MEASUREMENT = ("clock", "delay", "scale", "x", "y", "tilt")
+MEASUREMENT = ("clock", "delay", "scale", "x", "y", "tilt", "mounting", "bias_ax", "bias_ay", "bias_rate")
 """What a parameter can be that is none of the scene's: the path is `measurement.` and one of these."""
 RESERVED = "measurement"
 _POSITIVE = {
@@ -51,8 +52,8 @@ class Prior(Record):
 class Parameter(Record):
     """A number to be found: its path in the scene, its bounds, and where to start if nothing better is known.
 
-    path: a field of the scene, or `measurement.` and clock, delay, scale, x, y or tilt; without one the parameter
-        only stands in `ties`
+    path: a field of the scene, or `measurement.` and clock, delay, scale, x, y, tilt, mounting or a bias; without one
+        the parameter only stands in `ties`
     scale: `log` for numbers that are known in order of magnitude only; `auto` is that for quantities that are positive
         by nature (a mass, a length, a modulus, friction) where `lower` is above 0, else `linear`
     own: every recording has its own (an initial state, for instance), named RECORDING.NAME
@@ -186,7 +187,7 @@ class Problem(Record):
         if not channels:
             raise InputError(f"{where}: channels: none are stated, neither by the problem nor by the recording")
         for channel in channels:
-            for marker in (channel.marker, channel.to):
+            for marker in (channel.marker or None, channel.to):
                 if marker is not None and marker not in scene.markers:
                     known = ", ".join(scene.markers)
                     raise InputError(f"{where}: channels: no marker {marker!r}; there are {known}")
@@ -198,8 +199,12 @@ class Problem(Record):
                 )
             if channel.noise is None and self.noise is None and any(p.prior for p in self.parameters.values()):
                 raise InputError(
-                    f"{where}: noise: a prior weighs against the data by their noise; state it for {channel.marker}"
+                    f"{where}: noise: a prior weighs against the data by their noise; state it for {channel.place}"
                 )
+        try:
+            check_felt(scene, channels)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
 
     @classmethod
     def parse(cls, data: Any, source: str) -> Problem:

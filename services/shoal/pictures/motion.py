@@ -151,12 +151,12 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
     times = np.linspace(earliest, float(samples.times[-1]), frames)
     traced, read = _traced(answer.estimate.scenes[recording])
     seen = answer.model.engine.simulate(traced, np.maximum(0.0, times / view["clock"] + view["delay"]))
-    markers = {channel.marker: seen.marker(channel.marker) for channel in samples.channels}
+    markers = {channel.marker: seen.marker(channel.marker) for channel in samples.channels if channel.marker}
     nearest = np.abs(samples.times[None] - times[:, None]).argmin(axis=1)
     close = np.abs(samples.times[nearest] - times) <= 1.01 * max(times[1] - times[0], _step(samples.times))
     places: dict[str, dict[str, Array]] = {}
     for k, channel in enumerate(samples.channels):
-        if channel.to is not None:
+        if channel.to is not None or channel.is_felt:
             continue
         values = np.where(close, samples.values[nearest, k], np.nan)
         places.setdefault(channel.marker, {})[channel.quantity] = values

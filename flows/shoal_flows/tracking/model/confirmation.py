@@ -21,7 +21,7 @@ ACCURACY = 1e-4
 class Confirmation:
     """What a second engine says of the signals that were fitted.
 
-    signal: where the engines differ most for what is allowed; away, allowed: root mean square there, in SI units
+    signal: where the engines differ most for what is allowed; away, allowed: root mean square there, in its unit
     refusal: why there is no answer, else empty
     """
 
@@ -29,6 +29,7 @@ class Confirmation:
     signal: str = ""
     away: float = np.nan
     allowed: float = np.nan
+    unit: str = ""
     refusal: str = ""
 
     @property
@@ -39,8 +40,8 @@ class Confirmation:
     def __str__(self) -> str:
         if self.refusal:
             return f"{self.engine} does not confirm the motion: {self.refusal}"
-        words, unit = "confirms" if self.ok else "does not confirm", QUANTITIES[self.signal.rpartition(".")[2]]
-        numbers = f"differs by {self.away:.1e} {unit} (RMS), allowed are {self.allowed:.1e} {unit}"
+        words = "confirms" if self.ok else "does not confirm"
+        numbers = f"differs by {self.away:.1e} {self.unit} (RMS), allowed are {self.allowed:.1e} {self.unit}"
         return f"{self.engine} {words} the motion: {self.signal} {numbers}"
 
 
@@ -59,18 +60,18 @@ def confirm(answer: Answer) -> Confirmation:
     if not all(np.all(np.isfinite(values)) for values in seen.values()):
         return Confirmation(engine, refusal=model.refusal or "its simulation failed")
     rows = [
-        Confirmation(engine, f"{name}/{signal}" if len(seen) > 1 else signal, away, allowed)
+        Confirmation(engine, f"{name}/{signal}" if len(seen) > 1 else signal, away, allowed, unit)
         for name, recording in estimate.measurement.recordings.items()
-        for signal, away, allowed in _signals(recording, estimate.predicted[name], seen[name])
+        for signal, away, allowed, unit in _signals(recording, estimate.predicted[name], seen[name])
     ]
     return max(rows, key=lambda row: row.away / row.allowed)
 
 
-def _signals(recording: Recording, fitted: Array, seen: Array) -> Iterator[tuple[str, float, float]]:
-    """Name, distance of the engines, and what is allowed, for every channel; arrays are (samples, channels)."""
+def _signals(recording: Recording, fitted: Array, seen: Array) -> Iterator[tuple[str, float, float, str]]:
+    """Name, distance of the engines, what is allowed, and unit of every channel; arrays are (samples, channels)."""
     left = recording.values - fitted
     for k, channel in enumerate(recording.channels):
         stated = float(recording.noise[k])
         estimated = max(float(np.sqrt(np.nanmean(left[:, k] ** 2))), ACCURACY * float(np.ptp(fitted[:, k])))
         away = float(np.sqrt(np.mean((seen[:, k] - fitted[:, k]) ** 2)))
-        yield f"{channel.marker}.{channel.quantity}", away, stated if np.isfinite(stated) else estimated
+        yield channel.signal, away, stated if np.isfinite(stated) else estimated, QUANTITIES[channel.quantity]

@@ -108,9 +108,10 @@ def _only(sources: dict[str, dict[str, Any]]) -> dict[str, Any]:
 def _source(name: str, recording: Recording) -> dict[str, Any]:
     """How the samples of `_table` are read: in SI units, from the start of the motion, by the recording's clock."""
     channels = []
-    for channel, noise in zip(recording.channels, recording.noise.tolist(), strict=True):
-        stated = {"marker": channel.marker, "quantity": channel.quantity, "column": _column(channel)}
-        channels.append(stated | ({"noise": noise} if np.isfinite(noise) else {}))
+    read = {"column", "origin", "unit", "scale", "offset", "noise"}
+    for channel, column, noise in zip(recording.channels, _columns(recording), recording.noise.tolist(), strict=True):
+        where = channel.model_dump(mode="json", exclude_defaults=True, exclude=read)
+        channels.append(where | {"column": column} | ({"noise": noise} if np.isfinite(noise) else {}))
     stated_too = recording.stated.model_dump(mode="json", exclude_defaults=True, exclude={"channels"})
     return {
         "kind": "file",
@@ -126,11 +127,13 @@ def _table(recording: Recording) -> str:
     """Time [s] and channels in SI units, with all digits; empty where nothing was measured."""
     stream = StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["t", *map(_column, recording.channels)])
+    writer.writerow(["t", *_columns(recording)])
     for time, row in zip(recording.times.tolist(), recording.values.tolist(), strict=True):
         writer.writerow([repr(time), *("" if np.isnan(value) else repr(value) for value in row)])
     return stream.getvalue()
 
 
-def _column(channel: Any) -> str:
-    return f"{channel.marker}.{channel.quantity}"
+def _columns(recording: Recording) -> list[str]:
+    """A name for each channel; those that show the same in another way are numbered."""
+    names = [channel.signal for channel in recording.channels]
+    return [f"{name}-{k}" if names.count(name) > 1 else name for k, name in enumerate(names)]

@@ -22,11 +22,14 @@ INSTANTS = 400
 class Verdict:
     """Marker motion of one run and what to think of it.
 
-    points [m], (samples, markers, 2); angles [rad], (samples, markers); gap: largest joint gap [m].
+    points [m], (samples, markers, d); angles [rad], (samples, markers); velocities [m/s] and rates [rad/s] likewise,
+    in the plane; gap: largest joint gap [m].
     """
 
     points: Array
     angles: Array
+    velocities: Array | None
+    rates: Array | None
     status: Status
     message: str
     energy_drift: float
@@ -35,7 +38,7 @@ class Verdict:
 
 def judge(machine: Machine, record: Record, failure: str) -> Verdict:
     """Read the markers and check the run; `failure` is what the solver said, empty where it was content."""
-    points, angles = _markers(machine, record)
+    points, angles, velocities, rates = _markers(machine, record)
     rows = np.unique(np.linspace(0, len(record.q) - 1, INSTANTS).astype(int))
     gap = machine.gap(record.q[rows], record.v[rows])
     energy, moving = machine.energy(record.times, record.q, record.v, rows)
@@ -58,21 +61,26 @@ def judge(machine: Machine, record: Record, failure: str) -> Verdict:
         status, message = Status.DRIFTED, f"a joint opened by {gap:.3g} m; reduce solver.step"
     elif drift > tolerance:
         status, message = Status.ENERGY, f"energy is off by {drift:.3g}, allowed is {tolerance:.3g}; reduce solver.step"
-    return Verdict(points, angles, status, message, drift, gap)
+    return Verdict(points, angles, velocities, rates, status, message, drift, gap)
 
 
-def _markers(machine: Machine, record: Record) -> tuple[Array, Array]:
+def _markers(machine: Machine, record: Record) -> tuple[Array, Array, Array | None, Array | None]:
+    """Points, angles, velocities and rates; the last two in the plane."""
     scene, samples = machine.scene, record.at_wanted()
-    points, angles = [], []
+    angles, motions = [], []
     for marker in scene.markers.values():
         part, place = machine.parts[marker.body], scene.location(marker)
         path = np.unwrap(part.motion(record.q, record.v, place).direction)
         path += _turns(scene.start(marker.body).angle + lead(scene, marker) - path[0])
         here = part.motion(*samples, place)
         about = np.interp(record.steps.wanted, record.times, path)
-        points.append(here.position)
+        motions.append(here)
         angles.append(here.direction + _turns(about - here.direction))
-    return np.stack(points, axis=1), np.stack(angles, axis=1)
+    points, directions = np.stack([one.position for one in motions], axis=1), np.stack(angles, axis=1)
+    if scene.dimensions != 2:
+        return points, directions, None, None
+    velocities = np.stack([one.velocity for one in motions], axis=1)
+    return points, directions, velocities, np.stack([one.rate for one in motions], axis=1)
 
 
 def _turns(angle: Array) -> Array:

@@ -115,6 +115,8 @@ class ExudynEngine:
             markers=tuple(scene.markers),
             points=verdict.points[..., None],
             angles=verdict.angles[..., None],
+            velocities=None if verdict.velocities is None else verdict.velocities[..., None],
+            rates=None if verdict.rates is None else verdict.rates[..., None],
             status=(verdict.status,),
             energy_drift=np.array([verdict.energy_drift]),
             constraint_drift=np.array([verdict.gap / machine.span]),

@@ -69,7 +69,7 @@ def _pose_misfit(model: ForwardModel, name: str, angles: list[int], wanted: Arra
     """
     from scipy.stats import qmc  # slow to import
 
-    kinds = tuple(channel.quantity for channel in model.measurement.recordings[name].channels)
+    kinds = tuple(c.quantity if c.is_pose else "" for c in model.measurement.recordings[name].channels)
     library = np.repeat(model.parameters.start[None], _LIBRARY, axis=0)
     library[:, angles] = np.pi * (2 * qmc.Sobol(len(angles), seed=0).random(_LIBRARY) - 1)
     targets = wanted.reshape(-1, len(kinds))
@@ -88,10 +88,10 @@ def _pose_misfit(model: ForwardModel, name: str, angles: list[int], wanted: Arra
 
 
 def _difference(seen: Array, targets: Array, kinds: tuple[str, ...]) -> Array:
-    """Channels minus what they should be, angles without whole turns, (points, channels); zero for rates."""
+    """Channels minus what they should be, angles without whole turns, (points, channels); zero for no pose."""
     error = seen - targets
     error = np.where([kind == "angle" for kind in kinds], (error + np.pi) % (2 * np.pi) - np.pi, error)
-    return np.where([kind == "rate" for kind in kinds], 0.0, error)
+    return np.where([not kind for kind in kinds], 0.0, error)
 
 
 def _gauss_newton(
@@ -100,7 +100,7 @@ def _gauss_newton(
     """The points with their angles moved towards the targets, (points, parameters)."""
     seen, jacobian = poses_and_slopes(model, name, points, angles)
     error = _difference(seen, targets, kinds)
-    jacobian[:, [kind == "rate" for kind in kinds]] = 0.0
+    jacobian[:, [not kind for kind in kinds]] = 0.0
     # A little damping, so that a stretched pose (singular) does not send the angles far away.
     step = damped_steps(error, jacobian, np.full(len(points), 1e-6))
     moved = points.copy()

@@ -141,7 +141,7 @@ def _within_bounds(model: ForwardModel, point: Array) -> Array | None:
 def _alike(model: ForwardModel, point: Array, candidates: Array) -> Array:
     """Those of the images whose channels begin about as the answer's, the most similar first, (images, parameters).
 
-    Angles count without whole turns, rates do not count: a pose has none.
+    Angles count without whole turns; rates and what sensors feel do not count: a pose has none.
     """
     if not len(candidates):
         return candidates
@@ -152,7 +152,7 @@ def _alike(model: ForwardModel, point: Array, candidates: Array) -> Array:
             difference = seen[1:, k] - seen[0, k]
             if channel.quantity == "angle":
                 difference = (difference + np.pi) % (2 * np.pi) - np.pi
-            if channel.quantity != "rate":
+            if channel.is_pose:
                 size = float(np.nanstd(recording.values[:, k]))
                 off = np.maximum(off, np.abs(difference) / max(size, 1e-300))
     order = np.argsort(np.where(np.isfinite(off), off, np.inf), kind="stable")[:_SIMULATED]

@@ -153,11 +153,11 @@ def _distinct(model: ForwardModel, points: Array, cost: Array, angles: list[int]
 def _pose_error(model: ForwardModel, name: str, points: Array, angles: list[int], pose: Array) -> tuple[Array, Array]:
     """Pose minus measured pose, (points, channels), and its derivative in the angles, (points, channels, angles).
 
-    Channels that are not known, or that are no pose (rates), do not count.
+    Channels that are not known, or that are no pose (rates, accelerations), do not count.
     """
     seen, slope = poses_and_slopes(model, name, points, angles)
     channels = model.measurement.recordings[name].channels
-    counted = np.isfinite(pose) & np.array([channel.quantity != "rate" for channel in channels])
+    counted = np.isfinite(pose) & np.array([channel.is_pose for channel in channels])
     error = np.where(counted, seen - np.where(counted, pose, 0.0), 0.0)
     return error, np.where(counted[:, None] & np.isfinite(slope), slope, 0.0)
 

@@ -73,8 +73,8 @@ class Recording:
 
     @property
     def things(self) -> int:
-        """How many things are observed: positions (x and y count as one) and angles."""
-        return len({(c.marker, c.to, "position" if c.is_position else c.quantity) for c in self.channels})
+        """How many things are observed: positions (x and y count as one), angles, and what sensors show."""
+        return len({(c.place, c.to, "position" if c.is_position else c.quantity) for c in self.channels})
 
     def until(self, end: float) -> Recording:
         """The samples up to a time [s]."""

@@ -1,23 +1,33 @@
-"""From the motion of markers to what a recording shows of it: through a camera, in the order of the channels."""
+"""From the motion of markers to what a recording shows: by a camera and sensors, in the order of the channels."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.identification.recording.felt import felt
 from shoal.identification.recording.source import Channel, Clocked
+from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
 
 class Camera(NamedTuple):
-    """Where positions are seen from: at rotation(-tilt) (X - [x, y]) / scale, z at z / scale; numbers or (lanes,)."""
+    """Where positions are seen from: at rotation(-tilt) (X - [x, y]) / scale, z at z / scale; numbers or (lanes,).
+
+    mounting, bias_ax, bias_ay, bias_rate: of inertial sensors, see `Clocked`
+    """
 
     scale: float | Array = 1.0
     x: float | Array = 0.0
     y: float | Array = 0.0
     tilt: float | Array = 0.0
+    mounting: float | Array = 0.0
+    bias_ax: float | Array = 0.0
+    bias_ay: float | Array = 0.0
+    bias_rate: float | Array = 0.0
 
 
 STRAIGHT = Camera()
@@ -25,7 +35,7 @@ STRAIGHT = Camera()
 
 def camera(stated: Clocked) -> Camera:
     """The camera that a recording states."""
-    return Camera(stated.scale, stated.x, stated.y, stated.tilt)
+    return Camera(*(getattr(stated, name) for name in Camera._fields))
 
 
 def without_turns(seen: Array, channels: tuple[Channel, ...]) -> Array:
@@ -40,11 +50,26 @@ def without_turns(seen: Array, channels: tuple[Channel, ...]) -> Array:
     return np.asarray(seen - 2 * np.pi * np.round(first / (2 * np.pi)))
 
 
-def observe(trajectory: Trajectory, channels: tuple[Channel, ...], seen_by: Camera = STRAIGHT) -> Array:
-    """The channels of a trajectory, (lanes, samples, channels). Raises InputError if its engine tells no rates."""
+def observe(
+    trajectory: Trajectory,
+    channels: tuple[Channel, ...],
+    seen_by: Camera = STRAIGHT,
+    scene: Scene | None = None,
+    values: Mapping[str, Array] | None = None,
+) -> Array:
+    """The channels of a trajectory, (lanes, samples, channels). Raises InputError if its engine tells no rates.
+
+    scene, values by path, one for each lane: of the machine, which sensors of acceleration, force and strain need; the
+    trajectory is then that of the scene with their markers, see `felt.equipped`
+    """
     columns = []
     c, s = np.cos(seen_by.tilt), np.sin(seen_by.tilt)
-    for channel in channels:
+    sensed = felt(trajectory, channels, scene, values or {}, seen_by.mounting)
+    for number, channel in enumerate(channels):
+        if number in sensed:
+            bias = {"ax": seen_by.bias_ax, "ay": seen_by.bias_ay}.get(channel.quantity, 0.0)
+            columns.append(sensed[number] + bias)
+            continue
         index = trajectory.markers.index(channel.marker)
         against = None if channel.to is None else trajectory.markers.index(channel.to)
         if channel.quantity == "angle":
@@ -53,7 +78,8 @@ def observe(trajectory: Trajectory, channels: tuple[Channel, ...], seen_by: Came
         elif channel.quantity == "rate":
             if trajectory.rates is None:
                 raise InputError(f"channels: engine {trajectory.engine} tells no rates; use gauss, or no rate")
-            columns.append(trajectory.rates[:, index] - (0.0 if against is None else trajectory.rates[:, against]))
+            still = 0.0 if against is None else trajectory.rates[:, against]
+            columns.append(trajectory.rates[:, index] - still + seen_by.bias_rate)
         elif channel.quantity == "z":
             columns.append(trajectory.points[:, index, 2] / seen_by.scale)
         elif channel.is_position:

@@ -120,10 +120,10 @@ def check_constant(measurement: Measurement, simulated: Callable[[str], Array]) 
         for k in still:
             channel, moved = recording.channels[k], np.ptp(seen[:, k]) if np.all(np.isfinite(seen[:, k])) else 0.0
             if moved > _STILL * max(1.0, float(np.max(np.abs(seen[:, k])))):
-                what = f"column {channel.column!r}" if channel.column else f"{channel.marker} {channel.quantity}"
+                what = f"column {channel.column!r}" if channel.column else f"{channel.place} {channel.quantity}"
                 value = float(np.nanmean(recording.values[:, k]))
                 raise InputError(
-                    f"{recording.origin}: {what} is constant ({value:.6g}), while {channel.marker} {channel.quantity} "
+                    f"{recording.origin}: {what} is constant ({value:.6g}), while {channel.place} {channel.quantity} "
                     "moves in the model; is it the right column?"
                 )
 

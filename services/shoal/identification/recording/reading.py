@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from shoal.errors import InputError
 from shoal.identification.recording.measurement import Recording
 from shoal.identification.recording.noise import differences
-from shoal.identification.recording.source import Channel, FileSource
+from shoal.identification.recording.source import Channel, FileSource, units_of
 from shoal.identification.recording.swaps import mend
 from shoal.identification.recording.unit_line import with_units
 from shoal.scene.load import read_yaml
@@ -162,12 +162,13 @@ def _signal(
     """A channel in SI units, (rows,), and notes. Where y grows down, y and the sense of angles are turned round."""
     column = columns[channel.column]
     notes: list[str] = []
-    unit = SI[channel.unit or ("m" if channel.is_position else "rad")]
+    unit = SI[channel.unit or units_of(channel.quantity)[0]]
     if channel.quantity == "angle":
         column, notes = _unwrapped(column, times, 2 * np.pi / unit, channel.marker, inside)
     if channel.origin:
         column = column - columns[channel.origin]
-    sense = -1.0 if source.y_axis == "down" and channel.quantity != "x" else 1.0
+    seen = channel.quantity != "x" and not channel.is_felt
+    sense = -1.0 if source.y_axis == "down" and seen else 1.0
     return np.asarray(channel.offset + sense * channel.scale * unit * column), notes
 
 
@@ -210,10 +211,10 @@ def _findings(times: Array, values: Array, channels: tuple[Channel, ...]) -> lis
         notes.append(f"about {frames} dropped frames; intervals of {usual:.3g} s, the longest {interval.max():.3g} s")
     for channel, signal in zip(channels, values.T, strict=True):
         if missing := int(np.isnan(signal).sum()):
-            notes.append(f"{channel.marker} {channel.quantity}: {missing} of {len(times)} samples are gaps")
+            notes.append(f"{channel.place} {channel.quantity}: {missing} of {len(times)} samples are gaps")
         if count := _outliers(times, signal):
             notes.append(
-                f"{channel.marker} {channel.quantity}: outliers, {count} samples beyond {_OUTLIER:g} standard "
+                f"{channel.place} {channel.quantity}: outliers, {count} samples beyond {_OUTLIER:g} standard "
                 "deviations of the noise; `loss: huber` lets them weigh less"
             )
     return notes

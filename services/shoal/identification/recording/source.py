@@ -7,19 +7,33 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from shoal.scene.record import NonNegative, Positive, Record
-from shoal.table_units import AngleUnit, LengthUnit
+from shoal.scene.record import Angle, NonNegative, Positive, Record
+from shoal.table_units import AccelerationUnit, AngleUnit, ForceUnit, LengthUnit, StrainUnit, TorqueUnit
 
-Quantity = Literal["x", "y", "z", "angle", "rate"]
+Quantity = Literal["x", "y", "z", "angle", "rate", "ax", "ay", "fx", "fy", "torque", "strain"]
+ACCELERATIONS, REACTIONS, STRAIN = ("ax", "ay"), ("fx", "fy", "torque"), "strain"
+"""What an accelerometer, a load cell in a joint, and a strain gauge show."""
+_UNITS: dict[str, Any] = {
+    **dict.fromkeys(("x", "y", "z"), LengthUnit),
+    **dict.fromkeys(("angle", "rate"), AngleUnit),
+    **dict.fromkeys(ACCELERATIONS, AccelerationUnit),
+    **dict.fromkeys(("fx", "fy"), ForceUnit),
+    **{"torque": TorqueUnit, STRAIN: StrainUnit},
+}
 
 
 def units_of(quantity: str) -> tuple[str, ...]:
-    """The units in which a column of that quantity may be; a rate is in them per second."""
-    return get_args(LengthUnit if quantity in ("x", "y", "z") else AngleUnit)
+    """The units in which a column of that quantity may be, that of SI first; a rate is in them per second."""
+    return get_args(_UNITS[quantity])
 
 
 class Channel(Record):
     """One measured signal: a marker's x, y, in space z [m], angle [rad] or rate of its angle [rad/s].
+
+    ax, ay [m/s^2]: acceleration less gravity at a marker, along the axes of its body turned by `tilt` [rad], as an
+    accelerometer shows it. fx, fy [N], torque [N m]: what a `joint` exerts on its second body, along the axes of the
+    ground, friction and drive included. strain: of a flexible rod along its axis, at a marker and a
+    `height` above the axis [m].
 
     With `to`, an angle or rate is that of the marker's body less that of the body at another marker: of a joint between
     them, what its encoder shows. Neither tilts with the camera.
@@ -31,14 +45,17 @@ class Channel(Record):
     noise: standard deviation in SI units; offset: in SI units
     """
 
-    marker: str
+    marker: str = ""
+    joint: str | None = None
     quantity: Quantity
     to: str | None = None
+    tilt: Angle = 0.0
+    height: float = 0.0
     column: str = ""
     scale: float = 1.0
     offset: float = 0.0
     origin: str | None = None
-    unit: LengthUnit | AngleUnit | None = None
+    unit: LengthUnit | AngleUnit | AccelerationUnit | ForceUnit | TorqueUnit | StrainUnit | None = None
     noise: Positive | None = None
 
     @model_validator(mode="after")
@@ -49,8 +66,20 @@ class Channel(Record):
         return self
 
     @model_validator(mode="after")
+    def _somewhere(self) -> Self:
+        if self.quantity in REACTIONS and (self.joint is None or self.marker):
+            raise ValueError(f"joint: {self.quantity} is measured in a joint; name it, and no marker")
+        if self.quantity not in REACTIONS and (self.joint is not None or not self.marker):
+            raise ValueError(f"marker: {self.quantity} is measured at a marker; name it, and no joint")
+        if self.tilt and self.quantity not in ACCELERATIONS:
+            raise ValueError(f"tilt: of the axes of ax and ay, found {self.quantity}")
+        if self.height and self.quantity != STRAIN:
+            raise ValueError(f"height: of a strain gauge above the axis of its rod, found {self.quantity}")
+        return self
+
+    @model_validator(mode="after")
     def _between_two(self) -> Self:
-        if self.to is not None and self.is_position:
+        if self.to is not None and self.quantity not in ("angle", "rate"):
             raise ValueError(f"to: an angle or a rate is measured between two markers, found {self.quantity}")
         if self.to == self.marker:
             raise ValueError(f"to: another marker than {self.marker} is needed")
@@ -59,7 +88,39 @@ class Channel(Record):
     @property
     def name(self) -> str:
         """What is measured, in words."""
-        return f"{self.quantity} of {self.marker}{f' against {self.to}' if self.to else ''}"
+        height = f" at height {self.height:g} m" if self.height else ""
+        return f"{self.quantity} of {self.place}{f' against {self.to}' if self.to else ''}{height}"
+
+    @property
+    def kind(self) -> str:
+        """What is measured in a place, as one word."""
+        height = f"_at_{self.height:g}" if self.height else ""
+        return self.quantity + (f"_against_{self.to}" if self.to else "") + height
+
+    @property
+    def place(self) -> str:
+        """The marker or the joint."""
+        return self.joint or self.marker
+
+    @property
+    def signal(self) -> str:
+        """Place and kind, as columns and charts name it."""
+        return f"{self.place}.{self.kind}"
+
+    @property
+    def is_felt(self) -> bool:
+        """Whether a sensor on the machine shows it that knows no camera: of acceleration, force or strain."""
+        return self.quantity in (*ACCELERATIONS, *REACTIONS, STRAIN)
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether it shows accelerations or forces, which depend on the whole machine and not on its motion alone."""
+        return self.quantity in (*ACCELERATIONS, *REACTIONS)
+
+    @property
+    def is_pose(self) -> bool:
+        """Whether a pose alone shows it."""
+        return self.is_position or self.quantity == "angle"
 
     @property
     def is_position(self) -> bool:
@@ -91,7 +152,10 @@ class Clocked(Record):
 
     So `clock` is how many seconds the recording's clock shows in one second: 1.26 is a clock that is fast by 26 %.
     A marker at X [m] is recorded at rotation(-tilt) (X - [x, y]) / scale, its z at z / scale, angles less `tilt`:
-    clock, delay, scale, x, y and tilt may be parameters, with the paths `measurement.clock` and so on.
+    clock, delay, scale, x, y and tilt may be parameters, with the paths `measurement.clock` and so on; mounting and
+    the biases too.
+    mounting: angle [rad] that accelerometers are turned by beside their own `tilt`
+    bias_ax, bias_ay [m/s^2], bias_rate [rad/s]: what these channels show too much
     known: fields of the scene that are different in this recording
     channels: instead of those of the problem
     hold_out: windows [from, to] in seconds of the recording's clock that are predicted instead of fitted
@@ -103,6 +167,10 @@ class Clocked(Record):
     x: float = 0.0
     y: float = 0.0
     tilt: float = 0.0
+    mounting: float = 0.0
+    bias_ax: float = 0.0
+    bias_ay: float = 0.0
+    bias_rate: float = 0.0
     known: dict[str, Any] = {}
     channels: Annotated[list[Channel], Field(min_length=1)] | None = None
     hold_out: Windows = []
@@ -155,7 +223,7 @@ class FileSource(Clocked):
     def _with_columns(self) -> Self:
         for channel in self.channels or ():
             if not channel.column:
-                raise ValueError(f"channels: name the `column` of {channel.marker} {channel.quantity}")
+                raise ValueError(f"channels: name the `column` of {channel.place} {channel.quantity}")
         return self
 
 

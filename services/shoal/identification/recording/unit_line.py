@@ -33,7 +33,7 @@ def with_units(
         if unit and channel.unit is None:
             channel = channel.model_copy(update={"unit": unit})
         elif unit and unit != channel.unit:
-            what = f"{channel.marker} {channel.quantity}"
+            what = f"{channel.place} {channel.quantity}"
             notes.append(f"{what}: the table says {unit}, the recording {channel.unit}, which is taken")
         found.append(channel)
     return source, tuple(found), notes

@@ -8,11 +8,16 @@ if TYPE_CHECKING:
     from shoal.identification.recording.measurement import Measurement
     from shoal.identification.recording.source import Channel
 
-QUANTITIES = {"x": "m", "y": "m", "z": "m", "angle": "rad", "rate": "rad/s"}
+QUANTITIES = {
+    **{"x": "m", "y": "m", "z": "m", "angle": "rad", "rate": "rad/s"},
+    **{"ax": "m/s²", "ay": "m/s²", "fx": "N", "fy": "N", "torque": "N m", "strain": "m/m"},
+}
 """Of what a channel measures."""
 _FIELDS = {
     "angle": "rad",
     "tilt": "rad",
+    "mounting": "rad",
+    **{"bias_ax": "m/s²", "bias_ay": "m/s²", "bias_rate": "rad/s"},
     "direction": "rad",
     "rate": "rad/s",
     "length": "m",

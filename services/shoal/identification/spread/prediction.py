@@ -184,7 +184,7 @@ def _predicted(
                 expected[k], limit[k] = told.expected, allowance * told.limit + extra
                 half[np.isfinite(held.values[:, k]), k] = allowance * told.half + np.abs(bias[rows])
     told_of = [
-        Foretold(c.name, c.marker, c.quantity, of_channel(c), *map(float, numbers))
+        Foretold(c.name, c.place, c.quantity, of_channel(c), *map(float, numbers))
         for c, *numbers in zip(channels, rms, expected, limit, strict=True)
         if np.isfinite(numbers[0])
     ]

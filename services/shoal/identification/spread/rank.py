@@ -8,7 +8,7 @@ from math import gcd
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.problem import RESERVED
+from shoal.identification.problem import MEASUREMENT, RESERVED
 from shoal.identification.spread.uncertainty import Linearisation
 from shoal.trajectory import Array
 
@@ -42,7 +42,7 @@ def relative_changes(model: ForwardModel, point: Array, at: Linearisation) -> Ar
     if not at.unknown.size:
         return None
     values, lower = model.parameters.to_values(point), model.parameters.to_values(model.lower)
-    shifts = [f"{RESERVED}.{name}" for name in ("delay", "x", "y", "tilt")]
+    shifts = [f"{RESERVED}.{name}" for name in MEASUREMENT if name not in ("clock", "scale")]
     multiplies = ~model.parameters.initial & np.array([path not in shifts for path in model.parameters.paths])
     multiplies &= (lower >= 0) & (values > 0)
     involved = np.max(np.abs(at.unknown), axis=1) > _INVOLVED

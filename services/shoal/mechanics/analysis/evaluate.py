@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from shoal.mechanics.gates import ready
 from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import SINGLE, Array, Index
-from shoal.mechanics.tangent import damping_at, stiffness_at, tangent_tile
+from shoal.mechanics.tangent import Tangent, damping_at, stiffness_at, tangent_tile
 from shoal.scene import Scene
 
 Sparse = scipy.sparse.csr_array
@@ -75,33 +76,46 @@ class Points(NamedTuple):
         return np.asarray(plane.cross(now.T[..., None], (x, y)) / np.sum(now**2, axis=1)[:, None])
 
 
-def points(vectors: Sequence[Affine], unknowns: int) -> Points:
-    """Vectors of a placement as one matrix."""
+def points(vectors: Sequence[Affine], unknowns: int, lane: int = 0) -> Points:
+    """Vectors of a placement as one matrix, in one of its lanes."""
     dimensions = len(vectors[0].constant) if vectors else plane.DIMENSIONS
     matrix = np.zeros((len(vectors), dimensions, unknowns))
     constant = np.zeros((len(vectors), dimensions))
     for k, vector in enumerate(vectors):
-        constant[k] = vector.constant[:, 0]
+        constant[k] = vector.constant[:, lane % vector.constant.shape[1]]
         for unknown, coefficient in vector.terms.items():
-            matrix[k, :, unknown] += coefficient[:, 0]
+            matrix[k, :, unknown] += coefficient[:, lane % coefficient.shape[1]]
     return Points(matrix, constant)
 
 
 class Evaluator:
-    """Evaluates a model of one lane at any state; not for threads, as it keeps the turns that angle forces counted."""
+    """Evaluates a model at any state; not for threads, as it keeps the turns that angle forces counted.
 
-    def __init__(self, model: Model) -> None:
+    lane: which of the model's; forces and accelerations are told in any, all else in the first
+    """
+
+    def __init__(self, model: Model, lane: int = 0) -> None:
         self.model = model
-        self._arrays = model.tile(SINGLE, _LANE)
+        self._arrays = model.tile(SINGLE, slice(lane, lane + 1))
         self._room = work_space(SINGLE, self._arrays)
         self._arrays = ready(SINGLE, self._arrays, self._room)
-        self._tangent = tangent_tile(model, SINGLE, _LANE)
-        self.mass = sparse.matrix(self._tangent.pattern, self._tangent.mass)
-        self._rows = _expansion(model)
-        self._enter(model.q0[:, 0], None)
+        self._enter(model.q0[:, lane % model.q0.shape[1]], None)
         derived_rows(SINGLE, self._arrays, self._room)
-        start = model.start_angles[:, 0]
+        start = model.start_angles[:, lane % model.start_angles.shape[1]]
         self._room.memory[:] = forces.initial_memory(SINGLE, self._arrays.forces, self._room.z, start)
+
+    @cached_property
+    def _tangent(self) -> Tangent:
+        return tangent_tile(self.model, SINGLE, _LANE)
+
+    @cached_property
+    def mass(self) -> scipy.sparse.csc_array:
+        """The mass matrix, (unknowns, unknowns)."""
+        return sparse.matrix(self._tangent.pattern, self._tangent.mass)
+
+    @cached_property
+    def _rows(self) -> Sparse:
+        return _expansion(self.model)
 
     @classmethod
     def of(cls, scene: Scene, *, horizon: float = 0.0) -> Evaluator:
@@ -142,6 +156,10 @@ class Evaluator:
         self._enter(q, v)
         kernels.accelerate(SINGLE, self._arrays, self._room, t, self.model.scene.solver.rank_tolerance)
         return self._room.a[: self.model.unknowns].copy()
+
+    def force(self, q: Array, v: Array, t: float = 0.0) -> Array:
+        """Generalised force, elastic and applied, without the constraints, (unknowns,)."""
+        return self._force(q, v, self._arrays, t)
 
     def stiffness(
         self, q: Array, t: float = 0.0, *, multipliers: Array | None = None, load: float = 1.0
@@ -229,12 +247,12 @@ class Evaluator:
             applied=applied._replace(coefficient=0.0 * applied.coefficient, factor=0.0 * applied.factor, share=0.0),
         )
 
-    def _force(self, q: Array, v: Array | None, arrays: Arrays) -> Array:
+    def _force(self, q: Array, v: Array | None, arrays: Arrays, t: float = 0.0) -> Array:
         """The force of chosen parts; their energies are left in the room."""
         self._enter(q, v)
         gap, rate, bias = (np.zeros(arrays.constraints.size) for _ in range(3))
         entries = np.zeros(len(arrays.constraints.column))
-        kernels.look(SINGLE, arrays, self._room, 0.0, gap, rate, bias, entries)
+        kernels.look(SINGLE, arrays, self._room, t, gap, rate, bias, entries)
         return self._room.a[: self.model.unknowns].copy()
 
     def _energy(self, q: Array, arrays: Arrays) -> float:

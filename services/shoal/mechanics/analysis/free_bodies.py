@@ -61,9 +61,9 @@ class FreeBodies:
         return self.evaluator.model.unknowns
 
     def state(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Coordinates, rates and accelerations of the free bodies."""
+        """Coordinates, rates and accelerations of the free bodies, (..., unknowns)."""
         matrix, constant = self._map
-        return matrix @ q + constant, matrix @ v, matrix @ a
+        return q @ matrix.T + constant, v @ matrix.T, a @ matrix.T
 
 
 def _without_joints(scene: Scene, placement: Placement) -> Scene:

@@ -24,7 +24,10 @@ def bending(model: ForwardModel) -> Iterator[Candidate]:
     """Young's modulus of each rigid rod."""
     scene = model.scene
     size = size_of(scene)
-    angles = any(not c.is_position for run in model.measurement.recordings.values() for c in run.channels)
+    channels = [c for run in model.measurement.recordings.values() for c in run.channels]
+    if any(channel.is_dynamic for channel in channels):
+        return  # what they show is told of rigid machines only
+    angles = any(not channel.is_position for channel in channels)
     for name, body in scene.bodies.items():
         if not isinstance(body, Rod) or body.element != "rigid":
             continue

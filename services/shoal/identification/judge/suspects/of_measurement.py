@@ -1,4 +1,4 @@
-"""What a recording states: clock, scale, place and tilt of the camera, the release, and the gravity there."""
+"""What a recording states: clock, camera, inertial sensors, the release, and the gravity there."""
 
 from __future__ import annotations
 
@@ -16,6 +16,13 @@ _LATE = 0.2
 _EARLY = 0.5
 """Of the record: how much may be missing after the release, and how long the machine may be held before it."""
 _STEP = 1e-4
+_SENSORS = {
+    "mounting": ({"ax", "ay"}, np.pi / 2),
+    "bias_ax": ({"ax"}, 5.0),
+    "bias_ay": ({"ay"}, 5.0),
+    "bias_rate": ({"rate"}, 1.0),
+}
+"""Of inertial sensors: the quantities that show a fault, and how large it may be [rad, m/s^2, rad/s]."""
 
 
 def of_measurement(model: ForwardModel) -> Iterator[Candidate]:
@@ -30,6 +37,9 @@ def of_measurement(model: ForwardModel) -> Iterator[Candidate]:
         bounds, probe = (stated / _FACTORS, stated * _FACTORS), stated * (1 + _STEP)
         yield Candidate.single(name, f"{RESERVED}.{name}", stated, bounds, probe, "measurement", law="log", factor=True)
     shifts = {"tilt": np.pi / 2} | ({"x": reach, "y": reach} if positions else {})
+    shifts |= {
+        name: size for name, (quantities, size) in _SENSORS.items() if quantities & {c.quantity for c in channels}
+    }
     for name, width in shifts.items():
         stated = float(getattr(first.stated, name))
         bounds, probe = (stated - width, stated + width), stated + _STEP * width
