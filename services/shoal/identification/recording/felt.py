@@ -6,15 +6,17 @@ They need the motion of every body, or of two places beside the gauge, for which
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shoal.errors import InputError
 from shoal.identification.recording.source import ACCELERATIONS, STRAIN, Channel
-from shoal.mechanics.analysis.felt import Course, Felt, machine, machines
-from shoal.mechanics.analysis.load_cells import reactions_along
 from shoal.scene import Attachment, Rod, Scene
 from shoal.trajectory import Array, Trajectory
+
+if TYPE_CHECKING:
+    from shoal.mechanics.analysis.felt import Course, Felt
 
 _GAUGE = 1e-3
 """Length of a strain gauge over that of its rod."""
@@ -122,6 +124,8 @@ def felt(
     if trajectory.velocities is None or trajectory.rates is None:
         quantity = channels[dynamic[0]].quantity
         raise InputError(f"channels: {quantity} needs rates, of which engine {trajectory.engine} tells none; use gauss")
+    from shoal.mechanics.analysis.felt import machine, machines  # slow to import
+
     # Lanes that differ by their sensors alone share one motion.
     turned = np.atleast_1d(np.asarray(mounting, dtype=float))
     shape = len(trajectory.times), max(trajectory.lanes, len(turned))
@@ -146,6 +150,8 @@ def _of_lane(
     one: Felt, scene: Scene, channels: tuple[Channel, ...], numbers: list[int], joints: tuple[str, ...], turned: Array
 ) -> dict[int, Array]:
     """What accelerometers, turned by some angles, and load cells show of one lane, (samples, angles or 1) each."""
+    from shoal.mechanics.analysis.load_cells import reactions_along  # slow to import
+
     reactions = reactions_along(one, joints) if joints else {}
     c, s, found = np.cos(turned), np.sin(turned), {}
     for k in numbers:
@@ -162,6 +168,8 @@ def _of_lane(
 
 def _course(trajectory: Trajectory, scene: Scene) -> Course:
     """The motion of the bodies."""
+    from shoal.mechanics.analysis.felt import Course  # slow to import
+
     rows = [trajectory.markers.index(f"{_BODY}{name}") for name in scene.bodies]
     assert trajectory.velocities is not None
     assert trajectory.rates is not None
