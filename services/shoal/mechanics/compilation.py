@@ -21,20 +21,21 @@ from numba import types
 from numba.core import caching, config, dispatcher, event
 from numba.core.compiler_lock import global_compiler_lock
 
+from shoal.mechanics import linking
 from shoal.mechanics.notes import tell
 
 if sys.platform != "win32":
     import fcntl
 
 SECONDS = {
-    "_constrain": 28.0,
-    "loop": 20.0,
-    "_settle": 15.0,
-    "_motion": 14.0,
-    "_stiffness": 11.0,
-    "_energies": 9.0,
-    "_force": 8.0,
-    "_energy": 3.0,
+    "_constrain": 10.0,
+    "loop": 10.0,
+    "_motion": 4.0,
+    "_stiffness": 4.0,
+    "_settle": 3.0,
+    "_force": 3.0,
+    "_energies": 2.0,
+    "_energy": 1.0,
 }
 """What large kernels take on one core of a server: for the order, and to say how long it will take."""
 _WORTH_A_LINE = 1.0
@@ -114,9 +115,9 @@ _numbas_save = caching.Cache.save_overload
 
 def _compile(self: Any, sig: Any) -> Any:
     """`Dispatcher.compile`: looks into the cache, compiles, saves. Kernels wait for those they call: in no circle."""
-    if isinstance(self._cache, caching.NullCache):
-        return _numbas_compile(self, sig)
-    with _alone(f"{self.py_func.__module__}.{self.py_func.__qualname__} {sig}"):
+    whole = isinstance(self._cache, caching.NullCache)
+    name = f"{self.py_func.__module__}.{self.py_func.__qualname__} {sig}"
+    with global_compiler_lock if whole else _alone(name), linking.level(self, sig):
         return _numbas_compile(self, sig)
 
 
@@ -129,6 +130,7 @@ def _save(self: Any, sig: Any, data: Any) -> None:
 @cache
 def watch() -> None:
     """From now on compile under locks, and tell of it (`notes`)."""
+    linking.link()
     dispatcher.Dispatcher.compile = _compile  # type: ignore[method-assign]
     caching.Cache.save_overload = _save
     event.register("numba:compile", _Listener())

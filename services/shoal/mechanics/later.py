@@ -12,7 +12,7 @@ from typing import Any
 
 import llvmlite.binding as llvm
 from numba.core import caching
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary
 from numba.core.runtime import rtsys
 
 _OWN = "shoal."
@@ -64,7 +64,6 @@ def _load(self: Any, sig: Any, context: Any) -> Any:
         return self._load_overload(sig, context)
 
 
-_numbas_unserialize = JITCodeLibrary._unserialize.__func__
 _numbas_module_for_linking = JITCodeLibrary._get_module_for_linking
 _numbas_pointer_to_function = JITCodeLibrary.get_pointer_to_function
 
@@ -73,7 +72,7 @@ def _unserialize(cls: Any, codegen: Any, state: Any) -> Any:
     """`JITCodeLibrary._unserialize`, which also parses the code that others are compiled with, beside machine code."""
     name, kind, data = state
     if kind != "object":
-        return _numbas_unserialize(cls, codegen, state)
+        return CPUCodeLibrary._unserialize.__func__(cls, codegen, state)
     library = codegen.create_library(name)
     library.enable_object_caching()
     library._set_compiled_object(data[0])

@@ -1,0 +1,125 @@
+"""What kernels call is compiled to be linked into them, and no further.
+
+Numba makes machine code and doors for Python and C of every function, also of those that are only ever parts of others:
+they are optimised and emitted once by themselves and once more within each caller, level by level. Here only what
+Python or a gate asks for is optimised and emitted, with all that it calls; the parts stay intermediate code, in the
+cache as well. A part that is called from Python later is compiled again, with its doors.
+
+Numba offers no setting for this: private names of version 0.68 are replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba.core import caching, codegen, cpu, dispatcher, sigutils
+from numba.core.environment import lookup_environment
+
+_LINKED = "linked"
+_depth = 0
+"""How many compilations are under way, each asked for by the one before; Numba's lock is held meanwhile."""
+
+
+class Part:
+    """Stands for the entry point of a function that is only linked."""
+
+
+@contextmanager
+def level(function: Any, signature: Any) -> Iterator[None]:
+    """A compilation: the outermost makes an entry, those within make parts. Numba's lock is held."""
+    global _depth
+    if _depth == 0:
+        kinds = tuple(sigutils.normalize_signature(signature)[0])
+        found = function.overloads.get(kinds)
+        if found is not None and isinstance(found.entry_point, Part):
+            del function.overloads[kinds]
+    _depth += 1
+    try:
+        yield
+    finally:
+        _depth -= 1
+
+
+@cache
+def link() -> None:
+    """From now on functions within functions are linked only."""
+    numbas_flags = dispatcher._FunctionCompiler._customize_flags  # type: ignore[attr-defined]
+    numbas_executable = cpu.CPUContext.get_executable
+    numbas_set_env = codegen.JITCPUCodegen.set_env
+    numbas_add = dispatcher.Dispatcher.add_overload
+    numbas_key = caching.Cache._index_key
+    numbas_serialize = codegen.CPUCodeLibrary.serialize_using_object_code
+    numbas_unserialize = codegen.CPUCodeLibrary._unserialize.__func__
+    numbas_linking = codegen.CPUCodeLibrary.add_linking_library
+
+    def customize_flags(self: Any, flags: Any) -> Any:
+        flags = numbas_flags(self, flags)
+        if _depth > 1:
+            flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        return flags
+
+    def get_executable(self: Any, library: Any, description: Any, environment: Any) -> Any:
+        if _depth > 1:
+            _gather(library)
+            return Part()
+        entry = numbas_executable(self, library, description, environment)
+        for name in [variable.name for variable in library._final_module.global_variables]:
+            if name.startswith("_ZN08NumbaEnv") and (its := lookup_environment(name)) is not None:
+                library.codegen.set_env(name, its)
+        return entry
+
+    def set_env(self: Any, name: str, environment: Any) -> None:
+        if _depth <= 1:  # a part has no place for it until it is within an entry
+            numbas_set_env(self, name, environment)
+
+    def add_overload(self: Any, compiled: Any) -> None:
+        if isinstance(compiled.entry_point, Part):
+            self.overloads[tuple(compiled.signature.args)] = compiled
+        else:
+            numbas_add(self, compiled)
+
+    def index_key(self: Any, signature: Any, generator: Any) -> Any:
+        key = numbas_key(self, signature, generator)
+        return (*key, _LINKED) if _depth > 1 else key
+
+    def serialize(self: Any) -> Any:
+        if getattr(self, _LINKED, False):
+            return self.name, _LINKED, self._get_module_for_linking().as_bitcode()
+        return numbas_serialize(self)
+
+    def unserialize(cls: Any, generator: Any, state: Any) -> Any:
+        name, kind, data = state
+        if kind != _LINKED:
+            return numbas_unserialize(cls, generator, state)
+        library = generator.create_library(name)
+        library._final_module = library._shared_module = llvm.parse_bitcode(data)
+        library._finalized = library.linked = True
+        return library
+
+    def add_linking_library(self: Any, library: Any) -> None:
+        _gather(library)
+        numbas_linking(self, library)
+
+    dispatcher._FunctionCompiler._customize_flags = customize_flags  # type: ignore[attr-defined]
+    cpu.CPUContext.get_executable = get_executable
+    codegen.JITCPUCodegen.set_env = set_env
+    dispatcher.Dispatcher.add_overload = add_overload  # type: ignore[method-assign, assignment]
+    caching.Cache._index_key = index_key
+    codegen.CPUCodeLibrary.serialize_using_object_code = serialize
+    codegen.CPUCodeLibrary._unserialize = classmethod(unserialize)
+    codegen.CPUCodeLibrary.add_linking_library = add_linking_library
+
+
+def _gather(library: Any) -> None:
+    """Put a function and what it calls into one module, as it is: whoever takes it in optimises the whole."""
+    if library._finalized:
+        return
+    for part in dict.fromkeys(library._linking_libraries):
+        library._reload_init.update(part._reload_init)
+        library._final_module.link_in(part._get_module_for_linking(), preserve=True)
+    library._finalize_dynamic_globals()
+    library._finalized = library.linked = True
