@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from inspect import Parameter, Signature, signature
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import Any
 
@@ -16,22 +16,24 @@ import numpy as np
 import orjson
 
 from shoal import notebook
-from shoal.engines.remote import RemoteEngine, trajectory_of
+from shoal.engines.remote import RemoteEngine
 from shoal.errors import ComputationError, InputError
-from shoal.identification import Problem, load_problem
+from shoal.identification import Estimate, Problem, load_problem
+from shoal.identification.carried import carried
 from shoal.identification.recording.reading import YAML, described
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.identification.recording.unit_line import with_units
-from shoal.mechanics.analysis.joint_reactions import JointReaction, Reactions
+from shoal.response.read import by_name
 from shoal.scene import Scene, load_scene
 from shoal.shelf import NAME
 from shoal.table import Table, load_table
 from shoal.trajectory import Array
+from shoal.wire import unpacked
 
 PAUSES = (0.02, 1.0)
 """Between two looks at a job, the shortest and the longest [s]."""
 Answer = dict[str, Any]
-"""What the command of the same name prints with --json."""
+notebook.shown(Estimate)
 
 
 def _by_service(function: Callable[..., Any], *, job: bool = False) -> Any:
@@ -45,8 +47,7 @@ def _by_service(function: Callable[..., Any], *, job: bool = False) -> Any:
 
     stated = signature(function)
     own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
-    returned = stated.return_annotation if function in (notebook.simulate, notebook.reactions) else Answer
-    method.__signature__ = Signature([own, *stated.parameters.values()], return_annotation=returned)  # type: ignore[attr-defined]
+    method.__signature__ = stated.replace(parameters=[own, *stated.parameters.values()])  # type: ignore[attr-defined]
     method.__name__, method.__doc__ = function.__name__, function.__doc__
     return method
 
@@ -54,10 +55,10 @@ def _by_service(function: Callable[..., Any], *, job: bool = False) -> Any:
 class Client:
     """The service at an http(s) address. The key, if it asks for one, is SHOAL_API_KEY.
 
-    Each method takes what the function of the library with its name takes; `engine` is the service's own. `simulate`
-    and `reactions` give the same objects, to the last bit, the others what the command of that name prints with --json.
-    They raise InputError where the service refuses, ComputationError where it fails or does not answer. What takes long
-    is a job of the service; `submit` makes one of any of them, and `status`, `result` and `cancel` take its id.
+    Each method takes what the function of the library with its name takes and returns what it returns, to the last
+    bit; `engine` is the service's own. They raise InputError where the service refuses, ComputationError where it fails
+    or does not answer. What takes long is a job of the service; `submit` makes one of any of them, and `status`,
+    `result` and `cancel` take its id.
     """
 
     simulate = _by_service(notebook.simulate)
@@ -86,7 +87,7 @@ class Client:
         return dict(self._answer("GET", f"/v1/jobs/{job}"))
 
     def result(self, job: str) -> Any:
-        """What a job that is done has found."""
+        """What a job that is done has found: that of `submit` what its method returns."""
         return self._answer("GET", f"/v1/jobs/{job}/result")
 
     def cancel(self, job: str) -> None:
@@ -112,9 +113,11 @@ class Client:
     def _answer(self, method: str, path: str, content: Answer | None = None) -> Any:
         body = None if content is None else orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
         found = self._service.ask(method, path, body)
-        if isinstance(found, dict) and "points" in found:
-            return trajectory_of(found)
-        return _reactions(found) if isinstance(found, dict) and found.keys() == {"status", "reactions"} else found
+        try:
+            return unpacked(found)
+        except ValueError as error:
+            about = f"{self._service.name} answers what this version does not know, {error}"
+            raise ComputationError(f"engine: {about}; install the same version here and there") from None
 
     def _request(self, operation: str, *args: Any, **kwargs: Any) -> Answer:
         """The arguments of a function of the library as the fields of a request. Raises InputError."""
@@ -127,23 +130,19 @@ class Client:
             raise InputError(f"engine: the service at {self._service.name} runs {own}, found {engine!r}")
         if "scene" in given:
             given["scene"] = _scene(given["scene"])
+        if (values := given.get("values")) is not None and not isinstance(values, Mapping):
+            found = carried(values)
+            given["values"] = found.values
+            if "problem" in given:
+                given["problem"], given["values"], _ = found.into(_loaded(given["problem"]))
         if "problem" in given:
             given["problem"], given["recordings"] = _problem(given["problem"], given.pop("data", None))
-        return {name: _plain(value) for name, value in given.items() if value is not None}
-
-
-def _reactions(found: Answer) -> list[Reactions]:
-    """The reactions that a service answers."""
-    read = []
-    for one in found["reactions"]:
-        joints = {name: JointReaction(**_tuples(joint)) for name, joint in one["joints"].items()}
-        constraints = tuple(one["redundant_constraints"])
-        read.append(Reactions(one["time"], joints, one["redundancy"], constraints, one["unbalanced"]))
-    return read
-
-
-def _tuples(fields: Answer) -> Answer:
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
+        if operation == "uncertain":
+            given["vary"] = by_name(given["vary"])
+        if (pairs := given.get("correlations")) is not None:
+            given["correlations"] = [[*pair, value] for pair, value in pairs.items()]
+        stated = {name: _plain(value) for name, value in given.items() if value is not None}
+        return {**stated, "objects": True}
 
 
 def _scene(given: Scene | str) -> Any:
@@ -157,7 +156,7 @@ def _problem(given: Problem | str, data: Any) -> tuple[Any, Answer]:
     """A problem, with its scene, and its recordings by name. Raises InputError."""
     if isinstance(given, str) and Path(given).suffix not in YAML:
         return given, {name: _recording(FileSource(), one)[1] for name, one in _by_name(data).items()}
-    problem = load_problem(given) if isinstance(given, str) else given
+    problem = _loaded(given)
     stated = {**problem.model_dump(mode="json", exclude_unset=True), "scene": _scene(problem.scene)}
     found = _by_name(data, next(iter(problem.sources)))
     for name, source in problem.sources.items():
@@ -168,6 +167,10 @@ def _problem(given: Problem | str, data: Any) -> tuple[Any, Answer]:
             else:
                 stated["source"] = fields
     return stated, found
+
+
+def _loaded(given: Problem | str) -> Problem:
+    return load_problem(given) if isinstance(given, str) else given
 
 
 def _by_name(data: Any, single: str = "recording") -> Answer:
@@ -223,4 +226,4 @@ def _plain(value: Any) -> Any:
         return {key: _plain(one) for key, one in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [_plain(one) for one in value]
-    return value
+    return str(value) if isinstance(value, Path) else value

@@ -271,7 +271,7 @@ def identify(
     from shoal.identification import Estimate, identify
     from shoal.identification.conclude import Wishes
 
-    setattr(Estimate, _HTML, _html)
+    shown(Estimate)
     options = {"wishes": Wishes(profiles=profiles, bootstrap=bootstrap, sample=sample), **options}
     stated, carried = _values(values)
     if carried is not None:
@@ -330,9 +330,9 @@ def _values(given: Values | None) -> tuple[Mapping[str, Any] | None, Carried | N
     """Fields to set as they are stated, or what was found before."""
     if given is None or isinstance(given, Mapping):
         return given, None
-    from shoal.identification.carried import of_estimate, read_values
+    from shoal.identification.carried import carried
 
-    return None, read_values(given) if isinstance(given, str | Path) else of_estimate(given)
+    return None, carried(given)
 
 
 def _problem(given: Problem | str) -> Problem:
@@ -362,7 +362,10 @@ def _html(result: Any) -> str:
     return html(result)
 
 
-_HTML = "_repr_html_"
-# The classes themselves know nothing of pictures and notebooks.
+def shown(kind: type) -> None:
+    """Let notebooks show results of a class, which itself knows nothing of pictures."""
+    setattr(kind, "_repr_html_", _html)  # noqa: B010
+
+
 for _kind in (Scene, Trajectory):
-    setattr(_kind, _HTML, _html)
+    shown(_kind)

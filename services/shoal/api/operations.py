@@ -17,13 +17,24 @@ Positive = Annotated[float, Field(gt=0)]
 Some = Annotated[Times, Field(min_length=1)]
 Distribution = Annotated[str, Field(max_length=200, pattern=r"^\s*[a-z-]+\s*\([-+0-9.eE,\s]*\)\s*$")]
 """With numbers: files of the service are not read for anybody."""
+End = float | Annotated[str, Field(max_length=30, pattern=r"^\s*[-+0-9.eE]+\s*%\s*$")]
+Window = tuple[float, float]
 
 
 class Request(Asked):
-    """Base of all. answer: what comes back; follows: the numbers by which a job tells how far it is."""
+    """Base of all. answer: what comes back; follows: the numbers by which a job tells how far it is.
+
+    objects: answer what the library's function returns, whole, as `shoal.wire` writes it for `shoal.Client`
+    """
 
     answer: ClassVar[Any] = dict[str, Any]
     follows: ClassVar[tuple[str, ...]] = ()
+
+    objects: bool = False
+
+    def arguments(self) -> dict[str, Any]:
+        """Those of the library's function, as far as they are stated, without what names scenes and data."""
+        return self.model_dump(exclude={"objects", "scene", "problem", "recordings", "values"}, exclude_unset=True)
 
 
 class OfScene(Request):
@@ -109,7 +120,8 @@ class Sweep(OfScene):
 class Uncertain(OfScene):
     """How the markers may move if fields of the scene are intervals or distributions; see `shoal uncertain`.
 
-    vary: path -> [low, high], or a text such as "normal(1, 0.01)"; times: instants [s], else the scene's own; gap:
+    vary: path -> [low, high], or a text such as "normal(1, 0.01)"; a bound such as "-2%" is relative to what the scene
+    states; correlations: [path, path, value] of random ones; times: instants [s], else the scene's own; gap:
     between outer and attained bounds, as a share of the width, to be reached; tolerance: error [m] of the model
     verify: estimate mesh and step errors of extremal runs; most: runs that may be made
     limits: what must not happen, such as "B.y < -1.2"; limit_method, limit_runs: for their probabilities
@@ -119,7 +131,8 @@ class Uncertain(OfScene):
 
     follows: ClassVar[tuple[str, ...]] = ("runs",)
 
-    vary: Annotated[dict[Path, tuple[float, float] | Distribution], Field(min_length=1, max_length=100)]
+    vary: Annotated[dict[Path, tuple[End, End] | Distribution], Field(min_length=1, max_length=100)]
+    correlations: Annotated[list[tuple[Path, Path, float]], Field(max_length=1000)] = []
     times: Some | None = None
     method: BuiltIn = "auto"
     gap: Annotated[float, Field(gt=0, le=1)] | None = None
@@ -141,6 +154,13 @@ class Uncertain(OfScene):
     def runs(self) -> int:
         """That may be made, or nearly so."""
         return self.most + (len(self.limits) + 4 * self.allocate) * self.limit_runs
+
+    def arguments(self) -> dict[str, Any]:
+        """With correlations as the library has them."""
+        found = super().arguments()
+        if self.correlations:
+            found["correlations"] = {(one, other): value for one, other, value in self.correlations}
+        return found
 
 
 class AtRest(OfScene):
@@ -175,7 +195,10 @@ class Reactions(OfScene):
 
 
 class Identify(OfProblem):
-    """The parameters of a problem from measured motion; the fields are those of `shoal identify`. time_limit in s."""
+    """The parameters of a problem from measured motion; the fields are those of `shoal identify`. time_limit in s.
+
+    hold_out: windows [from, to] [s] that are predicted instead of fitted; by name of several recordings
+    """
 
     measured: ClassVar[bool] = True
     follows: ClassVar[tuple[str, ...]] = ("iteration", "best", "mean", "evaluations")
@@ -187,6 +210,7 @@ class Identify(OfProblem):
     profiles: bool = False
     bootstrap: Annotated[int, Field(ge=0, le=10_000)] = 0
     sample: Annotated[int, Field(ge=0, le=100_000)] = 0
+    hold_out: list[Window] | dict[RecordingName, list[Window]] | None = None
 
 
 class Design(OfProblem):

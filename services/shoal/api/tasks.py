@@ -25,6 +25,7 @@ from shoal.identification.methods import get_method
 from shoal.identification.recording.source import FileSource
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory, plain
+from shoal.wire import packed
 
 Note = Callable[[Any], None]
 """Told how a computation goes."""
@@ -67,8 +68,7 @@ def _prepared(bench: Bench, asked: Call) -> Computation:
     else:
         assert isinstance(request, OfProblem)
         arguments = _of_problem(bench, request)
-    stated = request.model_dump(exclude={"scene", "problem", "recordings", "values"}, exclude_unset=True)
-    return partial(_computed, bench, name, {**stated, **arguments}, request.follows)
+    return partial(_computed, bench, name, {**request.arguments(), **arguments}, request)
 
 
 def _of_scene(bench: Bench, request: OfScene) -> tuple[Scene, Scene]:
@@ -100,14 +100,15 @@ def _of_problem(bench: Bench, request: OfProblem) -> dict[str, Any]:
     return {"problem": problem, "data": written(request.recordings) or None, "values": request.values}
 
 
-def _computed(bench: Bench, name: str, arguments: dict[str, Any], follows: tuple[str, ...], note: Note) -> bytes:
-    """What the library's function of that name gives, as the command of that name prints it."""
+def _computed(bench: Bench, name: str, arguments: dict[str, Any], request: Request, note: Note) -> bytes:
+    """What the library's function of that name gives, as the command of that name prints it, or whole."""
     function = getattr(notebook, name)
     if "engine" in signature(function).parameters:
         arguments = {**arguments, "engine": bench.engine.name}
-    if follows:
+    if follows := request.follows:
         arguments = {**arguments, "progress": lambda *row: note(dict(zip(follows, row, strict=True)))}
-    return to_json(plain(told(function(**arguments))))
+    found = function(**arguments)
+    return to_json(packed(found) if request.objects else plain(told(found)))
 
 
 def told(found: Any) -> Any:
@@ -124,7 +125,7 @@ def _simulated(bench: Bench, request: Simulate, scene: Scene, bounded: bool, not
     times, engine = request.times, bench.engine
     if request.tolerance is not None:
         selection = notebook.select(scene, request.tolerance, times)
-        return motion(selection.trajectory, selection.to_json())
+        return _motion(request, selection.trajectory, selection.to_json())
     if request.lanes is None:
         found = verified(engine, scene, times) if request.verify else engine.simulate(scene, times)
     else:
@@ -136,11 +137,13 @@ def _simulated(bench: Bench, request: Simulate, scene: Scene, bounded: bool, not
             found = replace(found, model=model, message=found.message or checked.complaint)
     if bounded:
         check_end(found, scene)
-    return motion(found)
+    return _motion(request, found)
 
 
-def motion(trajectory: Trajectory, selection: dict[str, Any] | None = None) -> bytes:
-    """A trajectory as schemas.Motion, every lane and every digit of it; selection: how its model was found."""
+def _motion(request: Simulate, trajectory: Trajectory, selection: dict[str, Any] | None = None) -> bytes:
+    """A trajectory, every lane and every digit of it; selection: how its model was found."""
+    if request.objects:
+        return to_json(packed(trajectory))
     arrays = {
         name: None if (array := getattr(trajectory, name)) is None else np.ascontiguousarray(array)
         for name in ("times", "points", "angles", "velocities", "rates", "energy_drift", "constraint_drift")

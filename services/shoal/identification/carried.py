@@ -119,6 +119,11 @@ def of_estimate(estimate: Estimate) -> Carried:
     )
 
 
+def carried(found: Estimate | Path | str) -> Carried:
+    """What an estimate carries, or the JSON file of one. Raises InputError."""
+    return read_values(found) if isinstance(found, str | Path) else of_estimate(found)
+
+
 def read_values(path: Path | str) -> Carried:
     """What an estimate written by `shoal identify --json` or `--out FILE.json` carries. Raises InputError."""
     path = Path(path)

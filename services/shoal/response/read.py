@@ -74,6 +74,17 @@ def parameters(vary: Mapping[str, Any] | Sequence[str | Parameter], scene: Scene
     return tuple(one if isinstance(one, Parameter) else _parameter(*_split(one), scene) for one in vary)
 
 
+def by_name(vary: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:
+    """Name -> (low, high) or a text, of what users write. Raises InputError for what only an object tells."""
+    found = list(vary.items()) if isinstance(vary, Mapping) else [_split(text) for text in vary]
+    for name, known in found:
+        if not isinstance(known, str) and not (isinstance(known, Sequence) and len(known) == 2):
+            raise InputError(f"vary: {name}: needs (low, high) or a text such as normal(1,0.01), found {known!r:.60}")
+        if sum(other == name for other, _ in found) > 1:
+            raise InputError(f"vary: {name} is varied twice")
+    return dict(found)
+
+
 def correlations(pairs: Sequence[str]) -> Correlations | None:
     """PATH,PATH=VALUE texts. Raises InputError."""
     found: dict[tuple[str, str], float] = {}
