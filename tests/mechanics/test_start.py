@@ -474,3 +474,44 @@ def test_a_long_chain_that_cannot_be_assembled_is_not_sought_for_long(monkeypatc
     with pytest.raises(InputError, match=r"^joints\.C1: cannot be assembled; its places stay 5 m apart at best$"):
         complete(scene.with_values({path: 5 * scene.value(path) + 1.0}))
     assert sum(looked) < 3000
+
+
+def looked(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> tuple[str, int]:
+    """How a scene is refused, and how often the gaps of its joints are looked at."""
+    counted: list[int] = []
+    rows = Closure.rows
+    monkeypatch.setattr(Closure, "rows", lambda self, u: counted.append(len(u)) or rows(self, u))
+    with pytest.raises(InputError) as refusal:
+        complete(scene)
+    return str(refusal.value), len(counted)
+
+
+def test_a_contradiction_of_many_statements_is_not_narrowed_down_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a closed chain of thirty bars every angle is stated: the last contradicts others, which are not sought to the
+    end.
+    """
+    rng = np.random.default_rng(1)
+    bars = {f"r{k}": bar(0.4, rng) for k in range(30)}
+    joints = {f"J{k}": pin(f"r{k}", "end", f"r{k + 1}") for k in range(29)}
+    joints |= {"O": pin("ground", [0.0, 0.0], "r0"), "E": pin("r29", "end", "ground", [6.0, 0.0])}  # type: ignore[dict-item]
+    start = {name: {"angle": float(rng.uniform(-0.3, 0.3))} for name in bars}
+    text, count = looked(monkeypatch, Scene.parse(scene(bars, joints) | {"initial": start}))
+    assert text.startswith("initial.r29.angle: ")
+    assert "more: joint E would stay" in text
+    assert "leave some of them out" in text
+    assert count < 900
+
+
+def test_a_contradiction_names_the_mechanism_that_gapes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seven four-bars in one scene: the crank of the sixth points where its coupler does not reach."""
+    rng = np.random.default_rng(2)
+    bodies, joints, start = {}, {}, {}
+    for k in range(7):
+        bodies |= {f"{name}{k}": bar(length, rng) for name, length in (("a", 1.0), ("b", 1.0), ("c", 1.2))}
+        joints[f"O{k}"], joints[f"A{k}"] = pin("ground", [9.0 * k, 0.0], f"a{k}"), pin(f"a{k}", "end", f"b{k}")
+        joints[f"B{k}"] = pin(f"b{k}", "end", f"c{k}", "end")
+        joints[f"C{k}"] = pin("ground", [9.0 * k + 2.0, 0.0], f"c{k}")
+        start[f"a{k}"] = {"angle": 3.0 if k == 5 else 0.7}
+    text, count = looked(monkeypatch, Scene.parse(scene(bodies, joints) | {"initial": start}))
+    assert text.startswith("initial.a5.angle: 3 rad cannot be kept: joint C5 would stay ")
+    assert count < 900

@@ -85,16 +85,26 @@ class Closure:
         self.scene, self.begin, self.own = scene, begin, own
         self.column = {name: 3 * number for number, name in enumerate(scene.bodies)}
         self._points = {name for name, body in scene.bodies.items() if isinstance(body, PointMass)}
+        self._arms: dict[int, tuple[Attachment, Number]] = {}
 
-    def rows(self, u: Array) -> Rows:
-        """All joints at the poses u."""
-        found: list[tuple[str, list[int], Array, Array, Array]] = []
+    @cached_property
+    def _parts(self) -> list[tuple[str, list[int], Closure, tuple[Condition, ...]]]:
+        """Of every joint its columns, its bodies alone, and what it demands of them."""
+        found = []
         for name, joint in self.scene.joints.items():
             bodies = dict.fromkeys(at.body for at in places(joint) if at.body != GROUND)
             columns = [self.column[body] + k for body in bodies for k in range(3)]
             part = copy(self)
             part.begin, part.column = self.begin[:, columns], {body: 3 * k for k, body in enumerate(bodies)}
-            found += [(name, columns, *row) for one in conditions(joint) for row in part._rows_of(one, u[:, columns])]
+            found.append((name, columns, part, tuple(conditions(joint))))
+        return found
+
+    def rows(self, u: Array) -> Rows:
+        """All joints at the poses u."""
+        found: list[tuple[str, list[int], Array, Array, Array]] = []
+        for name, columns, part, demands in self._parts:
+            own = u[:, columns]
+            found += [(name, columns, *row) for one in demands for row in part._rows_of(one, own)]
         none = np.zeros(len(u))
         for name in self._points:  # a point mass has no angle
             k = self.column[name] + 2
@@ -119,10 +129,15 @@ class Closure:
             return Vector(_lanes(value, u), none, _lanes(rate, u))
         k = self.column[at.body]
         axis = phasor(u[:, k + 2])
-        arm = axis * place_of(self.scene, at)
+        arm = axis * self._arm(at)
         slope = np.zeros((len(u), u.shape[1]), dtype=complex)
         slope[:, k], slope[:, k + 1], slope[:, k + 2] = 1.0, 1j, 1j * arm
         return Vector(u[:, k] + 1j * u[:, k + 1] + arm, slope, np.zeros(len(u)))
+
+    def _arm(self, at: Attachment) -> Number:
+        if id(at) not in self._arms:
+            self._arms[id(at)] = at, place_of(self.scene, at)
+        return self._arms[id(at)][1]
 
     def here(self, u: Array, at: Attachment) -> Vector:
         """The same with derivatives by the attachment's own body alone, (lanes, 3)."""

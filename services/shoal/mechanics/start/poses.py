@@ -6,7 +6,7 @@ shaken, a little at first. Many lanes are one batch.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -28,6 +28,8 @@ ITERATIONS = 80
 ATTEMPTS = 24
 """Guesses for one machine; of many lanes fewer are tried."""
 FEW = 6
+FEWER = 8
+"""While a contradiction is narrowed down, in half of the iterations."""
 _SHAKEN = 1200
 """Poses of all guesses of one machine together: to shake a long chain at random hardly ever helps."""
 _PATIENCE, _STANDS = 8, 0.99
@@ -88,11 +90,13 @@ class Assembly:
         self.guess = self._guess(0, np.ones(self.angles.shape, dtype=bool))
         self.size = span(scene)
         arms = np.array([max(float(np.max(arm)), 1e-3 * self.size) for arm in extents(scene).values()])
-        self._yield = np.stack([np.ones_like(arms), np.ones_like(arms), arms**-2], 1).ravel()
+        self.give = np.stack([np.ones_like(arms), np.ones_like(arms), arms**-2], 1).ravel()
         """Inverse of the metric in which displacements are measured, (3 bodies,)."""
         self.closure = Closure(scene, self.guess)
-        self._sought: dict[tuple[int, bytes, bytes], Placed] = {}
+        self._sought: dict[tuple[bytes, bytes], Placed] = {}
         """What was looked for before: where it is not there, the reason is sought by the same steps."""
+        self.effort = 0
+        """Gaps that were looked at while closing joints, those of many lanes at once counted once."""
 
     def _guess(self, attempt: int, keep: Flags) -> Array:
         """Poses from the stated angles; later attempts shake those not in `keep`, (lanes, bodies)."""
@@ -119,14 +123,25 @@ class Assembly:
         loose = self._in_order()
         return Placed(np.where(found.ok[:, None], found.poses, loose.poses), found.ok | loose.ok)
 
-    def seek(self, fixed: Flags, values: Array, near: Array | None = None, attempts: int | None = None) -> Placed:
+    def seek(self, fixed: Flags, values: Array, near: Array | None = None) -> Placed:
         """Poses with some held, from one guess after another (or near one)."""
-        most = attempts or (self._attempts if self.lanes == 1 else FEW)
         begun = np.where(fixed, values, self.guess if near is None else near)
-        asked = (most, fixed.tobytes(), begun.tobytes())
+        asked = (fixed.tobytes(), begun.tobytes())
         if asked not in self._sought:
-            self._sought[asked] = self._seek(fixed, values, near, most)
+            self._sought[asked] = self._seek(fixed, values, near, self._attempts if self.lanes == 1 else FEW)
         return self._sought[asked]
+
+    def closes(self, chosen: list[Statement], joints: Sequence[str]) -> bool:
+        """Whether these joints of one machine close with these statements held: a few guesses, all at once."""
+        fixed, values = self.held(chosen)
+        begin = np.concatenate([self._guess(number, fixed[:, 2::3]) for number in range(FEWER)])
+        for own in (True, False) if self._own else (True,):
+            closure = Closure(self.scene, np.where(fixed, values, self.guess), own)
+            rows = closure.rows(self.close(closure, np.where(fixed, values, begin), fixed, most=ITERATIONS // 2)[0])
+            gap = np.abs(rows.gap / np.where(rows.angular, 1.0, self.size))[:, np.isin(rows.names, joints)]
+            if np.any(np.max(gap, axis=1, initial=0.0) <= CLOSED):
+                return True
+        return False
 
     @property
     def _attempts(self) -> int:
@@ -156,14 +171,15 @@ class Assembly:
         """Other poses of one machine that keep what is stated, each once."""
         fixed, values = self.held([one for one in self.statements if one.firm])
         known, first = [poses], np.where(fixed, values, self.guess)
-        for attempt in range(1, ATTEMPTS):
-            begin = np.where(fixed, values, self._guess(attempt, fixed[:, 2::3]))
-            found, gap = self.close(Closure(self.scene, first), begin, fixed)
+        shaken = [self._guess(attempt, fixed[:, 2::3]) for attempt in range(1, ATTEMPTS)]
+        found, gap = self.close(Closure(self.scene, first), np.where(fixed, values, np.concatenate(shaken)), fixed)
+        for closed in np.flatnonzero(gap <= CLOSED):
+            other = found[[closed]]
             # Turns of a body are one pose.
-            away = [np.max(np.abs(np.exp(1j * (found - one)[:, 2::3]) - 1.0)) for one in known]
-            if gap[0] <= CLOSED and min(away) > 1e-6:
-                known.append(found)
-                yield found
+            away = [np.max(np.abs(np.exp(1j * (other - one)[:, 2::3]) - 1.0)) for one in known]
+            if min(away) > 1e-6:
+                known.append(other)
+                yield other
 
     @property
     def _own(self) -> bool:
@@ -175,9 +191,11 @@ class Assembly:
             for _, one in of_scene(self.scene)
         )
 
-    def close(self, closure: Closure, u: Array, fixed: Flags, weight: Array | None = None) -> tuple[Array, Array]:
-        """Poses from u on with some held, and the largest gap left [1], (lanes,). weight: of every row."""
-        give = np.where(fixed, 0.0, self._yield)
+    def close(
+        self, closure: Closure, u: Array, fixed: Flags, weight: Array | None = None, most: int = ITERATIONS
+    ) -> tuple[Array, Array]:
+        """Poses from u on with some held, and the largest gap left [1], (lanes,). weight: of every row; most: steps."""
+        free = np.where(fixed, 0.0, self.give)
         u = u.copy()
         rows = closure.rows(u)
         if not len(rows.names):
@@ -191,12 +209,12 @@ class Assembly:
             return u, np.max(np.abs(gap), axis=1)
         slope = rows.slope / length[:, None]
         before = np.full(len(u), np.inf)
-        for iteration in range(ITERATIONS):
+        for iteration in range(most):
             if not np.any(running):
                 break
-            each = slope * give[:, None, :]
+            each = slope * free[:, None, :]
             matrix = each @ slope.transpose(0, 2, 1)
-            scale = np.sqrt(np.einsum("lkk->lk", slope * self._yield @ slope.transpose(0, 2, 1)))
+            scale = np.sqrt(np.einsum("lkk->lk", slope * self.give @ slope.transpose(0, 2, 1)))
             scale = np.where(scale > 0, scale, 1.0)  # what closes a rod upon itself depends on no pose
             matrix = matrix / scale[:, :, None] / scale[:, None, :]
             small = np.clip(damping * norm, 1e-13, 1e3)
@@ -205,6 +223,7 @@ class Assembly:
             step = -np.einsum("lki,lk->li", each, multiplier)
             ahead = u + np.where(running[:, None], step, 0.0)
             rows = closure.rows(ahead)
+            self.effort += len(rows.names)
             new = np.linalg.norm(rows.gap / length, axis=1)
             taken = running & (new < norm)
             damping = np.where(taken, damping / 10.0, damping * 10.0)
@@ -258,7 +277,7 @@ class Assembly:
 
     def _free(self, one: Statement, u: Array, kept: Flags) -> Flags:
         """Whether the joints and what is kept leave the columns of a statement free, (lanes, columns)."""
-        slope = Closure(self.scene, u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self._yield))[:, None, :]
+        slope = Closure(self.scene, u, own=False).rows(u).slope * np.sqrt(np.where(kept, 0.0, self.give))[:, None, :]
         basis = np.linalg.svd(slope, full_matrices=False)
         rank = DEPENDENT * np.max(basis.S, axis=1, initial=1e-300, keepdims=True) < basis.S
         told = np.einsum("lri,lr->li", basis.Vh**2, rank.astype(float))

@@ -18,13 +18,17 @@ from shoal.mechanics import plane
 from shoal.mechanics.frames import Frame
 from shoal.mechanics.joints import Apart, Geared, Meet, Turned, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
+from shoal.mechanics.start.closure import Rows
 from shoal.mechanics.start.poses import Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
 from shoal.scene import GROUND, InitialState, Scene
+from shoal.scene.joints import places
 from shoal.scene.scene import POSES, RATES, Quantity
 
-_MANY = 40
-"""Statements up to which those that contradict each other are sought."""
+_EFFORT = 8_000
+"""Gaps (`Assembly.effort`) after which no fewer statements are sought that contradict each other."""
+_SLACK = 1e-3
+"""Part of the largest pull on a statement below which one is not pulled."""
 ROUND_OFF = 1e-9
 """Changes below this, relative to the value, 1 rad or the size of the machine, are not spoken of."""
 _UNITS: dict[Quantity, str] = {
@@ -147,35 +151,77 @@ def _pose_refused(assembly: Assembly) -> InputError:
     if not assembly.seek(none, np.zeros_like(assembly.guess)).ok[0]:
         name, gap = _gape(assembly, [])
         return InputError(f"joints.{name}: cannot be assembled; its places stay {gap} apart at best")
-    guilty = [one for one in assembly.statements if one.firm]
-    if len(guilty) <= _MANY:
-        for one in list(guilty):
-            fewer = [other for other in guilty if other is not one]
-            fixed, values = assembly.held(fewer)
-            if not assembly.seek(fixed, values, attempts=FEWER).ok[0]:
-                guilty = fewer
+    guilty, fewest = _narrowed(assembly, [one for one in assembly.statements if one.firm])
     name, gap = _gape(assembly, guilty)
-    return _contradiction(guilty, f"joint {name} would stay {gap} apart")
+    return _contradiction(guilty, f"joint {name} would stay {gap} apart", fewest)
 
 
-FEWER = 8
-"""Guesses while the contradiction is narrowed down."""
+def _narrowed(assembly: Assembly, guilty: list[Statement]) -> tuple[list[Statement], bool]:
+    """Those that still contradict each other without the rest, large parts left out first; whether none can be missed.
+
+    The last ones are kept, as in the order of the scene they are the ones that come too many.
+    """
+    begun, joints = assembly.effort, list(assembly.scene.joints)
+    for mechanism in dict.fromkeys(tuple(_connected(assembly.scene, [one.body])) for one in guilty):
+        own = [one for one in guilty if tuple(_connected(assembly.scene, [one.body])) == mechanism]
+        if own != guilty and not assembly.closes(own, mechanism):
+            guilty, joints = own, list(mechanism)
+            break
+    pulled = _pulled(assembly, guilty)
+    if 0 < len(pulled) < len(guilty) and not assembly.closes(pulled, joints):
+        guilty = pulled
+    size = len(guilty) // 2
+    while size:
+        first = 0
+        while first < len(guilty):
+            if assembly.effort - begun > _EFFORT:
+                return guilty, False
+            fewer = guilty[:first] + guilty[first + size :]
+            if fewer and not assembly.closes(fewer, joints):
+                guilty = fewer
+            else:
+                first += size
+        size //= 2
+    return guilty, True
+
+
+def _held_open(assembly: Assembly, chosen: list[Statement]) -> tuple[Array, Rows]:
+    """Weights, and gaps with these statements held where what closes loops gapes as little as it can."""
+    fixed, values = assembly.held(chosen)
+    weight = np.where(np.isin(assembly.closure.rows(assembly.guess).names, assembly.walk.closing), 1.0, 1e3)
+    u, _ = assembly.close(assembly.closure, np.where(fixed, values, assembly.guess), fixed, weight)
+    return weight, assembly.closure.rows(u)
+
+
+def _pulled(assembly: Assembly, chosen: list[Statement]) -> list[Statement]:
+    """Those that gaps would pull away if joints were springs: the others do not keep the machine open."""
+    weight, rows = _held_open(assembly, chosen)
+    length = np.where(rows.angular, 1.0, assembly.size) / weight
+    pull = np.abs(rows.gap[0] / length**2 @ rows.slope[0]) * np.sqrt(assembly.give)
+    largest = [float(np.max(pull[list(one.columns)])) for one in chosen]
+    return [one for one, size in zip(chosen, largest, strict=True) if size > _SLACK * max(largest)]
 
 
 def _gape(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str]:
     """The joint that closes a loop, or the first of those that gape, and by how much, with these statements held."""
-    fixed, values = assembly.held(chosen)
-    closing = assembly.walk.closing
-    rows = assembly.closure.rows(assembly.guess)
-    weight = np.where(np.isin(rows.names, closing), 1.0, 1e3)
-    u, _ = assembly.close(assembly.closure, np.where(fixed, values, assembly.guess), fixed, weight)
-    rows = assembly.closure.rows(u)
-    size = np.abs(rows.gap[0])
+    rows = _held_open(assembly, chosen)[1]
+    near = _connected(assembly.scene, [one.body for one in chosen])
+    size = np.abs(rows.gap[0]) * np.isin(rows.names, near)
     worst = int(np.argmax(size / np.where(rows.angular, 1.0, assembly.size)))
     name = rows.names[worst]
     total = float(np.linalg.norm([g for g, n, a in zip(size, rows.names, rows.angular, strict=True)
                                   if n == name and a == rows.angular[worst]]))  # fmt: skip
     return name, f"{total:.3g} {'rad' if rows.angular[worst] else 'm'}"
+
+
+def _connected(scene: Scene, bodies: list[str]) -> list[str]:
+    """Joints of the mechanisms that these bodies are parts of, all joints if there are no bodies."""
+    joints = {name: {at.body for at in places(joint)} - {GROUND} for name, joint in scene.joints.items()}
+    found, size = set(bodies), -1
+    while len(found) > size:
+        size = len(found)
+        found = found.union(*(there for there in joints.values() if there & found))
+    return [name for name, there in joints.items() if not bodies or there & found] or list(joints)
 
 
 def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputError:
@@ -199,15 +245,16 @@ def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputErro
     return _contradiction([*guilty, last], wants)
 
 
-def _contradiction(guilty: list[Statement], why: str) -> InputError:
-    """One line that names the last of the statements and those that it contradicts."""
+def _contradiction(guilty: list[Statement], why: str, fewest: bool = True) -> InputError:
+    """One line that names the last of the statements and those that it contradicts. fewest: whether all of them do."""
     *others, last = guilty
     value = f"{last.path}: {_written(last.values[0])} {_UNITS[last.quantity]}"
     if not others:
         return InputError(f"{value} cannot be kept: {why}; leave it out and it follows from the joints")
     listed = ", ".join(f"{one.path} = {_written(one.values[0])}" for one in others[:3])
     more = f" and {len(others) - 3} more" if len(others) > 3 else ""
-    return InputError(f"{value} contradicts {listed}{more}: {why}; leave one of them out and it follows from the rest")
+    out = "one of them out and it follows" if fewest else "some of them out and they follow"
+    return InputError(f"{value} contradicts {listed}{more}: {why}; leave {out} from the rest")
 
 
 def _written(values: Array) -> str:
