@@ -18,7 +18,8 @@ from shoal.ports import check_free
 from shoal_flows import settings
 from shoal_flows.tracking.addresses import latest_study
 
-_PATIENCE = 60.0
+_PATIENCE = 600.0
+"""In s, as of `make up`: on a busy machine MLflow's server takes minutes; one that dies is noticed at once."""
 
 
 def ui(host: str, port: int) -> None:
