@@ -68,6 +68,18 @@ class Inputs:
         """Which parameters are random, (parameters,)."""
         return np.array([one.marginal.random for one in self.parameters], dtype=bool)
 
+    @property
+    def mixed(self) -> bool:
+        """Whether some parameters are random and others intervals."""
+        return bool(self.random.any() and not self.random.all())
+
+    def some(self, which: BoolArray) -> Inputs:
+        """Of these parameters alone, (parameters,); correlated ones are all random."""
+        kept = tuple(one for one, wanted in zip(self.parameters, which, strict=True) if wanted)
+        names = {one.name for one in kept}
+        pairs = {pair: value for pair, value in (self.correlations or {}).items() if names >= set(pair)}
+        return Inputs(kept, pairs or None)
+
     @cached_property
     def _correlated(self) -> list[int]:
         named = {name for pair in self.correlations or {} for name in pair}

@@ -8,6 +8,7 @@ from shoal.response.methods.chaos import chaos
 from shoal.response.methods.chebyshev import chebyshev
 from shoal.response.methods.kriging import kriging
 from shoal.response.methods.legendre import legendre
+from shoal.response.methods.nested import nested
 from shoal.response.methods.optimise import optimise
 from shoal.response.methods.rbf import rbf
 from shoal.response.methods.rs_ht import rs_ht
@@ -30,6 +31,7 @@ METHODS: dict[str, Method] = {
     "chebyshev": chebyshev,
     "legendre": legendre,
     "chaos": chaos,
+    "nested": nested,
     "optimise": optimise,
     "rbf": rbf,
     "kriging": kriging,
