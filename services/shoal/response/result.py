@@ -187,6 +187,7 @@ class Response:
             "horizon": plain(self.horizon),
             "gap": None if (bounded := self.bounds or self.boxes) is None else plain(bounded.gap),
             "parameters": self._parameters(),
+            "left_out": {name: why for joint in self.inputs.joints for name, why in joint.left.items()},
             "bounds": {} if self.bounds is None else self._by_marker(self._bounds),
             "statistics": self._told_statistics(),
             "mesh_error": plain(self.mesh_error),

@@ -130,6 +130,11 @@ def response_table(response: Response) -> None:
     if response.allocation is not None:
         _allocation(response.allocation)
     screen.say(f"status {response.status}; {response.evaluations} runs in {response.wall_s:.2f} s; {response.why}")
+    for joint in response.inputs.joints:
+        if joint.left:
+            screen.say(
+                f"left out of {joint.source}: {', '.join(f'{name} ({why})' for name, why in joint.left.items())}"
+            )
     if response.repeated or response.failed:
         screen.say(f"{response.repeated} runs were repeated with smaller steps, {response.failed} failed all the same")
     if response.bounds is not None:
