@@ -114,4 +114,6 @@ def _statistics(study: Study, found: Found) -> Statistics:
         if found.indices is None:
             sampled = replace(sampled, first=told.first, total=told.total)
         told = told if found.coarse is None else either(found.coarse, sampled, told)
+    if found.quantiles is not None:
+        told = replace(told, quantiles=found.quantiles)
     return masked(told, study.largest(np.nan_to_num(told.std), runs.values))
