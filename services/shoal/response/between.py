@@ -13,6 +13,8 @@ from dataclasses import replace
 import numpy as np
 from scipy import special
 
+from shoal.response.enclosure import enclosure
+from shoal.response.extremes import extremes
 from shoal.response.inputs import Inputs
 from shoal.response.limits import Judged, Limit, Shown, judge
 from shoal.response.limits.choice import probability
@@ -20,8 +22,10 @@ from shoal.response.limits.judge import watched
 from shoal.response.limits.judged import Between
 from shoal.response.limits.margins import FAR, Margins
 from shoal.response.machine import Machine
+from shoal.response.methods.nested import best
 from shoal.response.respond import respond
-from shoal.response.runs import Answers
+from shoal.response.runs import Answers, Runs
+from shoal.response.study import Study
 from shoal.trajectory import Array
 
 SHARE, LEAST = 5, 500
@@ -73,12 +77,24 @@ def between(
         made, failed = made + one.evaluations, failed + one.failed
         ends.append((one, dict(zip(given.names, named.tolist(), strict=True)), values))
     (lower, at_lower, _), (upper, at_upper, there) = ends
-    beyond = float(bounds.upper_outer[0] - bounds.upper[0]), float(bounds.lower[0] - bounds.lower_outer[0])
+    beyond = _beyond(answer.runs, seed)
     found = Between(lower, upper, at_lower, at_upper, beyond, answer.runs.evaluations)
     return Judged(
         *(limit, way, inputs, machine.times, None, None, float("nan"), float("nan")),
         *(_with(upper.shown, at_upper, there), made, failed, upper.reason or lower.reason, found),
     )
+
+
+def _beyond(runs: Runs, seed: int) -> tuple[float, float]:
+    """By how much the index may be above the largest one that is known, and below the least.
+
+    Indices are known to the scatter of few runs: of all polynomials the one that foretells left-out ones best tells.
+    """
+    study = Study(runs, np.zeros(1, dtype=np.int64), np.zeros(1), seed)
+    surrogate = best(study)
+    found = extremes(surrogate, len(runs.inputs), 1, seed)
+    told = enclosure(study, surrogate, found, surrogate.left_out)
+    return float(told.upper_outer[0] - told.upper[0]), float(told.lower[0] - told.lower_outer[0])
 
 
 def _on(progress: Callable[[int], None] | None, made: int) -> Callable[[int], None] | None:

@@ -56,7 +56,7 @@ def nested(study: Study) -> Found:
     try:
         while True:
             runs(_towards_ends(inputs, inputs.sobol(count - made, study.seed, made)))
-            made, found = count, _best(study)
+            made, found = count, best(study)
             sides = _extremes(study, found)
             where = _deciding(sides)
             before = len(runs.germs)
@@ -71,7 +71,7 @@ def nested(study: Study) -> Found:
     except TooManyRunsError:
         if found is None or not error.size:
             raise
-    found = _best(study)
+    found = best(study)
     degree = int(found.terms.sum(axis=1).max())
     why = (
         f"polynomial chaos of degree {degree} over distributions and intervals together, fitted to {runs.evaluations} "
@@ -85,30 +85,30 @@ def _towards_ends(inputs: Inputs, germs: Array) -> Array:
     return np.where(inputs.random, germs, np.sin(0.5 * np.pi * germs))
 
 
-def _best(study: Study) -> Expansion:
+def best(study: Study) -> Expansion:
     """In every column the degree with the least error at runs that are left out, among those that the runs carry."""
     runs, parameters = study.runs, len(study.inputs)
-    best: Expansion | None = None
+    known: Expansion | None = None
     worse = 0
     for degree in [study.degree] if study.degree else range(1, HIGHEST + 1):
-        if best is not None and SHARE * size(parameters, degree) > len(runs.germs):
+        if known is not None and SHARE * size(parameters, degree) > len(runs.germs):
             break
         found = fit(study.inputs, runs.germs, runs.values, total_degree(parameters, degree))
-        if best is None:
-            best = found
+        if known is None:
+            known = found
             continue
-        better = found.left_out < best.left_out
+        better = found.left_out < known.left_out
         # Terms of a lower degree come first.
         same = np.zeros_like(found.coefficients)
-        same[: len(best.terms)] = best.coefficients
+        same[: len(known.terms)] = known.coefficients
         coefficients = np.where(better, found.coefficients, same)
-        best = Expansion(study.inputs, found.terms, coefficients, np.where(better, found.left_out, best.left_out))
+        known = Expansion(study.inputs, found.terms, coefficients, np.where(better, found.left_out, known.left_out))
         worse = 0 if better.any() else worse + 1
         if worse == WORSE:
             break
-    assert best is not None
-    used = int(np.flatnonzero(np.any(best.coefficients != 0, axis=1)).max(initial=0)) + 1
-    return Expansion(study.inputs, best.terms[:used], best.coefficients[:used], best.left_out)
+    assert known is not None
+    used = int(np.flatnonzero(np.any(known.coefficients != 0, axis=1)).max(initial=0)) + 1
+    return Expansion(study.inputs, known.terms[:used], known.coefficients[:used], known.left_out)
 
 
 def _extremes(study: Study, found: Expansion) -> list[Extremes]:
