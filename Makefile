@@ -86,8 +86,13 @@ up-postgres: setup  ## the same on a PostgreSQL server of its own
 secrets:  ## passwords for docker-compose.yml, where there are none
 	@sh deploy/secrets.sh
 
+# The extras that the lock holds: all but the one that is too large for what it brings.
+LOCKED = $(shell $(BIN)/python -c 'import tomllib; \
+  extras = tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]; \
+  print(*(f"--extra {name}" for name in extras if name != "openturns"))')
+
 lock: setup  ## resolve pyproject.toml anew into requirements.lock
-	@$(BIN)/uv pip compile --quiet --upgrade --all-extras --no-emit-index-url --no-header --no-annotate -p 3.11 \
+	@$(BIN)/uv pip compile --quiet --upgrade $(LOCKED) --no-emit-index-url --no-header --no-annotate -p 3.11 \
 	  pyproject.toml -o requirements.lock
 
 clean:  ## remove the environment, the caches and the state, but for the library

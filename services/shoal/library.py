@@ -18,6 +18,7 @@ from shoal.identification.problem import built_in_problems
 from shoal.identification.recording.reading import YAML, described, read
 from shoal.identification.recording.source import FileSource
 from shoal.response.limits import limit
+from shoal.response.posterior import is_source
 from shoal.response.read import parameters
 from shoal.response.stated import KEY, built_in_studies, load_study
 from shoal.scene import Scene, load_scene
@@ -90,8 +91,8 @@ def _check_study(document: Path) -> None:
     study = load_study(str(document))
     scene, asked = study.machine(), study.asked()
     _model(scene)
-    if any("empirical(" in text for text in study.vary):
-        raise InputError(f"{document.name}: {KEY}: vary: a table of observations cannot be kept with a study")
+    if any("empirical(" in text or is_source(text) for text in study.vary):
+        raise InputError(f"{document.name}: {KEY}: vary: a file of observations cannot be kept with a study")
     parameters(asked["vary"], scene)
     for text in asked["limits"]:
         limit(text, scene)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from SALib import util
 from scipy import stats
 from shoal.errors import InputError
 from shoal.response.inputs import Inputs
@@ -44,7 +45,6 @@ def test_problems_of_salib(kind: str) -> None:
 
 def test_problems_agree_with_salib() -> None:
     """Samples that SALib scales from the unit cube are the quantiles here."""
-    util = pytest.importorskip("SALib.util")
     names = [f"x{k}" for k in range(len(FORMS))]
     problem = {"num_vars": len(FORMS), "names": names, "dists": list(FORMS)}
     problem["bounds"] = [bounds for bounds, _ in FORMS.values()]

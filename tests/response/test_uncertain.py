@@ -92,7 +92,6 @@ def test_beyond_the_horizon_nothing_is_claimed() -> None:
         (["bodies.OA.mass~normal(1,-1)"], "must be positive"),
         (["bodies.OA.mass~empirical(nowhere.csv)"], "cannot read"),
         (["bodies.OA.mass=1:2", "bodies.OA.mass=1:2"], "varied twice"),
-        (["bodies.OA.mass=1:2", "bodies.OA.inertia~normal(1,0.1)"], "give both the one or the other"),
     ],
 )
 def test_wrong_input_is_named(vary: list[str], names: str) -> None:

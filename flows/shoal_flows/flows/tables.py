@@ -46,15 +46,20 @@ def of_sweep(result: Sweep) -> str:
 def of_response(found: Response) -> str:
     """Bounds or statistics of every marker at the end, what is told of the limits, and the evidence."""
     header, rows = found.table()
+    brief = ("mean_lower", "mean_upper", "std_lower", "std_upper") if found.boxes is not None else ()
     ends: dict[str, dict[str, float]] = {}
     for name, value in zip(header[1:], rows[-1, 1:].tolist(), strict=True):
         of, _, told = name.partition(".")[2].partition(".")
-        ends.setdefault(f"{name.partition('.')[0]}.{of}", {})[told] = value
+        if not brief or told in brief:
+            ends.setdefault(f"{name.partition('.')[0]}.{of}", {})[told] = value
     shown = table(("at the end", *next(iter(ends.values()))), ((of, *told.values()) for of, told in ends.items()))
     said = [f"{found.status}; {found.evaluations} runs; {found.why}", found.message]
     for one in found.limits:
         kept = {True: "kept", False: "passed", None: "not decided"}[one.kept]
         told = kept if one.passing is None else f"passed with probability {one.passing.estimate.probability:.3g}"
+        if one.between is not None:
+            least, largest = one.between.estimates
+            told = f"passed with a probability between {least:.3g} and {largest:.3g}"
         said.append(f"limit {one.limit.text}: {told}")
     return "\n\n".join([shown, *(one for one in said if one)])
 

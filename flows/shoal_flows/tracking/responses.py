@@ -43,6 +43,10 @@ def _figures(run: Run, found: Response) -> None:
         told = {"lower": found.bounds.lower, "upper": found.bounds.upper}
     if found.statistics is not None:
         told |= {"mean": found.statistics.mean, "std": found.statistics.std}
+    if found.boxes is not None:
+        run.metric("final/gap", found.boxes.gap)
+        mean, std = found.boxes.mean, found.boxes.std
+        told = {"mean_lower": mean.lower, "mean_upper": mean.upper, "std_lower": std.lower, "std_upper": std.upper}
     some = np.unique(np.linspace(0, len(found.times) - 1, min(POINTS, len(found.times))).astype(int))
     for marker in found.markers:
         for quantity in found.quantities:
@@ -55,5 +59,8 @@ def _figures(run: Run, found: Response) -> None:
         run.params({f"limit.{k}": judged.limit.text})
         if judged.passing is not None:
             run.metric(f"final/limit.{k}/probability", judged.passing.estimate.probability)
+        elif judged.between is not None:
+            for side, chance in zip(("lower", "upper"), judged.between.estimates, strict=True):
+                run.metric(f"final/limit.{k}/probability_{side}", chance)
         elif judged.kept is not None:
             run.metric(f"final/limit.{k}/kept", float(judged.kept))

@@ -35,9 +35,9 @@ def _ways() -> str:
     "vary",
     multiple=True,
     required=True,
-    metavar="PATH=LOW:HIGH|PATH~DISTRIBUTION",
+    metavar="PATH=LOW:HIGH|PATH~DISTRIBUTION|FILE",
     help='An interval (-2%:2% is relative) or a distribution, such as "bodies.OA.length~normal(1,0.01)" (repeatable). '
-    "PATH,PATH=... ties fields together.",
+    "PATH,PATH=... ties fields together. FILE is what `shoal identify --out` wrote, .json or .nc of draws.",
 )
 @click.option("--correlate", "pairs", multiple=True, metavar="PATH,PATH=VALUE", help="Correlation of two of them.")
 @click.option("--method", cls=options.LateHelp, told=_methods, default="auto", show_default=True, metavar="NAME")

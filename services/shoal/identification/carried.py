@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from shoal.identification.estimate import Estimate
     from shoal.identification.parametrization import Parametrization
     from shoal.identification.problem import Problem
+    from shoal.identification.spread.value import Value
     from shoal.scene import Scene
     from shoal.trajectory import Array
 
@@ -109,6 +110,37 @@ def fitted(parameters: Parametrization, point: Array) -> tuple[dict[str, float],
     }
     found = parameters.scene_values(point[None], parameters.recordings[0])
     return {path: float(numbers[0]) for path, numbers in found.items() if path not in paths}, left
+
+
+def joint(parameters: Parametrization, point: Array, covariance: Array, values: Mapping[str, Value]) -> dict[str, Any]:
+    """What an answer knows of the machine for use elsewhere, as plain data.
+
+    Of every parameter that is of the machine and of all recordings its path (None if it stands in ties only), value,
+    whether its logarithm is the normal variable, and whether it is known; their covariance in their own units; ties of
+    them, and the constants that these name.
+
+    point: (components,); covariance: (components, components)
+    """
+    problem, (_, left) = parameters.problem, fitted(parameters, point)
+    kept = [k for k, name in enumerate(parameters.names) if name not in left]
+    ties = {path: text for path, text in problem.ties.items() if path not in left}
+    entries = list(parameters.entries.values())
+    told: dict[str, Any] = {
+        parameters.names[k]: {
+            "path": entries[k].parameter.path,
+            "value": float(parameters.to_values(point)[k]),
+            "logarithmic": bool(parameters.logarithmic[k]),
+            "known": values[parameters.names[k]].identifiable,
+        }
+        for k in kept
+    }
+    used = set().union(*(expression.names(text) for text in ties.values())) if ties else set()
+    return {
+        "parameters": told,
+        "covariance": covariance[np.ix_(kept, kept)].tolist(),
+        "ties": ties,
+        "constants": {name: float(x) for name, x in parameters.constants.items() if name in used},
+    }
 
 
 def of_estimate(estimate: Estimate) -> Carried:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from shoal.identification.adapt import Stage
-from shoal.identification.carried import fitted
+from shoal.identification.carried import fitted, joint
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
@@ -184,6 +184,7 @@ def conclude(
         values=carried,
         left_out=left,
         prediction=foretold,
+        joint=joint(model.parameters, point, intervals.covariance(model, point, at), values),
     )
 
 

@@ -37,7 +37,7 @@ class Estimate:
     scenes: the identified machine, by recording; predicted: its channels at the samples of each recording
     covariance: of the parameters, in the products of their units, (parameters, parameters)
     values: the fields of the scene that were found, by path, ties evaluated; left_out: what is not among them, and why
-    prediction: of the windows that were held out
+    prediction: of the windows that were held out; joint: see `carried.joint`
     """
 
     problem: str
@@ -80,6 +80,7 @@ class Estimate:
     values: dict[str, float] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
     prediction: list[Prediction] = field(default_factory=list)
+    joint: dict[str, Any] = field(default_factory=dict)
 
     @property
     def scene(self) -> Scene:
@@ -133,6 +134,7 @@ class Estimate:
             "parameters": {**values(self.parameters), **values(self.quantities)},
             "values": plain(self.values),
             "left_out": self.left_out,
+            "joint": self.joint,
             "prediction": [one.to_json() for one in self.prediction],
             "combinations": self.combinations,
             "fitness": plain(self.fitness),

@@ -101,7 +101,8 @@ def estimate(found: Estimate, problem: Problem, path: Path) -> None:
     def draws() -> bytes:
         if found.posterior is None:
             raise InputError(f"out: no posterior was drawn, so {path} has nothing to hold")
-        return bytes(found.posterior.to_xarray().to_netcdf(engine="scipy"))
+        about = {"left_out": json_text(found.left_out), "joint": json_text(found.joint)}
+        return bytes(found.posterior.to_xarray().assign_attrs(about).to_netcdf(engine="scipy"))
 
     moves = {".gif": lambda: moving_picture(Answer(problem, found))}
     save(path, {".html": page, ".png": lambda: _plotted(found), **moves, ".json": kept, ".nc": draws})

@@ -5,32 +5,43 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from shoal.pictures.style import BLUE, canvas, headline, log_ticks, styled
+from shoal.pictures.style import BLUE, VERMILION, canvas, headline, log_ticks, styled
 from shoal.response.limits import Judged
 
 
 @styled
 def probability(found: Judged) -> Figure:
-    """The first passage with its interval, on a logarithmic axis if it is rare; found: of random parameters."""
-    assert found.passing is not None
-    estimate = found.passing.estimate
-    lower, upper = estimate.interval
+    """The first passage with its interval, on a logarithmic axis if it is rare; found: of random parameters.
+
+    Beside intervals, the least and the largest.
+    """
     figure, axes = canvas()
-    seen = estimate.passed > 0
-    if not seen.any():
-        axes.text(0.5, 0.5, f"no run has passed it; below {upper[-1]:.1e}", ha="center", transform=axes.transAxes)
-    axes.fill_between(found.times[seen], lower[seen], upper[seen], color=BLUE, alpha=0.25, label="95 % confidence")
-    axes.plot(found.times[seen], estimate.passed[seen], color=BLUE, label="passed by then")
-    if seen.any() and estimate.probability < 0.1:
+    estimates = found.estimates
+    labels = ["passed by then"] if len(estimates) == 1 else ["least probable", "most probable"]
+    seen = False
+    for estimate, label, colour in zip(estimates, labels, (BLUE, VERMILION), strict=False):
+        some = estimate.passed > 0
+        lower, upper = estimate.interval
+        axes.fill_between(found.times[some], lower[some], upper[some], color=colour, alpha=0.25, linewidth=0)
+        if some.any():
+            axes.plot(found.times[some], estimate.passed[some], color=colour, label=f"{label}; band: 95 % confidence")
+        seen = seen or bool(some.any())
+    most = estimates[-1]
+    if not seen:
+        below = most.interval[1][-1]
+        axes.text(0.5, 0.5, f"no run has passed it; below {below:.1e}", ha="center", transform=axes.transAxes)
+    if seen and most.probability < 0.1:
+        least = min(one.probability for one in estimates if one.probability > 0)
         axes.set_yscale("log")
-        axes.set_ylim(estimate.probability * 1e-4, upper[-1] * 3)
+        axes.set_ylim(least * 1e-4, most.interval[1][-1] * 3)
         log_ticks(axes)
     axes.set_xlim(found.times[0], max(found.times[-1], found.times[0] + 1e-9))
     axes.set_xlabel("time [s]")
     axes.set_ylabel("probability")
-    if seen.any():
+    if seen:
         axes.legend()
-    headline(figure, f"{found.limit.text} happens with probability {_number(estimate.probability)}")
+    chances = " to ".join(_number(one.probability) for one in estimates)
+    headline(figure, f"{found.limit.text} happens with probability {chances}")
     return figure
 
 

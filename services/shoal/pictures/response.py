@@ -26,6 +26,8 @@ def response(found: Response, marker: str) -> Figure:
     says = (
         "places of {0} are {1} apart at most, as attained by runs"
         if found.bounds is not None
+        else "over all interval values, {0} scatters with a standard deviation of {1} at most"
+        if found.boxes is not None
         else "{0} scatters with a standard deviation of {1} at most"
     )
     trust = "" if found.ok else f" ({found.status}: see the message)"
@@ -48,6 +50,15 @@ def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
         if not within.all():
             panel.axvline(found.horizon, color=GREY, linestyle=":", label="horizon")
         widest = float(np.max(upper - lower))
+    elif found.boxes is not None:
+        mean, levels = found.boxes.mean, found.boxes.quantiles
+        low, high = (found.column(marker, quantity, of) for of in (levels[1].lower, levels[-2].upper))
+        panel.fill_between(t, low, high, color=BLUE, alpha=0.25, linewidth=0, label="5 % and 95 % at their farthest")
+        low, high = (found.column(marker, quantity, of) for of in (mean.lower, mean.upper))
+        panel.fill_between(t, low, high, color=ORANGE, alpha=0.5, linewidth=0, label="means over the intervals")
+        if found.horizon < t[-1]:
+            panel.axvline(found.horizon, color=GREY, linestyle=":", label="horizon")
+        widest = float(np.max(found.column(marker, quantity, found.boxes.std.upper)))
     else:
         told = found.statistics
         assert told is not None

@@ -38,7 +38,7 @@ def uncertainty(found: Response) -> str:
         motions=[_over_nominal(found, case) for case in cases],
         cases=[_case(case) for case in cases],
         pictures=[one.embedded() for one in _pictures(found)],
-        passages=[_passage(one).embedded() for one in found.limits if one.passing is not None],
+        passages=[_passage(one).embedded() for one in found.limits if one.estimates],
         allocation=_allocation(found),
         remarks=_remarks(found),
         provenance=_provenance(found),
@@ -54,13 +54,15 @@ def _lead(found: Response) -> str:
             (float(found.column(marker, axis, told).max()), marker) for marker in found.markers for axis in ("x", "y")
         )
         return f"Places of {widest[1]} differ by up to {length(widest[0])}; runs attain the bounds."
-    assert found.statistics is not None
+    if found.boxes is not None:
+        deviation, among = found.boxes.std.upper, "Over all interval values, "
+    else:
+        assert found.statistics is not None
+        deviation, among = found.statistics.std, ""
     spread = max(
-        (float(found.column(marker, axis, found.statistics.std).max()), marker)
-        for marker in found.markers
-        for axis in ("x", "y")
+        (float(found.column(marker, axis, deviation).max()), marker) for marker in found.markers for axis in ("x", "y")
     )
-    return f"{spread[1]} scatters with a standard deviation of up to {length(spread[0])}."
+    return f"{among}{spread[1]} scatters with a standard deviation of up to {length(spread[0])}."
 
 
 def _parameters(found: Response) -> list[list[str]]:
@@ -70,6 +72,9 @@ def _parameters(found: Response) -> list[list[str]]:
 def _limit(one: Judged) -> list[str]:
     shown = one.shown
     how = "–" if shown is None else ", ".join(f"{name} = {value:.5g}" for name, value in shown.parameters.items())
+    if one.between is not None:
+        ends = (f"{low:.3g} to {high:.3g}" for low, high in (one.between.estimates, one.between.interval))
+        return [one.limit.text, *ends, how]
     if one.passing is None:
         says = {True: "kept", False: "passed", None: "not decided"}[one.kept]
         return [one.limit.text, says, f"{one.margin:.3g} {one.limit.unit}", how]
@@ -114,6 +119,8 @@ def _case(case: Worst) -> list[str]:
 def _pictures(found: Response) -> list[Drawn]:
     drawn = []
     what = "The band that runs attain, with outer bounds" if found.bounds is not None else "Mean and quantiles"
+    if found.boxes is not None:
+        what = "Where the mean and the 5 % and 95 % quantiles may lie"
     for marker in found.markers[-MARKERS:]:
         alt = f"{what} of {marker} over time."
         drawn.append(Drawn(f"response-{marker}", response(found, marker), alt, f"{what} of {marker}."))
@@ -144,9 +151,14 @@ def _allocation(found: Response) -> list[list[str]]:
 
 def _remarks(found: Response) -> list[str]:
     remarks = [f"{one.limit.text}: {one.passing.why}." for one in found.limits if one.passing is not None]
+    for one in found.limits:
+        if one.between is not None:
+            for side, at in (("least", one.between.at_lower), ("most", one.between.at_upper)):
+                values = ", ".join(f"{name} = {value:.5g}" for name, value in at.items())
+                remarks.append(f"{one.limit.text}: {side} probable with {values}.")
     if found.repeated or found.failed:
         remarks.append(f"{found.repeated} runs were repeated with smaller steps; {found.failed} failed all the same.")
-    if found.bounds is not None and found.horizon < found.times[-1]:
+    if (found.bounds or found.boxes) is not None and found.horizon < found.times[-1]:
         remarks.append(f"Bounds hold until {found.horizon:.4g} s.")
     return remarks
 

@@ -22,15 +22,19 @@ STEPS = 0.25, 0.1, 0.04, 0.015, 0.005, 0.001, 0.0002
 """Of the search along each axis from the best place that was scanned."""
 
 
-class Surrogate(Protocol):
+class Each(Protocol):
+    """One column at any germ without a run."""
+
+    def each(self, germs: Array, columns: IntArray) -> Array:
+        """(places,)."""
+        ...
+
+
+class Surrogate(Each, Protocol):
     """Answers at any germ without a run."""
 
     def __call__(self, germs: Array) -> Array:
         """(places, columns)."""
-        ...
-
-    def each(self, germs: Array, columns: IntArray) -> Array:
-        """(places,)."""
         ...
 
 
@@ -72,13 +76,13 @@ def extremes(surrogate: Surrogate, parameters: int, columns: int, seed: int = 0,
         value, place = best[side].reshape(-1), at[side].reshape(-1, parameters)
         for step in STEPS:
             for axis in range(parameters):
-                _along(surrogate, sign, axis, step, value, place, np.tile(every, starts))
+                along(surrogate, sign, axis, step, value, place, np.tile(every, starts))
     first = [np.argmin(one, axis=0) for one in best]
     lower, upper = (one[k, every] for one, k in zip(best, first, strict=True))
     return Extremes(lower, -upper, *(one[k, every] for one, k in zip(at, first, strict=True)))
 
 
-def _along(surrogate: Surrogate, sign: float, axis: int, step: float, best: Array, at: Array, every: IntArray) -> None:
+def along(surrogate: Each, sign: float, axis: int, step: float, best: Array, at: Array, every: IntArray) -> None:
     """Improve all columns along one axis: at both sides and where the parabola through the three is least."""
     here, sides, tried = best.copy(), [], []
     for way in (-step, step):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy.stats import qmc
 from shoal.errors import InputError
 from shoal.response.marginals import Marginal, Normal
 from shoal.response.polynomials import HERMITE, Recurrence, Terms
+from shoal.scene import expression
 from shoal.trajectory import Array
 
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
@@ -21,15 +22,33 @@ Correlations = Mapping[tuple[str, str], float]
 
 
 @dataclass(frozen=True)
+class Joint:
+    """What parameters of one source know of each other.
+
+    source: its name; correlations: of its parameters; ties: path -> expression in what `known` names and in constants;
+    known: name in expressions -> name of the parameter; left: what is not taken from the source, and why
+    """
+
+    source: str
+    correlations: Correlations
+    ties: Mapping[str, str] = field(default_factory=dict)
+    known: Mapping[str, str] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)
+    left: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Parameter:
     """An uncertain parameter.
 
-    name: as it was given; factors: path -> what its value is multiplied by there (more than one path: a tie)
+    name: as it was given; factors: path -> what its value is multiplied by there (more than one path: a tie); joint:
+    with others of the same source
     """
 
     name: str
     marginal: Marginal
     factors: Mapping[str, float]
+    joint: Joint | None = None
 
 
 @dataclass(frozen=True)
@@ -42,10 +61,14 @@ class Inputs:
     def __post_init__(self) -> None:
         names = self.names
         if not names:
-            raise InputError("vary: needs at least one parameter, such as bodies.OA.length=0.98:1.02")
+            raise InputError("vary: needs at least one parameter, such as --vary bodies.OA.length=0.98:1.02")
         paths = [path for one in self.parameters for path in one.factors]
+        paths += [path for joint in self.joints for path in joint.ties]
         if twice := sorted({path for path in paths if paths.count(path) > 1}):
             raise InputError(f"vary: {twice[0]} is varied twice")
+        known = {pair: value for joint in self.joints for pair, value in joint.correlations.items()}
+        if known:
+            object.__setattr__(self, "correlations", {**known, **(self.correlations or {})})
         for pair in self.correlations or {}:
             for name in pair:
                 if name not in names:
@@ -54,6 +77,11 @@ class Inputs:
                     raise InputError(f"correlate: {name} is an interval; only random parameters correlate")
         if self.correlations:
             _ = self._factor
+
+    @property
+    def joints(self) -> list[Joint]:
+        """Sources of several parameters, each once."""
+        return list({id(one.joint): one.joint for one in self.parameters if one.joint is not None}.values())
 
     @property
     def names(self) -> list[str]:
@@ -67,6 +95,18 @@ class Inputs:
     def random(self) -> BoolArray:
         """Which parameters are random, (parameters,)."""
         return np.array([one.marginal.random for one in self.parameters], dtype=bool)
+
+    @property
+    def mixed(self) -> bool:
+        """Whether some parameters are random and others intervals."""
+        return bool(self.random.any() and not self.random.all())
+
+    def some(self, which: BoolArray) -> Inputs:
+        """Of these parameters alone, (parameters,); correlated ones are all random."""
+        kept = tuple(one for one, wanted in zip(self.parameters, which, strict=True) if wanted)
+        names = {one.name for one in kept}
+        pairs = {pair: value for pair, value in (self.correlations or {}).items() if names >= set(pair)}
+        return Inputs(kept, pairs or None)
 
     @cached_property
     def _correlated(self) -> list[int]:
@@ -94,29 +134,43 @@ class Inputs:
 
     def values(self, germs: Array) -> dict[str, Array]:
         """Path -> value of every run; germs: (runs, parameters)."""
-        given = {}
+        return self._given(self._numbers(germs))
+
+    def _numbers(self, germs: Array) -> Array:
+        """Values of the parameters, both (runs, parameters)."""
+        found = []
         correlated = germs[:, self._correlated] @ self._factor.T if self._correlated else None
         for k, one in enumerate(self.parameters):
             s = germs[:, k]
             if correlated is not None and self._standard(k):
                 z = correlated[:, self._correlated.index(k)]
                 s = z if isinstance(one.marginal, Normal) else one.marginal.germ(special.ndtr(z))
-            value = one.marginal.value(s)
-            given.update({path: value * factor for path, factor in one.factors.items()})
+            found.append(one.marginal.value(s))
+        return np.stack(found, axis=1)
+
+    def _given(self, numbers: Array) -> dict[str, Array]:
+        """Path -> value, of values of the parameters, (runs, parameters)."""
+        pairs = zip(self.parameters, numbers.T, strict=True)
+        given = {path: at * factor for one, at in pairs for path, factor in one.factors.items()}
+        for joint in self.joints:
+            known = {word: numbers[:, self.names.index(name)] for word, name in joint.known.items()}
+            for path, text in joint.ties.items():
+                told = expression.evaluate_array(text, {**joint.constants, **known})
+                given[path] = np.broadcast_to(told, len(numbers)).astype(float)
         return given
+
+    @property
+    def _first(self) -> Array:
+        """What users state of a parameter over its value, (parameters,)."""
+        return np.array([next(iter(one.factors.values()), 1.0) for one in self.parameters])
 
     def named(self, germs: Array) -> Array:
         """Values of the parameters as the user states them, (runs, parameters)."""
-        values = self.values(np.atleast_2d(germs))
-        return np.stack([values[next(iter(one.factors))] for one in self.parameters], axis=1)
+        return np.asarray(self._numbers(np.atleast_2d(germs)) * self._first)
 
     def at(self, named: Array) -> dict[str, float]:
         """Path -> value where the parameters have these values, (parameters,), as the user states them."""
-        given = {}
-        for one, value in zip(self.parameters, named.tolist(), strict=True):
-            first = next(iter(one.factors.values()))
-            given.update({path: value * factor / first for path, factor in one.factors.items()})
-        return given
+        return {path: float(at[0]) for path, at in self._given((named / self._first)[None]).items()}
 
     def germs(self, x: Array) -> Array:
         """Germs at independent probabilities, both (runs, parameters)."""

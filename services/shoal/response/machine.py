@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class Machine:
     Quantities are x, y [m] and angle [rad]; in space x, y and z, where an angle in the plane z = 0 may jump.
 
     columns: their number along each of the three; told: what is told of a motion instead, (lanes, columns);
-    keep: of the runs
+    keep: of the runs; fixed: values of parameters that are set in the scene, in words, by which these are told apart
     """
 
     scene: Scene
@@ -37,6 +37,11 @@ class Machine:
     engine: Engine
     told: Callable[[Trajectory], Array] = field(default_factory=lambda: _columns)
     keep: Keep | None = None
+    fixed: str = ""
+
+    def at(self, values: Mapping[str, float]) -> Machine:
+        """The same machine with these values. Raises InputError."""
+        return replace(self, scene=self.scene.with_values(values), fixed=f"{self.fixed}{dict(values)}")
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -65,7 +70,7 @@ class Machine:
     def _known(self, values: Mapping[str, Array]) -> Answers:
         if self.keep is None:
             return self._some(values)
-        return self.keep(repr(getattr(self.told, "__self__", "markers")), values, self._some)
+        return self.keep(repr(getattr(self.told, "__self__", "markers")) + self.fixed, values, self._some)
 
     def _some(self, values: Mapping[str, Array]) -> Answers:
         motion = self.engine.simulate_many(self.scene, values, self.times)

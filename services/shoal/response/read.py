@@ -14,11 +14,12 @@ from scipy import stats
 from shoal.errors import InputError
 from shoal.response.inputs import Correlations, Parameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
+from shoal.response.posterior import from_posterior, is_source
 from shoal.response.salib import from_salib, is_problem
 from shoal.scene import Scene
 from shoal.trajectory import Array
 
-FORM = "PATH=LOW:HIGH or PATH~normal(MEAN,SD)"
+FORM = "PATH=LOW:HIGH or PATH~normal(MEAN,SD) or the FILE.json of an estimate"
 _CALL = re.compile(r"^\s*([a-z-]+)\s*\((.*)\)\s*$")
 EVERYTHING = 10
 """Observations that an empirical distribution needs."""
@@ -71,7 +72,16 @@ def parameters(vary: Mapping[str, Any] | Sequence[str | Parameter], scene: Scene
         vary = from_salib(cast(Mapping[str, Any], vary))
     if isinstance(vary, Mapping):
         return tuple(_parameter(name, known, scene) for name, known in vary.items())
-    return tuple(one if isinstance(one, Parameter) else _parameter(*_split(one), scene) for one in vary)
+    given = [vary] if isinstance(vary, str) else vary
+    found: list[Parameter] = []
+    for one in given:
+        if isinstance(one, Parameter):
+            found.append(one)
+        elif is_source(one):
+            found += from_posterior(one, scene)
+        else:
+            found.append(_parameter(*_split(one), scene))
+    return tuple(found)
 
 
 def by_name(vary: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:

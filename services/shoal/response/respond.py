@@ -11,6 +11,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.response.attained import DRAWN, bounds_of, likely
+from shoal.response.boxes import Boxes, boxes_of, sampled
 from shoal.response.expansion import Expansion
 from shoal.response.inputs import Inputs
 from shoal.response.kept import TimeIsUpError
@@ -21,6 +22,8 @@ from shoal.response.statistics import Statistics, either, masked, of_expansion, 
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 
+MIXED = "auto", "nested"
+"""Methods for intervals and distributions together."""
 MOST = 20_000
 """Runs that a study may make unless another limit is asked for."""
 
@@ -33,11 +36,17 @@ class Answer:
     runs: Runs
     bounds: Bounds | None
     statistics: Statistics | None
+    boxes: Boxes | None = None
+
+    @property
+    def bounded(self) -> Bounds | Boxes | None:
+        """What has a horizon and a gap."""
+        return self.bounds or self.boxes
 
     @property
     def horizon(self) -> float:
         """Up to when bounds hold [s], infinite if always."""
-        return math.inf if self.bounds is None else self.bounds.horizon
+        return math.inf if self.bounded is None else self.bounded.horizon
 
 
 def respond(
@@ -60,6 +69,10 @@ def respond(
 
     model: path -> values, (runs,), to answers, (runs, columns). Raises InputError, ComputationError.
     """
+    if inputs.mixed and method not in MIXED:
+        raise InputError(
+            f"vary: method {method} takes intervals or distributions, not both; methods for both are {', '.join(MIXED)}"
+        )
     runs = Runs(model, inputs, most, progress)
     group = np.arange(columns) if groups is None else np.asarray(groups, dtype=np.int64)
     when = np.zeros(columns) if instants is None else instants
@@ -79,7 +92,11 @@ def respond(
         with suppress(TimeIsUpError):
             bounds = likely(study, bounds)
     statistics = _statistics(study, found) if random.all() else None
-    return Answer(found, runs, bounds, statistics)
+    boxes = boxes_of(study, found) if inputs.mixed else None
+    if boxes is not None and math.isfinite(boxes.horizon):
+        with suppress(TimeIsUpError):
+            boxes = sampled(study, boxes)
+    return Answer(found, runs, bounds, statistics, boxes)
 
 
 def _broken_off(runs: Runs) -> Found:
@@ -97,4 +114,6 @@ def _statistics(study: Study, found: Found) -> Statistics:
         if found.indices is None:
             sampled = replace(sampled, first=told.first, total=told.total)
         told = told if found.coarse is None else either(found.coarse, sampled, told)
+    if found.quantiles is not None:
+        told = replace(told, quantiles=found.quantiles)
     return masked(told, study.largest(np.nan_to_num(told.std), runs.values))

@@ -9,6 +9,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.response.allocation import Allocation
+from shoal.response.boxes import Boxes
 from shoal.response.inputs import Inputs
 from shoal.response.limits import Judged
 from shoal.response.marginals import Interval
@@ -48,7 +49,8 @@ class Response:
 
     status: ok, gap-not-reached, beyond-horizon, failed-runs or model-rejected; message: why it is not ok; why: what the
     method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds: None if a parameter is
-    random; statistics: None if none is; columns are (instants, markers, quantities) in this order;
+    random; statistics: None unless all are; boxes: bounds of the statistics, if only some are; columns are (instants,
+    markers, quantities) in this order;
     mesh_error, step_error: of extremal runs [m], None where not estimated; stated: the scene with its model in the
     middle; engine: its name; limits: of what must not happen;
     allocation: tolerances that keep the limit, where they were asked for
@@ -77,6 +79,7 @@ class Response:
     engine: str
     limits: tuple[Judged, ...] = ()
     allocation: Allocation | None = None
+    boxes: Boxes | None = None
 
     @property
     def ok(self) -> bool:
@@ -102,6 +105,9 @@ class Response:
         if self.statistics is not None:
             told = {"mean": self.statistics.mean, "std": self.statistics.std}
             told |= {f"q{q:g}": self.statistics.quantiles[k] for k, q in enumerate(QUANTILES)}
+        if self.boxes is not None:
+            sides = "lower", "upper", "lower_outer", "upper_outer"
+            told = {f"{name}_{side}": getattr(of, side) for name, of in self.boxes.named().items() for side in sides}
         header, columns = ["t"], [self.times]
         for marker in self.markers:
             for quantity in self.quantities:
@@ -115,7 +121,8 @@ class Response:
         Raises InputError.
 
         lower, upper over bound (attained, outer); argument_lower, argument_upper over parameter; mean, std, quantiles
-        over quantile; first and total Sobol indices over parameter.
+        over quantile; first and total Sobol indices over parameter. With intervals and distributions: mean_lower,
+        mean_upper, std_..., quantiles_... over bound (inner, outer), and their arguments over interval.
         """
         try:
             import xarray as xr
@@ -128,7 +135,7 @@ class Response:
         def put(name: str, of: Array, *more: str) -> None:
             """of: (..., columns)."""
             whole = of.reshape(*of.shape[:-1], *shape)
-            variables[name] = (*base, *more), np.moveaxis(whole, 0, -1) if more else whole
+            variables[name] = (*base, *more), np.moveaxis(whole, range(len(more)), range(-len(more), 0))
 
         coordinates: dict[str, Any] = {
             "time": ("time", self.times, {"units": "s"}),
@@ -149,6 +156,17 @@ class Response:
             put("quantiles", self.statistics.quantiles, "quantile")
             put("first", self.statistics.first, "parameter")
             put("total", self.statistics.total, "parameter")
+        if self.boxes is not None:
+            coordinates |= {"quantile": np.array(QUANTILES), "bound": ["inner", "outer"]}
+            coordinates["interval"] = list(self.boxes.names)
+            for side in ("lower", "upper"):
+                for name, of in (("mean", self.boxes.mean), ("std", self.boxes.std)):
+                    put(f"{name}_{side}", np.stack([getattr(of, side), getattr(of, f"{side}_outer")]), "bound")
+                    put(f"argument_{name}_{side}", getattr(of, f"at_{side}").T, "interval")
+                both = [[getattr(of, side), getattr(of, f"{side}_outer")] for of in self.boxes.quantiles]
+                put(f"quantiles_{side}", np.array(both), "quantile", "bound")
+                at = np.array([getattr(of, f"at_{side}").T for of in self.boxes.quantiles])
+                put(f"argument_quantiles_{side}", at, "quantile", "interval")
         about = {"scene": self.scene, "status": self.status, "method": self.method, "why": self.why}
         numbers = {"horizon": self.horizon, "evaluations": self.evaluations, "seed": self.seed}
         return xr.Dataset(variables, coordinates, {**about, **numbers})
@@ -167,10 +185,11 @@ class Response:
             "seed": self.seed,
             "wall_s": self.wall_s,
             "horizon": plain(self.horizon),
-            "gap": None if self.bounds is None else plain(self.bounds.gap),
+            "gap": None if (bounded := self.bounds or self.boxes) is None else plain(bounded.gap),
             "parameters": self._parameters(),
+            "left_out": {name: why for joint in self.inputs.joints for name, why in joint.left.items()},
             "bounds": {} if self.bounds is None else self._by_marker(self._bounds),
-            "statistics": {} if self.statistics is None else self._by_marker(self._statistics),
+            "statistics": self._told_statistics(),
             "mesh_error": plain(self.mesh_error),
             "step_error": plain(self.step_error),
             "limits": [one.to_json() for one in self.limits],
@@ -185,6 +204,11 @@ class Response:
             if isinstance(one.marginal, Interval):
                 described[one.name] |= {"low": one.marginal.low, "high": one.marginal.high}
         return described
+
+    def _told_statistics(self) -> dict[str, Any]:
+        if self.boxes is not None:
+            return self._by_marker(self._boxes)
+        return {} if self.statistics is None else self._by_marker(self._statistics)
 
     def _by_marker(self, told: Any) -> dict[str, Any]:
         return {marker: {name: told(marker, name) for name in self.quantities} for marker in self.markers}
@@ -203,6 +227,29 @@ class Response:
             "argument_upper": plain(self.column(marker, quantity, found.at_upper.T).T),
             **({} if found.likely is None else {"lower_95": at(found.likely[0]), "upper_95": at(found.likely[1])}),
         }
+
+    def _boxes(self, marker: str, quantity: str) -> dict[str, Any]:
+        """Numbers over time, of quantiles for each level; arguments are values of `intervals`, in their order."""
+        found = self.boxes
+        assert found is not None
+
+        def at(of: Array) -> Any:
+            return plain(self.column(marker, quantity, of))
+
+        told: dict[str, Any] = {"t": plain(self.times), "intervals": list(found.names)}
+        for side in ("lower", "upper"):
+            for name, of in (("mean", found.mean), ("std", found.std)):
+                told[f"{name}_{side}"] = at(getattr(of, side))
+                told[f"{name}_{side}_outer"] = at(getattr(of, f"{side}_outer"))
+                told[f"argument_{name}_{side}"] = plain(self.column(marker, quantity, getattr(of, f"at_{side}").T).T)
+            levels = [f"{q:g}" for q in QUANTILES]
+            for name, key in ((f"quantiles_{side}", side), (f"quantiles_{side}_outer", f"{side}_outer")):
+                told[name] = {q: at(getattr(of, key)) for q, of in zip(levels, found.quantiles, strict=True)}
+            told[f"argument_quantiles_{side}"] = {
+                q: plain(self.column(marker, quantity, getattr(of, f"at_{side}").T).T)
+                for q, of in zip(levels, found.quantiles, strict=True)
+            }
+        return told
 
     def _statistics(self, marker: str, quantity: str) -> dict[str, Any]:
         found = self.statistics

@@ -91,6 +91,7 @@ class Found:
 
     surrogate: of the answers, if it made one; error: what that is off by at runs it had not seen, (columns,); why: what
     it did, in words; indices: first and total Sobol indices by sampling, (2, parameters, columns);
+    quantiles: that take the place of those of the runs, (levels, columns);
     coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,)
     """
 
@@ -101,6 +102,7 @@ class Found:
     coarse: BoolArray | None = None
     foretold: bool = False
     share: float = 0.0
+    quantiles: Array | None = None
 
 
 Method = Callable[[Study], Found]

@@ -30,6 +30,7 @@ from shoal.response.allocation import (
     of_intervals,
 )
 from shoal.response.attained import DRAWN
+from shoal.response.between import between
 from shoal.response.inputs import Correlations, Inputs, Parameter
 from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
@@ -92,9 +93,8 @@ def uncertain(
     wanted = load_scene(scene) if isinstance(scene, str) else scene
     wanted = wanted.with_values(values) if values else wanted
     inputs = Inputs(parameters(vary, wanted), correlations)
-    if inputs.random.any() and not inputs.random.all():
-        one, other = (inputs.names[int(np.argmax(inputs.random == kind))] for kind in (True, False))
-        raise InputError(f"vary: {one} has a distribution and {other} an interval; give both the one or the other")
+    if allocate and inputs.mixed:
+        raise InputError("allocate: needs intervals or distributions, found both among the parameters")
     if allocate and len(limits) != 1:
         raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")
     when, asked = sampling_times(wanted, times), [limit(text, wanted) for text in limits]
@@ -128,9 +128,11 @@ def uncertain(
     judged, allocation = list[Judged](), None
     try:
         for passed in asked:
-            bounded = _reach(inputs, when, gap, seed, most)
             how = dict[str, Any](way=limit_method, most=limit_runs, seed=seed, verify=verify, progress=progress)
-            judged.append(judge(passed, machine, inputs, bounded, **how))
+            if inputs.mixed:
+                judged.append(between(passed, machine, inputs, **how))
+            else:
+                judged.append(judge(passed, machine, inputs, _reach(inputs, when, gap, seed, most), **how))
         if allocate:
             allocation = _allocated(asked[0], machine, inputs, costs or {}, target, seed, most)
     except TimeIsUpError:
@@ -170,6 +172,7 @@ def uncertain(
         engine=engine,
         limits=tuple(judged),
         allocation=allocation,
+        boxes=answer.boxes,
     )
 
 
@@ -252,11 +255,18 @@ def _allocated(
 
 def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[Judged]) -> tuple[str, str]:
     """ok, or what speaks against believing the answer, and why."""
-    runs, bounds = answer.runs, answer.bounds
+    runs, bounds = answer.runs, answer.bounded
     if runs.failed:
         return "failed-runs", f"{runs.failed} of {runs.evaluations} runs failed even with smaller steps: {runs.why}"
     if rejected:
         return "model-rejected", rejected
+    if answer.boxes is not None and math.isfinite(answer.horizon):
+        return "beyond-horizon", (
+            f"statistics are known until {answer.horizon:g} s; beyond, no polynomial tells them, and what is told are "
+            f"their extremes over {answer.boxes.places} interval values with {answer.boxes.inner} runs each"
+            if answer.boxes.places
+            else f"statistics are known until {answer.horizon:g} s; beyond, what is told is not to be believed"
+        )
     if math.isfinite(answer.horizon):
         return "beyond-horizon", (
             f"bounds hold until {answer.horizon:g} s; beyond, small changes of the parameters change everything, and "

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from shoal.response import Response
     from shoal.response.allocation import Allocation
     from shoal.response.limits import Judged
+    from shoal.response.limits.judged import Between
     from shoal.scene import Scene
     from shoal.selection import Selection
     from shoal.trajectory import Trajectory
@@ -98,12 +99,17 @@ def sweep_table(sweep: Sweep) -> None:
 
 
 def response_table(response: Response) -> None:
-    """The end: bounds with their gap, or mean, deviation and what it is owed to."""
+    """The end: bounds with their gap, or mean, deviation and what it is owed to, or bounds of these."""
     title = f"{response.scene} at t = {response.times[-1]:g} s, {response.method}"
+    headings: tuple[str, ...]
     if response.bounds is not None:
         headings = "lower", "upper", "outer lower", "outer upper"
         found = response.bounds
         columns = [found.lower, found.upper, found.lower_outer, found.upper_outer]
+    elif response.boxes is not None:
+        headings = "mean from", "to", "deviation from", "to", "5 % from", "95 % to"
+        mean, std, quantiles = response.boxes.mean, response.boxes.std, response.boxes.quantiles
+        columns = [mean.lower, mean.upper, std.lower, std.upper, quantiles[1].lower, quantiles[-2].upper]
     else:
         assert response.statistics is not None
         headings = "mean", "deviation", "5 %", "95 %"
@@ -114,7 +120,8 @@ def response_table(response: Response) -> None:
         for quantity in response.quantities:
             unit = "rad" if quantity == "angle" else "m"
             numbers = (response.column(marker, quantity, column)[-1] for column in columns)
-            table.add_row(f"{marker}.{quantity} [{unit}]", *("-" if np.isnan(x) else f"{x:z.6f}" for x in numbers))
+            form = "z.6f" if response.boxes is None else ".4g"
+            table.add_row(f"{marker}.{quantity} [{unit}]", *("-" if np.isnan(x) else f"{x:{form}}" for x in numbers))
     screen.out.print(table)
     if response.statistics is not None:
         _shares(response)
@@ -123,6 +130,11 @@ def response_table(response: Response) -> None:
     if response.allocation is not None:
         _allocation(response.allocation)
     screen.say(f"status {response.status}; {response.evaluations} runs in {response.wall_s:.2f} s; {response.why}")
+    for joint in response.inputs.joints:
+        if joint.left:
+            screen.say(
+                f"left out of {joint.source}: {', '.join(f'{name} ({why})' for name, why in joint.left.items())}"
+            )
     if response.repeated or response.failed:
         screen.say(f"{response.repeated} runs were repeated with smaller steps, {response.failed} failed all the same")
     if response.bounds is not None:
@@ -131,6 +143,11 @@ def response_table(response: Response) -> None:
             "the gap to the outer ones is not known" if np.isnan(gap) else f"outer ones lie {gap:.1e} of the width off"
         )
         screen.say(f"bounds are attained by runs; {known}; they hold until {response.horizon:g} s")
+    if response.boxes is not None:
+        screen.say(
+            f"statistics lie between these values, whatever the intervals are; they are known to "
+            f"{response.boxes.gap:.1e} of the scatter, until {response.horizon:g} s"
+        )
     errors = {"mesh": response.mesh_error, "step": response.step_error}
     told_of = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
     if told_of:
@@ -140,7 +157,10 @@ def response_table(response: Response) -> None:
 def _limit(judged: Judged) -> None:
     """What is told of a limit, and the values that show it."""
     title, shown = f"limit {judged.limit.text}", judged.shown
-    if judged.passing is not None:
+    if judged.between is not None:
+        _between(title, judged, judged.between)
+        how = "most probably with"
+    elif judged.passing is not None:
         lower, upper = judged.passing.estimate.interval
         screen.say(
             f"{title}: is passed with probability {judged.passing.estimate.probability:.3g}, with 95 % confidence "
@@ -156,6 +176,19 @@ def _limit(judged: Judged) -> None:
     if shown is not None:
         known = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
         screen.say(f"  {how} {known}: margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s")
+
+
+def _between(title: str, judged: Judged, found: Between) -> None:
+    """Two probabilities and the interval values that they are told at."""
+    (least, largest), (lower, upper) = found.estimates, found.interval
+    screen.say(
+        f"{title}: is passed with a probability between {least:.3g} and {largest:.3g}, with 95 % confidence between "
+        f"{lower:.3g} and {upper:.3g}",
+        style="bold",
+    )
+    for name, at in (("least", found.at_lower), ("largest", found.at_upper)):
+        screen.say(f"  {name} with {', '.join(f'{path} = {value:.6g}' for path, value in at.items())}")
+    screen.say(f"  by {found.places} interval values and {judged.evaluations} runs")
 
 
 def _allocation(found: Allocation) -> None:

@@ -18,7 +18,7 @@ from shoal_validation.document import publish, table
 from shoal_validation.uncertain.measure import Line, Study, measured, random_study
 from shoal_validation.uncertain.problems import PROBLEMS
 
-NOT_FOR_INTERVALS = {"chaos"}
+NOT_FOR_INTERVALS = {"chaos", "maximum-entropy", "nested"}
 
 
 def main(arguments: list[str]) -> bool:

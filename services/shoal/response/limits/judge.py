@@ -9,7 +9,6 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.engines.verification import verified
-from shoal.errors import InputError
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import get_way, probability
 from shoal.response.limits.judged import Judged, Shown
@@ -54,7 +53,8 @@ def judge(
 ) -> Judged:
     """By probability where all parameters are random, by bounds of the margin where all are intervals.
 
-    reach: bounds a model; way: one of `WAYS`; most: runs for a probability. Raises InputError, ComputationError.
+    Where there are both, see `response.between`. reach: bounds a model; way: one of `WAYS`; most: runs for a
+    probability. Raises InputError, ComputationError.
     """
     get_way(way)
     told, times = watched(machine, limit), machine.times
@@ -68,8 +68,6 @@ def judge(
         return Judged(
             limit, way, inputs, times, passing, None, nan, nan, shown, margins.evaluations, margins.failed, margins.why
         )
-    if inputs.random.any():
-        raise InputError(f"limit: {limit.text}: needs all parameters to be intervals, or all to be random")
     lower, outer, germs, evaluations, failed = reach(told)
     worst = int(lower.argmin())
     kept = False if lower[worst] < 0 else True if outer.min() >= 0 else None

@@ -10,8 +10,12 @@ from scipy import special
 
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import Passing
+from shoal.response.limits.estimate import Estimate
 from shoal.response.limits.limit import Limit
 from shoal.trajectory import Array, plain
+
+MOST_BEYOND = 0.25
+"""Reliability index by which interval values that were not looked at may lie beyond, and no more."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +41,75 @@ class Shown:
 
 
 @dataclass(frozen=True)
+class Between:
+    """A probability over all values of intervals.
+
+    lower, upper: judged where it is least and largest; at_lower, at_upper: name -> value of the intervals there;
+    beyond: by how much the reliability index may be larger than at the one, and smaller than at the other; places:
+    interval values that were looked at
+    """
+
+    lower: Judged
+    upper: Judged
+    at_lower: dict[str, float]
+    at_upper: dict[str, float]
+    beyond: tuple[float, float]
+    places: int
+
+    @property
+    def estimates(self) -> tuple[float, float]:
+        """The least and the largest probability."""
+        return self.lower.estimates[0].probability, self.upper.estimates[0].probability
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """From the lower end of the one to the upper end of the other, each of 95 % confidence."""
+        return float(self.lower.estimates[0].interval[0][-1]), float(self.upper.estimates[0].interval[1][-1])
+
+    @property
+    def outer(self) -> tuple[float, float]:
+        """The same with what other interval values may add."""
+        lower, upper = self.interval
+        low, high = special.ndtr(special.ndtri(self.interval) + np.array([-self.beyond[0], self.beyond[1]]))
+        return min(lower, float(low)), max(upper, float(high))
+
+    @property
+    def doubt(self) -> str:
+        """Why it should not be believed, empty if it may be."""
+        if found := self.lower.reason_to_doubt or self.upper.reason_to_doubt:
+            return found
+        if max(self.beyond) > MOST_BEYOND:
+            return f"the interval values that decide are not known: others may change beta by {max(self.beyond):.2g}"
+        return ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        sides = {}
+        for name, one, at in (("lower", self.lower, self.at_lower), ("upper", self.upper, self.at_upper)):
+            told = {key: value for key, value in one.to_json().items() if key not in ("limit", "unit", "method")}
+            sides[f"at_{name}"] = {"parameters": at, **told}
+        (least, largest), (lower, upper), (lower_outer, upper_outer) = self.estimates, self.interval, self.outer
+        return {
+            "probability_lower": least,
+            "probability_upper": largest,
+            "lower": lower,
+            "upper": upper,
+            "lower_outer": lower_outer,
+            "upper_outer": upper_outer,
+            "confidence": 0.95,
+            "interval_values": self.places,
+            **sides,
+        }
+
+
+@dataclass(frozen=True)
 class Judged:
     """Of one limit.
 
     way: that was asked for; times [s]; passing: of random parameters, else None; kept: of intervals, whether no values
     pass it, None where that is not decided; margin, outer: the least that a run attains, and that any may have, nan
     where not known; shown: the most probable way to pass it, or the run with the least margin; evaluations, failed:
-    runs made for it alone; reason: why the first of these failed
+    runs made for it alone; reason: why the first of these failed; between: of random parameters beside intervals
     """
 
     limit: Limit
@@ -58,10 +124,25 @@ class Judged:
     evaluations: int
     failed: int
     reason: str
+    between: Between | None = None
+
+    @property
+    def estimates(self) -> list[Estimate]:
+        """Probabilities over time: one, or the least and the largest over intervals, none where all are intervals."""
+        every = [self] if self.between is None else [self.between.lower, self.between.upper]
+        return [one.passing.estimate for one in every if one.passing is not None]
 
     @property
     def doubt(self) -> str:
         """Why it should not be believed, empty if it may be."""
+        found = self.reason_to_doubt
+        return f"limit {self.limit.text}: {found}" if found else ""
+
+    @property
+    def reason_to_doubt(self) -> str:
+        """The same without the limit's name."""
+        if self.between is not None:
+            return self.between.doubt
         found = self.passing.doubt if self.passing is not None else ""
         if self.passing is None and self.kept is None:
             found = "no run passes it, and the outer bounds do not show that none does"
@@ -69,12 +150,14 @@ class Judged:
             found = f"{self.failed} of {self.evaluations} runs failed even with smaller steps: {self.reason}"
         if not found and self.shown is not None and self.shown.status != "ok":
             found = f"the run that shows it is not borne out: {self.shown.message}"
-        return f"limit {self.limit.text}: {found}" if found else ""
+        return found
 
     def to_json(self) -> dict[str, Any]:
         """An entry of `limits` in what `shoal uncertain --json` prints."""
         found: dict[str, Any] = {"limit": self.limit.text, "unit": self.limit.unit, "method": self.way}
-        if self.passing is not None:
+        if self.between is not None:
+            found |= self.between.to_json()
+        elif self.passing is not None:
             found |= self._probability(self.passing)
         else:
             found |= {"kept": self.kept, "margin": self.margin, "margin_outer": self.outer}

@@ -6,8 +6,12 @@ from shoal.errors import InputError
 from shoal.response.methods.auto import auto
 from shoal.response.methods.chaos import chaos
 from shoal.response.methods.chebyshev import chebyshev
+from shoal.response.methods.chebyshev_sparse import chebyshev_sparse
+from shoal.response.methods.chebyshev_total import chebyshev_total
 from shoal.response.methods.kriging import kriging
 from shoal.response.methods.legendre import legendre
+from shoal.response.methods.maximum_entropy import maximum_entropy
+from shoal.response.methods.nested import nested
 from shoal.response.methods.optimise import optimise
 from shoal.response.methods.rbf import rbf
 from shoal.response.methods.rs_ht import rs_ht
@@ -28,8 +32,12 @@ METHODS: dict[str, Method] = {
     "sobol": sobol,
     "taylor": taylor,
     "chebyshev": chebyshev,
+    "chebyshev-total": chebyshev_total,
+    "chebyshev-sparse": chebyshev_sparse,
     "legendre": legendre,
     "chaos": chaos,
+    "maximum-entropy": maximum_entropy,
+    "nested": nested,
     "optimise": optimise,
     "rbf": rbf,
     "kriging": kriging,

@@ -11,6 +11,7 @@ from shoal.response.course import UnsuitableError, watch
 from shoal.response.expansion import Expansion
 from shoal.response.methods import chaos, long_time, sampling
 from shoal.response.methods.bounds import bounds
+from shoal.response.methods.nested import nested
 from shoal.response.methods.time_warp import TimeWarp
 from shoal.response.methods.torus import Torus
 from shoal.response.study import Found, Study
@@ -29,10 +30,11 @@ UNEVEN = 0.02
 
 
 def auto(study: Study) -> Found:
-    """Intervals: `bounds`, `time-warp` or `torus`. Distributions: chaos or else quasi-random runs."""
+    """Intervals: `bounds`, `time-warp` or `torus`. Distributions: chaos or else quasi-random runs. Both: `nested`."""
     if not study.inputs.random.any():
         return _intervals(study)
-    study.random_only("auto")
+    if study.inputs.mixed:
+        return nested(study)
     found = chaos.grown(study, study.count or chaos.RUNS)
     assert isinstance(found.surrogate, Expansion)
     off = chaos.shares(study, found.surrogate)

@@ -1,30 +1,83 @@
-"""Taylor's series about the centre, by central differences (interval perturbation: Qiu and Wang, 2003)."""
+"""Taylor's series of first or second order about the centre of the box, or of each of its subintervals.
+
+Interval perturbation (Qiu and Wang, Comparison of dynamic response of structures with uncertain-but-bounded parameters
+using non-probabilistic interval analysis method and probabilistic approach, International Journal of Solids and
+Structures 40, 2003), of second order and with subintervals (Qiu and Elishakoff, Antioptimization of structures with
+large uncertain-but-non-random parameters via interval analysis, Computer Methods in Applied Mechanics and Engineering
+152, 1998). For comparison.
+"""
 
 from __future__ import annotations
 
-from itertools import combinations
+from dataclasses import dataclass
+from itertools import combinations, product
 
 import numpy as np
 
-from shoal.response.expansion import fit
+from shoal.errors import ComputationError
+from shoal.response.expansion import Expansion, fit
+from shoal.response.extremes import IntArray
 from shoal.response.polynomials import total_degree
 from shoal.response.study import Found, Study
+from shoal.trajectory import Array
 
 STEP = 0.05
-"""Of the differences, as a share of half the interval."""
+"""Of the differences, as a share of half the interval, or subinterval."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """A series for each cell of a box that is cut alike along every axis; cells: in the order of their numbers."""
+
+    cut: int
+    cells: list[Expansion]
+
+    def __call__(self, germs: Array) -> Array:
+        """The answers at these germs."""
+        found = np.empty((len(germs), self.cells[0].coefficients.shape[1]))
+        cell, local = located(germs, self.cut)
+        for k in np.unique(cell):
+            found[cell == k] = self.cells[k](local[cell == k])
+        return found
+
+    def each(self, germs: Array, columns: IntArray) -> Array:
+        """One column at each germ."""
+        found = np.empty(len(germs))
+        cell, local = located(germs, self.cut)
+        for k in np.unique(cell):
+            found[cell == k] = self.cells[k].each(local[cell == k], columns[cell == k])
+        return found
+
+
+def located(germs: Array, cut: int) -> tuple[IntArray, Array]:
+    """The cell of every germ, (places,), and where in it, from -1 to 1 along each axis."""
+    along = np.clip(np.floor(0.5 * cut * (germs + 1)).astype(np.int64), 0, cut - 1)
+    middle = (2 * along + 1) / cut - 1
+    return np.asarray(along @ cut ** np.arange(germs.shape[1])), np.asarray((germs - middle) * cut)
 
 
 def taylor(study: Study) -> Found:
-    """First order (2 p + 1 runs), or `degree` 2 (p (p + 1) / 2 + p + 1 runs more or less). Raises InputError."""
+    """Of order `degree`, 1 or 2, in as many subintervals along each axis as `count` runs allow, else in one.
+
+    First order takes 2 p + 1 runs a cell, second order p (p - 1) / 2 more. Raises InputError, ComputationError.
+    """
     study.intervals_only("taylor")
-    parameters, order = len(study.inputs), min(study.degree or 1, 2)
+    inputs, parameters, order = study.inputs, len(study.inputs), min(study.degree or 1, 2)
     unit = STEP * np.eye(parameters)
     places = [np.zeros((1, parameters)), unit, -unit]
-    if order == 2:
-        places += [unit[i] + unit[j] for i, j in combinations(range(parameters), 2)]
-    study.runs(np.vstack(places))
+    if order == 2 and parameters > 1:
+        places.append(np.array([unit[i] + unit[j] for i, j in combinations(range(parameters), 2)]))
+    stencil = np.concatenate(places)
+    most = min(study.count or len(stencil), study.runs.left)
+    cut = max(1, int((most / len(stencil)) ** (1 / parameters) + 1e-9))
+    middles = np.array(list(product((2 * np.arange(cut) + 1) / cut - 1, repeat=parameters)))
+    study.runs((middles[:, None] + stencil / cut).reshape(-1, parameters))
     runs = study.runs
-    return Found(
-        f"Taylor's series of order {order} about the centre, whose rest is not known",
-        fit(study.inputs, runs.germs, runs.values, total_degree(parameters, order)),
-    )
+    cell, local = located(runs.germs, cut)
+    terms = total_degree(parameters, order)
+    if len(np.unique(cell)) < cut**parameters:
+        raise ComputationError(f"all runs of a subinterval failed: {runs.why}")
+    cells = [fit(inputs, local[cell == k], runs.values[cell == k], terms) for k in range(cut**parameters)]
+    about = "the centre" if cut == 1 else f"the centres of {cut} subintervals along each axis"
+    surrogate = cells[0] if cut == 1 else Pieces(cut, cells)
+    return Found(f"Taylor's series of order {order} about {about}, whose rest is not known", surrogate)

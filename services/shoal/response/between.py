@@ -1,0 +1,112 @@
+"""The probability that a limit is passed where some parameters are random and others intervals: between which two.
+
+The reliability index beta is a smooth function of the intervals. It is bounded as places of markers are: few runs of a
+reliability analysis at each of some interval values, a polynomial through their indices, whose extremal values are
+looked at and entered into the fit. Where the index is least and largest, all runs tell the probability.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy import special
+
+from shoal.response.enclosure import enclosure
+from shoal.response.extremes import extremes
+from shoal.response.inputs import Inputs
+from shoal.response.limits import Judged, Limit, Shown, judge
+from shoal.response.limits.choice import probability
+from shoal.response.limits.judge import watched
+from shoal.response.limits.judged import Between
+from shoal.response.limits.margins import FAR, Margins
+from shoal.response.machine import Machine
+from shoal.response.methods.nested import best
+from shoal.response.respond import respond
+from shoal.response.runs import Answers, Runs
+from shoal.response.study import Study
+from shoal.trajectory import Array
+
+SHARE, LEAST = 5, 500
+"""One in so many of the runs that a probability takes, but this number at least, tells the index while it is sought."""
+PLACES, MORE = 12, 6
+"""Interval values that are looked at, and more for each interval, at most."""
+GAP = 0.05
+"""Share of the spread of the index that is good enough."""
+
+
+def between(
+    limit: Limit,
+    machine: Machine,
+    inputs: Inputs,
+    *,
+    way: str,
+    most: int,
+    seed: int,
+    verify: bool,
+    progress: Callable[[int], None] | None,
+) -> Judged:
+    """The least and the largest probability, with the interval values there. Raises InputError, ComputationError."""
+    given, random = inputs.some(~inputs.random), inputs.some(inputs.random)
+    few, made, failed = min(most, max(LEAST, most // SHARE)), 0, 0
+
+    def index(values: Mapping[str, Array]) -> Answers:
+        """Of every place."""
+        nonlocal made, failed
+        found = np.full((len(next(iter(values.values()))), 1), np.nan)
+        why = ""
+        for k in range(len(found)):
+            here = machine.at({path: float(at[k]) for path, at in values.items()})
+            margins = Margins(watched(here, limit), random, few, _on(progress, made))
+            passing = probability(margins, way, seed)
+            found[k] = np.clip(-special.ndtri(passing.estimate.probability), -FAR, FAR)
+            made, failed = made + margins.evaluations, failed + margins.failed
+            why = why or (passing.why if np.isnan(found[k, 0]) else "")
+        return Answers(found, np.isfinite(found[:, 0]), 0, why)
+
+    answer = respond(index, given, 1, gap=GAP, seed=seed, most=PLACES + MORE * len(given))
+    bounds = answer.bounds
+    assert bounds is not None
+    ends = []
+    for k, named in enumerate((bounds.at_upper[0], bounds.at_lower[0])):
+        values = given.at(named)
+        # Other seeds than while it was sought: what was least by chance is not told as the least.
+        here, on, other = machine.at(values), _on(progress, made), seed + 101 + k
+        one = judge(limit, here, random, _no_reach, way=way, most=most, seed=other, verify=verify, progress=on)
+        made, failed = made + one.evaluations, failed + one.failed
+        ends.append((one, dict(zip(given.names, named.tolist(), strict=True)), values))
+    (lower, at_lower, _), (upper, at_upper, there) = ends
+    beyond = _beyond(answer.runs, seed)
+    found = Between(lower, upper, at_lower, at_upper, beyond, answer.runs.evaluations)
+    return Judged(
+        *(limit, way, inputs, machine.times, None, None, float("nan"), float("nan")),
+        *(_with(upper.shown, at_upper, there), made, failed, upper.reason or lower.reason, found),
+    )
+
+
+def _beyond(runs: Runs, seed: int) -> tuple[float, float]:
+    """By how much the index may be above the largest one that is known, and below the least.
+
+    Indices are known to the scatter of few runs: of all polynomials the one that foretells left-out ones best tells.
+    """
+    study = Study(runs, np.zeros(1, dtype=np.int64), np.zeros(1), seed)
+    surrogate = best(study)
+    found = extremes(surrogate, len(runs.inputs), 1, seed)
+    told = enclosure(study, surrogate, found, surrogate.left_out)
+    return float(told.upper_outer[0] - told.upper[0]), float(told.lower[0] - told.lower_outer[0])
+
+
+def _on(progress: Callable[[int], None] | None, made: int) -> Callable[[int], None] | None:
+    return None if progress is None else lambda runs: progress(made + runs)
+
+
+def _with(shown: Shown | None, named: dict[str, float], values: dict[str, float]) -> Shown | None:
+    """A run with the values of the intervals as well."""
+    if shown is None:
+        return None
+    return replace(shown, parameters={**named, **shown.parameters}, values={**values, **shown.values})
+
+
+def _no_reach(_: object) -> tuple[Array, Array, Array, int, int]:
+    raise AssertionError("all parameters are random here")

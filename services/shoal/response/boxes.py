@@ -1,0 +1,205 @@
+"""Statistics that are known between bounds only, because some parameters are intervals: probability boxes.
+
+Ferson, Kreinovich, Ginzburg, Myers and Sentz, Constructing probability boxes and Dempster-Shafer structures, Sandia
+National Laboratories SAND2002-4015, 2003.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from shoal.response.conditional import BLOCK, Above, Conditional, Mean, Quantile
+from shoal.response.expansion import Expansion
+from shoal.response.extremes import MOST_CORNERS, Each, Extremes, along, corners, extremes
+from shoal.response.inputs import Inputs
+from shoal.response.kept import TimeIsUpError
+from shoal.response.statistics import DRAWN, QUANTILES
+from shoal.response.study import SAFETY, Found, Study
+from shoal.trajectory import Array
+
+SEARCHED = 1024
+"""Places at which an expansion is evaluated while extremes of its quantiles are sought."""
+GRID = {1: 33, 2: 9, 3: 5}
+"""Places along each axis that quantiles are looked at, by the number of intervals."""
+ELSE = 64
+"""Quasi-random ones where there are more intervals."""
+STEPS = 0.1, 0.02
+"""Of the search from the best of them."""
+HOPELESS = 0.1
+"""Instants whose gap is above this share of the scatter lie beyond the horizon."""
+PLACES, INNER = 8, 128
+"""Interval values that are looked at beyond it, and runs at each."""
+
+
+@dataclass(frozen=True)
+class Ends:
+    """A statistic over all interval values. lower, upper: its extremes; lower_outer, upper_outer: with what they may be
+    off by, nan where not known, (columns,); at_lower, at_upper: values of the intervals there, (columns, intervals)
+    """
+
+    lower: Array
+    upper: Array
+    lower_outer: Array
+    upper_outer: Array
+    at_lower: Array
+    at_upper: Array
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """names: of the intervals; mean, std, quantiles: of every column; gap: the largest distance between outer bounds
+    and extremes within the horizon, as a share of the scatter (the largest spread of the mean and deviation together);
+    horizon: the last instant up to which they are known [s], infinite if they always are; places, inner: interval
+    values that were looked at beyond it, and runs at each
+    """
+
+    names: tuple[str, ...]
+    mean: Ends
+    std: Ends
+    quantiles: tuple[Ends, ...]
+    gap: float
+    horizon: float
+    places: int = 0
+    inner: int = 0
+
+    def named(self) -> dict[str, Ends]:
+        """Every statistic by its name."""
+        return {"mean": self.mean, "std": self.std, **dict(zip(map(_level, QUANTILES), self.quantiles, strict=True))}
+
+
+def _level(share: float) -> str:
+    return f"q{share:g}"
+
+
+def boxes_of(study: Study, found: Found) -> Boxes:
+    """From an expansion over all parameters and its error. Raises TimeIsUpError where there is none."""
+    if not isinstance(found.surrogate, Expansion) or found.error is None:
+        raise TimeIsUpError
+    of, error = Conditional(found.surrogate), SAFETY * found.error
+    count = len(error)
+    sides = [extremes(one, len(of.intervals), count, study.seed) for one in (Mean(of), Above(of))]
+    sides[1] = replace(sides[1], lower=np.maximum(sides[1].lower, 0.0))
+    mean, std = (_ends(of.intervals, one, error) for one in sides)
+    std = replace(std, lower_outer=np.maximum(std.lower_outer, 0.0))
+    told = _quantiles(of, sides, error, study.seed)
+    scale = scatter(study, *sides)
+    gap = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0)
+    first = study.instants[gap > max(study.gap or 0.0, HOPELESS)].min(initial=math.inf)
+    end = math.inf if math.isinf(first) else float(study.instants[study.instants < first].max(initial=0.0))
+    within = gap[study.instants <= end]
+    largest = float(within.max()) if within.size else math.nan
+    return Boxes(tuple(of.intervals.names), mean, std, tuple(told), largest, end)
+
+
+def scatter(study: Study, mean: Extremes, std: Extremes) -> Array:
+    """By how much the mean differs over the intervals, and the deviation: the largest of each group, (columns,)."""
+    return study.largest(mean.upper - mean.lower + np.maximum(std.upper, 0.0), study.runs.values)
+
+
+def _ends(intervals: Inputs, found: Extremes, off: Array) -> Ends:
+    return Ends(
+        *(found.lower, found.upper, found.lower - off, found.upper + off),
+        *(intervals.named(found.at_lower), intervals.named(found.at_upper)),
+    )
+
+
+def _quantiles(of: Conditional, sides: list[Extremes], error: Array, seed: int) -> list[Ends]:
+    intervals, random, count = of.intervals, of.random, len(error)
+    few = random.basis(random.sobol(SEARCHED, seed + 1), of.terms)
+    many = random.basis(random.sobol(DRAWN, seed + 2), of.terms)
+    best = np.full((len(QUANTILES), 2, count), np.inf)
+    at = np.zeros((len(QUANTILES), 2, count, len(intervals)))
+    signs = np.array([1.0, -1.0])[:, None]
+    every = np.arange(count)
+    block = max(1, BLOCK // SEARCHED)
+    for place in _looked_at(len(intervals), seed):
+        parts = np.concatenate(of.parts(place[None]))
+        found = [np.quantile(few @ parts[:, k : k + block], QUANTILES, axis=0) for k in range(0, count, block)]
+        _improve(best, at, np.concatenate(found, axis=1)[:, None] * signs, np.broadcast_to(place, at.shape))
+    told = []
+    for k, share in enumerate(QUANTILES):
+        one = Quantile(of, share, few)
+        for side in sides:
+            for place in (side.at_lower, side.at_upper):
+                _improve(best[k], at[k], one.each(place, every) * signs, np.broadcast_to(place, at[k].shape))
+        _search(one, best[k], at[k])
+        both = np.concatenate(at[k])
+        # Each half of the sequence is spread as evenly as the whole; every second place is not.
+        halves = [Quantile(of, share, half).each(both, np.tile(every, 2)) for half in np.split(many, 2)]
+        low, high = (0.5 * (halves[0] + halves[1])).reshape(2, -1)
+        # What two halves of the places differ by tells what so many of them are off by.
+        off = error + SAFETY * np.abs(halves[0] - halves[1]).reshape(2, -1).max(axis=0)
+        swapped = low > high
+        low, high = np.where(swapped, high, low), np.where(swapped, low, high)
+        ends = np.where(swapped[:, None], at[k][::-1], at[k])
+        told.append(_ends(intervals, Extremes(low, high, ends[0], ends[1]), off))
+    return told
+
+
+def _looked_at(parameters: int, seed: int) -> Array:
+    if parameters in GRID:
+        return np.array(list(product(np.linspace(-1, 1, GRID[parameters]), repeat=parameters)))
+    random = np.random.default_rng(seed).uniform(-1, 1, (ELSE, parameters))
+    some = corners(parameters) if parameters <= MOST_CORNERS - 4 else np.sign(random)
+    return np.concatenate([np.zeros((1, parameters)), some, random])
+
+
+def _improve(best: Array, at: Array, value: Array, place: Array) -> None:
+    better = value < best
+    best[better], at[better] = value[better], place[better]
+
+
+def _search(one: Each, best: Array, at: Array) -> None:
+    """Of one quantile, from the best places that were looked at; best: (2, columns), the upper side negative."""
+    every = np.arange(best.shape[1])
+    for side, sign in enumerate((1.0, -1.0)):
+        for step in STEPS:
+            for axis in range(at.shape[-1]):
+                along(one, sign, axis, step, best[side], at[side], every)
+
+
+def sampled(study: Study, boxes: Boxes) -> Boxes:
+    """Beyond the horizon: extremes over a few interval values of what runs there tell; outer bounds are not known."""
+    inputs, runs = study.inputs, study.runs
+    intervals, random = inputs.some(~inputs.random), inputs.some(inputs.random)
+    count = len(intervals)
+    unit = np.eye(count)
+    some = corners(count) if 2**count < PLACES else np.vstack([unit, -unit])
+    given = np.concatenate([np.zeros((1, count)), some])[:PLACES]
+    inner = min(INNER, runs.left // len(given))
+    if inner < INNER // 2:
+        return boxes
+    drawn, made, failed = random.sobol(inner, study.seed + 3), len(runs.germs), runs.failed
+    germs = np.empty((len(given) * inner, len(inputs)))
+    germs[:, ~inputs.random] = np.repeat(given, inner, axis=0)
+    germs[:, inputs.random] = np.tile(drawn, (len(given), 1))
+    runs.all(germs)
+    if runs.failed > failed:
+        return boxes
+    values = runs.values[made:].reshape(len(given), inner, -1)
+    named, late = intervals.named(given), study.instants > boxes.horizon
+
+    def instead(known: Ends, told: Array) -> Ends:
+        """told: (places, columns)."""
+        low, high, nothing = told.argmin(axis=0), told.argmax(axis=0), np.full(told.shape[1], np.nan)
+        new = Ends(told.min(axis=0), told.max(axis=0), nothing, nothing, named[low], named[high])
+        return Ends(
+            **{
+                name: np.where(late if of.ndim == 1 else late[:, None], of, getattr(known, name))
+                for name, of in vars(new).items()
+            }
+        )
+
+    quantiles = np.quantile(values, QUANTILES, axis=1)
+    return replace(
+        boxes,
+        mean=instead(boxes.mean, values.mean(axis=1)),
+        std=instead(boxes.std, values.std(axis=1, ddof=1)),
+        quantiles=tuple(instead(known, told) for known, told in zip(boxes.quantiles, quantiles, strict=True)),
+        places=len(given),
+        inner=inner,
+    )
