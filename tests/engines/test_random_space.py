@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from shoal_validation.random_space.study import Judged, judged
+from shoal_validation.random_space.study import Judged, drawn, flexible, judged, met
 
 MANY, LINKAGES = 200, 110
 FINE = ("right", "refused", "not judged")
+BENDING = [seed for seed in range(30) if flexible(drawn(seed, "chains")[1])]
+"""Machines with flexible rods."""
 
 
 def of_chains(seed: int) -> Judged:
@@ -38,3 +40,19 @@ def test_the_verdict_on_a_few_linkages_is_right(seed: int) -> None:
 def test_every_linkage_moves_as_newton_and_euler_say(seed: int) -> None:
     found = judged(seed, "linkages")
     assert found.verdict in ("right", "not judged"), found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", BENDING)
+def test_director_rods_move_as_exudyns_finer_cables(seed: int) -> None:
+    pytest.importorskip("exudyn")
+    found = judged(seed, "directors")
+    assert found.verdict in FINE, found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", BENDING)
+def test_a_tolerance_that_is_called_met_is(seed: int) -> None:
+    pytest.importorskip("exudyn")
+    found = met(seed, 1e-3)
+    assert found.verdict != "wrong and called right", found
