@@ -114,6 +114,25 @@ def jacobian(tile: Tile, constraints: Constraints, z: Array, linear: float, out:
 
 
 @njit(cache=True, error_model="numpy")
+def pace(tile: Tile, constraints: Constraints, weights: Array, v: Array, lane: int) -> float:
+    """What the entries of weights' dC_q/dt add up to at a rate v of one lane where nothing cancels; weights: an array.
+
+    Velocities whose differences vanish, as those of a platform that does not turn, leave round-off of this size times
+    eps, which says nothing.
+    """
+    width, total, r = len(tile), 0.0, 0
+    for k in range(constraints.size):
+        fastest = 0.0
+        for e in range(constraints.entry[k], constraints.entry[k + 1]):
+            fastest = max(fastest, abs(v[constraints.column[e] * width + lane]))
+        while r < constraints.parts and constraints.target[r] < constraints.entry[k + 1]:
+            if constraints.source[r] >= 0:
+                total += abs(weights[k] * constraints.coefficient[r * width + lane]) * fastest
+            r += 1
+    return total
+
+
+@njit(cache=True, error_model="numpy")
 def bias(tile: Tile, constraints: Constraints, drives: Functions, t: float, zdot: Array, out: Array) -> None:
     """eta = C_qq v v + C_tt, so that C_q a = -eta; out: (constraints, lanes). Derived rows of zdot must be filled."""
     width = len(tile)

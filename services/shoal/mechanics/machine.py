@@ -17,6 +17,7 @@ from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.space import start as spatial
+from shoal.mechanics.assembly.space.redundancy import redundant as redundant_in_space
 from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gates import Seek
@@ -198,7 +199,7 @@ class Machine:
         scene, model = self.scene, self.model
         if scene.dimensions == 3:
             used = spatial.begun(model.frames, model.scene, *np.split(begun, 2))
-            redundant = spatial.redundant(scene, begun[: model.unknowns])
+            redundant = redundant_in_space(scene, begun[: model.unknowns])
             told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
             return dict(plain(told))
         used = start.begun(model.frames, model.scene, *np.split(begun, 2))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from shoal.scene import Scene
+from shoal.scene import Rod, Scene
 
 Random = np.random.Generator
 GROUND = {"body": "ground", "point": [0.0, 0.0, 0.0]}
@@ -50,6 +50,12 @@ def machine(seed: int) -> Scene:
         initial["B0"]["spin"] = rng.normal(scale=3.0, size=3).tolist() if joints["J0"]["kind"] == "spherical" else None
     initial = {name: {key: x for key, x in one.items() if x is not None} for name, one in initial.items()}
     return _scene(seed, bodies, joints, initial, _loads(rng, list(bodies), before))
+
+
+def with_directors(scene: Scene) -> Scene:
+    """The same machine with director rods: their square sections, which nothing twists, bend as cables do."""
+    rods = [name for name, body in scene.bodies.items() if isinstance(body, Rod)]
+    return scene.with_values({f"bodies.{name}.element": "director-rod" for name in rods})
 
 
 def _link(rng: Random) -> tuple[dict[str, Any], Any]:

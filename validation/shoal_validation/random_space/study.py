@@ -1,22 +1,32 @@
-"""One machine in space, the verdict on its run, and what another engine says of that."""
+"""One machine in space, the verdict on its run, and what another program says of that."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
 from shoal.engines import get_engine
+from shoal.engines.contract import sampling_times
 from shoal.engines.verification import verified
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Rod, Scene
+from shoal.selection import select
 from shoal.trajectory import Trajectory
 
-from shoal_validation.random_space.machines import machine
+from shoal_validation.random_space import linkages
+from shoal_validation.random_space.machines import machine, with_directors
+from shoal_validation.random_space.newton_euler import NewtonEuler
 
+KINDS = ("chains", "linkages", "directors")
 RIGID_STEP, CABLE_STEP = 5e-4, 1e-4
 """Of Exudyn as a judge [s]."""
 FINER = 4
 NEWTON = 1e-7
 """Where its iterations stop: round-off of stiff cables reaches no further."""
+MESHES = 16, 32
+"""Cables of every rod of the judge of a tolerance, and of the run that says how well it knows."""
 
 
 @dataclass(frozen=True)
@@ -35,41 +45,114 @@ class Judged:
         return f"{self.seed:4d} {self.verdict:22s} {self.judge:12s} {self.told}"
 
 
-def judged(seed: int) -> Judged:
-    """Run and judge the machine of a seed."""
-    scene = machine(seed)
+@dataclass(frozen=True)
+class _Opinion:
+    """Of a judge: its motion or why it has none, and how far it may be off itself, as a part of the scale."""
+
+    judge: str
+    motion: Trajectory | Mapping[str, Any] | str
+    share: float = 2e-3
+
+    @property
+    def silence(self) -> str:
+        """Why there is nothing to go by; empty if there is."""
+        if isinstance(self.motion, str):
+            return self.motion
+        bad = isinstance(self.motion, Trajectory) and not self.motion.ok
+        return f"{self.motion.status[0]}: {self.motion.message}" if bad and isinstance(self.motion, Trajectory) else ""
+
+    def away(self, run: Trajectory) -> float:
+        """The largest distance of a marker at an instant [m]."""
+        if isinstance(self.motion, Trajectory):
+            return run.distance(self.motion)
+        assert not isinstance(self.motion, str)
+        return max(float(np.max(np.abs(run.marker(name) - places))) for name, places in self.motion.items())
+
+
+def judged(seed: int, kind: str = "chains") -> Judged:
+    """Run and judge the machine of a seed, see KINDS."""
+    name, scene = drawn(seed, kind)
     try:
         run = verified(get_engine("gauss"), scene)
     except (InputError, ComputationError) as error:
-        return Judged(seed, "not met", "", str(error))
+        return Judged(seed, "not met", "", f"{name}{error}")
     if not run.ok:
-        return Judged(seed, "refused", "", f"{run.status[0]}: {run.message}")
-    name, judge = _judge(scene)
-    if isinstance(judge, str) or not judge.ok:
-        why = judge if isinstance(judge, str) else f"{judge.status[0]}: {judge.message}"
-        return Judged(seed, "not judged", name, why)
+        return Judged(seed, "refused", "", f"{name}{run.status[0]}: {run.message}")
+    opinion = _by_newton_and_euler(seed) if kind == "linkages" else _by_engines(scene)
+    if opinion.silence:
+        return Judged(seed, "not judged", opinion.judge, name + opinion.silence)
     told = run.model["verification"]
     if told["time_error"] is None:
-        return Judged(seed, "not met", name, f"not estimated: {told['note']}")
-    away = run.distance(judge)
-    allowed = 3 * (told["time_error"] + (told["mesh_error"] or 0.0) * (name == "finer")) + 2e-3 * told["scale"]
+        return Judged(seed, "not met", opinion.judge, f"{name}not estimated: {told['note']}")
+    away = opinion.away(run)
+    meshed = opinion.judge == "finer"
+    allowed = 3 * (told["time_error"] + (told["mesh_error"] or 0.0) * meshed) + opinion.share * told["scale"]
     verdict = "right" if away <= allowed else "wrong and called right"
-    return Judged(seed, verdict, name, f"{away:.2g} m away, allowed {allowed:.2g} m")
+    return Judged(seed, verdict, opinion.judge, f"{name}{away:.2g} m away, allowed {allowed:.2g} m")
 
 
-def _judge(scene: Scene) -> tuple[str, Trajectory | str]:
-    """The name of a judge and its run of a scene, or why there is none."""
-    rods = {name: body for name, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
-    finer = any(body.element == "ancf-quintic" for body in rods.values())
-    values: dict[str, object] = {"solver.step": CABLE_STEP if rods else RIGID_STEP, "solver.newton_tolerance": NEWTON}
-    if finer:
-        for rod, body in rods.items():
-            values |= {f"bodies.{rod}.element": "ancf-cable", f"bodies.{rod}.elements": FINER * body.elements}
+def drawn(seed: int, kind: str) -> tuple[str, Scene]:
+    """What a machine is called where that says something, and the machine."""
+    if kind == "linkages":
+        name, data = linkages.drawn(seed)
+        return f"{name}: ", Scene.parse(data)
+    return "", with_directors(machine(seed)) if kind == "directors" else machine(seed)
+
+
+def flexible(scene: Scene) -> dict[str, Rod]:
+    """Its flexible rods."""
+    return {name: body for name, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
+
+
+def met(seed: int, tolerance: float, kind: str = "chains") -> Judged:
+    """Ask for the machine of a seed, which has flexible rods, within a tolerance [m], and judge by Exudyn's cables."""
+    _, scene = drawn(seed, kind)
+    times = sampling_times(scene, None)
     try:
-        return "tree", get_engine("tree").simulate(scene)
-    except InputError:
-        name = "finer" if finer else "exudyn"
-    try:
-        return name, get_engine("exudyn").simulate(scene.with_values(values))
+        found = select(scene, tolerance, times)
     except (InputError, ComputationError) as error:
-        return name, str(error)
+        return Judged(seed, "not met", "", str(error))
+    if not found.met:
+        return Judged(seed, "refused" if not found.trajectory.ok else "not met", "", found.reason)
+    coarse, fine = (_exudyn(scene, dict.fromkeys(flexible(scene), count)) for count in MESHES)
+    for one in (coarse, fine):
+        if isinstance(one, str) or not one.ok:
+            return Judged(seed, "not judged", "exudyn", one if isinstance(one, str) else one.message)
+    assert isinstance(coarse, Trajectory)
+    assert isinstance(fine, Trajectory)
+    known, away = coarse.distance(fine), found.trajectory.distance(fine)
+    if known > tolerance / 2:
+        return Judged(seed, "not judged", "exudyn", f"its own meshes are {known:.2g} m apart")
+    verdict = "right" if away <= tolerance + known else "wrong and called right"
+    return Judged(seed, verdict, "exudyn", f"{found.chosen.name}: {away:.2g} m away, known to {known:.2g} m")
+
+
+def _by_newton_and_euler(seed: int) -> _Opinion:
+    data = linkages.drawn(seed)[1]
+    try:
+        return _Opinion("newton-euler", NewtonEuler(data).markers(sampling_times(Scene.parse(data), None)), 1e-6)
+    except ArithmeticError as error:
+        return _Opinion("newton-euler", str(error))
+
+
+def _by_engines(scene: Scene) -> _Opinion:
+    """`tree` where it can, else Exudyn on the same cables, else on finer ones."""
+    rods = flexible(scene)
+    cables = all(rod.element == "ancf-cable" for rod in rods.values())
+    finer = {} if cables else {name: FINER * rod.elements for name, rod in rods.items()}
+    try:
+        return _Opinion("tree", get_engine("tree").simulate(scene))
+    except InputError:
+        return _Opinion("finer" if finer else "exudyn", _exudyn(scene, finer))
+
+
+def _exudyn(scene: Scene, cables: Mapping[str, int]) -> Trajectory | str:
+    """Exudyn with so many cables for these rods, and the others as they are stated."""
+    step = CABLE_STEP if flexible(scene) else RIGID_STEP
+    values: dict[str, object] = {"solver.step": step, "solver.newton_tolerance": NEWTON}
+    for rod, count in cables.items():
+        values |= {f"bodies.{rod}.element": "ancf-cable", f"bodies.{rod}.elements": count}
+    try:
+        return get_engine("exudyn").simulate(scene.with_values(values))
+    except (InputError, ComputationError) as error:
+        return str(error)

@@ -80,7 +80,8 @@ def _direction(scene: Scene, line: Along) -> Array:
 
 
 def _merge(groups: list[JointPoint], new: JointPoint) -> None:
-    for group in [g for g in groups if any(_same(p, q) for p in g.places for q in new.places)]:
+    bodies = {body for body, _ in new.places}
+    for group in [g for g in groups if any(_same(p, q) for p in g.places if p[0] in bodies for q in new.places)]:
         groups.remove(group)
         new.places += [p for p in group.places if not any(_same(p, q) for q in new.places)]
         new.line = new.line or group.line

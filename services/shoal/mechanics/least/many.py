@@ -14,6 +14,9 @@ from shoal.mechanics.numerics.pointers import pointer
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.mechanics.numerics.vector import clear, copy, subtract
 
+STILL = 1e-9
+"""A third derivative below this part of what its velocities could make it is none."""
+
 
 @njit(cache=True, error_model="numpy")
 def solve(tile: Tile, m: Arrays, w: GaussWork, load: Array, gap: Array, out: Array, multiplier: Array) -> None:
@@ -53,6 +56,7 @@ def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Arr
     moves = np.zeros((count, n))
     rows = np.zeros((count, n))
     zeros = np.zeros(count * width)
+    weights = np.zeros(count)
     load = np.zeros(n * width)
     found = np.zeros(n * width)
     for lane in range(width):
@@ -66,23 +70,21 @@ def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Arr
             for e in range(c.entry[k], c.entry[k + 1]):
                 load[c.column[e] * width + lane] = w.jacobian[e * width + lane]
             solve(tile, m, w, pointer(load), pointer(zeros), pointer(found), w.multiplier)
-            target, size = 0.0, 0.0
+            target = 0.0
             for i in range(n):
                 rows[rank, i] = 0.0
             for j in range(count):
-                u = (1.0 if j == k else 0.0) - w.multiplier[j * width + lane]
-                target -= u * functions.evaluate(m.functions, c.drive[j], t, 3)
+                weights[j] = (1.0 if j == k else 0.0) - w.multiplier[j * width + lane]
+                target -= weights[j] * functions.evaluate(m.functions, c.drive[j], t, 3)
                 for e in range(c.entry[j], c.entry[j + 1]):
-                    part = 3.0 * u * w.turning[e * width + lane]
-                    rows[rank, c.column[e]] += part
-                    size += abs(part)
+                    rows[rank, c.column[e]] += 3.0 * weights[j] * w.turning[e * width + lane]
             largest = 0.0
             for i in range(n * width):
                 load[i] = 0.0
             for i in range(n):
                 largest = max(largest, abs(rows[rank, i]))
                 load[i * width + lane] = rows[rank, i]
-            if not largest > 1e-10 * size:
+            if not largest > STILL * constraints.pace(tile, c, weights, v, lane):
                 continue
             solve(tile, m, w, pointer(load), pointer(zeros), pointer(found), w.multiplier)
             whole = 0.0

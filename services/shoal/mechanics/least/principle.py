@@ -99,19 +99,17 @@ def _add_third_derivatives(
     constraints.jacobian(tile, c, v, 0.0, w.turning)
     for number in range(first, count):
         projection.dependence(number, first, s.triangle, s.norms, s.order, s.weights)
-        target, size = 0.0, 0.0
+        target = 0.0
         for i in range(n * width):
             w.extra[i] = 0.0
         for k in range(count):
             target -= s.weights[k] * functions.evaluate(m.functions, c.drive[k], t, 3)
             for e in range(c.entry[k], c.entry[k + 1]):
-                part = 3.0 * s.weights[k] * w.turning[e * width + lane]
-                w.extra[c.column[e] * width + lane] += part
-                size += abs(part)
+                w.extra[c.column[e] * width + lane] += 3.0 * s.weights[k] * w.turning[e * width + lane]
         largest = 0.0
         for i in range(n):
             largest = max(largest, abs(w.extra[i * width + lane]))
-        if not largest > 1e-10 * size:
+        if not largest > many.STILL * constraints.pace(tile, c, s.weights, v, lane):
             continue  # redundant everywhere, or at rest
         sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
         for i in range(n):

@@ -6,6 +6,7 @@ in the coordinates themselves: poses by Gauss and Newton's method, rates of leas
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,6 @@ from shoal.mechanics.assembly.terms import Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.scene import InitialState, Scene
-from shoal.scene.joints import places
 from shoal.scene.scene import Quantity
 
 CLOSED = 1e-11
@@ -88,10 +88,8 @@ class _Closing:
         """Their derivatives by the coordinates of a lane, (constraints, unknowns)."""
         found = np.zeros((len(self.terms), len(q)))
         for row, term in enumerate(self.terms):
-            u, w = (_at(vector, q, lane) for vector in (term.u, term.w))
-            for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
-                for unknown, coefficient in vector.terms.items():
-                    found[row, unknown] += _lane(coefficient, lane) @ other
+            for unknown, slope in slopes(term, q, lane):
+                found[row, unknown] += slope
         return found
 
     def _keeps(self, lane: int) -> bool:
@@ -281,6 +279,14 @@ def _all(vector: Affine, q: Array) -> Array:
     return total
 
 
+def slopes(term: Term, q: Array, lane: int) -> Iterator[tuple[int, float]]:
+    """Unknowns and derivatives of a constraint at the coordinates of a lane; those of an unknown add up."""
+    u, w = (_at(vector, q, lane) for vector in (term.u, term.w))
+    for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
+        for unknown, coefficient in vector.terms.items():
+            yield unknown, float(_lane(coefficient, lane) @ other)
+
+
 def _value(term: Term, q: Array) -> Array:
     """A constraint at time zero in all lanes, (lanes,)."""
     u, w = _all(term.u, q), _all(term.w, q)
@@ -327,21 +333,3 @@ def begun(frames: dict[str, Frame], scene: Scene, q: Array, v: Array) -> dict[st
             guess=(),
         )
     return found
-
-
-def redundant(scene: Scene, q: Array) -> tuple[str, ...]:
-    """Joints that hold what others hold already at these coordinates, (unknowns,): they share a dependent row."""
-    placement = place_in_space(scene)
-    closing = _Closing(scene, placement)
-    slope = closing.jacobian(q[:, None], 0)
-    slope = slope / (np.linalg.norm(slope, axis=1, keepdims=True) + 1e-300)
-    if not len(slope):
-        return ()
-    left, size, _ = np.linalg.svd(slope)
-    share = np.linalg.norm(left[:, int(np.sum(size > 1e-7)) :], axis=1)
-    guilty = {term.name for term, part in zip(closing.terms, share, strict=True) if part > 1e-3}
-    return tuple(
-        name
-        for name, joint in placement.scene.joints.items()
-        if name in guilty or guilty & {side.body for side in places(joint)}
-    )

@@ -1,0 +1,50 @@
+"""Long chains in space: what a step and a start have to do grows with the number of bodies, not faster."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.mechanics import saddle
+from shoal.mechanics.assembly.build import build
+from shoal.mechanics.assembly.space.redundancy import redundant
+from shoal.scene import Scene
+
+
+def chain(count: int, kind: str, **more: Any) -> Scene:
+    """Bodies in a row on balls, or on hinges that turn them up and sideways by turns."""
+    bodies, joints = {}, {}
+    before: dict[str, Any] = {"body": "ground", "point": [0.0, 0.0, 0.0]}
+    for k in range(count):
+        bodies[f"B{k}"] = {"kind": "rigid-body", "mass": 1.0, "inertia": [0.01, 0.02, 0.02],
+                           "centre_of_mass": [0.1, 0.01, 0.02], "named_points": {"end": [0.2, 0.0, 0.0]}}  # fmt: skip
+        axis = {"axis": [0.0, 1.0, 0.0] if k % 2 else [0.0, 0.0, 1.0]} if kind == "revolute" else {}
+        joints[f"J{k}"] = {"kind": kind, "first": before, "second": {"body": f"B{k}"}} | axis
+        before = {"body": f"B{k}", "point": "end"}
+    return Scene.parse({"name": "chain", "dimensions": 3, "gravity": [0, 0, -9.81], "bodies": bodies,
+                        "joints": joints | more, "markers": {"e": before}})  # fmt: skip
+
+
+def work(count: int, kind: str) -> Any:
+    """Entries of the factor, and of the constraints' derivatives."""
+    model = build(chain(count, kind))
+    pattern = saddle.analyse(model.unknowns, model.mass_entries, model.constraints)[0]
+    return np.array([len(pattern.row), model.constraints.parts, model.unknowns])
+
+
+@pytest.mark.parametrize("kind", ["spherical", "revolute"])
+def test_the_work_of_a_step_grows_with_the_number_of_bodies(kind: str) -> None:
+    assert work(40, kind) / work(20, kind) == pytest.approx(2.0, rel=0.08)
+
+
+def test_a_long_chain_has_no_redundant_joint_until_one_holds_it_twice() -> None:
+    """The same hinge once more; both are named, and the bodies' joints beyond are not."""
+    free = chain(40, "spherical")
+    assert redundant(free, build(free).q0[:, 0]) == ()
+    again = {"kind": "distance", "first": {"body": "ground", "point": [0.2, 0.0, 0.5]},
+             "second": {"body": "B0", "point": "end"}}  # fmt: skip
+    other = again | {"first": {"body": "ground", "point": [0.2, 0.5, 0.0]}}
+    third = again | {"first": {"body": "ground", "point": [0.7, 0.0, 0.0]}}
+    held = chain(40, "spherical", K0=again, K1=other, K2=third)
+    assert {"K0", "K1", "K2"} >= set(redundant(held, build(held).q0[:, 0])) - {"J0", "J1"} != set()
