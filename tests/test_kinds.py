@@ -134,7 +134,7 @@ def test_the_places_of_a_newcomer_are_found_among_its_fields() -> None:
 
 def test_lists_of_the_scene_and_of_the_mechanics_name_the_same() -> None:
     assert set(get_args(IntegratorName)) == {"auto", *INTEGRATORS}
-    assert set(get_args(Element)) == {"rigid", *elements.ELEMENTS, *elements.SPATIAL}
+    assert set(get_args(Element)) == {"rigid", "modal", *elements.ELEMENTS, *elements.SPATIAL}
 
 
 @pytest.mark.parametrize("element", get_args(Element))

@@ -137,6 +137,8 @@ def test_scripts_move_as_both_engines(
 REPRESENTATIVE = "flexible-double-pendulum", "andrews-squeezer"
 SINGULAR = "equal-slider-crank", "n-four-bar-2", "n-four-bar-40", "parallelogram"
 """Exudyn does not pass their singular positions."""
+MODAL = "flexible-slider-crank"
+"""Exudyn refuses its modes by name."""
 
 
 @pytest.mark.parametrize(
@@ -144,7 +146,7 @@ SINGULAR = "equal-slider-crank", "n-four-bar-2", "n-four-bar-40", "parallelogram
     [
         name if name in REPRESENTATIVE else pytest.param(name, marks=pytest.mark.slow)
         for name in scene_names()
-        if name not in SINGULAR
+        if name not in (*SINGULAR, MODAL)
     ],
 )
 def test_built_in_scenes(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

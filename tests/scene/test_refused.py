@@ -54,7 +54,7 @@ GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": 
         pytest.param(
             ("bodies.OA.element", "brick"),
             "bodies.OA.element",
-            "'rigid', 'ancf-cable', 'ancf-quintic', 'ancf-full', 'simo-reissner' or 'director-rod'",
+            "'rigid', 'ancf-cable', 'ancf-quintic', 'ancf-full', 'simo-reissner', 'director-rod' or 'modal'",
             id="element",
         ),
         pytest.param(("bodies.OA.elements", 0), "bodies.OA.elements", "greater than or equal to 1", id="no-elements"),

@@ -94,7 +94,7 @@ def log_fit(fit: Fit, album: Album, study: str) -> str:
     ) as run:
         scene = estimate.scene
         run.data = of_measurement(estimate.measurement)
-        mesh = {name: b.elements for name, b in scene.bodies.items() if isinstance(b, Rod) and b.element != "rigid"}
+        mesh = {name: sum(b.mesh.values()) for name, b in scene.bodies.items() if isinstance(b, Rod) and b.mesh}
         run.params({"problem": cell.title, "method": cell.method, "seed": cell.seed, "engine": cell.engine})
         run.params({"scene": scene.name, "scene.fingerprint": scene.fingerprint, "data": estimate.data})
         run.params({"mesh": ", ".join(f"{name}: {n}" for name, n in mesh.items()) or "rigid", **cell.values})

@@ -100,4 +100,4 @@ def check_grid(
 
 def _costly(path: str) -> bool:
     """Whether the work depends on it, which then may differ from lane to lane."""
-    return path.startswith("solver.") or path.endswith(".elements")
+    return path.startswith("solver.") or path.endswith((".elements", ".modes", ".axial_modes"))

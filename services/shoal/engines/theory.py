@@ -7,6 +7,7 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.errors import InputError
 from shoal.scene import Rod, Scene
+from shoal.scene.refined import unbent
 from shoal.trajectory import Trajectory
 
 WITH_SHEAR = ("exudyn-ge",)
@@ -41,6 +42,8 @@ def rigid_runs(scene: Scene, engine: str = "gauss") -> list[Scene]:
     if not slender or any(rod.curvature for rod in rods.values() if rod.element != "rigid"):
         return []
     values: dict[str, object] = {f"bodies.{name}.element": "rigid" for name in rods}
+    for name in rods:
+        values |= unbent(scene, name)
     values["solver.integrator"] = "auto"
     inertias = (
         {f"bodies.{name}.rotary_inertia": stout or name not in slender for name in rods} for stout in (False, True)

@@ -29,10 +29,13 @@ from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import STEP_MARGIN, stable_step
 from shoal.scene import GROUND, Revolute, Rod, Scene, Slider, Solver
 from shoal.scene.joints import places
+from shoal.scene.refined import refined, unbent
 from shoal.trajectory import Array, Status, Trajectory, plain
 
 WRONG = 0.1
 """A run whose estimated error is beyond this fraction of the machine's scale is rejected."""
+MODES_A_CABLE = 2
+"""A quintic element stands for so many modes of a rod, to tell how far small bending is off."""
 WORTH = 0.01
 """What the model leaves out is worth a warning beyond this fraction of the scale."""
 SPAN = 100.0
@@ -68,7 +71,8 @@ class Verification:
 
     time_error: against a more careful run of the same mesh; mesh_error: against twice as many elements;
     theory_error: what the rods' theory leaves out, friction_error: how far what should stick creeps, as dry friction is
-    smoothed, both None where there is nothing of the kind; scale: how far the markers get from the ground [m];
+    smoothed, bending_error: of modal rods, against cables that may bend far, each None where there is nothing of the
+    kind; scale: how far the markers get from the ground [m];
     rejected: why the more careful run is itself not to be trusted
     """
 
@@ -79,6 +83,7 @@ class Verification:
     rejected: str = ""
     theory_error: float | None = None
     friction_error: float | None = None
+    bending_error: float | None = None
 
     @property
     def complaint(self) -> str:
@@ -92,6 +97,11 @@ class Verification:
             )
         if self.mesh_error is not None and self.mesh_error > WRONG * self.scale:
             return f"the mesh error is about {self.mesh_error:.2g} m: use more elements, or --tolerance to find them"
+        if (self.bending_error or 0.0) > WRONG * self.scale:
+            return (
+                f"modal rods bend too far: cables, which may, end about {self.bending_error:.2g} m away; "
+                "use element: ancf-cable"
+            )
         return ""
 
     @property
@@ -100,6 +110,8 @@ class Verification:
         found = [self.note] if self.time_error is None and self.note else []
         if (self.theory_error or 0.0) > WORTH * self.scale:
             found.append(f"shear and rotary inertia that slender rods leave out are worth {self.theory_error:.2g} m")
+        if (self.bending_error or 0.0) > WORTH * self.scale:
+            found.append(f"that modal rods bend more than a little is worth {self.bending_error:.2g} m")
         if (self.friction_error or 0.0) > WORTH * self.scale:
             found.append(f"what dry friction should hold creeps by {self.friction_error:.2g} m; lower coulomb_speed")
         return "; ".join(found)
@@ -136,9 +148,11 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
         mesh_error, note = _mesh_error(trajectory, scene, scale, second)
         notes.append(note)
     friction_error, note = _friction_error(trajectory, scene, second)
+    notes.append(note)
+    bending_error, note = _bending_error(trajectory, scene, second)
     told = "; ".join(note for note in [*notes, note] if note)
     theory_error = left_out(trajectory, scene, native)
-    return Verification(time_error, mesh_error, scale, told, theory_error=theory_error, friction_error=friction_error)
+    return Verification(time_error, mesh_error, scale, told, "", theory_error, friction_error, bending_error)
 
 
 def _mesh_error(trajectory: Trajectory, scene: Scene, scale: float, second: Second) -> tuple[float | None, str]:
@@ -152,6 +166,23 @@ def _mesh_error(trajectory: Trajectory, scene: Scene, scale: float, second: Seco
         if finest is not None and finest.ok:
             mesh_error = max(mesh_error, trajectory.distance(finest))
     return mesh_error, ""
+
+
+def _bending_error(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[float | None, str]:
+    """How far the markers are from where cables bring them in place of modal rods [m], which may bend far."""
+    modal = {name: rod for name, rod in _flexible(scene).items() if rod.element == "modal"}
+    if not modal:
+        return None, ""
+    if any(np.any(scene.start(name).modes) or np.any(scene.start(name).mode_rates) for name in modal):
+        return None, "error of small bending not estimated: cables start unstrained"
+    values: dict[str, object] = {}
+    for name, rod in modal.items():
+        fields = rod.by_elements("ancf-quintic", max(MODES_A_CABLE, rod.modes) // MODES_A_CABLE)
+        values |= {f"bodies.{name}.{field}": value for field, value in fields.items()} | unbent(scene, name)
+    far, note = second("bending", lambda: _able(scene.with_values(values), scene.solver.step), 4)
+    if far is None or not far.ok:
+        return None, note or "error of small bending not estimated: the run with cables is rejected"
+    return trajectory.distance(far), ""
 
 
 def _friction_error(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[float | None, str]:
@@ -263,9 +294,8 @@ def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) 
 
 
 def _finer(scene: Scene, times: int) -> Iterator[Scene]:
-    """So many times as many elements."""
-    finer = {f"bodies.{name}.elements": times * rod.elements for name, rod in _flexible(scene).items()}
-    yield from _able(scene.with_values({**finer, "solver.inertia_cap": False}), scene.solver.step)
+    """So many times as many elements, or modes."""
+    yield from _able(scene.with_values({**refined(scene, times), "solver.inertia_cap": False}), scene.solver.step)
 
 
 def _able(scene: Scene, step: float) -> Iterator[Scene]:
@@ -274,7 +304,7 @@ def _able(scene: Scene, step: float) -> Iterator[Scene]:
     The stable step of leapfrog is that of the start; loops and stretched rods have shorter ones, which none tells
     beforehand. Damping may leave it none that is of use.
     """
-    if not any(_flexible(scene)):
+    if not any(rod.element != "modal" for rod in _flexible(scene).values()):
         yield scene.with_values({"solver.integrator": "auto"})
         return
     longest = min(step, STEP_MARGIN * stable_step(scene, "leapfrog"))

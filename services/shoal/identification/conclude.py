@@ -206,7 +206,7 @@ def _fitted(scene: Scene) -> dict[str, Any]:
     for name, body in scene.bodies.items():
         if isinstance(body, Rod):
             found[f"bodies.{name}.element"] = body.element
-            found |= {f"bodies.{name}.elements": body.elements} if body.element != "rigid" else {}
+            found |= {f"bodies.{name}.{field}": number for field, number in body.mesh.items()}
             found |= {f"bodies.{name}.quadrature": body.quadrature} if body.element == "ancf-cable" else {}
     return found | {f"solver.{name}": getattr(scene.solver, name) for name in ("integrator", "step", "inertia_cap")}
 

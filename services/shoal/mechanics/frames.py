@@ -11,6 +11,7 @@ from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.elements.element import Element
+from shoal.mechanics.modal.numbers import Modes
 from shoal.mechanics.numerics.tile import Number
 
 Place = tuple[Number, ...]
@@ -59,6 +60,45 @@ class RigidFrame:
     def vectors(self) -> list[Affine]:
         """The vectors that are its coordinates when it is free: in the plane the first director turns the second."""
         return [self.origin, *(self.directors[:1] if len(self.directors) == plane.DIMENSIONS else self.directors)]
+
+
+@dataclass(frozen=True)
+class ModalFrame(RigidFrame):
+    """A body that bends by modes in a frame that moves: the frame, and for every mode q a vector q e along it.
+
+    The frame of a rod that stretches is longer by its even strain, and the vector of a mode by which it stretches is
+    q e less the stretch times e_perp.
+    """
+
+    modes: Modes
+    amplitudes: tuple[Affine, ...]
+
+    def point(self, place: Place) -> Affine:
+        """The material point whose place in the undeformed body is told."""
+        return super().point(place) + self._sum(self.modes.shapes(place)[0])
+
+    def direction(self, place: Place) -> Affine:
+        """A vector along what was the body's x axis there."""
+        return self.directors[0] + self._sum(self.modes.shapes(place)[1])
+
+    @property
+    def vectors(self) -> list[Affine]:
+        """The vectors that are its coordinates when it is free."""
+        return [self.origin, self.directors[0], *self.amplitudes]
+
+    @property
+    def measured(self) -> list[tuple[Affine, Number]]:
+        """Of every mode a vector whose part along the frame is its amplitude but for a length [m]."""
+        length, along = self.modes.length, self.modes.along
+        stretching = [one.turned(plane.QUARTER) for one in self.amplitudes[: max(along - 1, 0)]]
+        even = [(self.directors[0] * length, length)] if along else []
+        return [*((one, 0.0) for one in self.amplitudes), *even, *((one, 0.0) for one in stretching)]
+
+    def _sum(self, factors: list[Any]) -> Affine:
+        """The sum of complex numbers times the amplitudes; i turns by a right angle."""
+        factors = factors[: len(self.amplitudes)]
+        both = (*self.amplitudes, *(one.turned(plane.QUARTER) for one in self.amplitudes))
+        return combined(both, (*np.real(factors), *np.imag(factors)))
 
 
 @dataclass(frozen=True)

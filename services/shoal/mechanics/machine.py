@@ -32,7 +32,7 @@ from shoal.mechanics.start.redundancy import redundant_joints
 from shoal.mechanics.still import Still
 from shoal.mechanics.verdict import Limits
 from shoal.mechanics.workspace import Workspace
-from shoal.scene import Scene
+from shoal.scene import Rod, Scene
 from shoal.trajectory import Trajectory, plain
 
 INSTANTS = 8
@@ -189,7 +189,7 @@ class Machine:
             **({"slowed_modes": model.slowed} if model.slowed else {}),
             **({} if begun is None else self._started(begun)),
             "bodies": {
-                name: {"element": body.element, **({"elements": body.elements} if body.element != "rigid" else {})}
+                name: {"element": body.element, **(body.mesh if isinstance(body, Rod) else {})}
                 for name, body in scene.bodies.items()
             },
         }

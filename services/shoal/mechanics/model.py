@@ -20,7 +20,7 @@ from shoal.mechanics.applied import Applied
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.derived import Derived
 from shoal.mechanics.forces import Forces
-from shoal.mechanics.frames import Frame
+from shoal.mechanics.frames import Frame, ModalFrame
 from shoal.mechanics.functions import Functions, Piecewise
 from shoal.mechanics.numerics import alike, gate, sparse
 from shoal.mechanics.numerics.alike import Alike
@@ -158,6 +158,11 @@ class Model:
     def flexible(self) -> int:
         """Number of flexible elements."""
         return sum(family.size for family in self.elements)
+
+    @property
+    def modal(self) -> bool:
+        """Whether any body bends by modes."""
+        return any(isinstance(frame, ModalFrame) for frame in self.frames.values())
 
     @property
     def elastic(self) -> bool:

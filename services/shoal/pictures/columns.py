@@ -46,7 +46,10 @@ def about_motion(motion: Trajectory, scene: Scene) -> dict[str, str | float]:
         "steps": float(motion.steps),
         "energy_drift": float(motion.energy_drift[0]),
         "constraint_drift": float(motion.constraint_drift[0]),
-        **{f"{name}_m": checked.get(name) for name in ("time_error", "mesh_error", "theory_error", "friction_error")},
+        **{
+            f"{name}_error_m": checked.get(f"{name}_error")
+            for name in ("time", "mesh", "theory", "friction", "bending")
+        },
     }
     return {name: value for name, value in told.items() if value is not None and value == value}
 

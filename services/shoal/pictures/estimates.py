@@ -19,6 +19,11 @@ def estimates(verification: Mapping[str, Any]) -> Iterator[str]:
             f"{verification['theory_error']:.1e} m (rotary_inertia: true counts it in rigid rods, "
             "simo-reissner has both)"
         )
+    if verification.get("bending_error") is not None:
+        yield (
+            "modal rods bend only a little: cables, which may bend far, come out about "
+            f"{verification['bending_error']:.1e} m away at the markers"
+        )
     if verification.get("friction_error") is not None:
         yield (
             f"dry friction is smoothed below coulomb_speed, so that what should stick creeps: about "

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shoal.pictures.outline import INSIDE
-from shoal.scene import GROUND, Attachment, Body, Rod, Scene
+from shoal.scene import GROUND, Attachment, Body, RigidBody, Rod, Scene
 from shoal.scene.joints import Coupling, Cylindrical, Distance, Joint, Planar, Revolute, Slider, Universal
 from shoal.scene.loads import Spring
 from shoal.trajectory import Array
@@ -91,7 +91,7 @@ class Solids:
             size = np.column_stack([side * np.ones(len(names)) for side in (section.height, section.width)])
             across = None if body.element != "rigid" else self._add(name, (0.0, body.length, 0.0))
             return lambda at: _bar(at, names, across, size, body.length)
-        if body.kind == "point-mass":
+        if not isinstance(body, RigidBody):
             return None
         moments, axes = np.linalg.eigh(body.inertia_matrix)
         # Of a cuboid with sides a, b, c: I_a = m (b^2 + c^2) / 12. The smallest moment is about its longest side.

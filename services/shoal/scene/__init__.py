@@ -1,6 +1,6 @@
 """What a user states: bodies, joints, loads, markers, initial state, gravity and solver settings, in SI units."""
 
-from shoal.scene.bodies import Body, PointMass, RigidBody, Rod
+from shoal.scene.bodies import Body, Rod
 from shoal.scene.function import Function
 from shoal.scene.joints import (
     GROUND,
@@ -25,6 +25,7 @@ from shoal.scene.joints import (
 from shoal.scene.load import load_scene, scene_names
 from shoal.scene.loads import LOAD_KINDS, DistributedForce, Force, Load, Spring, Torque, TorsionSpring
 from shoal.scene.scene import InitialState, Scene
+from shoal.scene.solids import ModalBody, PointMass, RigidBody
 from shoal.scene.solver import Solver
 
 __all__ = [
@@ -44,6 +45,7 @@ __all__ = [
     "InitialState",
     "Joint",
     "Load",
+    "ModalBody",
     "MovingPoint",
     "Parallel",
     "Perpendicular",

@@ -1,20 +1,22 @@
-"""Bodies: a rod whose element decides how much of it is modelled, and a rigid body."""
+"""Bodies: a rod, whose element decides how much of it is modelled, and those of `solids`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from shoal.scene.record import NonNegative, Positive, Record, Vector, Vector3
+from shoal.scene.record import NonNegative, Positive, Record, Vector
 from shoal.scene.sections import SECTIONS, Section
+from shoal.scene.solids import ModalBody, PointMass, RigidBody
 
-Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full", "simo-reissner", "director-rod"]
+Element = Literal["rigid", "ancf-cable", "ancf-quintic", "ancf-full", "simo-reissner", "director-rod", "modal"]
 Quadrature = Literal["full", "reduced"]
 Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
+End = Literal["pinned", "clamped", "free"]
 SectionName = Literal["rectangle", "round", "tube", "i-beam"]
 
 _SHEARS = {
@@ -22,6 +24,7 @@ _SHEARS = {
     "ancf-cable": False,
     "ancf-quintic": False,
     "director-rod": False,
+    "modal": False,
     "ancf-full": True,
     "simo-reissner": True,
 }
@@ -32,6 +35,9 @@ _ONLY_FLEXIBLE = {
     "elements": 1,
     "quadrature": "full",
     "law": "plane-stress",
+    "modes": 4,
+    "axial_modes": 0,
+    "ends": None,
     "retardation": 0.0,
 }
 """Fields that a rigid rod has no use for, and what they are where nobody states them."""
@@ -62,6 +68,9 @@ class Rod(Record):
     the section, `side_curvature` [1/m, ...] bends the unstrained axis towards its local z axis and `twist` [rad/m, ...]
     turns its sections, both polynomials over the arc length. `director`: the axis of the section that its nodes carry,
     by default the one that a joint can share.
+    `modal` bends little in a frame that moves with it, in the plane, by so many `modes`, the eigenmodes of a uniform
+    rod whose `ends` are held in that frame as the joints hold them, or as stated. It stretches by so many
+    `axial_modes`: evenly, then by the same shapes taken along it.
     """
 
     kind: Literal["rod"] = "rod"
@@ -77,6 +86,9 @@ class Rod(Record):
     poisson_ratio: Annotated[float, Field(gt=-1, le=0.5)] = 0.3
     element: Element = "rigid"
     elements: Annotated[int, Field(ge=1, le=10_000)] = 1
+    modes: Annotated[int, Field(ge=1, le=200)] = 4
+    axial_modes: Annotated[int, Field(ge=0, le=201)] = 0
+    ends: tuple[End, End] | None = None
     quadrature: Quadrature = "full"
     law: Law = "plane-stress"
     curvature: tuple[float, ...] = ()
@@ -100,10 +112,21 @@ class Rod(Record):
                     "ancf-full), or element: rigid"
                 )
             return self
-        if self.rotary_inertia and not self.shears:
+        if self.rotary_inertia and not self.shears and self.element != "modal":
             raise ValueError(
                 f"rotary_inertia: {self.element} has none; use simo-reissner, or a rigid rod, or rotary_inertia: false"
             )
+        if self.element == "modal" and self.elements != 1:
+            raise ValueError(f"elements: a modal rod is one element; found {self.elements}, state its modes instead")
+        if self.element == "modal" and self.axial_modes > self.modes + 1:
+            raise ValueError(
+                f"axial_modes: {self.axial_modes} is more than {self.modes + 1}, the even stretch and one for each mode"
+            )
+        if self.ends in (("clamped", "clamped"), ("clamped", "pinned"), ("pinned", "clamped")):
+            raise ValueError(f"ends: {', '.join(self.ends)} keep a rod from bending with its joints; free one of them")
+        for field in ("modes", "axial_modes", "ends"):
+            if self.element != "modal" and getattr(self, field) != _ONLY_FLEXIBLE[field]:
+                raise ValueError(f"{field}: {self.element} has elements instead; it is for element: modal")
         if self.quadrature != "full" and self.element != "ancf-cable":
             raise ValueError(f"quadrature: {self.element} has its own; {self.quadrature} is for ancf-cable")
         if self.element != "director-rod":
@@ -142,6 +165,8 @@ class Rod(Record):
             raise ValueError(f"width {self.width:g} m is larger than the length {self.length:g} m; a rod is slender")
         if self.element != "rigid" and self.youngs_modulus is None:
             raise ValueError(f"youngs_modulus is missing; element {self.element} needs it (Pa)")
+        if self.element == "modal" and self.curvature:
+            raise ValueError("curvature: a modal rod is straight; use ancf-cable, ancf-quintic or simo-reissner")
         if self.element == "ancf-full":
             if self.curvature:
                 raise ValueError("curvature: an ancf-full rod is straight; use simo-reissner or ancf-cable")
@@ -155,6 +180,21 @@ class Rod(Record):
     def shears(self) -> bool:
         """Whether its element has shear and the rotary inertia of its sections."""
         return _SHEARS[self.element]
+
+    @property
+    def mesh(self) -> dict[str, int]:
+        """The fields that tell how finely a flexible rod is divided, and their numbers."""
+        if self.element == "modal":
+            return {"modes": self.modes, "axial_modes": self.axial_modes}
+        return {} if self.element == "rigid" else {"elements": self.elements}
+
+    def by_elements(self, element: Element, count: int) -> dict[str, Any]:
+        """The fields that make a rod of so many elements of it, whatever it was before."""
+        fields: dict[str, Any] = {"element": element, "elements": count}
+        if self.element == "modal":
+            fields |= {name: _ONLY_FLEXIBLE[name] for name in ("modes", "axial_modes", "ends")}
+            fields["rotary_inertia"] = False
+        return fields
 
     @property
     def straight(self) -> bool:
@@ -255,67 +295,4 @@ class Rod(Record):
         return {"start": (0.0, 0.0), "centre": (middle.real, middle.imag), "end": (end.real, end.imag)}
 
 
-Principal = tuple[NonNegative, NonNegative, NonNegative]
-Matrix = tuple[Vector3, Vector3, Vector3]
-if TYPE_CHECKING:
-    Inertia = Any  # who computes in the plane has one number, or one a lane
-else:
-    Inertia = NonNegative | Principal | Matrix
-
-
-class RigidBody(Record):
-    """A rigid body of any shape: mass [kg], inertia about the centre of mass [kg m^2], named points [m].
-
-    In space the inertia is a number (the same about every axis), three principal moments about the axes of the body's
-    frame, or a symmetric matrix in it.
-    The point `start` is the origin of the body's frame unless `named_points` says otherwise.
-    """
-
-    kind: Literal["rigid-body"] = "rigid-body"
-    mass: Positive
-    inertia: Inertia
-    centre_of_mass: Vector = (0.0, 0.0)
-    named_points: dict[str, Vector] = {}
-    element: Literal["rigid"] = "rigid"
-
-    @model_validator(mode="after")
-    def _possible(self) -> RigidBody:
-        if isinstance(self.inertia, tuple):
-            matrix = np.array(self.inertia) if isinstance(self.inertia[0], tuple) else np.diag(self.inertia)
-            if np.max(np.abs(matrix - matrix.T)) > 1e-9 * np.max(np.abs(matrix)):
-                raise ValueError("inertia: the matrix is not symmetric")
-            a, b, c = np.linalg.eigvalsh(matrix)
-            if a < -1e-12 * c or a + b < c * (1 - 1e-9):
-                raise ValueError(
-                    f"inertia: no body has the principal moments {a:g}, {b:g}, {c:g} kg m^2; none is negative or "
-                    "larger than the sum of the others"
-                )
-        return self
-
-    @property
-    def inertia_matrix(self) -> Any:
-        """Inertia about the centre of mass in the body's frame [kg m^2], (3, 3), or (3, 3, lanes)."""
-        if not isinstance(self.inertia, tuple):
-            return np.multiply.outer(np.eye(3), self.inertia)
-        return np.array(self.inertia) if isinstance(self.inertia[0], tuple) else np.diag(self.inertia)
-
-    @property
-    def points(self) -> dict[str, Vector]:
-        """Named points in the body's frame [m]."""
-        return {"start": (0.0, 0.0), **self.named_points}
-
-
-class PointMass(Record):
-    """A mass [kg] without extension."""
-
-    kind: Literal["point-mass"] = "point-mass"
-    mass: Positive
-    element: Literal["rigid"] = "rigid"
-
-    @property
-    def points(self) -> dict[str, Vector]:
-        """The one point there is."""
-        return {"start": (0.0, 0.0)}
-
-
-Body = Annotated[Rod | RigidBody | PointMass, Field(discriminator="kind")]
+Body = Annotated[Rod | RigidBody | ModalBody | PointMass, Field(discriminator="kind")]

@@ -11,7 +11,7 @@ from shoal.scene.record import Record
 
 SPATIAL_KINDS = ("spherical", "universal", "cylindrical", "planar")
 PLANAR_KINDS = ("gear",)
-PLANAR_ELEMENTS = ("ancf-full", "simo-reissner")
+PLANAR_ELEMENTS = ("ancf-full", "simo-reissner", "modal")
 _Z = (0.0, 0.0, 1.0)
 
 
@@ -49,6 +49,8 @@ def check_dimensions(scene: Any) -> None:
             if getattr(start, one) is not None and getattr(start, other) is not None:
                 raise ValueError(f"initial.{name}.{other}: {one} is stated as well; state one of them")
     for name, body in scene.bodies.items():
+        if body.kind == "modal-body":
+            raise ValueError(f"bodies.{name}.kind: modal-body is a body of the plane; say dimensions: 2")
         if body.kind == "rod" and body.element in PLANAR_ELEMENTS:
             raise ValueError(f"bodies.{name}.element: {body.element} is for the plane; use ancf-cable or director-rod")
         if body.kind == "rod" and body.element == "director-rod":

@@ -13,12 +13,14 @@ from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
 from shoal.scene import joints as joint_types
+from shoal.scene.amplitudes import check_amplitudes, check_place
 from shoal.scene.bodies import Body
 from shoal.scene.dimensions import check_dimensions, padded
 from shoal.scene.expect import Expectation, ExpectedValue
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
 from shoal.scene.loads import DistributedForce, Force, Load
 from shoal.scene.record import Angle, Record, Vector, Vector3, one_line
+from shoal.scene.solids import ModalBody
 from shoal.scene.solver import Solver
 
 INITIAL, FROM = "initial", "from"
@@ -37,7 +39,8 @@ class InitialState(Record):
 
     position [m] and velocity [m/s] are those of its frame's origin. What is None is not stated: it follows from what
     is, and is zero where nothing tells it. rotation, spin: in space, a rotation vector [rad] in place of the angle and
-    an angular velocity [rad/s] along the axes of the ground in place of the rate. guess: the quantities that may change
+    an angular velocity [rad/s] along the axes of the ground in place of the rate. modes, mode_rates: of a body that
+    bends by modes, their amplitudes and rates, all or none. guess: the quantities that may change
     where the joints demand it.
     """
 
@@ -47,6 +50,8 @@ class InitialState(Record):
     velocity: Vector | None = None
     rotation: Vector3 | None = None
     spin: Vector3 | None = None
+    modes: tuple[float, ...] = ()
+    mode_rates: tuple[float, ...] = ()
     guess: tuple[Quantity, ...] = ()
 
     def stated(self, quantity: Quantity) -> bool:
@@ -63,6 +68,8 @@ class Begin(NamedTuple):
     velocity: Vector
     rotation: Vector3 | None = None
     spin: Vector3 | None = None
+    modes: tuple[float, ...] = ()
+    mode_rates: tuple[float, ...] = ()
 
 
 class Scene(Record):
@@ -126,7 +133,7 @@ class Scene(Record):
                 self._check_attachment(f"joints.{name}.{field}", side)
             if not isinstance(joint, joint_types.Coupling) and joint.first.body == joint.second.body:
                 body = self.bodies.get(joint.first.body)
-                if body is None or body.element == "rigid":
+                if body is None or body.element in ("rigid", "modal"):
                     raise ValueError(
                         f"joints.{name}: joins {joint.first.body!r} to itself; a joint needs two bodies, or two places "
                         "of a flexible rod"
@@ -147,6 +154,7 @@ class Scene(Record):
         for name in self.initial:
             if name not in self.bodies:
                 raise ValueError(f"initial.{name}: no such body; the bodies are {', '.join(self.bodies)}")
+            check_amplitudes(name, self.bodies[name], self.initial[name])
         self._check_directions()
         check_dimensions(self)
         placed = self._placed()
@@ -170,6 +178,9 @@ class Scene(Record):
             known = ", ".join([*self.bodies, GROUND])
             raise ValueError(f"{where}.body: no body {attachment.body!r}; there are {known}")
         body = self.bodies[attachment.body]
+        if isinstance(body, ModalBody):
+            check_place(where, attachment, body)
+            return
         if isinstance(attachment.point, str) and attachment.point not in body.points:
             raise ValueError(
                 f"{where}.point: {attachment.body} has no point {attachment.point!r}; "
@@ -249,6 +260,8 @@ class Scene(Record):
             padded((0.0, 0.0) if stated.velocity is None else stated.velocity, self.dimensions),
             stated.rotation,
             stated.spin,
+            stated.modes,
+            stated.mode_rates,
         )
 
     def with_values(self, values: Mapping[str, Any]) -> Scene:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from shoal.scene.bodies import Rod
+from shoal.scene.refined import unbent
 from shoal.scene.scene import Scene
 
 
@@ -12,7 +15,10 @@ def with_shear(scene: Scene) -> Scene | None:
     None if there are none, or in space, which has no such element.
     """
     flexible = {name: rod for name, rod in scene.bodies.items() if isinstance(rod, Rod) and rod.element != "rigid"}
-    rods = [name for name, rod in flexible.items() if not rod.shears]
-    fields = {"element": "simo-reissner", "quadrature": "full"}
-    values = {f"bodies.{name}.{field}": value for name in rods for field, value in fields.items()}
-    return scene.with_values(values) if rods and scene.dimensions == 2 else None
+    values: dict[str, Any] = {}
+    for name, rod in flexible.items():
+        if not rod.shears:
+            count = rod.modes if rod.element == "modal" else rod.elements
+            fields = {**rod.by_elements("simo-reissner", count), "quadrature": "full"}
+            values |= {f"bodies.{name}.{field}": value for field, value in fields.items()} | unbent(scene, name)
+    return scene.with_values(values) if values and scene.dimensions == 2 else None

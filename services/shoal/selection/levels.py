@@ -92,7 +92,7 @@ def open_rods(scene: Scene) -> dict[str, str]:
     Bernoulli-Euler's beam, unless the scene names simo-reissner or ancf-full, which have shear, or director-rod, which
     twists. A rigid rod that leaves the plane may twist.
     """
-    finest = dict.fromkeys(("ancf-cable", SLENDER), SLENDER)
+    finest = dict.fromkeys(("ancf-cable", "modal", SLENDER), SLENDER)
     finest["rigid"] = "director-rod" if scene.dimensions == 3 and not is_flat(scene) else SLENDER
     return {
         name: finest.get(body.element, body.element)
@@ -110,5 +110,9 @@ def apply(scene: Scene, levels: Levels) -> Scene:
     """The scene with its rods modelled so. Raises InputError where a joint does not suit a flexible rod."""
     values: dict[str, Any] = {}
     for rod, level in levels.items():
+        body = scene.bodies[rod]
+        if isinstance(body, Rod) and body.element == "modal":
+            fields = body.by_elements("ancf-cable", level.elements)
+            values |= {f"bodies.{rod}.{field}": value for field, value in fields.items()}
         values |= level.fields(rod)
     return scene.with_values(values)

@@ -176,8 +176,11 @@ def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
     }
     limits = open_rods(scene)
     for rod, limit in limits.items():
-        body = scene.bodies[rod]
+        body, start = scene.bodies[rod], scene.start(rod)
         assert isinstance(body, Rod)
+        if start.modes or start.mode_rates:
+            field = "modes" if start.modes else "mode_rates"
+            raise InputError(f"initial.{rod}.{field}: models are chosen of rods that start unstrained; leave it out")
         if limit == "director-rod" and not body.straight:
             raise InputError(
                 f"bodies.{rod}.element: models are chosen of straight rods in space, and {rod} is curved or twisted; "

@@ -20,6 +20,7 @@ from shoal.scene import (
     Attachment,
     Distance,
     Force,
+    ModalBody,
     PointMass,
     Revolute,
     Rod,
@@ -251,6 +252,7 @@ class Mjcf:
         if isinstance(body, PointMass):
             moments = np.full(3, least)
         else:
+            assert not isinstance(body, ModalBody)
             second = np.array(second_moments(body), dtype=float)
             centre, inertia = padded(body.centre_of_mass, 3), np.trace(second) * np.eye(3) - second
             if self.scene.dimensions == 2:

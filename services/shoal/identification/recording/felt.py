@@ -35,12 +35,14 @@ def check_felt(scene: Scene, channels: tuple[Channel, ...]) -> None:
         if channel.joint is not None and channel.joint not in scene.joints:
             raise InputError(f"{what}: no joint {channel.joint!r}; there are {', '.join(scene.joints) or 'none'}")
         body = "" if channel.joint is not None else scene.markers[channel.marker].body
-        bending = {name: one.element for name, one in scene.bodies.items() if isinstance(one, Rod) and is_flexible(one)}
+        bending = {name: one.element for name, one in scene.bodies.items() if one.element != "rigid"}
         if channel.quantity == STRAIN and body not in bending:
             known = f"; flexible are {', '.join(bending)}" if bending else ""
             raise InputError(
                 f"{what} is measured on a flexible rod; {body}, with marker {channel.marker}, is rigid{known}"
             )
+        if channel.quantity == STRAIN and bending[body] == "modal":
+            raise InputError(f"{what} is told of rods of elements; bodies.{body}.element is modal, use ancf-cable")
         rod = scene.bodies.get(body)
         if channel.quantity == STRAIN and isinstance(rod, Rod) and rod.curvature:
             raise InputError(f"{what} is told of straight rods; bodies.{body}.curvature is not zero")

@@ -13,6 +13,7 @@ from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Rod, Scene
+from shoal.scene.refined import refined
 from shoal.scene.shear import with_shear
 from shoal.trajectory import Array
 
@@ -69,7 +70,7 @@ def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array
     }
     if not flexible:
         return ModelError(None, None)
-    finer = _finer(model.scene, flexible)
+    finer = _finer(model.scene)
     mesh = None if finer is None else _difference(model, point, predicted, finer)
     slender = {name: rod for name, rod in flexible.items() if not rod.shears}
     if not slender or model.engine.name in WITH_SHEAR:
@@ -78,7 +79,7 @@ def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array
     uncertain = rms_of(residual) / np.sqrt(len(residual))
     matters = theory is None or rms_of(theory) > _MATTERS * max(uncertain, 0.0 if mesh is None else rms_of(mesh))
     if finer is not None and mesh is not None and matters:
-        sheared = _sheared(model, point, predicted, flexible)
+        sheared = _sheared(model, point, predicted)
         theory = theory if sheared is None else sheared - mesh
     return ModelError(mesh, theory)
 
@@ -91,23 +92,20 @@ def _softened(
     return _difference(model, point, predicted, model.scene, softer)
 
 
-def _sheared(
-    model: ForwardModel, point: Array, predicted: Mapping[str, Array], flexible: Mapping[str, Rod]
-) -> Array | None:
+def _sheared(model: ForwardModel, point: Array, predicted: Mapping[str, Array]) -> Array | None:
     """By twice as many rods with shear and rotary inertia; None where they cannot be had."""
     stout = with_shear(model.scene)
-    finer = None if stout is None else _finer(stout, flexible)
+    finer = None if stout is None else _finer(stout)
     return None if finer is None else _difference(replace(model, engine=GaussEngine()), point, predicted, finer)
 
 
-def _finer(scene: Scene, flexible: Mapping[str, Rod]) -> Scene | None:
+def _finer(scene: Scene) -> Scene | None:
     """Twice as many elements, and half the step: that takes away three quarters of a time error of second order.
 
     Inertia is not capped there, so that what capping costs counts in full.
     """
     try:
-        elements = {f"bodies.{name}.elements": 2 * rod.elements for name, rod in flexible.items()}
-        finer = scene.with_values({**elements, "solver.inertia_cap": False})
+        finer = scene.with_values({**refined(scene, 2), "solver.inertia_cap": False})
         integrator = scene.solver.integrator
         limit = np.inf if integrator == "auto" else stable_step(finer, integrator)
         return finer.with_values({"solver.step": min(scene.solver.step / 2, _STABLE * limit)})

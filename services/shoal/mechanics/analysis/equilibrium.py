@@ -11,7 +11,7 @@ import numpy as np
 from shoal.mechanics.analysis.balance import zero_level
 from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import Scene
+from shoal.scene import Rod, Scene
 from shoal.trajectory import plain
 
 
@@ -93,7 +93,11 @@ class Equilibrium:
                 }
                 for name in self.markers
             },
-            "elements": {name: body.elements for name, body in self.scene.bodies.items() if body.element != "rigid"},
+            "elements": {
+                name: sum(body.mesh.values())
+                for name, body in self.scene.bodies.items()
+                if isinstance(body, Rod) and body.mesh
+            },
             "models": {name: body.element for name, body in self.scene.bodies.items()},
             "energy": self.energy,
             "strain_energy": self.strain_energy,

@@ -19,8 +19,9 @@ from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.forces import LAW
 from shoal.mechanics.frames import BeamFrame
+from shoal.mechanics.modal.modes import held
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import InitialState, RigidBody, Scene
+from shoal.scene import InitialState, RigidBody, Rod, Scene
 
 
 class FreeBodies:
@@ -70,7 +71,7 @@ def _without_joints(scene: Scene, placement: Placement) -> Scene:
     """The scene with every body flying free from where the joints placed it."""
     if scene.dimensions != plane.DIMENSIONS:
         return _without_joints_in_space(scene, placement)
-    initial = {}
+    initial, bodies = {}, dict(scene.bodies)
     for name in scene.bodies:
         pose, start = placement.poses[name], placement.scene.start(name)
         axis, turning = pose.directors[0, :, 0], pose.turning[0, :, 0]
@@ -80,8 +81,13 @@ def _without_joints(scene: Scene, placement: Placement) -> Scene:
             rate=float(plane.cross(axis, turning)),
             position=tuple(pose.position[:, 0].tolist()),
             velocity=tuple(pose.velocity[:, 0].tolist()),
+            modes=start.modes,
+            mode_rates=start.mode_rates,
         )
-    return scene.model_copy(update={"joints": {}, "initial": initial})
+        body = scene.bodies[name]
+        if isinstance(body, Rod) and body.element == "modal":  # its modes are those of the machine
+            bodies[name] = body.model_copy(update={"ends": held(scene, name)})
+    return scene.model_copy(update={"joints": {}, "initial": initial, "bodies": bodies})
 
 
 def _without_joints_in_space(scene: Scene, placement: Placement) -> Scene:

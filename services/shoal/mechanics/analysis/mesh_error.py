@@ -1,4 +1,4 @@
-"""How far what is computed of a machine is off for its mesh: by the same once more, on twice as many elements."""
+"""How far what is computed of a machine is off for its mesh: by the same once more, on twice as many of all."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.modes import Modes, modes
 from shoal.mechanics.analysis.statics import statics
-from shoal.scene import Rod, Scene
+from shoal.scene import Scene
+from shoal.scene.refined import refined
 
 
 def finer(scene: Scene) -> Scene | None:
-    """The scene with twice the elements of its flexible rods; None if there are none."""
-    rods = {name: body for name, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
-    twice = {f"bodies.{name}.elements": 2 * rod.elements for name, rod in rods.items()}
+    """The scene with twice the elements or modes of its flexible rods; None if there are none."""
+    twice = refined(scene, 2)
     return scene.with_values(twice) if twice else None
 
 

@@ -9,7 +9,7 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.joint_forces import Component, Rubbing, gap, moving, of_places
-from shoal.mechanics.frames import BeamFrame, RigidFrame
+from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
 from shoal.mechanics.joints import Along, Condition, Geared, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, Revolute, Slider
@@ -57,7 +57,19 @@ def displacements(bodies: FreeBodies, at: Array, lever: float) -> Array:
             for axis in axes:
                 add(vector, axis * lever ** -float(k % order))
         if isinstance(frame, RigidFrame):
-            add(frame.directors[0], plane.quarter(frame.directors[0].at(at)) / lever)
+            modes = frame.amplitudes if isinstance(frame, ModalFrame) else ()
+            row = np.zeros(bodies.unknowns)
+            for vector in (frame.directors[0], *modes):
+                row[list(vector.own or ())] = plane.quarter(vector.at(at)) / lever
+            rows.append(row)
+            e = frame.directors[0].at(at) / lever
+            for vector in modes:
+                add(vector, e)
+            stretching = frame.modes.along if isinstance(frame, ModalFrame) else 0
+            if stretching:
+                add(frame.directors[0], e)
+            for vector in modes[: max(stretching - 1, 0)]:
+                add(vector, plane.quarter(e))
     return np.array(rows)
 
 

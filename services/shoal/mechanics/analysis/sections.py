@@ -67,6 +67,8 @@ def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: 
     body = scene.bodies.get(rod)
     if not isinstance(body, Rod) or body.element == "rigid":
         raise InputError(f"{rod}: section forces need a flexible rod of the scene")
+    if body.element == "modal":
+        raise InputError(f"bodies.{rod}.element: section forces are those of elements; use ancf-cable instead of modal")
     bodies = FreeBodies(evaluator, t)
     at, rate, change = bodies.state(q, v, a)
     frame = bodies.placement.frames[rod]

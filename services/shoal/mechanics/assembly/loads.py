@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import fitting, plane
-from shoal.mechanics.affine import Affine
+from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.applied import Applied
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
@@ -19,7 +19,7 @@ from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.holding import direction, hinge, line_of
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
-from shoal.mechanics.frames import BeamFrame, RigidFrame
+from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.numerics.tile import Number, index, stacked
 from shoal.mechanics.reach import span
@@ -73,6 +73,9 @@ class Loads:
                 np.any(size) for size in (joint.friction, joint.coulomb, joint.share)
             ):
                 self._friction(name, joint)
+        for name, frame in placement.frames.items():
+            if isinstance(frame, ModalFrame):
+                self._bend(name, frame)
         for name, load in scene.loads.items():
             if type(load) not in LOADS:
                 raise NotImplementedError(f"the mechanics knows no load of kind {load.kind!r}")
@@ -91,6 +94,19 @@ class Loads:
             line = self.placement.direction(self.scene, joint.first).turned(plane.rotation(joint.direction))
         ends = [self.placement.point(self.scene, side) for side in (joint.first, joint.second)]
         self._measure(name, PLACE, [*ends, line], law, 0.0)
+
+    def _bend(self, name: str, frame: ModalFrame) -> None:
+        """Stiffness and damping of modes: springs along the frame, from zero to a mode, and from mode to mode."""
+        stiffness, damping = frame.modes.stiffness, frame.modes.damping
+        nowhere, measured = fixed(0.0 * frame.origin.constant[:, :1]), frame.measured
+        for i, (one, rest) in enumerate(measured):
+            for j, (other, other_rest) in enumerate(measured[: i + 1]):
+                # 1/2 q'Kq = 1/2 sum of (sum_j K_ij) q_i^2 - 1/2 sum over i > j of K_ij (q_i - q_j)^2
+                both = [np.sum(part[i], axis=0) if i == j else -part[i, j] for part in (stiffness, damping)]
+                if np.any(both):
+                    base, natural = (nowhere, rest) if i == j else (other, rest - other_rest)
+                    law = [both[0], 0.0, both[1], natural, 0.0, 1.0, 0.0]
+                    self._measure(name, PLACE, [base, one, frame.directors[0]], law, 0.0)
 
     def _torsion_spring(self, name: str, load: TorsionSpring) -> None:
         places = load.first_to is not None or load.second_to is not None

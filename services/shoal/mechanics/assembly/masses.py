@@ -14,9 +14,9 @@ from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.elements import FAMILIES, SPATIAL_FAMILIES
 from shoal.mechanics.elements.families import Collected
 from shoal.mechanics.elements.unstrained import unstrained
-from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
+from shoal.mechanics.frames import BeamFrame, ModalFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Number
-from shoal.scene import PointMass, RigidBody, Rod, Scene
+from shoal.scene import Body, RigidBody, Rod, Scene
 from shoal.scene.dimensions import padded
 
 Entries = dict[tuple[int, int], Number]
@@ -42,17 +42,23 @@ class Masses:
             least = min(np.min(np.asarray(body.mass)) for body in scene.bodies.values())
             _add(self.mass, [vector], [[least]])
 
-    def _add(self, name: str, body: Rod | RigidBody | PointMass) -> None:
+    def _add(self, name: str, body: Body) -> None:
         frame = self.placement.frames[name]
         if isinstance(frame, BeamFrame):
             assert isinstance(body, Rod)
             self._add_rod(name, body, frame)
+        elif isinstance(frame, ModalFrame):
+            moments = frame.modes.moments
+            vectors = [*frame.vectors, *(vector.turned(plane.QUARTER) for vector in frame.vectors)]
+            matrix = [[*np.real(row), *np.imag(row)] for row in moments]
+            _add(self.mass, vectors, matrix)
+            self._add_load(vectors, matrix[0])
         elif isinstance(frame, PointFrame):
             _add(self.mass, [frame.origin], [[body.mass]])
             self._add_load([frame.origin], [body.mass])
         else:
             assert isinstance(frame, RigidFrame)
-            assert not isinstance(body, PointMass)
+            assert isinstance(body, Rod | RigidBody)
             if len(frame.directors) == 3:
                 self._add_solid(body, frame)
                 return
@@ -133,8 +139,11 @@ def second_moments(body: Rod | RigidBody) -> list[list[Number]]:
 
 
 def _add(entries: Entries, vectors: list[Affine], matrix: list[list[Number]]) -> None:
-    """Add T' M T for the body's vectors = T q, in which it has the quadratic form 1/2 sum M_ab v_a . v_b."""
-    for left, row in zip(vectors, matrix, strict=True):
+    """Add T' M T for the body's vectors = T q, in which it has the quadratic form 1/2 sum M_ab v_a . v_b.
+
+    Of a matrix with fewer rows the others are zero; T' M T must be symmetric, not M.
+    """
+    for left, row in zip(vectors, matrix, strict=False):
         for right, weight in zip(vectors, row, strict=True):
             if _vanishes(weight):
                 continue

@@ -26,11 +26,13 @@ from shoal.mechanics.assembly.groups import (
     transposed,
 )
 from shoal.mechanics.assembly.holding import hold
+from shoal.mechanics.assembly.modal import place_modal
 from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
 from shoal.mechanics.assembly.rods import place_rod, rod_axis
 from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.frames import Place, PointFrame, RigidFrame
 from shoal.mechanics.joints import Along, Meet
+from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.start.start import started
 from shoal.scene import GROUND, Function, PointMass, Rod, Scene
@@ -60,6 +62,8 @@ def place(scene: Scene) -> Placement:
         body = scene.bodies[name]
         if isinstance(body, PointMass):
             _place_point(name, mine, pose, result)
+        elif body.element == "modal":
+            place_modal(scene, name, mine, pose, result)
         elif isinstance(body, Rod) and body.element != "rigid":
             place_rod(scene, name, body, mine, pose, result)
         else:
@@ -138,6 +142,10 @@ def _pose(scene: Scene, name: str, mine: list[JointPoint], turning: Orientations
     body = scene.bodies[name]
     if isinstance(body, Rod) and body.element != "rigid" and body.curvature:
         p = rod_axis(body, p[0])  # on a flexible rod the arc length tells a place
+    if body.element == "modal" and (known or start.position is None):
+        place, rate, _, _ = bent(scene, name, p)
+        p, pdot = ((np.real(part), np.imag(part)) for part in (place, rate))
+        velocity = velocity - arm(directors, pdot)
     return Pose(position - arm(directors, p), directors, velocity - arm(spin, p), spin)
 
 

@@ -38,6 +38,8 @@ INTEGRATORS: dict[str, Any] = {
 
 BY_ACCELERATION = ("dop853", "radau5", "rk4", "leapfrog")
 """Those that know a machine by its acceleration alone, and so whatever that depends on."""
+FOLLOWED = 100.0
+"""So many steps of a Runge-Kutta method may take the place of one, to follow the modes of bodies, which last."""
 STRIDES = 100
 """With functions of time, an adaptive integrator takes at least so many steps unless the scene says otherwise."""
 
@@ -66,7 +68,7 @@ def pick(solver: Solver, model: Model, limit: Callable[[Model, Facts], float]) -
     if solver.integrator != "auto":
         return Choice(solver.integrator, "named by the scene", limit(model, facts(solver.integrator)))
     if model.flexible == 0:
-        if solver.step > limit(model, facts("rk4")):
+        if solver.step > limit(model, facts("rk4")) * (FOLLOWED if model.modal else 1.0):
             return Choice("radau5", "auto: springs or friction are faster than the step", np.inf)
         return Choice("dop853", "auto: nothing is stiff", np.inf)
     stable = limit(model, facts("leapfrog"))

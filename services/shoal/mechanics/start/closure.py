@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from shoal.mechanics.joints import Along, Apart, Condition, Geared, Meet, Sum, Turned, conditions, unknown
+from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array, Index, Number
 from shoal.mechanics.plane import as_complex, phasor
 from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
@@ -130,9 +131,14 @@ class Closure:
         k = self.column[at.body]
         axis = phasor(u[:, k + 2])
         arm = axis * self._arm(at)
+        bending = _lanes(axis * self.bending_rate(at), u)
         slope = np.zeros((len(u), u.shape[1]), dtype=complex)
         slope[:, k], slope[:, k + 1], slope[:, k + 2] = 1.0, 1j, 1j * arm
-        return Vector(u[:, k] + 1j * u[:, k + 1] + arm, slope, np.zeros(len(u)))
+        return Vector(u[:, k] + 1j * u[:, k + 1] + arm, slope, bending)
+
+    def bending_rate(self, at: Attachment) -> Number:
+        """Velocity [m/s] of an attachment in its body's frame, x + iy."""
+        return _bending(self.scene, at)[1]
 
     def _arm(self, at: Attachment) -> Number:
         if id(at) not in self._arms:
@@ -156,7 +162,7 @@ class Closure:
         """Unit vector of a body at an attachment, turned by `turn` [rad]."""
         value, slope = self._angle(u, at)
         e = phasor(value + turn)
-        return Vector(e, 1j * e[:, None] * slope, np.zeros(len(u)))
+        return Vector(e, 1j * e[:, None] * slope, _lanes(1j * e * _bending(self.scene, at)[3], u))
 
     def _angle(self, u: Array, at: Attachment) -> tuple[Array, Array]:
         if at.body == GROUND:
@@ -190,7 +196,9 @@ class Closure:
                 return []
             (a, a_slope), (b, b_slope) = self._angle(u, condition.first), self._angle(u, condition.second)
             rate = rate_of(condition.angle) if isinstance(condition.angle, Function) else 0.0
-            return [(np.angle(phasor(b - a - self._turn(condition, u))), b_slope - a_slope, none - rate)]
+            bending = [_bending(self.scene, side)[3] for side in (condition.second, condition.first)]
+            rates = none + bending[0] - bending[1] - rate
+            return [(np.angle(phasor(b - a - self._turn(condition, u))), b_slope - a_slope, rates)]
         apart = self.place(u, condition.second) - self.place(u, condition.first)
         if isinstance(condition, Along):
             across = self.direction(u, condition.first, condition.direction).dot(apart)
@@ -226,19 +234,26 @@ def _lanes(value: Number, u: Array) -> Array:
 
 
 def place_of(scene: Scene, at: Attachment) -> Number:
-    """Place x + iy [m] of an attachment in the frame of the unstrained body."""
+    """Place x + iy [m] of an attachment in the frame of the body, unstrained but for its stated modes."""
     place, body = as_complex(scene.location(at)), scene.bodies.get(at.body)
     if isinstance(body, Rod) and body.element != "rigid" and body.curvature:
         s = np.real(place)
         return body.axis(s) + 1j * np.imag(place) * phasor(body.turn(s))
-    return place
+    return _bending(scene, at)[0]
+
+
+def _bending(scene: Scene, at: Attachment) -> tuple[Number, Number, Number, Number]:
+    """Place x + iy [m] in the body's frame, its rate, the turn there [rad] and its rate, of a body's stated modes."""
+    if at.body == GROUND or scene.bodies[at.body].element != "modal":
+        return as_complex(scene.location(at)), 0.0, 0.0, 0.0
+    return bent(scene, at.body, scene.location(at))
 
 
 def lead(scene: Scene, at: Attachment) -> Number:
-    """Angle [rad] by which the direction at an attachment is ahead of the unstrained body's x axis."""
+    """Angle [rad] by which the direction at an attachment is ahead of the body's x axis at the start."""
     body = scene.bodies.get(at.body)
     curved = isinstance(body, Rod) and body.element != "rigid" and bool(body.curvature)
-    return body.turn(scene.location(at)[0]) if curved and isinstance(body, Rod) else 0.0
+    return body.turn(scene.location(at)[0]) if curved and isinstance(body, Rod) else _bending(scene, at)[2]
 
 
 def value_of(f: Function) -> float:

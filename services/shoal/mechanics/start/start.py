@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from shoal.errors import InputError
 from shoal.mechanics import plane
-from shoal.mechanics.frames import Frame
+from shoal.mechanics.frames import Frame, ModalFrame
 from shoal.mechanics.joints import Apart, Geared, Meet, Turned, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.start.closure import Rows
@@ -85,6 +85,8 @@ def complete(scene: Scene) -> Start:
             rate=column(v, turn),
             position=(column(u, x), column(u, y)),
             velocity=(column(v, x), column(v, y)),
+            modes=scene.start(name).modes,
+            mode_rates=scene.start(name).mode_rates,
             guess=(),
         )
     return Start(scene.model_copy(update={"initial": initial}), ~(placed.ok & moving.ok))
@@ -111,7 +113,7 @@ def gives_numbers(scene: Scene) -> bool:
 
 def is_direct(scene: Scene) -> bool:
     """Whether the walk along the joints keeps every statement: open chains of revolute joints in the plane."""
-    if scene.ground_points or scene.dimensions == 3:
+    if scene.ground_points or scene.dimensions == 3 or any(start.mode_rates for start in scene.initial.values()):
         return False
     group = {name: name for name in (GROUND, *scene.bodies)}
     for _, condition in of_scene(scene):
@@ -267,7 +269,12 @@ def begun(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict
     found = {}
     origin = (0.0,) * plane.DIMENSIONS
     for name, frame in frames.items():
-        place, axis = frame.point(origin), frame.direction(origin)
+        modes, mode_rates = tuple[float, ...](), tuple[float, ...]()
+        if isinstance(frame, ModalFrame):
+            place, axis = frame.origin, frame.directors[0]
+            modes, mode_rates = _bending(frame, q, v)
+        else:
+            place, axis = frame.point(origin), frame.direction(origin)
         near, along = scene.start(name).angle, axis.at(q)
         turn = float(plane.angle(along)) - near
         found[name] = InitialState.model_construct(
@@ -275,9 +282,19 @@ def begun(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict
             rate=float(plane.cross(along, axis.rate(v)) / sum(along**2)),
             position=tuple(place.at(q).tolist()),
             velocity=tuple(place.rate(v).tolist()),
+            modes=modes,
+            mode_rates=mode_rates,
             guess=(),
         )
     return found
+
+
+def _bending(frame: ModalFrame, q: Array, v: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Amplitudes of modes and their rates."""
+    e = frame.directors[0].at(q) / np.linalg.norm(frame.directors[0].at(q))
+    turning = float(plane.cross(e, frame.directors[0].rate(v)) / (e @ frame.directors[0].at(q))) * plane.quarter(e)
+    modes = tuple(float(e @ one.at(q) - rest) for one, rest in frame.measured)
+    return modes, tuple(float(e @ one.rate(v) + turning @ one.at(q)) for one, _ in frame.measured)
 
 
 def changes(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:

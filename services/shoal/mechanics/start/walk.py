@@ -79,7 +79,8 @@ class Walk:
                 at = closure.here(u, here)
                 arm = phasor(u[:, k + 2]) * place_of(self.scene, there)
                 position = at.value + away - arm
-                speed = closure.speed(at, v, here) - 1j * v[:, k + 2] * arm
+                bending = phasor(u[:, k + 2]) * closure.bending_rate(there)
+                speed = closure.speed(at, v, here) - 1j * v[:, k + 2] * arm - bending
             u[:, k], u[:, k + 1] = np.real(position), np.imag(position)
             v[:, k], v[:, k + 1] = np.real(speed), np.imag(speed)
         return u, v

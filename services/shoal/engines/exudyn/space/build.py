@@ -21,7 +21,7 @@ from shoal.mechanics.assembly.space.start import begun, place_started
 from shoal.mechanics.frames import BeamFrame, PointFrame
 from shoal.mechanics.numerics.tile import stacked
 from shoal.mechanics.reach import span
-from shoal.scene import GROUND, PointMass, Rod, Scene
+from shoal.scene import GROUND, ModalBody, PointMass, Rod, Scene
 from shoal.scene.dimensions import padded
 
 DEPENDENT = 1e-9
@@ -48,6 +48,7 @@ def build_in_space(exu: Any, scene: Scene, end: float | None = None, system_of: 
             assert isinstance(body, Rod)
             parts[name] = SpatialCablePart.enter(system, body, frame, q, v)
         else:
+            assert not isinstance(body, ModalBody)
             parts[name] = SolidPart.add(system, body, frame, q, v)
     system.enter(GROUND)
     ground = SpatialGround.add(system)

@@ -16,7 +16,7 @@ from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.frames import Place
 from shoal.mechanics.joints import Aligned
 from shoal.mechanics.numerics.tile import Array, Number
-from shoal.scene import GROUND, Attachment, PointMass, Rod, Scene
+from shoal.scene import GROUND, Attachment, Rod, Scene
 
 ALIGNED = 1e-9
 """Cosine from which two directions do not count as being at a right angle."""
@@ -67,7 +67,7 @@ def chosen_elements(scene: Scene, attitudes: Attitudes) -> dict[str, Element]:
                     wishes.setdefault(side.body, []).extend((both, k) for k in along)
     found = {}
     for name, body in scene.bodies.items():
-        if isinstance(body, PointMass) or body.element == "rigid":
+        if not isinstance(body, Rod) or body.element == "rigid":
             continue
         element = SPATIAL[body.element]
         wish = max(wishes.get(name, []), key=lambda one: one[0], default=(False, element.director))[1]
