@@ -138,7 +138,8 @@ class Closure:
 
     def bending_rate(self, at: Attachment) -> Number:
         """Velocity [m/s] of an attachment in its body's frame, x + iy."""
-        return _bending(self.scene, at)[1]
+        modal = at.body != GROUND and self.scene.bodies[at.body].element == "modal"
+        return _bending(self.scene, at)[1] if modal else 0.0
 
     def _arm(self, at: Attachment) -> Number:
         if id(at) not in self._arms:
