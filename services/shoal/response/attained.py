@@ -26,8 +26,8 @@ def bounds_of(study: Study, found: Found) -> Bounds:
     named = None
     if surrogate is not None:
         # Over many cycles there are many extremes.
-        starts = STARTS if found.foretold else 1
-        named = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed, starts)
+        how = (STARTS, error) if found.foretold else (1, None)
+        named = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed, *how)
         if error is None:
             error = _confirmed(study, surrogate, named)
     values, germs = runs.values, runs.germs

@@ -58,6 +58,8 @@ class Watch:
         phases = []
         for course in self.courses[1:]:
             turns = turning_points(self.times, spline(self.times, course[:, self.signal]))
+            if not len(turns):
+                raise UnsuitableError("some runs have no cycles")
             phases.append(float(np.pi * np.interp(end, turns, np.arange(len(turns)))))
         return float(np.abs(np.array(phases[:parameters]) - phases[parameters:]).sum() / 2)
 

@@ -39,13 +39,16 @@ def telling(inputs: Inputs, germs: Array, terms: Terms, count: int, places: Arra
     factor = np.linalg.cholesky(known.T @ known + UNKNOWN * np.eye(len(terms)))
     # Rows in which what is known has the unit matrix: their squares tell how little is known at a place.
     rows = solve_triangular(factor, inputs.basis(places, terms).T, lower=True).T
-    chosen = []
-    for _ in range(min(count, len(places))):
-        unknown = np.einsum("ij,ij->i", rows, rows)
+    unknown = np.einsum("ij,ij->i", rows, rows)
+    chosen: list[int] = []
+    taken = np.empty((min(count, len(places)), len(terms)))
+    for k in range(len(taken)):
         best = int(np.argmax(unknown))
         chosen.append(best)
-        row = rows[best].copy()
-        rows -= np.outer(rows @ row, row * ((1 - 1 / np.sqrt(1 + unknown[best])) / unknown[best]))
+        # The direction in which a run there tells something new, of the length by which it lessens what is unknown.
+        new = rows[best] - taken[:k].T @ (taken[:k] @ rows[best])
+        taken[k] = new / np.sqrt(1 + unknown[best])
+        unknown -= (rows @ taken[k]) ** 2
     return np.asarray(places[chosen])
 
 

@@ -2,8 +2,9 @@
 
 The error of a surrogate is known at runs; far from them it is as large as it was at runs that it had not seen. So it is
 taken to grow with the distance from the nearest run, as fast as an error of the surrogate's degree can: a polynomial of
-degree n that is at most e on [-1, 1] has a slope of at most n^2 e (Markov's inequality). Where a bound is attained at a
-corner, and the answer falls off from there faster than that, the attained bound is the bound.
+total degree n that is at most e on the box changes by at most n e for every radian between the places arccos(u) of two
+germs (Bernstein's inequality). Where a bound is attained by a run, and the answer falls off from there faster than
+that, the attained bound is the bound.
 """
 
 from __future__ import annotations
@@ -11,14 +12,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from shoal.response.expansion import Expansion
-from shoal.response.extremes import Extremes, Surrogate, places
+from shoal.response.extremes import Extremes, IntArray, Surrogate, places
 from shoal.response.study import SAFETY, Study
 from shoal.trajectory import Array
 
-DEGREE = 6
-"""Of surrogates that are no polynomials."""
+ARMS = 1.0, 0.3, 0.1
+"""Of the search for widened extremes, in lengths over which the margin grows to its full size."""
+ROUGH = 50
+"""Change of the error of a surrogate that is no polynomial, in margins for every radian."""
 
 
 @dataclass(frozen=True)
@@ -32,29 +36,15 @@ class Enclosure:
     gap: Array
 
 
-def enclosure(study: Study, surrogate: Surrogate, found: Extremes, error: Array) -> Enclosure:
-    """error: of the surrogate at runs that it had not seen, (columns,); found: its extremes."""
-    values, germs = study.runs.values, study.runs.germs
+def enclosure(study: Study, surrogate: Surrogate, found: Extremes, error: Array, *, rough: bool = False) -> Enclosure:
+    """error: of the surrogate at runs that it had not seen, (columns,); found: its extremes; rough: the margin is
+    looked at there and where the surrogate is scanned only; in between it may reach farther
+    """
+    values = study.runs.values
     lower, upper = values.min(axis=0), values.max(axis=0)
-    low, high = np.array(found.lower), np.array(found.upper)
-    scanned = places(germs.shape[1], study.seed)
-    degree = int(surrogate.terms.sum(axis=1).max()) if isinstance(surrogate, Expansion) else DEGREE
-    slope = (degree + 1.0) ** 2
-    away = _away(scanned, germs, slope)
-    block = max(1, 4_000_000 // values.shape[1])
-    for k in range(0, len(scanned), block):
-        foretold = surrogate(scanned[k : k + block])
-        margin = SAFETY * error * away[k : k + block, None]
-        low = np.minimum(low, (foretold - margin).min(axis=0))
-        high = np.maximum(high, (foretold + margin).max(axis=0))
-    low = np.minimum(low, found.lower - SAFETY * error * _away(found.at_lower, germs, slope))
-    high = np.maximum(high, found.upper + SAFETY * error * _away(found.at_upper, germs, slope))
-    every = np.arange(values.shape[1])
-    misfit = [
-        np.abs(surrogate.each(germs[at], every) - attained)
-        for at, attained in ((values.argmin(axis=0), lower), (values.argmax(axis=0), upper))
-    ]
-    low, high = np.minimum(lower, low - misfit[0]), np.maximum(upper, high + misfit[1])
+    slope = 1 + int(surrogate.terms.sum(axis=1).max()) if isinstance(surrogate, Expansion) else ROUGH
+    low, high = _widened(study, surrogate, found, SAFETY * error, slope, rough)
+    low, high = np.minimum(lower, low), np.maximum(upper, high)
     width = study.widths(values)
     beyond = np.maximum(lower - low, high - upper)
     gap = np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0)
@@ -67,17 +57,58 @@ def foretold(study: Study, _: Surrogate, found: Extremes, error: Array) -> Enclo
     error: of the surrogate at runs that it had not seen, (columns,). Inner bounds take the place of attained ones.
     """
     values, margin = study.runs.values, SAFETY * error
+    missed = SAFETY * found.doubt
     lower = np.minimum(values.min(axis=0), found.lower + margin)
     upper = np.maximum(values.max(axis=0), found.upper - margin)
-    low, high = np.minimum(lower, found.lower - margin), np.maximum(upper, found.upper + margin)
+    low = np.minimum(lower, found.lower - margin - missed)
+    high = np.maximum(upper, found.upper + margin + missed)
     width = study.largest(np.maximum(upper - lower, 0.0), values)
     beyond = np.maximum(lower - low, high - upper)
     return Enclosure(lower, upper, low, high, np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0))
 
 
-def _away(wanted: Array, germs: Array, slope: float) -> Array:
-    """Share of the full error at each place: the distance to the nearest run times a slope, at most one."""
-    nearest = np.full(len(wanted), np.inf)
-    for germ in germs:
-        nearest = np.minimum(nearest, np.abs(wanted - germ).max(axis=1))
-    return np.minimum(slope * nearest, 1.0)
+def _widened(
+    study: Study, surrogate: Surrogate, found: Extremes, margin: Array, slope: int, rough: bool
+) -> tuple[Array, Array]:
+    """Where the surrogate is least and largest if it is off by its margin at the most, (columns,) each.
+
+    The margin grows away from runs, so that an extreme may move off the surrogate's own: sought along the axes.
+    """
+    germs, columns = study.runs.germs, len(margin)
+    every, runs = np.arange(columns), cKDTree(np.arccos(germs))
+    misfit = np.abs(surrogate(germs) - study.runs.values)
+
+    def away(at: Array) -> tuple[Array, IntArray]:
+        """Share of the margin at each place, and the nearest run."""
+        distance, nearest = runs.query(np.arccos(at), p=np.inf)
+        return np.minimum(slope * distance, 1.0), np.asarray(nearest, dtype=np.int64)
+
+    scanned = places(germs.shape[1], study.seed)
+    share, run = away(scanned)
+    block = max(1, 4_000_000 // columns)
+    ends = []
+    for sign, own in ((1.0, found.at_lower), (-1.0, found.at_upper)):
+
+        def objective(at: Array, side: float = sign) -> Array:
+            which = np.arange(len(at)) % columns
+            share, run = away(at)
+            return side * surrogate.each(at, which) - margin[which] * share - misfit[run, which]
+
+        best, place = np.full(columns, np.inf), np.array(own)
+        for k in range(0, len(scanned), block):
+            some = slice(k, k + block)
+            value = sign * surrogate(scanned[some]) - margin * share[some, None] - misfit[run[some]]
+            least = value.argmin(axis=0)
+            better = value[least, every] < best
+            best[better], place[better] = value[least, every][better], scanned[some][least][better]
+        value, at = np.concatenate([best, objective(own)]), np.concatenate([place, own])
+        for step in () if rough else (arm / slope for arm in ARMS):
+            for axis in range(germs.shape[1]):
+                for way in (-step, step):
+                    beside = at.copy()
+                    beside[:, axis] = np.cos(np.clip(np.arccos(beside[:, axis]) + way, 0, np.pi))
+                    now = objective(beside)
+                    better = now < value
+                    value[better], at[better] = now[better], beside[better]
+        ends.append(sign * value.reshape(2, columns).min(axis=0))
+    return ends[0], ends[1]

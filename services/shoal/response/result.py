@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,8 @@ from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
     import xarray as xr
+
+BOUNDS = "lower", "upper", "lower_outer", "upper_outer"
 
 
 @dataclass(frozen=True)
@@ -97,11 +100,27 @@ class Response:
         whole = of.reshape(*of.shape[:-1], *shape)
         return np.asarray(whole[..., self.markers.index(marker), self.quantities.index(quantity)])
 
+    def gaps(self, marker: str, quantity: str) -> Array:
+        """Distance of outer and attained bounds as a share of the largest width over time, (instants,), nan where it is
+        not known. Of intervals only.
+        """
+        assert self.bounds is not None
+        found = {name: self.column(marker, quantity, getattr(self.bounds, name)) for name in BOUNDS}
+        width = float((found["upper"] - found["lower"]).max())
+        beyond = np.maximum(found["lower"] - found["lower_outer"], found["upper_outer"] - found["upper"])
+        # What is not known stays so where nothing varies.
+        return np.asarray(beyond / width if width > 0 else 0.0 * beyond)
+
+    def gap(self, marker: str, quantity: str) -> float:
+        """The largest of `gaps` within the horizon."""
+        within = self.gaps(marker, quantity)[self.times <= self.horizon]
+        return float(within.max()) if within.size else math.nan
+
     def table(self) -> tuple[list[str], Array]:
         """Header and rows over time of what is told of every marker, (instants, columns)."""
         told: dict[str, Array] = {}
         if self.bounds is not None:
-            told = {name: getattr(self.bounds, name) for name in ("lower", "upper", "lower_outer", "upper_outer")}
+            told = {name: getattr(self.bounds, name) for name in BOUNDS}
         if self.statistics is not None:
             told = {"mean": self.statistics.mean, "std": self.statistics.std}
             told |= {f"q{q:g}": self.statistics.quantiles[k] for k, q in enumerate(QUANTILES)}
@@ -222,7 +241,8 @@ class Response:
 
         return {
             "t": plain(self.times),
-            **{name: at(getattr(found, name)) for name in ("lower", "upper", "lower_outer", "upper_outer")},
+            **{name: at(getattr(found, name)) for name in BOUNDS},
+            "gap": plain(self.gap(marker, quantity)),
             "argument_lower": plain(self.column(marker, quantity, found.at_lower.T).T),
             "argument_upper": plain(self.column(marker, quantity, found.at_upper.T).T),
             **({} if found.likely is None else {"lower_95": at(found.likely[0]), "upper_95": at(found.likely[1])}),

@@ -21,7 +21,7 @@ ROUNDING = 1e-11
 """A spread below this share of the answers is none."""
 SAFETY = 3.0
 """An error that was seen is taken so many times."""
-FAIR_GAP = 2e-2
+FAIR_GAP = 5e-2
 """The gap that is good enough, where none is asked for, once many runs are made."""
 
 

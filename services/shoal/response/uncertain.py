@@ -274,8 +274,8 @@ def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[J
             f"another, where with 95 % confidence 95 % of all runs lie ({DRAWN} random runs)"
         )
     if bounds is not None and gap is not None and not bounds.gap <= gap:
-        found = "is not known" if math.isnan(bounds.gap) else f"is {bounds.gap:.1e}"
-        return "gap-not-reached", f"the gap between outer and attained bounds {found} of the width, asked for {gap:g}"
+        found = "is not known" if math.isnan(bounds.gap) else f"is {bounds.gap:.1e} of the width"
+        return "gap-not-reached", f"the gap between outer and attained bounds {found}, asked for {gap:g}"
     doubts = [one.doubt for one in judged if one.doubt]
     if doubts:
         return "limit-in-doubt", "; ".join(doubts)

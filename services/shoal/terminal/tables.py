@@ -115,13 +115,17 @@ def response_table(response: Response) -> None:
         headings = "mean", "deviation", "5 %", "95 %"
         told = response.statistics
         columns = [told.mean, told.std, told.quantiles[1], told.quantiles[-2]]
-    table = screen.table(title, "", *headings)
+    table = screen.table(title, "", *headings, *(("gap",) if response.bounds is not None else ()))
     for marker in response.markers:
         for quantity in response.quantities:
             unit = "rad" if quantity == "angle" else "m"
             numbers = (response.column(marker, quantity, column)[-1] for column in columns)
             form = "z.6f" if response.boxes is None else ".4g"
-            table.add_row(f"{marker}.{quantity} [{unit}]", *("-" if np.isnan(x) else f"{x:{form}}" for x in numbers))
+            cells = ["-" if np.isnan(x) else f"{x:{form}}" for x in numbers]
+            if response.bounds is not None:
+                gap = response.gap(marker, quantity)
+                cells.append("-" if np.isnan(gap) else f"{gap:.0e}")
+            table.add_row(f"{marker}.{quantity} [{unit}]", *cells)
     screen.out.print(table)
     if response.statistics is not None:
         _shares(response)

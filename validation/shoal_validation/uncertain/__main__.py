@@ -1,8 +1,8 @@
-"""`python -m shoal_validation.uncertain [--studies N] [--quick] [--page FILE]`: methods for uncertain parameters.
+"""`python -m shoal_validation.uncertain [--studies N] [--runs N] [--only PART] [--quick] [--page FILE]`.
 
-Prints accuracy by number of runs of every method for intervals on every problem, and N random studies by `auto` whose
-bounds 100 000 random runs try to leave; writes both into FILE (docs/uncertain.md). Five minutes; quick: 20 studies and
-the problems of one parameter.
+Prints accuracy by number of runs of every method for intervals on every problem (`methods`), and N random studies of
+machines in closed form by `auto`, whose bounds 100 000 random runs try to leave (`studies`); writes both into FILE
+(docs/uncertain.md). An hour; quick: 20 studies of at most three parameters and the problems of one.
 """
 
 from __future__ import annotations
@@ -15,29 +15,63 @@ from pathlib import Path
 from shoal.response.methods import METHODS
 
 from shoal_validation.document import publish, table
-from shoal_validation.uncertain.measure import Line, Study, measured, random_study
+from shoal_validation.uncertain.measure import Line, measured
 from shoal_validation.uncertain.problems import PROBLEMS
+from shoal_validation.uncertain.studies import RUNS, Judged, drawn, judged
 
 NOT_FOR_INTERVALS = {"chaos", "maximum-entropy", "nested"}
+FEW = 3
+"""Parameters of quick studies, at most."""
 
 
 def main(arguments: list[str]) -> bool:
     """Measure, print, write; whether nothing is wrong in silence where `auto` told it."""
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.uncertain", description=__doc__)
     parser.add_argument("--studies", type=int, default=200)
+    parser.add_argument("--runs", type=int, default=RUNS, help="random runs against every study")
+    parser.add_argument("--only", choices=["methods", "studies"])
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--page", type=Path, default=Path("docs/uncertain.md"))
     chosen = parser.parse_args(arguments)
+    told, good = {}, True
+    if chosen.only != "studies":
+        lines = compared(quick=chosen.quick)
+        told["uncertain-methods"] = methods_table(lines)
+        good = all(line.verdict != "silent" for line in lines if line.method == "auto")
+    if chosen.only != "methods":
+        found = tried(20 if chosen.quick else chosen.studies, chosen.runs, FEW if chosen.quick else None)
+        told["uncertain-studies"] = studies_text(found, chosen.runs)
+        good = good and all(one.kept for one in found)
+    publish(chosen.page, told)
+    return good
+
+
+def compared(*, quick: bool) -> list[Line]:
+    """Every method on every problem; quick: those of one parameter."""
     lines = []
     for problem in PROBLEMS:
-        if chosen.quick and problem.parameters > 1:
+        if not quick or problem.parameters == 1:
+            low, high = problem.reference()
+            lines += [measured(problem, method, low, high) for method in METHODS if method not in NOT_FOR_INTERVALS]
+    return lines
+
+
+def tried(count: int, runs: int, most: int | None = None) -> list[Judged]:
+    """So many random studies against so many runs each; most: parameters. One that fails is printed."""
+    found, seed = list[Judged](), 0
+    while len(found) < count:
+        asked = drawn(seed)
+        seed += 1
+        if most is not None and len(asked.varied) > most:
             continue
-        low, high = problem.reference()
-        lines += [measured(problem, method, low, high) for method in METHODS if method not in NOT_FOR_INTERVALS]
-    studies = [random_study(seed) for seed in range(20 if chosen.quick else chosen.studies)]
-    publish(chosen.page, {"uncertain-methods": methods_table(lines), "uncertain-studies": studies_text(studies)})
-    ours = all(line.verdict != "silent" for line in lines if line.method == "auto")
-    return ours and all(study.kept for study in studies)
+        one = judged(asked, runs)
+        found.append(one)
+        if not one.kept:
+            sys.stdout.write(
+                f"seed {asked.seed}, {asked.kind.name}, {len(asked.varied)} parameters, {asked.cycles:.3g} cycles: gap "
+                f"{one.gap:.1e}, but a run lies {one.beyond:.1e} beyond ({one.why})\n"
+            )
+    return found
 
 
 def methods_table(lines: Sequence[Line]) -> str:
@@ -56,14 +90,22 @@ def _cell(line: Line) -> str:
     return f"{line.runs}: {max(line.short, 0.0):.0e} {line.verdict}"
 
 
-def studies_text(studies: Sequence[Study]) -> str:
-    """One sentence."""
+def studies_text(studies: Sequence[Judged], runs: int) -> str:
+    """One paragraph."""
     left = sum(not study.kept for study in studies)
-    runs = sorted(study.runs for study in studies)
+    whole = [study for study in studies if study.ok]
+    made = sorted(study.runs for study in whole)
+    furthest = max((study.beyond for study in whole), default=0.0)
+    gaps = sorted(study.gap for study in whole)
+    kinds = len({study.drawn.kind.name for study in studies})
+    most = max(len(study.drawn.varied) for study in studies)
+    middle_runs, middle_gap = made[len(made) // 2] if made else 0, gaps[len(gaps) // 2] if gaps else 0.0
     return (
-        f"Of {len(studies)} random studies of one to four intervals (median {runs[len(runs) // 2]} runs) {left} state "
-        "outer bounds that one of 100 000 random runs exceeds by more than the gap told; the furthest lies "
-        f"{max(study.beyond for study in studies):.1e} of the width beyond."
+        f"Of {len(studies)} random studies of {kinds} machines with one to {most} intervals of 0.5 to 30 % after "
+        f"0.3 to 300 cycles, {left} state outer bounds that one of {runs} random runs exceeds within the horizon by "
+        f"more than the gap told. {len(whole)} hold at all instants (median {middle_runs} runs, gap {middle_gap:.0e}); "
+        f"there the furthest run lies {furthest:.0e} of the width beyond. The other {len(studies) - len(whole)} end at "
+        "a horizon and say so."
     )
 
 

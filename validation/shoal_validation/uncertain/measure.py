@@ -1,17 +1,13 @@
-"""One method on one problem, and random studies by `auto`."""
+"""One method on one problem."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from shoal.errors import InputError
 from shoal.response import respond
-from shoal.response.inputs import Inputs, Parameter
-from shoal.response.marginals import Interval
-from shoal.response.runs import Answers
 from shoal.trajectory import Array
 
 from shoal_validation.uncertain.problems import Problem
@@ -20,8 +16,6 @@ MOST = 4000
 """Runs that a method may make."""
 ROUNDING = 1e-5
 """Of the width: what the reference itself may miss."""
-RUNS = 100_000
-"""Random runs that look for a place outside."""
 
 
 @dataclass(frozen=True)
@@ -70,44 +64,3 @@ def measured(problem: Problem, method: str, low: Array, high: Array) -> Line:
         held = beyond <= found.gap + ROUNDING
         verdict = ("holds" if within.all() else "horizon") if held else "silent"
     return Line(problem.name, method, answer.runs.evaluations, short, verdict)
-
-
-@dataclass(frozen=True)
-class Study:
-    """A random study: parameters, runs, gap told, and how far a random run lies beyond the outer bounds, as shares."""
-
-    parameters: int
-    runs: int
-    gap: float
-    beyond: float
-
-    @property
-    def kept(self) -> bool:
-        """Whether no run lies further out than the gap told."""
-        return math.isnan(self.gap) or self.beyond <= self.gap
-
-
-def random_study(seed: int) -> Study:
-    """Two waves in one to four parameters at three instants, by `auto`, against 100 000 random runs and all corners."""
-    random = np.random.default_rng(seed)
-    count = int(random.integers(1, 5))
-    slope, waves = random.normal(size=(count, 3)), random.normal(size=(2, count, 3))
-    shift, strength = random.uniform(0, 2 * np.pi, (2, 3)), random.uniform(0, 2, (2, 3))
-
-    def motion(u: Array) -> Array:
-        return np.asarray(u @ slope + sum(strength[k] * np.sin(u @ waves[k] + shift[k]) for k in range(2)))
-
-    def model(values: Mapping[str, Array]) -> Answers:
-        found = motion(np.stack([values[f"u{k}"] for k in range(count)], axis=1))
-        return Answers(found, np.ones(len(found), dtype=bool))
-
-    inputs = Inputs(tuple(Parameter(f"u{k}", Interval(-1.0, 1.0), {f"u{k}": 1.0}) for k in range(count)))
-    answer = respond(model, inputs, 3, seed=seed)
-    found = answer.bounds
-    assert found is not None
-    drawn = random.uniform(-1, 1, (RUNS, count))
-    drawn[:1000] = np.sign(drawn[:1000])
-    seen = motion(drawn)
-    width = found.upper - found.lower
-    beyond = np.maximum(found.lower_outer - seen.min(axis=0), seen.max(axis=0) - found.upper_outer) / width
-    return Study(count, answer.runs.evaluations, found.gap, float(max(beyond.max(), 0.0)))

@@ -76,6 +76,9 @@ def _next(study: Study, degree: int) -> int:
     if wanted >= HIGHEST or study.runs.evaluations > MORE * study.fair:
         raise TooManyRunsError
     missing = math.ceil(SHARE * size(parameters, wanted)) - made
+    if made < study.fair:
+        # Extremal points come after these, and the fair number holds both.
+        missing = min(missing, study.fair - made - 1)
     if missing > 0:
         terms = total_degree(parameters, wanted)
         study.runs(box_design(study.inputs, study.runs.germs, terms, missing, study.seed + wanted))
@@ -118,7 +121,10 @@ def _round(study: Study, degree: int) -> Round:
         # What the new runs tell makes the polynomial better; its error is what it was without them.
         surrogate = _foretold(study, degree)
         found = extremes(surrogate, parameters, runs.values.shape[1], study.seed + degree)
-    return Round(surrogate, error, enclosure(study, surrogate, found, error).gap, len(new))
+    gap = enclosure(study, surrogate, found, error, rough=True).gap
+    if gap.max() <= (study.gap or FAIR_GAP):
+        gap = enclosure(study, surrogate, found, error).gap
+    return Round(surrogate, error, gap, len(new))
 
 
 def _promising(study: Study, found: Extremes, width: Array) -> Array:
@@ -129,6 +135,8 @@ def _promising(study: Study, found: Extremes, width: Array) -> Array:
     share = np.divide(gains, np.concatenate([width, width]), out=np.zeros_like(gains), where=np.tile(width, 2) > 0)
     apart = max(1e-3, min(0.1, math.sqrt(wanted)))
     most = max(2, min(3 * len(study.inputs), study.fair // 8))
+    if runs.evaluations < study.fair:
+        most = min(most, study.fair - runs.evaluations)
     chosen: list[Array] = []
     beside = runs.germs
     for k in np.argsort(-share):

@@ -18,7 +18,7 @@ from shoal.response.design import box_design
 from shoal.response.extremes import IntArray, Surrogate
 from shoal.response.polynomials import Terms, size, total_degree
 from shoal.response.runs import TooManyRunsError
-from shoal.response.study import FAIR_GAP, FINE_GAP, SAFETY, Found, Study
+from shoal.response.study import FINE_GAP, SAFETY, Found, Study
 from shoal.trajectory import Array
 
 SHARE = 1.25
@@ -26,6 +26,8 @@ SHARE = 1.25
 STRETCHES = 1.05, 1.2, 1.6
 """Runs are so many times as long as asked for: the slowest has to reach the phase of the fastest."""
 HIGHEST = 12
+OFF = 2e-2
+"""Share of the width above which a surrogate is no good."""
 HELPS = 0.5
 """A degree that leaves more than this share of the error does not help; two in a row are enough."""
 
@@ -91,7 +93,7 @@ def _grown(study: Study, make: Callable[[Watch], LongTime], seen: Watch) -> Foun
                 degree += 1
     except TooManyRunsError:
         pass
-    if found is None or found.share > max(wanted, FAIR_GAP):
+    if found is None or found.share > max(wanted, OFF):
         off = "too few runs" if found is None else f"its error is {found.share:.1g} of the width"
         raise UnsuitableError(f"{kind.name} does not foretell new runs: {off}")
     return found

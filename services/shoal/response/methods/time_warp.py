@@ -10,6 +10,7 @@ time warping, SIAM/ASA Journal on Uncertainty Quantification 5, 2017). For one d
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -54,28 +55,35 @@ class Warped:
     def __call__(self, germs: Array) -> Array:
         """(places, columns)."""
         basis = self.inputs.basis(germs, self.terms)
-        turns = basis @ self.turns
-        return at_every_instant(len(germs), len(self.instants), lambda at: self._at(basis, turns, at))
+        return at_every_instant(len(germs), len(self.instants), lambda at: self._at(basis, at))
 
     def each(self, germs: Array, columns: IntArray) -> Array:
         """One column at each place, (places,)."""
         signals = self.course.shape[2]
-        basis = self.inputs.basis(germs, self.terms)
-        told = self._at(basis, basis @ self.turns, columns // signals)
+        told = self._at(self.inputs.basis(germs, self.terms), columns // signals)
         return np.asarray(told[np.arange(len(germs)), columns % signals])
 
-    def _at(self, basis: Array, turns: Array, at: IntArray) -> Array:
+    @cached_property
+    def _by_turn(self) -> Array:
+        return np.ascontiguousarray(self.turns.T)
+
+    def _at(self, basis: Array, at: IntArray) -> Array:
         """At one instant each, (places, signals)."""
-        count, last = turns.shape[0], turns.shape[1] - 1
-        when, rows = self.instants[at], np.arange(count)
-        # One search in all rows: each is shifted beyond the one before.
-        shift = 2 * (np.abs(turns).max() + self.instants[-1]) * rows
-        turn = np.searchsorted((turns + shift[:, None]).ravel(), when + shift, side="right") - 1 - rows * (last + 1)
-        turn = np.clip(turn, 0, last - 1)
-        begin, end = turns[rows, turn], turns[rows, turn + 1]
-        phase = 2 * (when - begin) / (end - begin) - 1
+        when, last = self.instants[at], self.turns.shape[1] - 1
+
+        def begin(turn: IntArray) -> Array:
+            return np.asarray(np.einsum("ij,ij->i", basis, self._by_turn[turn]))
+
+        # The last turn that is not later, by bisection.
+        turn, above = np.zeros(len(when), dtype=np.int64), np.full(len(when), last)
+        for _ in range(last.bit_length()):
+            middle = (turn + above) // 2
+            earlier = begin(middle) <= when
+            turn, above = np.where(earlier, middle, turn), np.where(earlier, above, middle)
+        start = begin(turn)
+        phase = 2 * (when - start) / (begin(turn + 1) - start) - 1
         within = np.polynomial.chebyshev.chebvander(phase, NODES - 1)
-        told = np.empty((count, self.course.shape[2]))
+        told = np.empty((len(when), self.course.shape[2]))
         order = np.argsort(turn, kind="stable")
         for some in np.split(order, np.flatnonzero(np.diff(turn[order])) + 1):
             products = (within[some, :, None] * basis[some, None, :]).reshape(len(some), -1)
