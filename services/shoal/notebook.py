@@ -289,22 +289,25 @@ def design(
     values: Values | None = None,
     noise: float | None = None,
     angle_noise: float | None = None,
+    sensor_noise: Mapping[str, float] | None = None,
     duration: float | None = None,
     rate: float | None = None,
     parameter: str | None = None,
 ) -> Design:
-    """What to measure to know the parameters of a problem best: which marker, how long and how often.
+    """What to measure to know the parameters of a problem best: which sensor where, how long and how often.
 
     data: as for `identify`; about: the answer from the data, where there are any, or the start; noise [m], angle_noise
-    [rad]: standard deviations, duration [s] and rate [1/s] of the measurement, else those of the problem and its data;
-    parameter: to be sharpened, else the weakest. Raises InputError, ComputationError where no answer can be trusted.
+    [rad]: standard deviations, sensor_noise: of acceleration, rate, force, torque and strain, by name, in SI units,
+    which are weighed where it is known; duration [s] and rate [1/s] of the measurement, else those of the problem and
+    its data; parameter: to be sharpened, else the weakest. Raises InputError, ComputationError where no answer can be
+    trusted.
     """
     from shoal.identification.design import about_answer, design, has_data
 
     (stated, carried), wanted = _values(values), _problem(problem)
     if carried is not None:
         wanted, stated, _ = carried.into(wanted)
-    how = dict[str, Any](noise=noise, angle_noise=angle_noise, duration=duration, rate=rate)
+    how = dict[str, Any](noise=noise, angle_noise=angle_noise, sensor_noise=sensor_noise, duration=duration, rate=rate)
     if about == "answer" or (about is None and (data is not None or has_data(wanted))):
         with _files(data) as files:
             return about_answer(wanted, data=files, values=stated, parameter=parameter, **how)

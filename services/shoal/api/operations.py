@@ -192,12 +192,14 @@ class Identify(OfProblem):
 class Design(OfProblem):
     """What to measure to know the parameters best; the fields are those of `shoal design`.
 
-    about: `answer` is what the data tell, `start` needs none; noise in m, angle_noise in rad, duration in s, rate in Hz
+    about: `answer` is what the data tell, `start` needs none; noise in m, angle_noise in rad, sensor_noise by
+    what a sensor measures (acceleration, rate, force, torque, strain) in SI units, duration in s, rate in Hz
     """
 
     about: Literal["answer", "start"] | None = None
     noise: Positive | None = None
     angle_noise: Positive | None = None
+    sensor_noise: dict[str, Positive] | None = None
     duration: Positive | None = None
     rate: Positive | None = None
     parameter: BuiltIn | None = None
