@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from shoal.engines.compare import Comparison
     from shoal.engines.prepared import Prepared
     from shoal.engines.sweep import Sweep
+    from shoal.exported import Exported
     from shoal.identification import Estimate, Problem
     from shoal.identification.carried import Carried
     from shoal.identification.design import Design
@@ -230,6 +231,29 @@ def modes(
     wanted = _scene(scene, values)
     found = modes(wanted, about=about, count=count)
     return of_modes(found, wanted) if verify else found
+
+
+def export(
+    scene: Scene | str,
+    to: Literal["exudyn", "mjcf"],
+    file: str | Path | None = None,
+    *,
+    values: Values | None = None,
+    verify: bool = True,
+) -> Exported:
+    """A scene for another tool: a script for Exudyn that runs by itself, or MuJoCo's MJCF.
+
+    file: written where it is given, .py or .xml; values: fields of the scene to set, by dotted path; verify: run it
+    there and here, and tell how far apart the motions are [m]. Raises InputError that names what the tool has not,
+    ComputationError where a run fails.
+    """
+    from shoal.exported import checked, export
+
+    path = None if file is None else Path(file)
+    found = export(_scene(scene, values), checked(to, path), verify=verify)
+    if path is not None:
+        found.save(path)
+    return found
 
 
 def reactions(scene: Scene | str, times: Times, *, values: Values | None = None) -> list[Reactions]:

@@ -174,6 +174,21 @@ class Reactions(OfScene):
     times: Some
 
 
+class Export(OfScene):
+    """A scene as the `text` of a file of another tool, `name`d, and the `distance` [m] between the motions.
+
+    verify: whether it is run there and here
+    """
+
+    to: Literal["exudyn", "mjcf"]
+    verify: bool = True
+
+    @property
+    def runs(self) -> int:
+        """Here and, to compare, there."""
+        return 2 if self.verify else 1
+
+
 class Identify(OfProblem):
     """The parameters of a problem from measured motion; the fields are those of `shoal identify`. time_limit in s."""
 
@@ -213,6 +228,7 @@ OPERATIONS: dict[str, type[Request]] = {
     "statics": Statics,
     "modes": Modes,
     "reactions": Reactions,
+    "export": Export,
     "identify": Identify,
     "design": Design,
 }
