@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from shoal.notebook import (
         compare,
         design,
+        export,
         identify,
         modes,
         plot,
@@ -37,6 +38,7 @@ __all__ = [
     "Trajectory",
     "compare",
     "design",
+    "export",
     "identify",
     "load_problem",
     "load_scene",

@@ -43,7 +43,11 @@ def _by_service(function: Callable[..., Any], *, job: bool = False) -> Any:
         told = kwargs.pop("progress", None) if job else None
         if job:
             return self._awaited(self.submit(function.__name__, *args, **kwargs), told)
-        return self._answer("POST", f"/v1/{function.__name__}", self._request(function.__name__, *args, **kwargs))
+        found = self._answer("POST", f"/v1/{function.__name__}", self._request(function.__name__, *args, **kwargs))
+        file = signature(function).bind(*args, **kwargs).arguments.get("file")
+        if file is not None:
+            found.save(Path(file))
+        return found
 
     stated = signature(function)
     own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
@@ -65,6 +69,7 @@ class Client:
     statics = _by_service(notebook.statics)
     modes = _by_service(notebook.modes)
     reactions = _by_service(notebook.reactions)
+    export = _by_service(notebook.export)
     select = _by_service(notebook.select, job=True)
     sweep = _by_service(notebook.sweep, job=True)
     uncertain = _by_service(notebook.uncertain, job=True)
@@ -125,6 +130,7 @@ class Client:
             raise InputError(f"operation: no operation {operation!r}")
         given = dict(signature(getattr(notebook, operation)).bind(*args, **kwargs).arguments)
         given |= given.pop("options", {})
+        given.pop("file", None)
         engine = given.pop("engine", None)
         if engine is not None and engine != (own := self._service.ask("GET", "/v1/capabilities")["engine"]):
             raise InputError(f"engine: the service at {self._service.name} runs {own}, found {engine!r}")

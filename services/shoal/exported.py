@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
@@ -25,29 +26,44 @@ class Tool:
 
 @dataclass(frozen=True)
 class Exported:
-    """A file, and how far the tool's motion is from the native one at most [m], if that was asked for."""
+    """A scene as the content of another tool's file, with the name that the file would have.
 
-    file: Path
+    distance: how far the tool's motion is from the native one at most [m], if that was asked for
+    """
+
+    to: str
+    name: str
+    text: str
     distance: float | None
 
+    def to_json(self) -> dict[str, Any]:
+        """The object that a service answers."""
+        return {"status": "ok", **asdict(self)}
 
-def export(scene: Scene, to: str, out: Path | None = None, *, verify: bool = True) -> Exported:
-    """Write a scene as a file of another tool, one of `TOOLS`.
+    def save(self, file: Path) -> None:
+        """Write the file, whole or not at all. Raises ComputationError."""
+        with whole(file) as part:
+            part.write_text(self.text, encoding="utf-8")
 
-    out: the file, else the scene's name in the working folder; verify: run it there and here, and compare.
-    Raises InputError that names what the tool has not, ComputationError where a run fails or the file is not written.
+
+def export(scene: Scene, to: str, *, verify: bool = True) -> Exported:
+    """A scene for another tool, one of `TOOLS`; verify: run it there and here, and compare.
+
+    Raises InputError that names what the tool has not, ComputationError where a run fails.
     """
+    tool = TOOLS[checked(to)]
+    text = tool.text(scene)
+    return Exported(to, f"{scene.name}{tool.ending}", text, _compared(tool, scene) if verify else None)
+
+
+def checked(to: str, file: Path | None = None) -> str:
+    """The tool, if there is one that has files of such a name. Raises InputError."""
     if to not in TOOLS:
         raise InputError(f"to: no tool {to!r}; there are {', '.join(TOOLS)}")
-    tool = TOOLS[to]
-    target = out or Path(f"{scene.name}{tool.ending}")
-    if target.suffix != tool.ending:
-        raise InputError(f"out: {target} ends in {target.suffix or 'nothing'}; {to} has {tool.ending}")
-    text = tool.text(scene)
-    distance = _compared(tool, scene) if verify else None
-    with whole(target) as part:
-        part.write_text(text, encoding="utf-8")
-    return Exported(target, distance)
+    ending = TOOLS[to].ending
+    if file is not None and file.suffix != ending:
+        raise InputError(f"out: {file} ends in {file.suffix or 'nothing'}; {to} has {ending}")
+    return to
 
 
 def _compared(tool: Tool, scene: Scene) -> float:

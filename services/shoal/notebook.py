@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from shoal.engines.compare import Comparison
     from shoal.engines.prepared import Prepared
     from shoal.engines.sweep import Sweep
+    from shoal.exported import Exported
     from shoal.identification import Estimate, Problem
     from shoal.identification.carried import Carried
     from shoal.identification.design import Design
@@ -232,6 +233,29 @@ def modes(
     return of_modes(found, wanted) if verify else found
 
 
+def export(
+    scene: Scene | str,
+    to: Literal["exudyn", "mjcf"],
+    file: str | Path | None = None,
+    *,
+    values: Values | None = None,
+    verify: bool = True,
+) -> Exported:
+    """A scene for another tool: a script for Exudyn that runs by itself, or MuJoCo's MJCF.
+
+    file: written where it is given, .py or .xml; values: fields of the scene to set, by dotted path; verify: run it
+    there and here, and tell how far apart the motions are [m]. Raises InputError that names what the tool has not,
+    ComputationError where a run fails.
+    """
+    from shoal.exported import checked, export
+
+    path = None if file is None else Path(file)
+    found = export(_scene(scene, values), checked(to, path), verify=verify)
+    if path is not None:
+        found.save(path)
+    return found
+
+
 def reactions(scene: Scene | str, times: Times, *, values: Values | None = None) -> list[Reactions]:
     """Forces and torques in the joints of a scene at times [s] of its motion. Raises InputError, ComputationError.
 
@@ -289,22 +313,25 @@ def design(
     values: Values | None = None,
     noise: float | None = None,
     angle_noise: float | None = None,
+    sensor_noise: Mapping[str, float] | None = None,
     duration: float | None = None,
     rate: float | None = None,
     parameter: str | None = None,
 ) -> Design:
-    """What to measure to know the parameters of a problem best: which marker, how long and how often.
+    """What to measure to know the parameters of a problem best: which sensor where, how long and how often.
 
     data: as for `identify`; about: the answer from the data, where there are any, or the start; noise [m], angle_noise
-    [rad]: standard deviations, duration [s] and rate [1/s] of the measurement, else those of the problem and its data;
-    parameter: to be sharpened, else the weakest. Raises InputError, ComputationError where no answer can be trusted.
+    [rad]: standard deviations, sensor_noise: of acceleration, rate, force, torque and strain, by name, in SI units,
+    which are weighed where it is known; duration [s] and rate [1/s] of the measurement, else those of the problem and
+    its data; parameter: to be sharpened, else the weakest. Raises InputError, ComputationError where no answer can be
+    trusted.
     """
     from shoal.identification.design import about_answer, design, has_data
 
     (stated, carried), wanted = _values(values), _problem(problem)
     if carried is not None:
         wanted, stated, _ = carried.into(wanted)
-    how = dict[str, Any](noise=noise, angle_noise=angle_noise, duration=duration, rate=rate)
+    how = dict[str, Any](noise=noise, angle_noise=angle_noise, sensor_noise=sensor_noise, duration=duration, rate=rate)
     if about == "answer" or (about is None and (data is not None or has_data(wanted))):
         with _files(data) as files:
             return about_answer(wanted, data=files, values=stated, parameter=parameter, **how)

@@ -39,6 +39,7 @@ CALLS: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {
     "statics": (("flexible-double-pendulum",), {"values": {"gravity": [0.5, -1.62]}}),
     "modes": (("flexible-double-pendulum",), {"count": 3, "about": "equilibrium"}),
     "reactions": ((SCENE, np.array([0.0, 0.1])), {}),
+    "export": (("single-pendulum", "exudyn"), {"values": {"solver.duration": 0.1}}),
     "identify": (("paper-case-1",), {"method": "least-squares", "seed": 1}),
     "design": (("paper-case-1",), {"about": "start", "noise": 1e-3}),
 }
@@ -50,6 +51,7 @@ ERRORS: dict[str, tuple[str, ...]] = {
     "statics": ("mesh_error",),
     "modes": ("modes", "0", "mesh_error"),
     "reactions": ("reactions", "0", "unbalanced"),
+    "export": ("distance",),
     "identify": ("parameters", "theta1", "std"),
     "design": ("doubt",),
 }
@@ -161,6 +163,16 @@ def test_an_estimate_is_taken_on(client: Client, tmp_path: Path) -> None:
     assert far.prediction
     assert far.parameters == near.parameters
     assert far.evaluations == near.evaluations
+
+
+def test_an_export_is_written_where_the_caller_says(client: Client, tmp_path: Path) -> None:
+    near, far = tmp_path / "near.py", tmp_path / "far.py"
+    shoal.export("single-pendulum", to="exudyn", file=near, verify=False)
+    answer = client.export("single-pendulum", to="exudyn", file=far, verify=False)
+    assert far.read_text() == near.read_text() == answer.text
+    assert (answer.name, answer.distance) == ("single-pendulum.py", None)
+    with pytest.raises(InputError, match=r"out: x\.xml ends in \.xml; exudyn has \.py"):
+        shoal.export("single-pendulum", to="exudyn", file="x.xml")
 
 
 def test_jobs_are_submitted_followed_and_cancelled(client: Client) -> None:

@@ -12,16 +12,20 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
+from newton_euler import NewtonEuler
 from scipy.integrate import solve_ivp
 from shoal.cli import main
 from shoal.engines import get_engine
+from shoal.engines.poses import initial_poses
 from shoal.errors import InputError
 from shoal.identification import Problem, identify, measure
 from shoal.identification.recording.felt import equipped, from_start
 from shoal.identification.recording.observation import Camera, observe
-from shoal.identification.recording.source import Channel
+from shoal.identification.recording.source import REACTIONS, Channel
+from shoal.mechanics.start.start import complete
 from shoal.scene import Scene
 from shoal.trajectory import Array
+from shoal_validation.coverage.sensed_machines import machine
 
 LENGTH, MASS, GRAVITY, FRICTION = 1.3, 1.3, 9.81, 0.2
 INERTIA = MASS * LENGTH**2 / 3
@@ -146,6 +150,26 @@ def test_the_torque_of_a_drive_is_what_turns_the_rod_as_stated(engine: str) -> N
     np.testing.assert_allclose(found[:, 0], torque, atol=1e-4)
     np.testing.assert_allclose(found[:, 1], -FRICTION * rate, atol=1e-4)
     np.testing.assert_allclose(found[:, 2], centre_force(angle, rate, change)[:, 1], atol=1e-4)
+
+
+@pytest.mark.parametrize("seed", [0, 4, 9])
+def test_sensors_of_random_machines_show_what_newton_and_euler_say(seed: int) -> None:
+    """A slider-crank, a four-bar linkage and a chain, with friction, springs and motors."""
+    drawn = machine(np.random.default_rng(seed))
+    joints, times = list(drawn.scene.joints), np.linspace(0.05, 1.0, 20)
+    cells = [Channel(joint=joint, quantity=what) for joint in joints for what in REACTIONS]
+    imu = [Channel(marker="imu", quantity=axis, tilt=drawn.tilt) for axis in ("ax", "ay")]
+    found = seen(drawn.scene, (*imu, *cells, GYRO), "gauss", times)
+    starts = initial_poses(complete(drawn.scene).scene)
+    poses = {name: np.array([*starts[name].origin, starts[name].angle]) for name in drawn.scene.bodies}
+    rates = {name: np.array([*starts[name].velocity, starts[name].rate]) for name in drawn.scene.bodies}
+    oracle, place = NewtonEuler(drawn.data, poses, rates), drawn.data["markers"]["imu"]
+    wanted = []
+    for q, v, t in oracle.run(times):
+        a, exerted = oracle.solve(q, v, t)
+        felt = oracle.specific_force(place, drawn.tilt, q, v, a)
+        wanted.append([*felt, *np.concatenate([exerted[joint] for joint in joints]), oracle.rate(place, v)])
+    np.testing.assert_allclose(found, wanted, atol=1e-7)
 
 
 SPAN, HEIGHT, WIDTH, YOUNG = 1.0, 0.02, 0.03, 2e9

@@ -20,6 +20,7 @@ def design(
     about: About = None,
     noise: Size = None,
     angle_noise: Size = None,
+    sensor_noise: dict[str, float] = {},  # noqa: B006 - as `values`
     duration: Size = None,
     rate: Size = None,
     parameter: str | None = None,
@@ -34,6 +35,8 @@ def design(
         about: About what the data tell, or about the start; else the first, where there are data.
         noise: Standard deviation of positions [m]; else the problem's.
         angle_noise: Standard deviation of angles [rad]; else the problem's.
+        sensor_noise: Of sensors on the machine that are weighed too, in SI units, as {sensor: size}, such as
+            {"acceleration": 0.05, "rate": 0.005, "strain": 1e-6}; force and torque are load cells in joints.
         duration: Of the measurement [s]; else that of the data.
         rate: Samples per second; else that of the data.
         parameter: To be sharpened; else the weakest.
@@ -42,7 +45,8 @@ def design(
     problem, data = held("problem", "problems", problem), held("data", "recordings", data)
     load_problem(problem).load_scene(values)
     name = title(problem)
-    how = {"about": about, "noise": noise, "angle_noise": angle_noise, "duration": duration, "rate": rate}
+    sizes = {"noise": noise, "angle_noise": angle_noise, "sensor_noise": sensor_noise}
+    how = {**sizes, "about": about, "duration": duration, "rate": rate}
     with progress(1, f"a measurement for {name}"):
         result = Designed(*plan(problem, data or None, {**how, "parameter": parameter, "values": values}))
     show_result(f"{name}: what to measure", tables.of_design(result.answer), result.run_id)

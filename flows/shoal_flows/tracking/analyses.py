@@ -49,7 +49,7 @@ def log_design(found: Design) -> str:
     """One run with the table of what could be measured; returns its id."""
     tags = {"kind": "design", "problem": found.problem, "verdict": "ok" if found.ok else "failed"}
     with open_run("Design", f"{found.problem} · design", tags=tags) as run:
-        asked = {"noise": found.noise, "duration": found.duration, "rate": found.rate}
+        asked = {"noise": json_text(found.noise), "duration": found.duration, "rate": found.rate}
         run.params({"problem": found.problem, "best": found.ranked[0][0].label, **asked})
         best = found.ranked[0][1]
         for kind, precision in (("now", found.now), ("best", best)):

@@ -194,6 +194,21 @@ class Reactions(OfScene):
     times: Some
 
 
+class Export(OfScene):
+    """A scene as the `text` of a file of another tool, `name`d, and the `distance` [m] between the motions.
+
+    verify: whether it is run there and here
+    """
+
+    to: Literal["exudyn", "mjcf"]
+    verify: bool = True
+
+    @property
+    def runs(self) -> int:
+        """Here and, to compare, there."""
+        return 2 if self.verify else 1
+
+
 class Identify(OfProblem):
     """The parameters of a problem from measured motion; the fields are those of `shoal identify`. time_limit in s.
 
@@ -216,12 +231,14 @@ class Identify(OfProblem):
 class Design(OfProblem):
     """What to measure to know the parameters best; the fields are those of `shoal design`.
 
-    about: `answer` is what the data tell, `start` needs none; noise in m, angle_noise in rad, duration in s, rate in Hz
+    about: `answer` is what the data tell, `start` needs none; noise in m, angle_noise in rad, sensor_noise by
+    what a sensor measures (acceleration, rate, force, torque, strain) in SI units, duration in s, rate in Hz
     """
 
     about: Literal["answer", "start"] | None = None
     noise: Positive | None = None
     angle_noise: Positive | None = None
+    sensor_noise: dict[str, Positive] | None = None
     duration: Positive | None = None
     rate: Positive | None = None
     parameter: BuiltIn | None = None
@@ -235,6 +252,7 @@ OPERATIONS: dict[str, type[Request]] = {
     "statics": Statics,
     "modes": Modes,
     "reactions": Reactions,
+    "export": Export,
     "identify": Identify,
     "design": Design,
 }

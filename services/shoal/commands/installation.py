@@ -72,16 +72,18 @@ def export_fmu(
 @options.out(".py", ".xml", otherwise="; else the scene's name")
 def export(scene: str, to: str, values: Values, verify: bool, out: Out) -> None:
     """Write SCENE as a file of another tool. How far its motion is from ours is told on stderr."""
-    from shoal.exported import export
+    from shoal.exported import checked, export
     from shoal.scene import load_scene
     from shoal.terminal import screen
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"exporting {wanted.name}"):
-        done = export(wanted, to, out, verify=verify)
+        done = export(wanted, checked(to, out), verify=verify)
+    out = out or Path(done.name)
+    done.save(out)
     if done.distance is not None:
         click.echo(f"{to}: its motion is within {done.distance:.2g} m of `shoal simulate`", err=True)
-    click.echo(done.file)
+    click.echo(out)
 
 
 @click.command("import")

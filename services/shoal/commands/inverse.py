@@ -102,6 +102,13 @@ def identify(
 @click.option("--about", type=click.Choice(["answer", "start"]), help="The answer from the data, where there are any.")
 @click.option("--noise", type=float, metavar="METRES", help="Standard deviation of positions; else the problem's.")
 @click.option("--angle-noise", type=float, metavar="RADIANS", help="Standard deviation of angles; else the problem's.")
+@click.option(
+    "--sensor-noise",
+    multiple=True,
+    metavar="SENSOR=SIZE",
+    callback=options.sizes,
+    help="Weigh acceleration, rate, force, torque or strain too, with this standard deviation in SI units.",
+)
 @click.option("--duration", type=float, metavar="SECONDS", help="Of the measurement; else that of the data.")
 @click.option("--rate", type=float, metavar="HERTZ", help="Samples per second; else that of the data.")
 @click.option("--parameter", metavar="NAME", help="To be sharpened; else the weakest.")
@@ -118,7 +125,7 @@ def design(
     fitted: Carried | None,
     **how: Any,
 ) -> None:
-    """Say what to measure to know the parameters of PROBLEM best. Which marker, how long and how often."""
+    """Say what to measure to know the parameters of PROBLEM best. Which sensor where, how long and how often."""
     from shoal.identification import load_problem
     from shoal.notebook import design
     from shoal.pictures import files

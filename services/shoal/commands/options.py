@@ -88,6 +88,15 @@ def recordings(
     return found or None
 
 
+def sizes(context: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> dict[str, float] | None:
+    """NAME=NUMBER, once or more."""
+    found = key_value(context, parameter, given)
+    try:
+        return {name: float(size) for name, size in found.items()} or None
+    except ValueError:
+        raise click.BadParameter(f"{', '.join(given)} is not NAME=NUMBER") from None
+
+
 def windows(
     context: click.Context, parameter: click.Parameter, given: tuple[str, ...]
 ) -> list[tuple[float, float]] | dict[str, list[tuple[float, float]]] | None:

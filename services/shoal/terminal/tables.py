@@ -412,10 +412,12 @@ def _effort(estimate: Estimate) -> None:
 
 def design_table(found: Design) -> None:
     """Candidates, the best first, each alone and beside the best one; then duration and rate."""
+    from shoal.identification.design import SENSORS
+
     beside = dict(found.second)
     best = found.ranked[0][0]
     title = f"{found.problem}: what to measure, {found.duration:g} s at {found.rate:g} samples a second"
-    table = screen.table(title, "marker", "weakest", "std", "A", "D", f"with {best.name}: weakest", "std")
+    table = screen.table(title, "sensor", "weakest", "std", "A", "D", f"with {best.name}: weakest", "std")
     now = found.aim.weakest(found.now)
     table.add_row("as now", now[0], f"{now[1]:.2e}", f"{found.now.a:.1e}", f"{found.now.d:.1e}", "", "")
     for candidate, precision in found.ranked:
@@ -432,9 +434,10 @@ def design_table(found: Design) -> None:
     for duration, row in zip(found.durations, found.table, strict=True):
         table.add_row(f"{duration:g}", *(f"{score:.1e}" for score in row))
     screen.out.print(table)
-    angle = "" if found.angle_noise is None else f", {found.angle_noise:g} rad"
+    units = {"position": "m", "angle": "rad"} | SENSORS
+    noise = ", ".join(f"{size:g} {units[kind]}" for kind, size in found.noise.items())
     values = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
-    screen.say(f"noise {found.noise:g} m{angle}; about {values}")
+    screen.say(f"noise {noise}; about {values}")
     screen.say("A, D: root mean square and geometric mean of the standard deviations over the ranges of the parameters")
     screen.say(f"sensitivities by two steps differ by {found.doubt:.0e}")
 

@@ -1,6 +1,8 @@
 """Which property of a measurement explains a misfit: the right one, with its value, and none where none is wrong."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -8,8 +10,10 @@ from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem, Verdict, identify, load_problem
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects import Suspect, suspects
+from shoal.identification.judge.suspects.of_machine import of_machine
 from shoal.identification.methods.least_squares import differentiate, least_squares
 from shoal_validation.coverage.cases import tip
+from shoal_validation.coverage.sensed_machines import machine
 from shoal_validation.suspects.study import trial
 
 RECORDINGS = Path(__file__).parents[4] / "shared" / "data" / "multiarm_kaheman"
@@ -46,6 +50,15 @@ TIP = tip(TIMES, np.pi / 4, np.pi / 6)
 
 def test_nothing_is_suspect_where_the_model_is_right() -> None:
     assert found(TIP, TIMES) == {}
+
+
+def test_every_suspect_of_a_machine_has_a_name_of_its_own() -> None:
+    """Both coordinates of a centre of mass beside the axes, among others."""
+    scene = machine(np.random.default_rng(40)).scene
+    candidates = [*of_machine(cast("ForwardModel", SimpleNamespace(scene=scene)))]
+    names = [candidate.name for candidate in candidates]
+    assert {"x of the centre of mass of crank", "y of the centre of mass of crank"} <= {*names}
+    assert len({*names}) == len(names)
 
 
 def test_a_wrong_clock() -> None:

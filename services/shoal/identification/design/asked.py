@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,30 +17,61 @@ _MOST = 4000
 """Instants at which sensitivities are computed, at most."""
 
 
-def stated_noise(problem: Problem, noise: float | None, angle_noise: float | None) -> tuple[float, float | None]:
-    """Standard deviations of positions [m] and angles [rad], as given, else as the problem states them."""
+POSITION, ANGLE = "position", "angle"
+KINDS = {
+    **dict.fromkeys(("x", "y", "z"), POSITION),
+    **dict.fromkeys(("ax", "ay"), "acceleration"),
+    **dict.fromkeys(("fx", "fy"), "force"),
+}
+"""What a quantity is as far as noise goes, where that is not the quantity itself."""
+SENSORS = {"acceleration": "m/s^2", "rate": "rad/s", "force": "N", "torque": "N m", "strain": "m/m"}
+"""What sensors on a machine measure, and in which unit."""
+
+
+def kind_of(channel: Channel) -> str:
+    """What a channel measures: position, angle, acceleration, rate, force, torque or strain."""
+    return KINDS.get(channel.quantity, channel.quantity)
+
+
+def stated_noise(
+    problem: Problem, noise: float | None, angle_noise: float | None, sensors: Mapping[str, float] | None
+) -> dict[str, float]:
+    """Standard deviations in SI units by what is measured, as given, else as the problem states them.
+
+    A rate without its own is as noisy as an angle, per second. Raises InputError.
+    """
     source = next(iter(problem.sources.values()))
-    for channel in problem.channels_of(source):
-        stated = channel.noise or problem.noise
-        if channel.is_position:
-            noise = noise or stated
-        elif channel.quantity == "angle":
-            angle_noise = angle_noise or stated
-    for what, size in (("noise", noise), ("angle_noise", angle_noise)):
+    for kind in sensors or {}:
+        if kind not in SENSORS:
+            raise InputError(f"sensor_noise: no sensor of {kind!r}; there are {', '.join(SENSORS)}")
+    named = {"noise": (POSITION, noise), "angle_noise": (ANGLE, angle_noise)}
+    named |= {f"sensor_noise.{kind}": (kind, size) for kind, size in (sensors or {}).items()}
+    for what, (_, size) in named.items():
         if size is not None and not (np.isfinite(size) and size > 0):
             raise InputError(f"{what}: {size:g} is no standard deviation; it is positive")
-    if noise is None:
-        raise InputError(f"noise: {problem.name} states none for positions; give their standard deviation in m")
-    if angle_noise is None and any(not channel.is_position for channel in problem.channels_of(source)):
-        raise InputError(
-            f"angle_noise: {problem.name} states none for its angles; give their standard deviation in rad"
-        )
-    return noise, angle_noise
+    found = {kind: size for kind, size in named.values() if size is not None}
+    channels = problem.channels_of(source)
+    for channel in channels:
+        size = channel.noise or problem.noise
+        if size is not None:
+            found.setdefault(kind_of(channel), size)
+    if ANGLE in found and any(channel.quantity == "rate" for channel in channels):
+        found.setdefault("rate", found[ANGLE])
+    for kind in dict.fromkeys(map(kind_of, channels)):
+        if kind not in found:
+            field, unit = _ASKED.get(kind, (f"sensor_noise.{kind}", "in SI units"))
+            raise InputError(
+                f"{field}: {problem.name} states none for its {kind}s; give their standard deviation {unit}"
+            )
+    return found
 
 
-def noise_in(channel: Channel, noise: float, angle_noise: float | None) -> float:
-    """Standard deviation of a channel; a rate without its own is as noisy as an angle, per second."""
-    return channel.noise or (noise if channel.is_position else angle_noise or 1.0)
+_ASKED = {POSITION: ("noise", "in m"), ANGLE: ("angle_noise", "in rad")}
+
+
+def noise_in(channel: Channel, noise: Mapping[str, float]) -> float:
+    """Standard deviation of a channel, its own first."""
+    return channel.noise or noise[kind_of(channel)]
 
 
 def today_of(

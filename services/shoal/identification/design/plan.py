@@ -1,4 +1,4 @@
-"""What to measure: which marker, for how long and how often would sharpen the parameter that is known worst.
+"""What to measure: which sensor and where, for how long and how often would sharpen the parameter that is known worst.
 
 The sensitivities of every place to the parameters, at all times, come from one set of runs. With noise of a given size
 they tell the standard deviation of every parameter beforehand (Cramer-Rao bound; Atkinson, Donev, Tobias, Optimum
@@ -15,7 +15,7 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
-from shoal.identification.design.asked import grid, noise_in, stated_noise, today_of
+from shoal.identification.design.asked import ANGLE, POSITION, SENSORS, grid, noise_in, stated_noise, today_of
 from shoal.identification.design.precision import Aim, Bundle, Precision
 from shoal.identification.design.sensors import Sensor, columns_of, sensors_of
 from shoal.identification.forward import ForwardModel
@@ -35,8 +35,9 @@ _COURSE = 40
 
 @dataclass(frozen=True)
 class Design:
-    """Sensors, the best first, at the duration [s] and rate [1/s] of today, for given noise [m], [rad].
+    """Sensors, the best first, at the duration [s] and rate [1/s] of today.
 
+    noise: standard deviations in SI units by what is measured, of the kinds that were weighed
     aim: what is to be sharpened; now: with the channels of the problem; second: each sensor beside the best one
     table: score by the best marker, (durations, rates)
     course: score of each sensor until `times` [s], (sensors, times)
@@ -46,8 +47,7 @@ class Design:
     problem: str
     aim: Aim
     values: dict[str, float]
-    noise: float
-    angle_noise: float | None
+    noise: dict[str, float]
     duration: float
     rate: float
     now: Precision
@@ -73,14 +73,13 @@ class Design:
             return {"std": std, "a": precision.a, "d": precision.d, "unknown": precision.unknown}
 
         def rows(found: list[tuple[Sensor, Precision]]) -> list[dict[str, Any]]:
-            return [
-                {"marker": c.name, "to": c.to, "body": c.body, "point": c.point, "quantity": c.quantity} | told(p)
-                for c, p in found
-            ]
+            return [sensor.to_json() | told(precision) for sensor, precision in found]
 
-        stated = ("problem", "values", "noise", "angle_noise", "duration", "rate")
+        stated = ("problem", "values", "duration", "rate")
+        noise: dict[str, Any] = {"noise": self.noise.get(POSITION), "angle_noise": self.noise.get(ANGLE)}
+        noise["sensor_noise"] = {kind: size for kind, size in self.noise.items() if kind in SENSORS}
         return plain(  # type: ignore[no-any-return]
-            {"status": "ok" if self.ok else "failed", **{name: getattr(self, name) for name in stated}}
+            {"status": "ok" if self.ok else "failed", **{name: getattr(self, name) for name in stated}, **noise}
             | {"weakest": self.aim.weakest(self.now)[0], "parameter": self.aim.parameter, "now": told(self.now)}
             | {"ranked": rows(self.ranked), "second": rows(self.second), "durations": self.durations}
             | {"rates": self.rates, "table": self.table, "doubt": self.doubt}
@@ -95,6 +94,7 @@ def design(
     measurement: Measurement | None = None,
     noise: float | None = None,
     angle_noise: float | None = None,
+    sensor_noise: Mapping[str, float] | None = None,
     duration: float | None = None,
     rate: float | None = None,
     parameter: str | None = None,
@@ -103,15 +103,18 @@ def design(
 
     at: values of the parameters, else their starts; values: fields of the scene; measurement: whose duration and rate
     are today's, where `duration` [s] and `rate` [1/s] are not given; noise [m], angle_noise [rad]: standard deviations,
-    else the problem's; parameter: to sharpen, else whichever has the largest standard deviation for its range
+    else the problem's; sensor_noise: of acceleration [m/s^2], rate [rad/s], force [N], torque [N m] and strain: sensors
+    whose noise is known are weighed; parameter: to sharpen, else whichever has the largest standard deviation for its
+    range
     """
     source = next(iter(problem.sources.values()))
-    noise, angle_noise = stated_noise(problem, noise, angle_noise)
+    sizes = stated_noise(problem, noise, angle_noise, sensor_noise)
     duration, rate = today_of(source, measurement, duration, rate)
     stated = problem.load_scene(values)
     require_plane(stated, "the design of experiments is")
-    scene, sensors = sensors_of(stated)
+    scene, sensors = sensors_of(stated, sizes)
     present = problem.channels_of(source)
+    sensors = _possible(problem, scene, sensors, at)
     channels = (*present, *(channel for sensor in sensors for channel in sensor.channels))
     model = _model(problem, scene, channels, grid(duration, rate))
     aim = Aim(model.names, model.upper - model.lower, parameter)
@@ -122,25 +125,24 @@ def design(
     if not np.all(np.isfinite(seen.residual)):
         reason = model.refusal or "it fails"
         raise InputError(f"{problem.name}: the motion about these values cannot be simulated: {reason}")
-    size = np.array([noise_in(channel, noise, angle_noise) for channel in channels])
+    size = np.array([noise_in(channel, sizes) for channel in channels])
     bundle = Bundle.of(model.measurement.first.times, seen.jacobian, size, aim.span, len(present))
     now = bundle.precision(range(bundle.present), duration)
 
     def order(pair: tuple[Sensor, Precision]) -> tuple[float, int, float]:
         return aim.score(pair[1]), pair[1].unknown, pair[1].a
 
-    columns = columns_of(bundle, sensors, angle_noise is not None)
-    ranked = sorted(((c, bundle.precision(own, duration)) for c, own in columns.items()), key=order)
+    columns = columns_of(bundle, sensors)
+    ranked = _of_best_tilt(sorted(((c, bundle.precision(own, duration)) for c, own in columns.items()), key=order))
     best = columns[ranked[0][0]]
-    others = ((c, bundle.precision([*best, *own], duration)) for c, own in columns.items() if own != best)
+    others = [(c, bundle.precision([*best, *columns[c]], duration)) for c, _ in ranked[1:]]
     durations, steps = duration * np.array(_DURATIONS), [round(2 / factor) for factor in _RATES]
     course = np.linspace(0.0, 2 * duration, _COURSE + 1)[1:]
     return Design(
         problem=problem.name,
         aim=aim,
         values=model.parameters.told(point),
-        noise=noise,
-        angle_noise=angle_noise,
+        noise=sizes,
         duration=duration,
         rate=rate,
         now=now,
@@ -153,6 +155,25 @@ def design(
         course=np.array([[aim.score(bundle.precision(columns[c], end)) for end in course] for c, _ in ranked]),
         doubt=seen.doubt,
     )
+
+
+def _of_best_tilt(found: list[tuple[Sensor, Precision]]) -> list[tuple[Sensor, Precision]]:
+    """Without accelerometers of one axis that tell less than another in their place; the best come first."""
+    first = dict[object, Sensor]()
+    for sensor, _ in found:
+        first.setdefault(sensor.name if sensor.quantity == "one-axis" else sensor, sensor)
+    kept = {*first.values()}
+    return [(sensor, precision) for sensor, precision in found if sensor in kept]
+
+
+def _possible(problem: Problem, scene: Scene, sensors: list[Sensor], at: Mapping[str, float] | None) -> list[Sensor]:
+    """Without load cells in joints whose force is not unique."""
+    beyond = set[str]()
+    for name, sensor in {sensor.name: sensor for sensor in sensors if sensor.in_joint}.items():
+        model = _model(problem, scene, sensor.channels, np.array([0.0, 1e-3]))
+        if not np.all(np.isfinite(model.observe(_point(model, at)[None]))):
+            beyond.add(name)
+    return [sensor for sensor in sensors if not (sensor.in_joint and sensor.name in beyond)]
 
 
 def _model(problem: Problem, scene: Scene, channels: tuple[Channel, ...], times: Array) -> ForwardModel:

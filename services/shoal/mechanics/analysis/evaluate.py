@@ -157,6 +157,18 @@ class Evaluator:
         kernels.accelerate(SINGLE, self._arrays, self._room, t, self.model.scene.solver.rank_tolerance)
         return self._room.a[: self.model.unknowns].copy()
 
+    def along(self, way: Array, sample: Index, v: Array, times: Array) -> tuple[Array, Array]:
+        """Accelerations along a motion, (samples, unknowns), and the angles that angle forces count, (samples, forces).
+
+        way: poses less than half a turn apart, from where they are counted, (poses, unknowns); sample: which one each
+        is, or -1, (poses,); v, (samples, unknowns), and times [s]: of the samples
+        """
+        a, turns = np.empty_like(v), np.empty((len(v), len(self._room.memory)))
+        self._enter(way[0], None)
+        tolerance = self.model.scene.solver.rank_tolerance
+        kernels.along(SINGLE, self._arrays, self._room, way, sample, v, times, tolerance, a, turns)
+        return a, turns
+
     def force(self, q: Array, v: Array, t: float = 0.0) -> Array:
         """Generalised force, elastic and applied, without the constraints, (unknowns,)."""
         return self._force(q, v, self._arrays, t)

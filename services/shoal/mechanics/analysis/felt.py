@@ -77,29 +77,31 @@ class Felt:
         return np.concatenate(parts, axis=1)
 
     @cached_property
-    def turns(self) -> Array:
-        """The angles that angle forces have counted at every sample [rad], (samples, forces)."""
-        evaluator = self.evaluator
-        counted, way = [evaluator.turns], np.diff(self._angles, axis=0)
-        parts = np.ceil(np.max(np.abs(way), axis=1, initial=0.0) / _TURN).astype(int)
-        for k, count in enumerate(parts.tolist(), start=1):
-            if count > 1 and evaluator.model.forces.size:
+    def _along(self) -> tuple[Array, Array]:
+        """Accelerations and turns; between samples that are far apart the bodies turn evenly."""
+        way, sample = [self.q[:1]], [0]
+        turned = np.max(np.abs(np.diff(self._angles, axis=0)), axis=1, initial=0.0)
+        counted = self.evaluator.model.forces.size > 0
+        for k, count in enumerate(np.ceil(turned / _TURN).astype(int).tolist(), start=1):
+            if counted and count > 1:
                 share = np.arange(1, count)[:, None] / count
                 place = self._places[k - 1] + share[..., None] * (self._places[k] - self._places[k - 1])
-                for q in self._coordinates(place, self._angles[k - 1] + share * way[k - 1]):
-                    evaluator.remember(q)
-            evaluator.remember(self.q[k])
-            counted.append(evaluator.turns)
-        return np.array(counted)
+                angle = self._angles[k - 1] + share * (self._angles[k] - self._angles[k - 1])
+                way.append(self._coordinates(place, angle))
+                sample += [-1] * (count - 1)
+            way.append(self.q[k : k + 1])
+            sample.append(k)
+        return self.evaluator.along(np.concatenate(way), np.array(sample), self.v, np.asarray(self.times, dtype=float))
 
-    @cached_property
+    @property
     def a(self) -> Array:
         """Accelerations of the coordinates, (samples, unknowns)."""
-        found = np.empty_like(self.q)
-        for k, (q, v, t, turns) in enumerate(zip(self.q, self.v, self.times, self.turns, strict=True)):
-            self.evaluator.turns = turns
-            found[k] = self.evaluator.acceleration(q, v, float(t))
-        return found
+        return self._along[0]
+
+    @property
+    def turns(self) -> Array:
+        """The angles that angle forces have counted at every sample [rad], (samples, forces)."""
+        return self._along[1]
 
     def specific_force(self, at: Attachment, tilt: float = 0.0) -> Array:
         """Acceleration less gravity at a place of a body, along axes turned by `tilt` [rad] from its own.

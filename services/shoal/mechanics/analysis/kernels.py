@@ -10,7 +10,7 @@ from shoal.mechanics.dynamics import Work
 from shoal.mechanics.dynamics import remember as count
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.pointers import pointer, raw
-from shoal.mechanics.numerics.tile import Array, Tile
+from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 
 @njit(cache=True, error_model="numpy")
@@ -51,3 +51,31 @@ def remember(tile: Tile, arrays: Arrays, room: Work) -> None:
     """Count the turns of angle forces."""
     m, w = raw(arrays), raw(room)
     count(tile, m, w)
+
+
+@njit(cache=True, error_model="numpy")
+def along(
+    tile: Tile,
+    arrays: Arrays,
+    room: Work,
+    way: Array,
+    sample: Index,
+    v: Array,
+    times: Array,
+    tolerance: float,
+    a: Array,
+    turns: Array,
+) -> None:
+    """Accelerations and the turns of angle forces at the poses of a way whose `sample` is one, not -1."""
+    m, w = raw(arrays), raw(room)
+    gates.enter(m, w)
+    for k in range(len(way)):
+        room.z[: m.unknowns] = way[k]
+        if k > 0:
+            count(tile, m, w)
+        n = sample[k]
+        if n >= 0:
+            room.zdot[: m.unknowns] = v[n]
+            turns[n] = room.memory
+            gates.acceleration(tile, m, w, times[n], w.z, w.zdot, tolerance, w.a)
+            a[n] = room.a[: m.unknowns]

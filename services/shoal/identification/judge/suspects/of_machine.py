@@ -80,7 +80,7 @@ def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
             for axis, where in enumerate(body.centre_of_mass):
                 if where:
                     path = f"bodies.{name}.centre_of_mass.{axis}"
-                    yield _ratio(f"centre of mass of {name}", path, where)
+                    yield _ratio(f"{'xyz'[axis]} of the centre of mass of {name}", path, where)
 
 
 def _lengths(scene: Scene) -> Iterator[Candidate]:
