@@ -136,7 +136,7 @@ def _quantiles(of: Conditional, sides: list[Extremes], error: Array, seed: int) 
         swapped = low > high
         low, high = np.where(swapped, high, low), np.where(swapped, low, high)
         ends = np.where(swapped[:, None], at[k][::-1], at[k])
-        told.append(_ends(intervals, Extremes(low, high, *ends, np.zeros(len(low))), off))
+        told.append(_ends(intervals, Extremes(low, high, ends[0], ends[1], np.zeros(len(low))), off))
     return told
 
 
