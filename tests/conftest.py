@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +15,10 @@ from shoal.home import prepare_kernel_cache
 
 # Before SHOAL_HOME moves: the kernels compiled ahead of the tests lie in the real home.
 prepare_kernel_cache()
+# Before tests are collected: the pipeline's modules look where the state is when they are imported. No test reads or
+# writes the state of the user's own runs.
+OWN_HOME = tempfile.TemporaryDirectory(prefix="shoal-home-", ignore_cleanup_errors=True)
+os.environ["SHOAL_HOME"] = OWN_HOME.name
 os.environ["MPLBACKEND"] = "Agg"
 # While tests are collected, which some are once for every name: the user's own names are none of theirs.
 os.environ["SHOAL_LIBRARY"] = os.path.join(os.devnull, "none")
@@ -29,10 +34,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.path.name != "test_up.py")
 
 
+def pytest_unconfigure() -> None:
+    OWN_HOME.cleanup()
+
+
 @pytest.fixture(autouse=True, scope="session")
-def own_home(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """No test reads or writes the state of the user's own runs."""
-    os.environ["SHOAL_HOME"] = str(tmp_path_factory.mktemp("home"))
+def own_library() -> None:
+    """What is collected runs with the library of its own home."""
     os.environ.pop("SHOAL_LIBRARY", None)
 
 

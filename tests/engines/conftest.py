@@ -414,6 +414,7 @@ ONLY_NATIVE = [
         },
     ),
     pendulum("shear", CABLE | {"element": "simo-reissner"}),
+    pendulum("floating", CABLE | {"element": "modal", "elements": 1}),
     scene(
         "ring",
         {"A": CABLE | {"curvature": [2 * np.pi / CABLE["length"]], "elements": 6}},

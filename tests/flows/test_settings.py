@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 import socket
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,14 @@ def test_state_lies_below_the_home_and_the_user_wins(monkeypatch: pytest.MonkeyP
     assert os.environ["MLFLOW_TRACKING_URI"] == f"sqlite:///{tmp_path}/mlflow.db"
     assert os.environ["MLFLOW_DISABLE_TELEMETRY"] == os.environ["DO_NOT_TRACK"] == "true"
     assert settings.tracking_server() is None
+
+
+def test_the_tests_leave_the_users_runs_alone() -> None:
+    settings.apply()
+    place = os.environ["SHOAL_HOME"]
+    assert place.startswith(tempfile.gettempdir())
+    assert os.environ["MLFLOW_TRACKING_URI"] == f"sqlite:///{place}/mlflow.db"
+    assert os.environ["PREFECT_HOME"].startswith(place)
 
 
 def test_ui_refuses_a_port_in_use_in_one_line() -> None:

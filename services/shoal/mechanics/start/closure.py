@@ -253,8 +253,9 @@ def _bending(scene: Scene, at: Attachment) -> tuple[Number, Number, Number, Numb
 def lead(scene: Scene, at: Attachment) -> Number:
     """Angle [rad] by which the direction at an attachment is ahead of the body's x axis at the start."""
     body = scene.bodies.get(at.body)
-    curved = isinstance(body, Rod) and body.element != "rigid" and bool(body.curvature)
-    return body.turn(scene.location(at)[0]) if curved and isinstance(body, Rod) else _bending(scene, at)[2]
+    if isinstance(body, Rod) and body.element != "rigid" and body.curvature:
+        return body.turn(scene.location(at)[0])
+    return 0.0 if scene.dimensions == 3 else _bending(scene, at)[2]
 
 
 def value_of(f: Function) -> float:
