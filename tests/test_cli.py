@@ -73,6 +73,12 @@ def test_lists_mappings_and_nothing_can_be_set() -> None:
     assert found["final"]["A"] == pytest.approx([math.cos(0.6), math.sin(0.6)], abs=1e-12)  # type: ignore[index]
 
 
+def test_a_planar_scene_moves_as_well_in_space() -> None:
+    flat = answer("simulate", "single-pendulum", "--no-verify", "--at", "0.3")["final"]["A"]  # type: ignore[index]
+    found = answer("simulate", "single-pendulum", "--no-verify", "--at", "0.3", "--set", "dimensions=3")
+    assert found["final"]["A"] == pytest.approx([*flat, 0.0], abs=1e-9)  # type: ignore[index]
+
+
 def test_scenes_lists_and_prints() -> None:
     assert "flexible-double-pendulum" in shoal("scenes").stdout
     assert shoal("scenes", "single-pendulum").stdout.startswith("name: single-pendulum")
@@ -91,6 +97,8 @@ def test_a_printed_scene_can_be_simulated_again(tmp_path: Path) -> None:
         (["simulate", "nothing.yaml"], "nothing.yaml"),
         (["simulate", "single-pendulum", "--set", "bodies.OA.mass=-1"], "bodies.OA.mass"),
         (["simulate", "single-pendulum", "--set", "bodies.OA.mass"], "PATH=VALUE"),
+        (["simulate", "single-pendulum", "--set", "dimensions=4"], "dimensions: Input should be 2 or 3, found '4'"),
+        (["simulate", "single-pendulum", "--set", "dimensions=[3]"], "dimensions: Input should be 2 or 3"),
         (["simulate", "single-pendulum", "--at", "0.2,0.1"], "increase"),
         (["simulate", "single-pendulum", "--at", "soon"], "soon"),
         (["simulate", "single-pendulum", "--engine", "magic"], "magic"),

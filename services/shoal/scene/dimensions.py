@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from shoal.errors import InputError
 from shoal.scene.record import Record
@@ -13,6 +14,8 @@ SPATIAL_KINDS = ("spherical", "universal", "cylindrical", "planar")
 PLANAR_KINDS = ("gear",)
 PLANAR_ELEMENTS = ("ancf-full", "simo-reissner", "modal")
 _Z = (0.0, 0.0, 1.0)
+Dimensions = Annotated[Literal[2, 3], BeforeValidator(lambda given: int(given) if given in ("2", "3") else given)]
+"""A text stands for its number, as `--set` gives it."""
 
 
 def padded(vector: Any, dimensions: int) -> Any:

@@ -15,7 +15,7 @@ from shoal.errors import InputError
 from shoal.scene import joints as joint_types
 from shoal.scene.amplitudes import check_amplitudes, check_place
 from shoal.scene.bodies import Body
-from shoal.scene.dimensions import check_dimensions, padded
+from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.expect import Expectation, ExpectedValue
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
 from shoal.scene.loads import DistributedForce, Force, Load
@@ -85,7 +85,7 @@ class Scene(Record):
 
     name: str
     description: str = ""
-    dimensions: Literal[2, 3] = 2
+    dimensions: Dimensions = 2
     gravity: Vector = (0.0, -9.81)
     bodies: Annotated[dict[Name, Body], Field(min_length=1)]
     joints: dict[Name, Joint] = {}
