@@ -224,7 +224,8 @@ def test_limits_of_intervals(text: str, passed: bool) -> None:
         ("P.y", "is not"),
         ("P.y < low", "no finite number"),
         ("Q.y < 1", "no marker 'Q'"),
-        ("P.force < 1", "no quantity 'force'"),
+        ("P.weight < 1", "no quantity 'weight'"),
+        ("P < 1", "no quantity 'P'"),
         ("abs(P.y < 1", "is not"),
     ],
 )

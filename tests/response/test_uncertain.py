@@ -143,3 +143,18 @@ def test_a_method_that_knows_no_gap_says_so() -> None:
     found = uncertain("single-pendulum", ["initial.OA.angle=-0.1:0.1"], [0.5], method="scan", degree=4, verify=False)
     assert found.ok
     assert "cannot tell" in found.message
+
+
+def test_what_misses_the_gap_is_named_worst_first() -> None:
+    """Three at most; all gaps beside the bounds are those that the message goes by."""
+    found = uncertain(
+        *("rigid-double-pendulum", {"initial.OA.angle": ("-5%", "5%")}, [0.5, 0.6]),
+        **{"method": "chebyshev", "degree": 5, "verify": False, "gap": 1e-6},
+    )
+    bounds = found.to_json()["bounds"]
+    missed = {f"{m}.{q}": one["gap"] for m, told in bounds.items() for q, one in told.items() if one["gap"] > 1e-6}
+    worst = sorted(missed, key=lambda name: -missed[name])
+    assert len(worst) > 3
+    assert found.status == "gap-not-reached"
+    named = ", ".join(f"{name} {missed[name]:.1e}" for name in worst[:3])
+    assert found.message.endswith(f"asked for 1e-06: {named} and {len(worst) - 3} more")

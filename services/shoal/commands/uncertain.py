@@ -48,7 +48,11 @@ def _ways() -> str:
 @click.option("--degree", type=click.IntRange(1, 40), help="Of a method that has one.")
 @click.option("--count", type=click.IntRange(1), help="Runs of a method that samples.")
 @click.option(
-    "--limit", "limits", multiple=True, metavar='"MARKER.QUANTITY < NUMBER"', help="What must not happen (repeatable)."
+    "--limit",
+    "limits",
+    multiple=True,
+    metavar='"MARKER.QUANTITY < NUMBER"',
+    help="What must not happen (repeatable); also JOINT.force, .fx, .fy, .torque, and energy, kinetic, potential.",
 )
 @click.option("--limit-method", cls=options.LateHelp, told=_ways, default="auto", show_default=True, metavar="NAME")
 @click.option("--limit-runs", type=click.IntRange(100), default=5_000, show_default=True, help="For each probability.")

@@ -108,5 +108,5 @@ def _with(shown: Shown | None, named: dict[str, float], values: dict[str, float]
     return replace(shown, parameters={**named, **shown.parameters}, values={**values, **shown.values})
 
 
-def _no_reach(_: object) -> tuple[Array, Array, Array, int, int]:
+def _no_reach(_: object, _size: float) -> tuple[Array, Array, Array, int, int]:
     raise AssertionError("all parameters are random here")

@@ -28,14 +28,15 @@ class Machine:
 
     Quantities are x, y [m] and angle [rad]; in space x, y and z, where an angle in the plane z = 0 may jump.
 
-    columns: their number along each of the three; told: what is told of a motion instead, (lanes, columns);
-    keep: of the runs; fixed: values of parameters that are set in the scene, in words, by which these are told apart
+    columns: their number along each of the three; told: what is told instead, (lanes, columns), of the motion of a
+    scene with some values of its lanes; keep: of the runs; fixed: values of parameters that are set in the scene, in
+    words, by which these are told apart
     """
 
     scene: Scene
     times: Array
     engine: Engine
-    told: Callable[[Trajectory], Array] = field(default_factory=lambda: _columns)
+    told: Callable[[Trajectory, Scene, Mapping[str, Array]], Array] = field(default_factory=lambda: _columns)
     keep: Keep | None = None
     fixed: str = ""
 
@@ -74,7 +75,7 @@ class Machine:
 
     def _some(self, values: Mapping[str, Array]) -> Answers:
         motion = self.engine.simulate_many(self.scene, values, self.times)
-        found, good = self.told(motion), _good(motion)
+        found, good = self.told(motion, self.scene, values), _good(motion)
         why, repeated = motion.message, 0
         for finer in FINER:
             left = np.flatnonzero(~good)
@@ -82,12 +83,13 @@ class Machine:
                 break
             repeated = max(repeated, left.size)
             careful = self.scene.with_values(_careful(self.scene, motion, finer))
+            those = {path: at[left] for path, at in values.items()}
             try:
-                again = self.engine.simulate_many(careful, {path: at[left] for path, at in values.items()}, self.times)
+                again = self.engine.simulate_many(careful, those, self.times)
             except InputError as error:
                 why = str(error)
                 break
-            found[left], good[left] = self.told(again), _good(again)
+            found[left], good[left] = self.told(again, careful, those), _good(again)
             why = again.message
         return Answers(found, good, repeated, "" if good.all() else why)
 
@@ -102,7 +104,7 @@ def _careful(scene: Scene, motion: Trajectory, finer: float) -> dict[str, float]
     }
 
 
-def _columns(motion: Trajectory) -> Array:
+def _columns(motion: Trajectory, _scene: Scene, _values: Mapping[str, Array]) -> Array:
     """(lanes, instants * markers * 3)."""
     plane = motion.points.shape[2] == 2
     whole = np.concatenate([motion.points, motion.angles[:, :, None]], axis=2) if plane else motion.points

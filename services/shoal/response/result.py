@@ -116,6 +116,11 @@ class Response:
         within = self.gaps(marker, quantity)[self.times <= self.horizon]
         return float(within.max()) if within.size else math.nan
 
+    def missed(self, gap: float) -> dict[str, float]:
+        """Which markers' quantities have a larger gap than that, and theirs, worst first. Of intervals only."""
+        told = {f"{marker}.{name}": self.gap(marker, name) for marker in self.markers for name in self.quantities}
+        return dict(sorted(((name, one) for name, one in told.items() if one > gap), key=lambda pair: -pair[1]))
+
     def table(self) -> tuple[list[str], Array]:
         """Header and rows over time of what is told of every marker, (instants, columns)."""
         told: dict[str, Array] = {}

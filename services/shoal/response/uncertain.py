@@ -35,7 +35,7 @@ from shoal.response.inputs import Correlations, Inputs, Parameter
 from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
 from shoal.response.limits import Judged, Limit, judge, limit
-from shoal.response.limits.judge import Reach, watched
+from shoal.response.limits.judge import Reach, require, watched
 from shoal.response.machine import Machine
 from shoal.response.read import parameters
 from shoal.response.respond import MOST, Answer, respond
@@ -47,6 +47,10 @@ from shoal.versions import versions
 
 CHECKED = 6
 """Extremal runs, or drawn ones, that are looked at by more careful runs."""
+UNRESOLVED = 1e-8
+"""Runs that differ by less than this share of a limit's quantity differ by the errors of their steps."""
+NAMED = 3
+"""Of what missed the gap asked for, in the message."""
 
 
 def uncertain(
@@ -102,6 +106,8 @@ def uncertain(
         wanted = _modelled(wanted, inputs, tolerance, when, engine)
     keep = _keep(wanted, when, engine, checkpoint, end)
     machine = Machine(wanted, when, get_engine(engine), keep=keep)
+    for one in asked:
+        require(machine, one, inputs)
     count_t, count_m, count_q = machine.columns
     try:
         answer = respond(
@@ -148,7 +154,7 @@ def uncertain(
         )
     if status == "ok" and allocation is not None and not allocation.ok:
         status, message = "allocation-not-met", allocation.message
-    return Response(
+    response = Response(
         status=status,
         message=message,
         scene=wanted.name,
@@ -174,6 +180,16 @@ def uncertain(
         allocation=allocation,
         boxes=answer.boxes,
     )
+    if status == "gap-not-reached" and bounds is not None and gap is not None:
+        response = replace(response, message=message + _named(response.missed(gap)))
+    return response
+
+
+def _named(missed: Mapping[str, float]) -> str:
+    """The first of what missed a gap, in words."""
+    told = ", ".join(f"{name} {gap:.1e}" for name, gap in list(missed.items())[:NAMED])
+    more = f" and {len(missed) - NAMED} more" if len(missed) > NAMED else ""
+    return f": {told}{more}" if told else ""
 
 
 def _beyond(scene: Scene, inputs: Inputs, bounds: Bounds, machine: Machine) -> Bounds:
@@ -224,13 +240,18 @@ def _keep(scene: Scene, times: Array, engine: str, checkpoint: Path | str | None
 def _reach(inputs: Inputs, when: Array, gap: float | None, seed: int, most: int) -> Reach:
     """Bounds of the margins of a model over time."""
 
-    def reach(model: Model) -> tuple[Array, Array, Array, int, int]:
+    def reach(model: Model, size: float) -> tuple[Array, Array, Array, int, int]:
         answer = respond(
             model, inputs, len(when), groups=np.zeros(len(when)), instants=when, gap=gap, seed=seed, most=most
         )
         bounds, runs = answer.bounds, answer.runs
         assert bounds is not None
         outer = np.where(when <= bounds.horizon, bounds.lower_outer, -math.inf)
+        values = runs.values
+        spread = values.max(axis=0) - values.min(axis=0)
+        if spread.max() <= UNRESOLVED * max(size, np.abs(values).max()):
+            # No surrogate foretells how the steps of a solver fall: an energy that is the same in all runs.
+            outer = bounds.lower - spread
         return bounds.lower, outer, runs.germs[runs.values.argmin(axis=0)], runs.evaluations, runs.failed
 
     return reach
@@ -246,7 +267,7 @@ def _allocated(
         return of_distributions(wanted.text, told, inputs, target, prices, widest, seed)
 
     def least(here: Inputs) -> Reached:
-        lower, outer, germs, evaluations, _ = _reach(here, when, None, seed, most)(told)
+        lower, outer, germs, evaluations, _ = _reach(here, when, None, seed, most)(told, abs(wanted.bound))
         worst = int(lower.argmin())
         return Reached(float(outer.min()), float(lower[worst]), germs[worst], evaluations)
 

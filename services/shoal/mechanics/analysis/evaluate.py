@@ -16,7 +16,7 @@ import scipy.sparse
 
 from shoal.mechanics import forces, functions, plane
 from shoal.mechanics.affine import Affine
-from shoal.mechanics.analysis import kernels
+from shoal.mechanics.analysis import kernels, stored
 from shoal.mechanics.analysis.load_stiffness import in_plane, in_space
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import derived_rows, work_space
@@ -168,6 +168,12 @@ class Evaluator:
         tolerance = self.model.scene.solver.rank_tolerance
         kernels.along(SINGLE, self._arrays, self._room, way, sample, v, times, tolerance, a, turns)
         return a, turns
+
+    def stored(self, way: Array, turns: Array) -> Array:
+        """Strain energy [J] at poses, (poses, unknowns), at which angle forces have counted `turns`, (poses,)."""
+        energy = np.empty(len(way))
+        stored.stored(SINGLE, self._arrays, self._room, way, turns, energy)
+        return energy
 
     def force(self, q: Array, v: Array, t: float = 0.0) -> Array:
         """Generalised force, elastic and applied, without the constraints, (unknowns,)."""

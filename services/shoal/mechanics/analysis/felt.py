@@ -46,9 +46,9 @@ class Felt:
 
     def __init__(self, evaluator: Evaluator, course: Course, lane: int, of_model: int = 0) -> None:
         """lane: of the course; of_model: of the evaluator's model."""
-        self.evaluator, self.times, self._lane = evaluator, course.times, of_model
+        self.evaluator, self.times, self.lane = evaluator, course.times, of_model
         self.scene = scene = evaluator.model.stated
-        self._gravity = np.array([float(np.ravel(part)[of_model % np.size(part)]) for part in scene.gravity[:2]])
+        self.gravity = np.array([float(np.ravel(part)[of_model % np.size(part)]) for part in scene.gravity[:2]])
         numbers = {name: number for number, name in enumerate(scene.bodies)}
         order = [numbers[name] for name in evaluator.model.frames]
         own = (course.places, course.angles, course.velocities, course.rates)
@@ -111,8 +111,8 @@ class Felt:
         model = self.evaluator.model
         name, place = place_of(self.scene, at)
         frame = model.frames[name]
-        found = points([frame.point(place), frame.direction(place)], model.unknowns, self._lane)
-        acceleration = self.a @ found.matrix[0].T - self._gravity
+        found = points([frame.point(place), frame.direction(place)], model.unknowns, self.lane)
+        acceleration = self.a @ found.matrix[0].T - self.gravity
         x = self.q @ found.matrix[1].T + found.constant[1]
         x = x / np.linalg.norm(x, axis=1, keepdims=True)
         c, s = np.cos(tilt), np.sin(tilt)

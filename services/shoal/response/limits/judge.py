@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,22 +21,43 @@ from shoal.trajectory import Array, Trajectory
 
 MOST = 5_000
 """Runs for the probability of a limit unless another number is asked for."""
-Reach = Callable[[Model], tuple[Array, Array, Array, int, int]]
-"""Of the margins of a model over time: the least that runs attain, that may be, (instants,); the germs of the former,
-(instants, parameters); runs made, and how many failed."""
+Reach = Callable[[Model, float], tuple[Array, Array, Array, int, int]]
+"""Of the margins of a model over time, from a bound of some size: the least that runs attain, that may be, (instants,);
+the germs of the former, (instants, parameters); runs made, and how many failed."""
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Tells the margins of a limit at the last instants of a motion."""
+
+    limit: Limit
+    instants: int
+
+    def margins(self, motion: Trajectory, scene: Scene, values: Mapping[str, Array]) -> Array:
+        """Of every lane, (lanes, instants). Raises InputError."""
+        return self.limit.margins(motion, scene, values)[:, -self.instants :]
 
 
 def watched(machine: Machine, limit: Limit) -> Machine:
     """The same machine, of which the margins of a limit are told."""
-    return replace(machine, told=limit.margins)
+    told = Watch(limit, len(machine.times)).margins
+    return replace(machine, scene=limit.scene(machine.scene), times=limit.instants(machine.times), told=told)
+
+
+def require(machine: Machine, limit: Limit, inputs: Inputs) -> None:
+    """Whether the machine tells a limit, by a run in the middle, as a balance of forces does. Raises InputError."""
+    if limit.is_dynamic:
+        middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
+        watched(replace(machine, keep=None), limit)(middle)
 
 
 def _show(limit: Limit, machine: Machine, inputs: Inputs, germ: Array, verify: bool) -> Shown:
     named = inputs.named(germ[None])[0]
     if verify:
         return show(limit, machine.scene, machine.times, machine.engine, inputs, named)
-    motion = machine.engine.simulate(machine.scene.with_values(inputs.at(named)), machine.times)
-    return _shown(limit, machine.times, inputs, named, motion)
+    scene = limit.scene(machine.scene.with_values(inputs.at(named)))
+    motion = machine.engine.simulate(scene, limit.instants(machine.times))
+    return _shown(limit, machine.times, inputs, named, scene, motion)
 
 
 def judge(
@@ -68,7 +89,7 @@ def judge(
         return Judged(
             limit, way, inputs, times, passing, None, nan, nan, shown, margins.evaluations, margins.failed, margins.why
         )
-    lower, outer, germs, evaluations, failed = reach(told)
+    lower, outer, germs, evaluations, failed = reach(told, abs(limit.bound))
     worst = int(lower.argmin())
     kept = False if lower[worst] < 0 else True if outer.min() >= 0 else None
     shown = _show(limit, machine, inputs, germs[worst], verify)
@@ -80,11 +101,12 @@ def judge(
 
 def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Inputs, named: Array) -> Shown:
     """Run a scene once more, with care, with these values of the parameters, (parameters,). Raises InputError."""
-    return _shown(limit, times, inputs, named, verified(engine, scene.with_values(inputs.at(named)), times))
+    here = limit.scene(scene.with_values(inputs.at(named)))
+    return _shown(limit, times, inputs, named, here, verified(engine, here, limit.instants(times)))
 
 
-def _shown(limit: Limit, times: Array, inputs: Inputs, named: Array, motion: Trajectory) -> Shown:
-    margins = limit.margins(motion)[0]
+def _shown(limit: Limit, times: Array, inputs: Inputs, named: Array, scene: Scene, motion: Trajectory) -> Shown:
+    margins = Watch(limit, len(times)).margins(motion, scene, {})[0]
     estimated = motion.model.get("verification", {})
     instant = int(np.argmin(margins))
     return Shown(

@@ -1,13 +1,18 @@
-"""What must not happen: MARKER.QUANTITY < NUMBER, or >. Margins are positive as long as it does not."""
+"""What must not happen: MARKER.QUANTITY < NUMBER, or >; of a joint, or of the whole machine as well.
+
+Margins are positive as long as it does not.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.response.limits.dynamic import ENERGIES, REACTIONS, along, check, equipped
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
@@ -21,20 +26,25 @@ UNITS = {
     "vz": "m/s",
     "speed": "m/s",
     "rate": "rad/s",
+    **REACTIONS,
+    **ENERGIES,
 }
+"""Of all quantities."""
 QUANTITIES = {2: ("x", "y", "angle", "vx", "vy", "speed", "rate"), 3: ("x", "y", "z", "vx", "vy", "vz", "speed")}
-"""By dimensions."""
-"""Of a marker, with their units."""
-FORM = '"MARKER.QUANTITY < NUMBER", with <, > and abs(MARKER.QUANTITY)'
-_EXPRESSION = re.compile(r"^\s*(abs\()?\s*([^\s()<>]+)\.(\w+)\s*(\))?\s*(<|>)=?\s*(\S+)\s*$")
+"""Of a marker, by dimensions."""
+FORM = '"MARKER.QUANTITY < NUMBER", "JOINT.QUANTITY < NUMBER" or "energy < NUMBER", with <, > and abs(...)'
+_EXPRESSION = re.compile(r"^\s*(abs\()?\s*(?:([^\s()<>]+)\.)?(\w+)\s*(\))?\s*(<|>)=?\s*(\S+)\s*$")
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Passed where a quantity of a marker lies beyond a bound: above it or below it, its absolute value or itself."""
+    """Passed where a quantity lies beyond a bound: above it or below it, its absolute value or itself.
+
+    place: a marker, a joint, or empty for the whole machine, as the quantity has it
+    """
 
     text: str
-    marker: str
+    place: str
     quantity: str
     above: bool
     bound: float
@@ -45,14 +55,36 @@ class Limit:
         """Of the bound and the margin."""
         return UNITS[self.quantity]
 
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether masses and loads tell it, not the motion of a marker alone."""
+        return self.quantity in REACTIONS or self.quantity in ENERGIES
+
+    def scene(self, scene: Scene) -> Scene:
+        """The scene whose motion tells the margins: that one with the markers that it takes."""
+        return equipped(scene) if self.is_dynamic else scene
+
+    def instants(self, times: Array) -> Array:
+        """Those of a motion that tells the margins at `times` [s]: angles are counted from the start."""
+        return np.append(0.0, times) if self.is_dynamic and times[0] > 0.0 else times
+
     def margin(self, of: Array) -> Array:
         """How far the quantity is from the bound, negative beyond it."""
         value = np.abs(of) if self.absolute else of
         return np.asarray(self.bound - value if self.above else value - self.bound)
 
-    def margins(self, motion: Trajectory) -> Array:
-        """Of every lane at every instant, (lanes, instants). Raises InputError."""
-        return self.margin(_quantity(motion, self.marker, self.quantity).T)
+    def margins(self, motion: Trajectory, scene: Scene, values: Mapping[str, Array]) -> Array:
+        """Of every lane at every instant, (lanes, instants). Raises InputError.
+
+        scene: that of the motion, see `scene`; values: of its lanes by path
+        """
+        if not self.is_dynamic:
+            return self.margin(_quantity(motion, self.place, self.quantity).T)
+        try:
+            return self.margin(along(motion, scene, values, self.quantity, self.place).T)
+        except InputError as error:
+            # What mechanics says of load cells it says of channels.
+            raise InputError(f"limit: {self.text}: {str(error).removeprefix('channels: ')}") from None
 
 
 def limit(text: str, scene: Scene) -> Limit:
@@ -60,18 +92,45 @@ def limit(text: str, scene: Scene) -> Limit:
     found = _EXPRESSION.match(text)
     if found is None or bool(found[1]) != bool(found[4]):
         raise InputError(f"limit: {text!r} is not {FORM}")
-    _, marker, quantity, _, sign, number = found.groups()
-    if marker not in scene.markers:
-        raise InputError(f"limit: {text}: no marker {marker!r}; there are {', '.join(scene.markers)}")
-    if quantity not in (known := QUANTITIES[scene.dimensions]):
-        raise InputError(f"limit: {text}: no quantity {quantity!r}; there are {', '.join(known)}")
+    _, place, quantity, _, sign, number = found.groups()
+    try:
+        _check(place or "", quantity, scene)
+    except InputError as error:
+        raise InputError(f"limit: {text}: {error}") from None
     try:
         bound = float(number)
     except ValueError:
         bound = float("nan")
     if not np.isfinite(bound):
         raise InputError(f"limit: {text}: {number!r} is no finite number; write {FORM}")
-    return Limit(text.strip(), marker, quantity, sign == ">", bound, bool(found[1]))
+    return Limit(text.strip(), place or "", quantity, sign == ">", bound, bool(found[1]))
+
+
+def _check(place: str, quantity: str, scene: Scene) -> None:
+    """Whether a scene has that. Raises InputError."""
+    of_markers = QUANTITIES[scene.dimensions]
+    if quantity in ENERGIES:
+        if place:
+            raise InputError(f"{quantity} is that of the whole machine, not of {place!r}; write {quantity} alone")
+        check(quantity, scene)
+        return
+    if quantity not in of_markers and quantity not in REACTIONS:
+        raise InputError(
+            f"no quantity {quantity!r}; there are {', '.join(of_markers)} of a marker, {', '.join(REACTIONS)} of a "
+            f"joint, and {', '.join(ENERGIES)} of the machine"
+        )
+    kind, known, others = "marker", list(scene.markers), list(scene.joints)
+    if quantity in REACTIONS:
+        kind, known, others = "joint", others, known
+    there = f"there are {', '.join(known)}" if known else "there are none"
+    if not place:
+        raise InputError(f"{quantity} is that of a {kind}; write {kind.upper()}.{quantity}, {there}")
+    if place not in known:
+        other = "marker" if kind == "joint" else "joint"
+        also = f" ({place} is a {other}, and {quantity} is that of a {kind})" if place in others else ""
+        raise InputError(f"no {kind} {place!r}{also}; {there}")
+    if quantity in REACTIONS:
+        check(quantity, scene)
 
 
 def _quantity(motion: Trajectory, marker: str, quantity: str) -> Array:
