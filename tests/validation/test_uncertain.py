@@ -24,6 +24,15 @@ def test_auto_is_never_wrong_in_silence(problem: object) -> None:
     assert problem.name in methods_table([auto, corners])
 
 
+def test_series_in_subintervals_hold_where_one_series_does_not() -> None:
+    """The rows of `taylor` with options of its own."""
+    problem = PROBLEMS[0]
+    low, high = problem.reference()
+    whole, cut = (measured(problem, "taylor", low, high, degree=2, count=count) for count in (None, 400))
+    assert (whole.verdict, cut.verdict) == ("horizon", "holds")
+    assert cut.short < 0.2 * whole.short
+
+
 def test_machines_are_what_they_say() -> None:
     """Closed forms against the equation of motion that they solve, by differences: forced, damped and tumbling."""
     random = np.random.default_rng(5)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from shoal.response.methods import METHODS
@@ -20,6 +21,11 @@ from shoal_validation.uncertain.problems import PROBLEMS
 from shoal_validation.uncertain.studies import RUNS, Judged, drawn, judged
 
 NOT_FOR_INTERVALS = {"chaos", "maximum-entropy", "nested"}
+VARIANTS = {
+    "taylor, order 2": ("taylor", {"degree": 2}),
+    "taylor, order 2, subintervals": ("taylor", {"degree": 2, "count": 400}),
+}
+"""Rows of methods with options of their own."""
 FEW = 3
 """Parameters of quick studies, at most."""
 
@@ -53,6 +59,8 @@ def compared(*, quick: bool) -> list[Line]:
         if not quick or problem.parameters == 1:
             low, high = problem.reference()
             lines += [measured(problem, method, low, high) for method in METHODS if method not in NOT_FOR_INTERVALS]
+            for name, (method, options) in VARIANTS.items():
+                lines.append(replace(measured(problem, method, low, high, **options), method=name))
     return lines
 
 

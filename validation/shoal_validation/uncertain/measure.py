@@ -34,17 +34,21 @@ class Line:
     verdict: str
 
 
-def measured(problem: Problem, method: str, low: Array, high: Array) -> Line:
-    """low, high: the reference, (instants,)."""
-    times, count = np.array(problem.times), len(problem.times)
-    one = np.zeros(count)
+def measured(
+    problem: Problem, method: str, low: Array, high: Array, *, degree: int | None = None, count: int | None = None
+) -> Line:
+    """low, high: the reference, (instants,); degree, count: options of the method."""
+    times, instants = np.array(problem.times), len(problem.times)
+    one = np.zeros(instants)
     over_time = problem.at if problem.continuous else None
     try:
         answer = respond(
             problem.at(times),
             problem.inputs,
-            count,
+            instants,
             method=method,
+            degree=degree,
+            count=count,
             groups=one,
             instants=times,
             most=MOST,
