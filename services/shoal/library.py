@@ -104,7 +104,11 @@ KINDS = {
         Kind("recordings", "recording", _check_recording, "path", references={("path",): ""}),
         Kind(
             *("scenes", "scene", _check_scene, "bodies", lambda name: _scene_named(name)),
-            references={("expect", "*", "path"): "recordings", **{(part, "*", "*", "path"): "" for part in PARTS}},
+            references={
+                ("expect", "*", "path"): "recordings",
+                ("initial", "from"): "",
+                **{(part, "*", "*", "path"): "" for part in PARTS},
+            },
         ),
         Kind(
             *("problems", "problem", _check_problem, "parameters", lambda name: name in built_in_problems()),
@@ -274,7 +278,7 @@ def _places(data: Any, wanted: Keys, above: Keys = ()) -> Iterable[tuple[Keys, s
     for key in list(data) if wanted[0] == "*" else [key for key in wanted[:1] if key in data]:
         if len(wanted) > 1:
             yield from _places(data[key], wanted[1:], (*above, key))
-        elif isinstance(data[key], str):
+        elif isinstance(data[key], str) and ((*above, key), data[key]) != (("initial", "from"), "statics"):
             yield (*above, key), data[key]
 
 

@@ -49,6 +49,8 @@ class Trajectory:
     model: what was computed, for the record (unknowns, elements, integrator, step, ...)
     velocities: of the markers [m/s], (samples, markers, d, lanes); rates: of the angles [rad/s],
         (samples, markers, lanes); None where the engine does not tell them
+    end: the whole state at the last instant, from which `initial_from` lets a scene go on; None where it is not known,
+        as of several lanes and of other engines
     """
 
     engine: str
@@ -65,6 +67,7 @@ class Trajectory:
     model: dict[str, Any] = field(default_factory=dict)
     velocities: Array | None = None
     rates: Array | None = None
+    end: Mapping[str, Any] | None = None
 
     @property
     def axes(self) -> str:
@@ -142,6 +145,7 @@ class Trajectory:
             "steps": self.steps,
             "wall_s": self.wall_s,
             "model": self.model,
+            **({} if self.end is None else {"end": dict(self.end)}),
         }
 
 

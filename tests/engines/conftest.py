@@ -76,6 +76,7 @@ ROD = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.04, "density": 1
 CABLE = ROD | {"youngs_modulus": 2e7, "element": "ancf-cable", "elements": 2}
 BLOCK = {"kind": "rigid-body", "mass": 2.0, "inertia": 0.1, "centre_of_mass": [0.2, 0.1]}
 BALL = {"kind": "point-mass", "mass": 0.5}
+THROWN = {"element": "rigid", "vectors": [[0.3, -0.4]], "rates": [[0.8, 0.6]]}
 TIP = {"tip": at("A", "end")}
 CLAMP = {"O": joint(GROUND, at("A"), "weld")}
 PIN = {"O": joint(GROUND, at("A"))}
@@ -423,6 +424,13 @@ ONLY_NATIVE = [
         initial={"A": {"position": [0.0, 0.0]}},
     ),
     pendulum("at-rest", CABLE, CLAMP).with_values({"initial.from": "statics", "initial.A.rate": 0.0}),
+    scene(
+        "going-on",
+        {"A": BALL},
+        {"D": joint(GROUND, at("A"), "distance", length=0.5)},
+        {"A": at("A")},
+        initial={"A": {"position": [0.5, 0.0]}, "from": {"t": 1.0, "bodies": {"A": THROWN}}},
+    ),
     pair(
         "coupled",
         {

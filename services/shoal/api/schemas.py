@@ -30,7 +30,7 @@ class Motion(BaseModel):
     lanes); velocities [m/s] and rates [rad/s] likewise, null where the engine does not tell them
     status, energy_drift, constraint_drift: one per lane; steps: time steps; wall_s: of the computation
     model: what was computed; its `verification` holds the estimated errors [m], of lanes the largest of a few of them
-    selection: with a tolerance, how the model was found
+    selection: with a tolerance, how the model was found; end: of one scene, the state at which another run may go on
     Numbers that are not finite are null.
     """
 
@@ -49,6 +49,7 @@ class Motion(BaseModel):
     message: str
     model: dict[str, Any]
     selection: dict[str, Any] | None = None
+    end: dict[str, Any] | None = None
 
 
 class Table(Asked):

@@ -150,7 +150,7 @@ def _motion(request: Simulate, trajectory: Trajectory, selection: dict[str, Any]
     }
     same = ("engine", "markers", "status", "steps", "wall_s", "message", "model")
     stated = {name: getattr(trajectory, name) for name in same}
-    return to_json({**stated, **arrays, "selection": selection})
+    return to_json({**stated, **arrays, "selection": selection, "end": trajectory.end and dict(trajectory.end)})
 
 
 def to_json(data: Any) -> bytes:

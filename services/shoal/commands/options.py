@@ -42,11 +42,18 @@ def field_values(context: click.Context, parameter: click.Parameter, pairs: tupl
     return {path: _structured(path, text) for path, text in key_value(context, parameter, pairs).items()}
 
 
+def _start(text: str) -> Any:
+    """A way to start, or what the file of a run says of its end."""
+    from shoal.scene.ended import read_end
+
+    return text if text == "statics" else read_end(Path(text))
+
+
 def _structured(path: str, text: str) -> Any:
     if text == "null":
         return None
     if text[0] not in "[{":
-        return text
+        return _start(text) if path in ("initial.from", "initial_from") else text
     from shoal.scene.load import read_yaml
 
     try:

@@ -20,6 +20,7 @@ FEATURES = (
     "closed rods",
     "moving ground points",
     "starts at rest",
+    "starts at the end of a run",
     "functions of time",
     "varying distances",
     "dry friction",
@@ -61,6 +62,8 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
             yield f"initial.{name}.position", "free bodies"
     if scene.starts_at_rest:
         yield "initial.from", "starts at rest"
+    elif scene.initial_from is not None:
+        yield "initial.from", "starts at the end of a run"
     for name in scene.ground_points:
         yield f"ground_points.{name}", "moving ground points"
     for name, joint in scene.joints.items():

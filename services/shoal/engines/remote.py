@@ -166,4 +166,5 @@ def trajectory_of(found: dict[str, Any]) -> Trajectory:
     known = (name for name in ("velocities", "rates") if found[name] is not None)
     optional: dict[str, Any] = {name: np.array(found[name], dtype=float) for name in known}
     status = tuple(Status(one) for one in found["status"])
-    return Trajectory(**plain, **arrays, **optional, markers=tuple(found["markers"]), status=status)
+    markers, end = tuple(found["markers"]), found.get("end")
+    return Trajectory(**plain, **arrays, **optional, markers=markers, status=status, end=end)

@@ -16,6 +16,7 @@ from shoal.errors import InputError
 from shoal.fmu.inputs import require_input
 from shoal.fmu.running import CONTENT, identifier
 from shoal.scene import Scene
+from shoal.scene.ended import End
 from shoal.scene.function import Function
 from shoal.whole import whole
 
@@ -69,7 +70,8 @@ def _builder(fmi: str) -> tuple[Any, str]:
 def _usual(scene: Scene) -> list[str]:
     """Gravity and the initial angles; in space those that are stated, as others may be rotations."""
     stated = {name for name, start in scene.initial.items() if start.stated("angle")}
-    turned = [name for name in scene.bodies if scene.dimensions == 2 or name in stated]
+    goes_on = isinstance(scene.initial_from, End)
+    turned = [name for name in scene.bodies if not goes_on and (scene.dimensions == 2 or name in stated)]
     return [*(f"gravity.{k}" for k in range(len(scene.gravity))), *(f"initial.{name}.angle" for name in turned)]
 
 

@@ -20,6 +20,7 @@ from shoal.mechanics.assembly.space import start as spatial
 from shoal.mechanics.assembly.space.redundancy import redundant as redundant_in_space
 from shoal.mechanics.assembly.starts import Starts
 from shoal.mechanics.dynamics import Work
+from shoal.mechanics.ended import Ended
 from shoal.mechanics.gates import Seek
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, halting
@@ -33,7 +34,8 @@ from shoal.mechanics.still import Still
 from shoal.mechanics.verdict import Limits
 from shoal.mechanics.workspace import Workspace
 from shoal.scene import Rod, Scene
-from shoal.trajectory import Trajectory, plain
+from shoal.scene.ended import End
+from shoal.trajectory import Status, Trajectory, plain
 
 INSTANTS = 8
 """The workspaces of so many lists of sampling times and kinds of tiles are kept."""
@@ -89,6 +91,7 @@ class Machine:
         motion = np.empty((len(times), len(self.scene.markers), 2 * d + 2, moved.lanes))
         numbers = np.empty((NUMBERS, moved.lanes))
         limits, floor = self._limits, self._limits.energy_floor(end)
+        left: list[tuple[Array, Array, Array]] = []
 
         def march(part: slice) -> None:
             count = part.stop - part.start
@@ -100,6 +103,8 @@ class Machine:
                 space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek, spare)
             record = space.run(moved, part)
             told(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
+            if single:
+                left.append(space.left)
             if single not in self._told:
                 self._told[single] = pickle.dumps(self._facts(record.begin if single else None))
             if seek is None and self._alike and space.size <= LARGEST:
@@ -120,6 +125,7 @@ class Machine:
         largest = np.maximum.reduce(numbers, axis=1)
         facts = pickle.loads(self._told[single])
         facts["evaluations"] = int(largest[EVALUATIONS])
+        ended = Ended(moved, end, *left[0], motion[-1, :, d, 0].copy()) if left and status[0] is Status.OK else None
         return Trajectory(
             engine="gauss",
             times=times,
@@ -135,6 +141,7 @@ class Machine:
             wall_s=time.perf_counter() - begin,
             message=message,
             model=facts,
+            end=ended,
         )
 
     @cached_property
@@ -236,5 +243,6 @@ def _taken(idle: list[Workspace]) -> Workspace | None:
 
 def _turns(scene: Scene, model: Model) -> Array:
     """Whole turns in the stated directions of the markers [rad], (markers, lanes) or (markers, 1)."""
-    begins = stacked([start_angle(model.scene, marker) for marker in scene.markers.values()])
+    known = scene.initial_from.angles if isinstance(scene.initial_from, End) else {}
+    begins = stacked([known.get(name, start_angle(model.scene, marker)) for name, marker in scene.markers.items()])
     return np.asarray(TURN * np.rint((begins - plane.angle(plane.unit(begins))) / TURN))

@@ -52,14 +52,14 @@ def simulate(
     if not values:
         return machine(scene, end).run(times, threads=threads, seek=seek, begin=begin)
     lanes = len(next(iter(values.values())))
-    at_rest = scene.starts_at_rest
-    if all(path.startswith("initial.") for path in values) and not start.gives_numbers(scene) and not at_rest:
+    found = scene.initial_from is not None
+    if all(path.startswith("initial.") for path in values) and not start.gives_numbers(scene) and not found:
         kept = machine(scene, end)
         return kept.run(times, kept.starts.at(values, lanes), threads=threads, begin=begin)
     model = capped(build(scene.with_lanes(values), lanes, max(end, scene.solver.duration)))
-    if at_rest:
+    if found:
         each = ({path: float(numbers[lane]) for path, numbers in values.items()} for lane in range(lanes))
-        model = _at_rest(model, [scene.with_values(one) for one in each])
+        model = _begun(model, [scene.with_values(one) for one in each])
     choice = pick(scene.solver, model, step_limit if end > 0 else _unlimited)
     return Machine(scene, model, choice, alone=False).run(times, threads=threads, begin=begin)
 
@@ -100,10 +100,10 @@ def _model(scene_json: str, horizon: float) -> Model:
     """Repeated runs, runs by other integrators, and lanes that only start differently share the model."""
     scene = Scene.model_validate_json(scene_json)
     model = capped(build(scene, horizon=horizon))
-    return _at_rest(model, [scene]) if scene.starts_at_rest else model
+    return model if scene.initial_from is None else _begun(model, [scene])
 
 
-def _at_rest(model: Model, scenes: list[Scene]) -> Model:
+def _begun(model: Model, scenes: list[Scene]) -> Model:
     """`at_rest.begun`, which takes half a second to import."""
     from shoal.mechanics.analysis.at_rest import begun
 

@@ -86,6 +86,12 @@ class Workspace:
         """Numbers that it holds."""
         return self._block.size
 
+    @property
+    def left(self) -> tuple[Array, Array, Array]:
+        """Coordinates and rates at the last sampling time, and the turns of angle forces, of a march of one lane."""
+        frame, n = self.march.frame, self._model.unknowns
+        return frame.own.q[:n].copy(), frame.own.v[:n].copy(), frame.room.memory.copy()
+
     def run(self, model: Model, part: slice) -> Marched:
         """The record of a march from the start of a model that differs in its start only; good until the next one."""
         np.copyto(self._block, self._start)

@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 from shoal.errors import InputError
+from shoal.scene.ended import with_end
 from shoal.scene.measured import with_signals
 from shoal.scene.parametric import EXAMPLES, parametric
 from shoal.scene.scene import Scene
@@ -192,4 +193,5 @@ def _read(name: str) -> Scene:
     data = read_named(name, scene_library(), "scene", scene_names())
     if not isinstance(data, dict):
         raise InputError(f"{name}: a scene is a mapping of fields, found {type(data).__name__}")
-    return Scene.parse(with_signals(data, Path(name).parent, name), name)
+    folder = Path(name).parent
+    return Scene.parse(with_end(with_signals(data, folder, name), folder, name), name)

@@ -16,6 +16,7 @@ from shoal.scene import joints as joint_types
 from shoal.scene.amplitudes import check_amplitudes, check_place
 from shoal.scene.bodies import Body
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
+from shoal.scene.ended import End
 from shoal.scene.expect import Expectation, ExpectedValue
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
 from shoal.scene.loads import DistributedForce, Force, Load
@@ -76,7 +77,8 @@ class Scene(Record):
     """A machine in SI units: bodies, joints, loads, markers, initial state, gravity, solver settings.
 
     dimensions: 2, or 3 for one in space. initial_from: `statics` for a machine that starts at rest where its forces
-    balance; a file says it as `from` in `initial`, whose angles and positions then say near where.
+    balance; a file says it as `from` in `initial`, whose angles and positions then say near where. Or the end of a run,
+    at which it goes on; what `initial` says beside is then what joints keep that hold what the start gives them.
 
     expect: what the nights of its library ask of it; no part of the machine, so that what is written of a scene,
     compared by its fingerprint or made of it by `with_values` is without.
@@ -93,7 +95,7 @@ class Scene(Record):
     ground_points: dict[Name, MovingPoint] = {}
     markers: Annotated[dict[Name, Attachment], Field(min_length=1)]
     initial: dict[str, InitialState] = {}
-    initial_from: Literal["statics"] | None = None
+    initial_from: Literal["statics"] | End | None = None
     solver: Solver = Solver()
     expect: Annotated[dict[Name, Expectation], Field(exclude=True)] = {}
 
@@ -106,8 +108,10 @@ class Scene(Record):
         origin = initial.pop(FROM, data.get("initial_from"))
         if origin is None:
             return {**data, INITIAL: initial}
+        if isinstance(origin, End | dict):
+            return {**data, INITIAL: initial, "initial_from": _end(origin)}
         if origin != "statics":
-            raise ValueError(f"initial.from: a start is computed by statics, found {str(origin)[:40]!r}")
+            raise ValueError(f"initial.from: `statics` or the `end` of a run's JSON, found {str(origin)[:40]!r}")
         # Where the search for the place of rest begins is near it, no more.
         near = {name: _guessed(start) for name, start in initial.items()}
         return {**data, INITIAL: near, "initial_from": origin}
@@ -126,6 +130,8 @@ class Scene(Record):
                 for quantity in RATES:
                     if np.any(getattr(start, quantity)):
                         raise ValueError(f"initial.{name}.{quantity}: a start from statics is at rest; leave it out")
+        if isinstance(self.initial_from, End):
+            self.initial_from.check(self.bodies)
         if GROUND in self.bodies:
             raise ValueError("bodies.ground: the name 'ground' is taken by the fixed frame")
         for name, joint in self.joints.items():
@@ -271,6 +277,7 @@ class Scene(Record):
         """
         values = {f"{INITIAL}_{FROM}" if path == f"{INITIAL}.{FROM}" else path: x for path, x in values.items()}
         fresh = [path for path, value in values.items() if not self._has(path, value)]
+        _check_start(values.get(f"{INITIAL}_{FROM}", self.initial_from), fresh)
         data = self._guessing(fresh).model_dump(mode="json")
         for path, value in values.items():
             place: Any = data
@@ -294,6 +301,7 @@ class Scene(Record):
         Every derived property broadcasts over the lanes. The extremes of each array are what
         `with_values` should have accepted first; `engines` does so.
         """
+        _check_start(self.initial_from, values)
         scene = self._guessing(values)
         for path, lanes in values.items():
             scene = _replace(scene, path.split("."), np.asarray(lanes, dtype=float))
@@ -346,6 +354,21 @@ class Scene(Record):
         """Twelve hexadecimal digits that change when any field does, not with the order of the fields."""
         text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _check_start(origin: Any, paths: Iterable[str]) -> None:
+    """Raises InputError for a path that would move a start which is the end of a run."""
+    for path in paths if isinstance(origin, End | dict) else ():
+        if path.split(".")[0] == INITIAL:
+            raise InputError(f"{path}: the machine starts at the end of a run; take initial.from out (null)")
+
+
+def _end(stated: Any) -> End:
+    """The end of a run. Raises ValueError."""
+    try:
+        return End.model_validate(stated)
+    except ValidationError as error:
+        raise ValueError(str(one_line(error, "initial.from"))) from None
 
 
 def _guessed(start: Any) -> Any:

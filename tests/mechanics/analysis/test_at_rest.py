@@ -129,7 +129,7 @@ def test_what_is_written_of_a_scene_can_be_read_and_set() -> None:
 @pytest.mark.parametrize(
     ("fields", "told"),
     [
-        ({"initial": {"from": "rest"}}, "initial.from: a start is computed by statics, found 'rest'"),
+        ({"initial": {"from": "rest"}}, "initial.from: .statics. or the .end. of a run's JSON, found 'rest'"),
         ({"initial": {"from": "statics", "blade": {"rate": 1.0}}}, "initial.blade.rate: a start from statics is at"),
     ],
 )

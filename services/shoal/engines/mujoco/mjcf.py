@@ -115,8 +115,8 @@ class Mjcf:
                 raise InputError("bodies.world: MJCF calls the ground so; give the body another name")
             if body.element != "rigid":
                 raise InputError(f"bodies.{name}.element: MJCF has no {body.element}; rigid bodies only")
-        if scene.starts_at_rest:
-            raise InputError("initial.from: MJCF states a start; it has no statics")
+        if scene.initial_from is not None:
+            raise InputError("initial.from: MJCF states a start; it has neither statics nor other runs")
         for name in scene.ground_points:
             raise InputError(f"ground_points.{name}: MJCF has no functions of time")
         for name, joint in scene.joints.items():

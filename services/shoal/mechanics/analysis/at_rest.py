@@ -1,4 +1,4 @@
-"""Machines that start where their forces balance, bent or prestressed as they are there."""
+"""Machines that start elsewhere than stated: where their forces balance, bent or prestressed, or where a run ended."""
 
 from __future__ import annotations
 
@@ -8,16 +8,21 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.mechanics.analysis.going_on import taken_up
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.model import Model
 from shoal.scene import Scene
+from shoal.scene.ended import End
 
 
 def begun(model: Model, scenes: Sequence[Scene] | None = None) -> Model:
-    """The model at rest in its equilibrium, where its scene wants to start there; else the model as it is.
+    """The model at rest in its equilibrium, or at the end of a run, where its scene wants to start there.
 
-    scenes: of every lane, else the one of the model. Raises InputError where a scene has no stable equilibrium.
+    Else the model as it is. scenes: of every lane, else the one of the model. Raises InputError where a scene has no
+    stable equilibrium, and where the end of the run does not fit.
     """
+    if isinstance(model.stated.initial_from, End):
+        return taken_up(model, model.stated.initial_from)
     if not model.stated.starts_at_rest:
         return model
     found = [_equilibrium(scene) for scene in scenes or [model.stated]]

@@ -58,6 +58,8 @@ class Loads:
         self.scene, self.placement, self.rows, self.horizon = scene, placement, rows, horizon
         self.fitted: list[Piecewise] = []
         self.kinds: list[int] = []
+        self.names: list[str] = []
+        """Of the joint, the load or the body that every element is part of."""
         self.places: list[list[int]] = []
         self.numbers: list[list[int]] = []
         self.laws: list[Number] = []
@@ -208,6 +210,7 @@ class Loads:
             driven = len(self.fitted) - 1
         vectors = [*vectors, *vectors[-1:] * (3 - len(vectors))]
         self.kinds.append(kind)
+        self.names.append(name)
         self.places.append(self.rows.of_all(vectors))
         self.numbers.append([table, energy, driven])
         self.laws += law

@@ -22,6 +22,7 @@ from shoal.mechanics.start.closure import Rows
 from shoal.mechanics.start.poses import Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
 from shoal.scene import GROUND, InitialState, Scene
+from shoal.scene.ended import End
 from shoal.scene.joints import places
 from shoal.scene.scene import POSES, RATES, Quantity
 
@@ -300,7 +301,7 @@ def _bending(frame: ModalFrame, q: Array, v: Array) -> tuple[tuple[float, ...], 
 def changes(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:
     """What was stated and is not what is used: body -> quantity -> stated, used; round-off of any size [m] left out."""
     found: dict[str, Any] = {}
-    for name, start in scene.initial.items():
+    for name, start in () if isinstance(scene.initial_from, End) else scene.initial.items():
         for quantity, unit in _UNITS.items():
             stated, now = getattr(start, quantity), getattr(used[name], quantity)
             if stated is None or now is None:

@@ -1,0 +1,144 @@
+"""Machines that start in the state in which a run has left them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
+from scipy.interpolate import BPoly
+
+from shoal.errors import InputError
+from shoal.mechanics.affine import Affine
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.ended import counting
+from shoal.mechanics.model import Model
+from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.reach import span
+from shoal.scene import Scene
+from shoal.scene.ended import End, mesh_of
+
+FITS = 1e-6
+"""A state may miss the joints by so much, relative to the machine's size and speed: what a run may drift at most."""
+
+
+def taken_up(model: Model, state: End) -> Model:
+    """The model in that state, in all lanes. Raises InputError where it is that of another machine."""
+    try:
+        state.check(model.stated.bodies)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    state = _finer(state, model.stated)
+    vectors = [(name, vector) for name, frame in model.frames.items() for vector in frame.vectors]
+    _check_count(model, state)
+    differ = any(part.shape[1] > 1 for _, one in vectors for part in (one.constant, *one.terms.values()))
+    found = [_coordinates(model, state, vectors, lane) for lane in range(model.lanes if differ else 1)]
+    q, v = (np.stack(columns, axis=1) for columns in zip(*found, strict=True))
+    q, v = (np.broadcast_to(part, (model.unknowns, model.lanes)).copy() for part in (q, v))
+    angles, told = model.start_angles.copy(), {name: iter(turns) for name, turns in state.turns.items()}
+    for name, number in counting(model):
+        angles[number] = next(told.get(name, iter(())), angles[number])
+    model = replace(model, q0=q, v0=v, start_angles=angles, shared_tiles={})
+    for lane in range(model.lanes if model.varies else 1):
+        _check_joints(model, lane)
+    return model
+
+
+def _finer(state: End, scene: Scene) -> End:
+    """The state with nodes for the elements of the scene, which may be a multiple of those of the run."""
+    bodies = {}
+    for name, one in state.bodies.items():
+        mine, there = mesh_of(scene.bodies[name]).get("elements", 0), one.mesh.get("elements", 0)
+        if mine != there:
+            both = {field: _divided(getattr(one, field), there, mine, one.length) for field in ("vectors", "rates")}
+            bodies[name] = one.model_copy(update=both)
+    return state.model_copy(update={"bodies": {**state.bodies, **bodies}}) if bodies else state
+
+
+def _divided(vectors: Sequence[Sequence[float]], there: int, mine: int, length: float | None) -> list[list[float]]:
+    """Places and derivatives by arc length at more nodes of a rod, on the polynomials of its elements."""
+    try:
+        nodes = np.array(vectors, dtype=float).reshape(there + 1, len(vectors) // (there + 1), -1)
+    except ValueError:
+        return []  # the count of vectors is refused
+    curve = BPoly.from_derivatives(np.linspace(0.0, length or 1.0, there + 1), nodes)
+    at = np.linspace(0.0, length or 1.0, mine + 1)
+    found = np.stack([curve.derivative(k)(at) if k else curve(at) for k in range(nodes.shape[1])], axis=1)
+    every = mine // there
+    found[::every] = nodes
+    return [list(map(float, vector)) for vector in found.reshape(len(at) * nodes.shape[1], -1)]
+
+
+def _check_count(model: Model, state: End) -> None:
+    for name, frame in model.frames.items():
+        one = state.bodies[name]
+        for field in ("vectors", "rates"):
+            given = getattr(one, field)
+            if len(given) != len(frame.vectors) or any(len(vector) != model.dimensions for vector in given):
+                raise InputError(
+                    f"initial.from: bodies.{name}.{field}: a body of this kind has {len(frame.vectors)} of "
+                    f"{model.dimensions} components, found {len(given)}"
+                )
+
+
+def _coordinates(model: Model, state: End, vectors: list[tuple[str, Affine]], lane: int) -> tuple[Array, Array]:
+    """Coordinates and rates at which the vectors of the bodies are those of the state.
+
+    Moving points of the ground that no body is joined to stay where their motion begins.
+    """
+    d = model.dimensions
+    stated = [[one for name in model.frames for one in getattr(state.bodies[name], f)] for f in ("vectors", "rates")]
+    places, rates = (np.array(one, dtype=float).ravel() for one in stated)
+    base = np.concatenate([one.constant[:, lane % one.constant.shape[1]] for _, one in vectors])
+    rows, columns, entries = (np.array(part) for part in zip(*_entries(vectors, d, lane), strict=True))
+    matrix = scipy.sparse.csc_array((entries, (rows, columns)), shape=(base.size, model.unknowns))
+    used = np.unique(columns)
+    part = matrix[:, used]
+    solve = scipy.sparse.linalg.factorized(scipy.sparse.csc_array(part.T @ part))
+    q, v = (part[:, lane % part.shape[1]].copy() for part in (model.q0, model.v0))
+    for _ in range(2):  # the second time takes what the first one rounded off
+        q[used] += solve(part.T @ (places - base - matrix @ q))
+        v[used] += solve(part.T @ (rates - matrix @ v))
+    size, speed = _scales(model, rates)
+    for wanted, off, unit in ((size, matrix @ q + base - places, "m"), (speed, matrix @ v - rates, "m/s")):
+        worst = int(np.argmax(np.abs(off)))
+        if not abs(off[worst]) <= FITS * wanted:
+            name = vectors[worst // d][0]
+            raise InputError(
+                f"initial.from: the joints hold {name} {abs(off[worst]):.3g} {unit} away from where the run left it; "
+                "joints and lengths have to be those of the run"
+            )
+    return q, v
+
+
+def _entries(vectors: list[tuple[str, Affine]], d: int, lane: int) -> Iterator[tuple[int, int, float]]:
+    for k, (_, one) in enumerate(vectors):
+        for unknown, coefficient in one.terms.items():
+            for axis in np.flatnonzero(coefficient[:, lane % coefficient.shape[1]]):
+                yield d * k + int(axis), unknown, float(coefficient[axis, lane % coefficient.shape[1]])
+
+
+def _scales(model: Model, rates: Array) -> tuple[float, float]:
+    """What a gap and a rate are compared with; directors have the length one."""
+    size = min(1.0, span(model.stated))
+    return size, max(float(np.max(np.abs(rates), initial=0.0)), size / max(model.stated.solver.duration, 1.0))
+
+
+def _check_joints(model: Model, lane: int) -> None:
+    """Raises InputError where a joint is open at time 0, or parts."""
+    q, v = (part[:, lane % part.shape[1]] for part in (model.q0, model.v0))
+    seen = Evaluator(model, lane).at(q, v)
+    if not seen.gap.size:
+        return
+    slope = seen.jacobian.toarray()
+    size, speed = _scales(model, v)
+    for gap, wanted, unit in ((seen.gap, size, "m"), (slope @ v + seen.rate, speed, "m/s")):
+        away = float(np.max(np.abs(np.linalg.lstsq(slope, gap, rcond=None)[0])))
+        if not away <= FITS * wanted:
+            name = model.constraint_names[int(np.argmax(np.abs(gap)))]
+            raise InputError(
+                f"initial.from: {name} is off by {away:.3g} {unit} where the run ended; joints, and drives at time 0, "
+                "have to be those of its end"
+            )

@@ -1,0 +1,75 @@
+"""The state in which a run leaves its machine, by body, so that it does not depend on how coordinates are numbered."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from shoal.mechanics.assembly.loads import Loads
+from shoal.mechanics.assembly.placement import place
+from shoal.mechanics.assembly.rows import Rows
+from shoal.mechanics.forces import ANGLE
+from shoal.mechanics.model import Model
+from shoal.mechanics.numerics.tile import Array
+from shoal.scene.ended import BodyState, End, mesh_of
+
+
+@dataclass(frozen=True, eq=False)
+class Ended(Mapping[str, Any]):
+    """The state as `End` has it, in plain data, worked out when it is asked for.
+
+    q, v: coordinates and rates, each (unknowns,); turns: of force elements, angles: of the markers [rad].
+    time: of the end [s].
+    """
+
+    model: Model
+    time: float
+    q: Array
+    v: Array
+    turns: Array
+    angles: Array
+
+    def __getitem__(self, field: str) -> Any:
+        return self._told[field]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._told)
+
+    def __len__(self) -> int:
+        return len(self._told)
+
+    @cached_property
+    def _told(self) -> dict[str, Any]:
+        scene = self.model.stated
+        bodies = {}
+        for name, body in scene.bodies.items():
+            vectors = self.model.frames[name].vectors
+            bodies[name] = BodyState.model_construct(
+                element=body.element,
+                mesh=mesh_of(body),
+                length=getattr(body, "length", None),
+                vectors=tuple(tuple(one.at(self.q).tolist()) for one in vectors),
+                rates=tuple(tuple(one.rate(self.v).tolist()) for one in vectors),
+            )
+        turns: dict[str, tuple[float, ...]] = {}
+        for name, number in counting(self.model):
+            turns[name] = (*turns.get(name, ()), float(self.turns[number]))
+        angles = dict(zip(scene.markers, self.angles.tolist(), strict=True))
+        return End.model_construct(t=self.time, bodies=bodies, turns=turns, angles=angles).model_dump(mode="json")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A model holds addresses of this process.
+        return dict, (self._told,)
+
+
+def counting(model: Model) -> list[tuple[str, int]]:
+    """The force elements of a model that count turns: the name of the joint or the load, and the element's number."""
+    numbers = np.flatnonzero(model.forces.kind == ANGLE)
+    if not numbers.size:
+        return []
+    names = Loads(model.stated, place(model.stated), Rows(0), 0.0).names
+    return [(names[number], int(number)) for number in numbers]
