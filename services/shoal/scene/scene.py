@@ -109,7 +109,9 @@ class Scene(Record):
         if origin is None:
             return {**data, INITIAL: initial}
         if isinstance(origin, End | dict):
-            return {**data, INITIAL: initial, "initial_from": _end(origin)}
+            # What is stated beside fits the drives as they were then.
+            beside = {name: _guessed(start, (*POSES, *RATES)) for name, start in initial.items()}
+            return {**data, INITIAL: beside, "initial_from": _end(origin)}
         if origin != "statics":
             raise ValueError(f"initial.from: `statics` or the `end` of a run's JSON, found {str(origin)[:40]!r}")
         # Where the search for the place of rest begins is near it, no more.
@@ -371,12 +373,12 @@ def _end(stated: Any) -> End:
         raise ValueError(str(one_line(error, "initial.from"))) from None
 
 
-def _guessed(start: Any) -> Any:
-    """The initial state of a body with its pose as a guess."""
+def _guessed(start: Any, quantities: tuple[Quantity, ...] = POSES) -> Any:
+    """The initial state of a body with its pose, or other quantities, as a guess."""
     stated = start.model_dump() if isinstance(start, InitialState) else start
     if not isinstance(stated, dict):
         return start
-    return {**stated, "guess": [quantity for quantity in POSES if stated.get(quantity) is not None]}
+    return {**stated, "guess": [quantity for quantity in quantities if stated.get(quantity) is not None]}
 
 
 def _counted(one: str, many: str, names: Mapping[str, Any]) -> str:
