@@ -1,8 +1,9 @@
 """The library's results as JSON and back, to the last bit: what a service answers to `shoal.Client`.
 
 What JSON has stays as it is. All else is an object whose key `@` says what it was: `array` (NumPy's own format, in
-base64), `number` (not finite), `complex`, `tuple`, `pairs` (a mapping), `distribution` (of scipy) or the class of
-this package that it is one of. Nothing is executed, and no class of another package is made.
+base64), `number` (not finite), `complex`, `tuple`, `pairs` (a mapping; any comes back as a dictionary),
+`distribution` (of scipy) or the class of this package that it is one of. Nothing is executed, and no class of another
+package is made.
 """
 
 from __future__ import annotations
