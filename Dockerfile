@@ -4,6 +4,8 @@ ARG PYTHON=3.11.14-slim-bookworm
 FROM python:${PYTHON} AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 UV_LINK_MODE=copy UV_COMPILE_BYTECODE=1
 WORKDIR /build
+# hadolint ignore=DL3008
+RUN apt-get update && apt-get install --no-install-recommends --yes binutils
 RUN pip install --no-cache-dir uv==0.13.8 && uv venv /opt/shoal/venv
 COPY requirements.lock pyproject.toml ./
 # The locked versions of what runs here; the tools of development stay outside.

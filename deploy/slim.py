@@ -1,4 +1,4 @@
-"""Take out of an environment what no service reads: headers, tests of others, repeated libraries. For the image.
+"""Take out of an environment what no service reads: headers, tests, and what libraries hold twice. For the image.
 
 python deploy/slim.py SITE_PACKAGES
 """
@@ -6,6 +6,7 @@ python deploy/slim.py SITE_PACKAGES
 from __future__ import annotations
 
 import shutil
+import subprocess
 import sys
 from collections.abc import Iterator
 from hashlib import sha256
@@ -34,7 +35,16 @@ def slim(packages: Path) -> int:
         for path in others:
             path.unlink()
             path.symlink_to(first.name)
+    for library in packages.rglob("*.so*"):
+        if library.is_file() and not library.is_symlink():
+            _strip(library)
     return before - _size(packages)
+
+
+def _strip(library: Path) -> None:
+    """Takes the symbols that debuggers read; libraries that the makers of a wheel have renamed stay as they are."""
+    if library.parent.suffix != ".libs":
+        subprocess.run(["strip", "--strip-unneeded", str(library)], check=False, stderr=subprocess.DEVNULL)
 
 
 def _repeated(folder: Path) -> Iterator[list[Path]]:

@@ -235,6 +235,25 @@ def test_the_image_leaves_out_what_no_service_reads(tmp_path: Path) -> None:
     assert (tmp_path / "casadi/libipopt.so").is_symlink()
 
 
+@pytest.mark.skipif(shutil.which("strip") is None, reason="needs binutils, as the stage that builds the image has")
+def test_the_image_keeps_libraries_usable_without_their_symbols(tmp_path: Path) -> None:
+    """A real extension module: smaller or equal, and it still works; what is no library is left alone."""
+    import _cffi_backend
+
+    module = tmp_path / Path(_cffi_backend.__file__).name
+    shutil.copy(_cffi_backend.__file__, module)
+    (tmp_path / "broken.so").write_bytes(b"no library")
+    command = [sys.executable, str(ROOT / "deploy" / "slim.py"), str(tmp_path)]
+    subprocess.run(command, check=True, capture_output=True, timeout=60)
+    assert module.stat().st_size <= Path(_cffi_backend.__file__).stat().st_size
+    assert (tmp_path / "broken.so").read_bytes() == b"no library"
+    code = "import _cffi_backend; print(_cffi_backend.__file__)"
+    used = subprocess.run(
+        [sys.executable, "-c", code], env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=True
+    )
+    assert used.stdout.strip() == str(module)
+
+
 def test_entrypoint_reads_the_password_from_its_file(tmp_path: Path) -> None:
     (tmp_path / "password").write_text("from a file\n")
     environment = {"PATH": "/usr/bin:/bin", "PGPASSWORD_FILE": str(tmp_path / "password")}
