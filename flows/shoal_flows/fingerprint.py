@@ -37,6 +37,9 @@ def of_cell(cell: Cell, measurement: Measurement) -> str:
     digest.update(problem.model_dump_json().encode() + measurement.origin.encode())
     for name, recording in measurement.recordings.items():
         digest.update(name.encode() + recording.times.tobytes() + recording.values.tobytes())
+        digest.update(recording.noise.tobytes() + repr((recording.channels, recording.stated)).encode())
+        for held in recording.held:
+            digest.update(repr(held.window).encode() + held.times.tobytes() + held.values.tobytes())
     return _with_code("fit", digest.hexdigest())
 
 

@@ -14,6 +14,8 @@ from shoal.engines.gauss import GaussEngine
 from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.identification import Estimate, Measurement, identify, load_problem, measure
+from shoal.identification.conclude import Wishes
+from shoal.identification.measure import Windows
 from shoal.pictures.answer import Answer
 from shoal.response import Response, uncertain
 from shoal.response.stated import load_study
@@ -29,7 +31,11 @@ _POINTS = 300
 
 @dataclass(frozen=True)
 class Cell:
-    """One optimisation of a study. values: fields of the scene to set; label: its readable name."""
+    """One optimisation of a study.
+
+    values: fields of the scene to set; tolerance [m]: for which the model is chosen; sample: effective draws from the
+    posterior; label: its readable name
+    """
 
     problem: str
     method: str
@@ -37,6 +43,8 @@ class Cell:
     engine: str = "gauss"
     values: dict[str, Any] = field(default_factory=dict)
     label: str = ""
+    tolerance: float | None = None
+    sample: int = 0
 
     @property
     def title(self) -> str:
@@ -63,10 +71,13 @@ class Fit:
         return next(iter(self.motions.values()))
 
 
-def measured(problem: str, data: str | None = None) -> Measurement:
-    """The motion to fit: read from `data`, or computed as the problem says. Raises InputError."""
+def measured(problem: str, data: str | None = None, hold_out: Windows | None = None) -> Measurement:
+    """The motion to fit: read from `data`, or computed as the problem says. Raises InputError.
+
+    hold_out: windows [s] that are predicted instead of fitted, in place of those that the recordings state
+    """
     stated = load_problem(problem)
-    return measure(stated, stated.load_scene(), data)
+    return measure(stated, stated.load_scene(), data, hold_out)
 
 
 def fit(cell: Cell, measurement: Measurement) -> Fit:
@@ -78,6 +89,8 @@ def fit(cell: Cell, measurement: Measurement) -> Fit:
         values=cell.values,
         seed=cell.seed,
         measurement=measurement,
+        tolerance=cell.tolerance,
+        wishes=Wishes(sample=cell.sample),
     )
     return with_motion(cell, estimate)
 

@@ -14,7 +14,7 @@ from shoal.pictures.answer import Answer
 from shoal.pictures.archive import archived
 from shoal.pictures.convergence import convergence
 from shoal.pictures.engines import engines
-from shoal.pictures.files import moving_picture
+from shoal.pictures.files import draws, moving_picture
 from shoal.pictures.gallery import gallery, motions
 from shoal.pictures.mesh_error import mesh_error
 from shoal.pictures.motion import motion
@@ -38,7 +38,7 @@ Picture = tuple[bytes, bytes]
 
 @dataclass(frozen=True)
 class Album:
-    """What is shown of one optimisation: pictures by the name of their file, the page, and all that it is made of."""
+    """What is shown of one optimisation: pictures and draws by the name of their file, the page, and its record."""
 
     pictures: dict[str, bytes]
     page: str
@@ -57,6 +57,8 @@ def album(found: Fit) -> Album:
     moving = motions(answer)
     drawn = gallery(answer, moving)
     pictures = {f"{one.name}.png": png(one.figure) for one in drawn}
+    if found.estimate.posterior is not None:
+        pictures["draws.nc"] = draws(found.estimate)
     return Album({**pictures, "motion.gif": moving_picture(answer)}, report(answer, moving, drawn), archived(answer))
 
 

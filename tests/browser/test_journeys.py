@@ -114,7 +114,8 @@ def test_the_best_run_is_found_compared_and_seen_moving(desk: Any, visit: Callab
     rows = page.get_by_role("row").filter(has_text="paper-case-1")
     expect(rows).to_have_count(2)
     fitness = [float(found) for text in rows.all_inner_texts() for found in re.findall(r"0\.00000\d+", text)]
-    assert fitness == sorted(fitness)
+    # Both methods end in the same minimum, up to rounding.
+    assert fitness == pytest.approx(sorted(fitness), rel=1e-9)
     one.shoot("best")
 
     # Fitness against iteration, the methods over each other.

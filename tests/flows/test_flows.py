@@ -70,6 +70,25 @@ def test_artifacts_hold_the_full_trajectory_and_pictures(study: Any) -> None:
     assert {"convergence.png", "residuals.png", "trajectory.png", "report.html", "model"} <= of_study
 
 
+def test_windows_are_held_out_and_the_posterior_is_drawn_on_the_dashboard() -> None:
+    """What the command line can do beside the fit, a flow can too; the data are Exudyn's."""
+    wishes = {"hold_out": "[[0.3, 0.4]]", "sample": "100", "methods": "least-squares"}
+    found = run.run_flow("identify", {"problem": "paper-case-1", **wishes})
+    (child,) = _children(found.run_id)
+    metrics = child.data.metrics
+    held = {name: value for name, value in metrics.items() if name.startswith("held out/recording/0.3 to 0.4 s/")}
+    assert len(held) == 4
+    for name in ("B.x", "B.y"):
+        assert held[f"held out/recording/0.3 to 0.4 s/{name}/rms"] <= held[f"held out/recording/0.3 to 0.4 s/{name}/limit"]
+    assert metrics["posterior/effective"] >= 100
+    for name in ("theta1", "theta2"):
+        assert metrics[f"posterior/{name}/r_hat"] < 1.05
+        inside = metrics[f"posterior/{name}/lower"], metrics[f"posterior/{name}/upper"]
+        assert inside[0] < metrics[f"final/{name}"] < inside[1]
+    names = {Path(item.path).name for item in _client().list_artifacts(child.info.run_id)}
+    assert {"draws.nc", "posterior.png", "prediction.png"} <= names
+
+
 def test_a_study_says_what_it_found_and_its_best_is_a_model(study: Any) -> None:
     run = _client().get_run(study.run_id)
     assert run.data.tags["verdict"] == "identified"

@@ -47,6 +47,8 @@ Instant = Annotated[float | None, Field(ge=0)]
 Time = Annotated[float, Field(ge=0)]
 Tolerance = Annotated[float, Field(gt=0)]
 Size = Annotated[float | None, Field(gt=0)]
+Count = Annotated[int, Field(ge=0, le=100_000)]
+Window = Annotated[list[float], Field(min_length=2, max_length=2)]
 About = Literal["answer", "start"] | None
 ALL = "all"
 Only = Annotated[

@@ -14,6 +14,7 @@ from shoal.engines.pieces import joined, pieces
 from shoal.engines.sweep import Sweep
 from shoal.identification import Measurement
 from shoal.identification.design import Design
+from shoal.identification.measure import Windows
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.response import Response
 from shoal.scene import Scene
@@ -29,10 +30,10 @@ from shoal_flows.tracking.identification import log_fit
 
 
 @task(task_run_name="measure", cache_policy=NO_CACHE)
-def measure(problem: str, data: str | None) -> Measurement:
+def measure(problem: str, data: str | None, hold_out: Windows | None = None) -> Measurement:
     """The motion to fit."""
     with events.work(f"data of {inputs.title(problem)}"):
-        return workers.run(jobs.measured, problem, data)
+        return workers.run(jobs.measured, problem, data, hold_out)
 
 
 @task(task_run_name="{cell.title} {cell.name}", cache_policy=NO_CACHE)

@@ -142,3 +142,13 @@ def _log_result(run: Run, fit: Fit) -> None:
             run.metric(f"correction/{name}", value.correction)
     for name, true in estimate.truth.items():
         run.metric(f"error/{name}", estimate.parameters[name].value - true)
+    for one in estimate.prediction:
+        window = f"{one.recording}/{one.window[0]:g} to {one.window[1]:g} s"
+        for channel in one.channels:
+            run.metric(f"held out/{window}/{channel.marker}.{channel.quantity}/rms", channel.rms)
+            run.metric(f"held out/{window}/{channel.marker}.{channel.quantity}/limit", channel.limit)
+    if estimate.posterior is not None:
+        run.metric("posterior/effective", estimate.posterior.worth)
+        for name, drawn in estimate.posterior.marginals.items():
+            for what in ("mean", "sd", "lower", "upper", "r_hat"):
+                run.metric(f"posterior/{name}/{what}", getattr(drawn, what))

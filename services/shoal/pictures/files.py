@@ -98,14 +98,21 @@ def estimate(found: Estimate, problem: Problem, path: Path) -> None:
 
         return json_text(archived(Answer(problem, found)), indent=1)
 
-    def draws() -> bytes:
+    def drawn() -> bytes:
         if found.posterior is None:
             raise InputError(f"out: no posterior was drawn, so {path} has nothing to hold")
-        about = {"left_out": json_text(found.left_out), "joint": json_text(found.joint)}
-        return bytes(found.posterior.to_xarray().assign_attrs(about).to_netcdf(engine="scipy"))
+        return draws(found)
 
     moves = {".gif": lambda: moving_picture(Answer(problem, found))}
-    save(path, {".html": page, ".png": lambda: _plotted(found), **moves, ".json": kept, ".nc": draws})
+    save(path, {".html": page, ".png": lambda: _plotted(found), **moves, ".json": kept, ".nc": drawn})
+
+
+def draws(found: Estimate) -> bytes:
+    """The draws from the posterior as NetCDF in ArviZ's form, where there are any."""
+    if found.posterior is None:
+        return b""
+    about = {"left_out": json_text(found.left_out), "joint": json_text(found.joint)}
+    return bytes(found.posterior.to_xarray().assign_attrs(about).to_netcdf(engine="scipy"))
 
 
 def moving_picture(answer: Answer) -> bytes:
