@@ -79,7 +79,8 @@ def test_windows_are_held_out_and_the_posterior_is_drawn_on_the_dashboard() -> N
     held = {name: value for name, value in metrics.items() if name.startswith("held out/recording/0.3 to 0.4 s/")}
     assert len(held) == 4
     for name in ("B.x", "B.y"):
-        assert held[f"held out/recording/0.3 to 0.4 s/{name}/rms"] <= held[f"held out/recording/0.3 to 0.4 s/{name}/limit"]
+        at = f"held out/recording/0.3 to 0.4 s/{name}"
+        assert held[f"{at}/rms"] <= held[f"{at}/limit"]
     assert metrics["posterior/effective"] >= 100
     for name in ("theta1", "theta2"):
         assert metrics[f"posterior/{name}/r_hat"] < 1.05
