@@ -200,7 +200,11 @@ def _figure(name: str, studies: Sequence[Study], line: Drift | None, says: str) 
             value, lower, upper = np.array([study.values[name] for study in some]).T
             # An interval of an answer that cannot be used may span all there is.
             bars = np.nan_to_num(np.abs([value - lower, upper - value])) if trusted else None
-            axes.errorbar([_date(s.started) for s in some], value, bars, markersize=4, linewidth=1, **look)
+            # Many bars would run together and hide the points.
+            thin = {"elinewidth": min(1.0, 60 / len(some)), "ecolor": (look["color"], 0.5), "linewidth": 1}
+            axes.errorbar(
+                [_date(s.started) for s in some], value, bars, markersize=min(4, 300 / len(some)), **thin, **look
+            )
     if line is not None:
         ends = np.array([studies[0].started, studies[-1].started])
         axes.plot([_date(end) for end in ends], line.at(ends), color=GREY, linestyle="--")
