@@ -93,7 +93,7 @@ class Worker:
 
     def kill(self) -> None:
         """End the process at once, whatever it is doing."""
-        if self._process is not None:
+        if self._process is not None and self._process.pid is not None:
             self._process.kill()
             self._process.join()
         self._folder.cleanup()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.mechanics.joints import Along, Apart, Condition, Geared, Meet, Sum, Turned, conditions, unknown
 from shoal.mechanics.modal.modes import bent
@@ -87,6 +88,7 @@ class Closure:
         self.column = {name: 3 * number for number, name in enumerate(scene.bodies)}
         self._points = {name for name, body in scene.bodies.items() if isinstance(body, PointMass)}
         self._arms: dict[int, tuple[Attachment, Number]] = {}
+        self._angular: npt.NDArray[np.int64] | None = None
 
     @cached_property
     def _parts(self) -> list[tuple[str, list[int], Closure, tuple[Condition, ...]]]:
@@ -113,10 +115,11 @@ class Closure:
         if not found:
             return Rows(np.zeros((len(u), 0)), np.zeros((len(u), 0)), (), (), np.zeros(0, dtype=np.int64), u.shape[1])
         names, columns_of, gap, slope, rate = zip(*found, strict=True)
-        angular = [not any(np.any(s[:, k]) for k, c in enumerate(cs) if c % 3 != 2)
-                   for cs, s in zip(columns_of, slope, strict=True)]  # fmt: skip
         parts = tuple(zip(columns_of, slope, strict=True))
-        return Rows(np.stack(gap, 1), np.stack(rate, 1), parts, names, np.array(angular, dtype=np.int64), u.shape[1])
+        if self._angular is None:  # which rows these are does not depend on the poses
+            angular = [not any(np.any(s[:, k]) for k, c in enumerate(cs) if c % 3 != 2) for cs, s in parts]
+            self._angular = np.array(angular, dtype=np.int64)
+        return Rows(np.stack(gap, 1), np.stack(rate, 1), parts, names, self._angular, u.shape[1])
 
     def place(self, u: Array, at: Attachment) -> Vector:
         """Where an attachment is [m]."""
@@ -231,7 +234,7 @@ class Closure:
 
 
 def _lanes(value: Number, u: Array) -> Array:
-    return np.broadcast_to(np.asarray(value, dtype=complex), len(u))
+    return np.full(len(u), value, dtype=complex)
 
 
 def place_of(scene: Scene, at: Attachment) -> Number:
