@@ -2,6 +2,7 @@
 
 from shoal.scene.bodies import Body, Rod
 from shoal.scene.function import Function
+from shoal.scene.initial import InitialState
 from shoal.scene.joints import (
     GROUND,
     JOINT_KINDS,
@@ -24,7 +25,7 @@ from shoal.scene.joints import (
 )
 from shoal.scene.load import load_scene, scene_names
 from shoal.scene.loads import LOAD_KINDS, DistributedForce, Force, Load, Spring, Torque, TorsionSpring
-from shoal.scene.scene import InitialState, Scene
+from shoal.scene.scene import Scene
 from shoal.scene.solids import ModalBody, PointMass, RigidBody
 from shoal.scene.solver import Solver
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from shoal.scene.bodies import Rod
-from shoal.scene.scene import InitialState, Scene
+from shoal.scene.initial import InitialState
+from shoal.scene.scene import Scene
 
 
 def refined(scene: Scene, times: int) -> dict[str, Any]:

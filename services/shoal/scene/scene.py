@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -18,59 +18,29 @@ from shoal.scene.bodies import Body
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.ended import End
 from shoal.scene.expect import Expectation, ExpectedValue
+from shoal.scene.initial import (
+    FROM,
+    INITIAL,
+    POSES,
+    RATES,
+    Begin,
+    InitialState,
+    check_start,
+    end_of,
+    guessed,
+)
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
 from shoal.scene.loads import DistributedForce, Force, Load
-from shoal.scene.record import Angle, Record, Vector, Vector3, one_line
+from shoal.scene.paths import key, unknown, with_lanes
+from shoal.scene.record import Record, Vector, one_line
 from shoal.scene.solids import ModalBody
 from shoal.scene.solver import Solver
 
-INITIAL, FROM = "initial", "from"
 _FEW = 4
 """So many names are listed."""
-Quantity = Literal["angle", "rate", "position", "velocity", "rotation", "spin"]
-POSES: tuple[Quantity, ...] = ("angle", "position", "rotation")
-RATES: tuple[Quantity, ...] = ("rate", "velocity", "spin")
 _SHAPES = ("length", "curvature", "side_curvature", "twist", "named_points")
 """Fields of a body that place its joints."""
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
-
-
-class InitialState(Record):
-    """Absolute angle [rad], counter-clockwise from +X, and rate [rad/s] of a body at time zero.
-
-    position [m] and velocity [m/s] are those of its frame's origin. What is None is not stated: it follows from what
-    is, and is zero where nothing tells it. rotation, spin: in space, a rotation vector [rad] in place of the angle and
-    an angular velocity [rad/s] along the axes of the ground in place of the rate. modes, mode_rates: of a body that
-    bends by modes, their amplitudes and rates, all or none. guess: the quantities that may change
-    where the joints demand it.
-    """
-
-    angle: Angle | None = None
-    rate: float | None = None
-    position: Vector | None = None
-    velocity: Vector | None = None
-    rotation: Vector3 | None = None
-    spin: Vector3 | None = None
-    modes: tuple[float, ...] = ()
-    mode_rates: tuple[float, ...] = ()
-    guess: tuple[Quantity, ...] = ()
-
-    def stated(self, quantity: Quantity) -> bool:
-        """Whether the user gave this quantity a value."""
-        return getattr(self, quantity) is not None
-
-
-class Begin(NamedTuple):
-    """Initial state of one body with zeros for what is not stated; without a position, joints place it."""
-
-    angle: float
-    rate: float
-    position: Vector | None
-    velocity: Vector
-    rotation: Vector3 | None = None
-    spin: Vector3 | None = None
-    modes: tuple[float, ...] = ()
-    mode_rates: tuple[float, ...] = ()
 
 
 class Scene(Record):
@@ -110,12 +80,12 @@ class Scene(Record):
             return {**data, INITIAL: initial}
         if isinstance(origin, End | dict):
             # What is stated beside fits the drives as they were then.
-            beside = {name: _guessed(start, (*POSES, *RATES)) for name, start in initial.items()}
-            return {**data, INITIAL: beside, "initial_from": _end(origin)}
+            beside = {name: guessed(start, (*POSES, *RATES)) for name, start in initial.items()}
+            return {**data, INITIAL: beside, "initial_from": end_of(origin)}
         if origin != "statics":
             raise ValueError(f"initial.from: `statics` or the `end` of a run's JSON, found {str(origin)[:40]!r}")
         # Where the search for the place of rest begins is near it, no more.
-        near = {name: _guessed(start) for name, start in initial.items()}
+        near = {name: guessed(start) for name, start in initial.items()}
         return {**data, INITIAL: near, "initial_from": origin}
 
     def __repr__(self) -> str:
@@ -279,7 +249,7 @@ class Scene(Record):
         """
         values = {f"{INITIAL}_{FROM}" if path == f"{INITIAL}.{FROM}" else path: x for path, x in values.items()}
         fresh = [path for path, value in values.items() if not self._has(path, value)]
-        _check_start(values.get(f"{INITIAL}_{FROM}", self.initial_from), fresh)
+        check_start(values.get(f"{INITIAL}_{FROM}", self.initial_from), fresh)
         data = self._guessing(fresh).model_dump(mode="json")
         for path, value in values.items():
             place: Any = data
@@ -289,8 +259,8 @@ class Scene(Record):
                     place.setdefault(part, InitialState().model_dump(mode="json"))
                 if parents[:1] == ["initial"] and part == "velocity" and place.get(part) is None:
                     place[part] = [0.0, 0.0]
-                place = place[_key(place, part, path, ".".join(parents[:depth]))]
-            place[_key(place, leaf, path, ".".join(parents))] = value
+                place = place[key(place, part, path, ".".join(parents[:depth]))]
+            place[key(place, leaf, path, ".".join(parents))] = value
         for name, body in self.bodies.items():
             said = {"bodies", f"bodies.{name}", f"bodies.{name}.element"} & set(values)
             if "element" not in body.model_fields_set and not said:
@@ -303,10 +273,10 @@ class Scene(Record):
         Every derived property broadcasts over the lanes. The extremes of each array are what
         `with_values` should have accepted first; `engines` does so.
         """
-        _check_start(self.initial_from, values)
+        check_start(self.initial_from, values)
         scene = self._guessing(values)
         for path, lanes in values.items():
-            scene = _replace(scene, path.split("."), np.asarray(lanes, dtype=float))
+            scene = with_lanes(scene, path.split("."), np.asarray(lanes, dtype=float))
         return scene
 
     def _has(self, path: str, value: Any) -> bool:
@@ -346,9 +316,9 @@ class Scene(Record):
             ):
                 place = getattr(place, part)
             elif isinstance(place, tuple):
-                place = place[_key(place, part, path, "")]
+                place = place[key(place, part, path, "")]
             else:
-                raise _unknown(path, "", place)
+                raise unknown(path, "", place)
         return place
 
     @property
@@ -356,29 +326,6 @@ class Scene(Record):
         """Twelve hexadecimal digits that change when any field does, not with the order of the fields."""
         text = json.dumps(self.model_dump(mode="json"), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
-
-
-def _check_start(origin: Any, paths: Iterable[str]) -> None:
-    """Raises InputError for a path that would move a start which is the end of a run."""
-    for path in paths if isinstance(origin, End | dict) else ():
-        if path.split(".")[0] == INITIAL:
-            raise InputError(f"{path}: the machine starts at the end of a run; take initial.from out (null)")
-
-
-def _end(stated: Any) -> End:
-    """The end of a run. Raises ValueError."""
-    try:
-        return End.model_validate(stated)
-    except ValidationError as error:
-        raise ValueError(str(one_line(error, "initial.from"))) from None
-
-
-def _guessed(start: Any, quantities: tuple[Quantity, ...] = POSES) -> Any:
-    """The initial state of a body with its pose, or other quantities, as a guess."""
-    stated = start.model_dump() if isinstance(start, InitialState) else start
-    if not isinstance(stated, dict):
-        return start
-    return {**stated, "guess": [quantity for quantity in quantities if stated.get(quantity) is not None]}
 
 
 def _counted(one: str, many: str, names: Mapping[str, Any]) -> str:
@@ -393,37 +340,3 @@ def _places(path: list[str]) -> bool:
     """Whether a field places joints."""
     shape = path[0] == "bodies" and len(path) > 2 and path[2] in _SHAPES
     return shape or path[0] in ("joints", "ground_points")
-
-
-def _replace(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any:
-    head, *rest = path
-    if isinstance(place, tuple):
-        return tuple(lanes if k == int(head) else entry for k, entry in enumerate(place))
-    if isinstance(place, Mapping):
-        inner = place.get(head, InitialState())
-        return {**place, head: _replace(inner, rest, lanes)}
-    inside = getattr(place, head)
-    if inside is None and head == "velocity":
-        inside = (0.0, 0.0)
-    value = _replace(inside, rest, lanes) if rest else lanes
-    return place.model_copy(update={head: value})
-
-
-def _key(place: Any, part: str, path: str, parent: str) -> Any:
-    """The key of a mapping, or the index of a vector's component. Raises InputError."""
-    if isinstance(place, dict) and part in place:
-        return part
-    if isinstance(place, list | tuple) and part.isdecimal() and int(part) < len(place):
-        return int(part)
-    raise _unknown(path, parent, place)
-
-
-def _unknown(path: str, parent: str, place: Any) -> InputError:
-    if isinstance(place, Record):
-        place = type(place).model_fields
-    if isinstance(place, Begin):
-        place = InitialState.model_fields
-    if isinstance(place, list | tuple):
-        place = {str(k): entry for k, entry in enumerate(place)}
-    known = ", ".join(place) if isinstance(place, Mapping) else "nothing below it"
-    return InputError(f"{path}: no such field; {parent or 'the scene'} has {known}")

@@ -18,7 +18,7 @@ from shoal.mechanics.reach import extents, span
 from shoal.mechanics.start.closure import Closure
 from shoal.mechanics.start.walk import Walk, guessed_angles
 from shoal.scene import Scene
-from shoal.scene.scene import Quantity
+from shoal.scene.initial import Quantity
 
 CLOSED = 1e-11
 """A joint that gapes by less, relative to the size of the machine or in rad, is closed."""

@@ -23,8 +23,8 @@ from shoal.mechanics.start.poses import Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
 from shoal.scene import GROUND, InitialState, Scene
 from shoal.scene.ended import End
+from shoal.scene.initial import POSES, RATES, Quantity
 from shoal.scene.joints import places
-from shoal.scene.scene import POSES, RATES, Quantity
 
 _EFFORT = 8_000
 """Gaps (`Assembly.effort`) after which no fewer statements are sought that contradict each other."""

@@ -21,7 +21,7 @@ from shoal.mechanics.assembly.terms import Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.scene import InitialState, Scene
-from shoal.scene.scene import Quantity
+from shoal.scene.initial import Quantity
 
 CLOSED = 1e-11
 """A joint that gapes by less, relative to the size of the machine, is closed."""
