@@ -9,6 +9,7 @@ import pytest
 from numba import njit
 from shoal.mechanics.numerics import alike, sparse
 from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics.row_pairs import paired
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Tile
 
 
@@ -46,7 +47,7 @@ def _shared(matrix: Any, components: int) -> alike.Alike:
     factor = values.copy()
     _factor(pattern, factor)
     inverse = alike.spread_inverse(matrix if size <= alike.FEW else np.zeros((0, 0)), components)
-    return alike.Alike(components, pattern, values, factor, inverse)
+    return alike.Alike(components, pattern, values, paired(pattern, factor), inverse)
 
 
 @pytest.mark.parametrize("tile", [SINGLE, WIDE], ids=["single", "lanes"])

@@ -114,12 +114,8 @@ def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Ar
 
     Fills the derived rows of z and zdot that forces act on, and the dissipated minus supplied power.
     """
-    derive(tile, m.derived, z, m.unknowns, m.force_rows, False)
     moving = part in (ALL, ACCELERATION)
-    if moving:
-        simd.assign(f, m.weight, m.unknowns * len(tile))
-    for row in range(m.unknowns if moving else 0, m.force_rows):
-        clear(tile, f, row)
+    _add_weight(tile, m, z, f, moving)
     if loaded(m):
         for lane in range(len(tile)):
             w.power[lane] = 0.0
@@ -127,7 +123,37 @@ def force(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, f: Ar
             derive(tile, m.derived, zdot, m.unknowns, m.force_rows, True)
             applied.add_force(tile, m.applied, m.functions, t, z, zdot, f, w.power)
         forces.add_force(tile, m.forces, m.functions, t, z, zdot, w.memory, f, w.element, w.power, moving)
-    kind = -1
+    _add_elements(tile, m, w, z, zdot, f, part)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def free(m: Arrays) -> bool:
+    """Whether nothing acts on the machine but weight and undamped elements, and no constraint: as fast ones are."""
+    return m.constraints.size == 0 and m.gates.sought == 0 and not loaded(m)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def free_acceleration(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, a: Array) -> None:
+    """`force` and `accelerate` of a free machine: they look at few members of the structures."""
+    _add_weight(tile, m, z, a, True)
+    _add_elements(tile, m, w, z, zdot, a, ACCELERATION)
+    _solve(tile, m, w, a)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _add_weight(tile: Tile, m: Arrays, z: Array, f: Array, moving: bool) -> None:
+    """Fill the derived rows of z that forces act on; the force begins as the weight or, if not moving, as none."""
+    derive(tile, m.derived, z, m.unknowns, m.force_rows, False)
+    if moving:
+        simd.assign(f, m.weight, m.unknowns * len(tile))
+    for row in range(m.unknowns if moving else 0, m.force_rows):
+        clear(tile, f, row)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _add_elements(tile: Tile, m: Arrays, w: Work, z: Array, zdot: Array, f: Array, part: int) -> None:
+    """Add the force of the elements, and pass all that is on derived rows to the unknowns."""
+    kind, moving = -1, part in (ALL, ACCELERATION)
     for family in literal_unroll(m.elements):
         kind += 1
         if family.size > 0 and not (part == SIMPLE and families.is_exact(family)):
@@ -148,7 +174,14 @@ def accelerate(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array, 
     if m.constraints.size > 0 or m.gates.sought != 0:
         arguments = (gate.typed(m.home, m), gate.typed(w.home, w), t, z, zdot, tolerance, a)
         gate.call(m.gates.constrain, (tile, *arguments))
-    elif m.alike.components > 0:
+    else:
+        _solve(tile, m, w, a)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _solve(tile: Tile, m: Arrays, w: Work, a: Array) -> None:
+    """Turn a force into the acceleration of a machine without constraints."""
+    if m.alike.components > 0:
         alike.solve(tile, m.space, m.alike, w.element, a)
     else:
         sparse.solve(tile, m.pattern, m.mass_factor, a, 0)
@@ -205,12 +238,14 @@ def energies(tile: Tile, m: Arrays, w: Work) -> None:
     """Kinetic, elastic and gravitational energy [J] of the state, into w.energy; uses w.stage."""
     width = len(tile)
     multiply_mass(tile, m, w.zdot, w.stage)
-    for kind in range(3):
-        clear(tile, w.energy, kind)
+    moving = simd.spread(tile, 0.0)
+    lifted = moving
     for i in range(m.unknowns):
-        for lane in range(width):
-            w.energy[lane] += 0.5 * w.zdot[i * width + lane] * w.stage[i * width + lane]
-            w.energy[2 * width + lane] -= m.weight[i * width + lane] * w.z[i * width + lane]
+        moving = moving + simd.load(tile, w.zdot, i * width) * simd.load(tile, w.stage, i * width)
+        lifted = lifted - simd.load(tile, m.weight, i * width) * simd.load(tile, w.z, i * width)
+    simd.store(w.energy, 0, 0.5 * moving)
+    clear(tile, w.energy, 1)
+    simd.store(w.energy, 2 * width, lifted)
     derive(tile, m.derived, w.z, m.unknowns, m.force_rows, False)
     kind = -1
     for family in literal_unroll(m.elements):

@@ -64,6 +64,10 @@ def acceleration(tile: Tile, m: Arrays, w: Work, t: float, z: Array, zdot: Array
 
 @njit(cache=True, error_model="numpy")
 def _motion(tile, pm, pw, t, z, zdot, tolerance, a, part):  # type: ignore[no-untyped-def]
+    # Each way loads what it looks at itself; all of both structures at every step would cost as much as two elements.
+    if part == ACCELERATION and dynamics.free(gate.load(pm)):
+        dynamics.free_acceleration(tile, gate.load(pm), gate.load(pw), z, zdot, a)
+        return
     m, w = gate.load(pm), gate.load(pw)
     dynamics.force(tile, m, w, t, z, zdot, a, part)
     if part == ACCELERATION:

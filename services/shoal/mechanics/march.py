@@ -23,7 +23,7 @@ from shoal.mechanics.halts import RESOLUTION, Halts, elongations, leapt
 from shoal.mechanics.integrators.scheme import adaptive, advance, averages, interpolate, restart
 from shoal.mechanics.marched import Frame, LoopRoom, Marched, frame_type, framed, loop_of, sampled
 from shoal.mechanics.model import Arrays
-from shoal.mechanics.numerics import gate
+from shoal.mechanics.numerics import gate, simd
 from shoal.mechanics.numerics.pointers import pointer
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
@@ -166,7 +166,8 @@ def _sample(
 ) -> None:
     """The markers at a time that is `ahead` [s] of the end of the last step, of length `taken`."""
     width, d = len(tile), len(m.space)
-    if abs(ahead) <= slack:
+    inside = abs(ahead) > slack
+    if not inside:
         for i in range(m.unknowns * width):
             k.q[i], k.v[i] = w.z[i], w.zdot[i]
     else:
@@ -186,8 +187,10 @@ def _sample(
         for lane in range(width):
             x_row, y_row = marker_rows[rows + d] * width + lane, marker_rows[rows + d + 1] * width + lane
             x, y = k.q[x_row], k.q[y_row]
-            angle = np.arctan2(w.z[y_row], w.z[x_row]) + k.turns[marker * width + lane]
-            samples[first + 2 * d * width + lane] = angle
+            turns = k.turns[marker * width + lane]
+            if inside:
+                turns += np.arctan2(w.z[y_row], w.z[x_row]) - np.arctan2(y, x)
+            samples[first + 2 * d * width + lane] = turns
             samples[first + (3 * d + 1) * width + lane] = (x * k.v[y_row] - y * k.v[x_row]) / (x * x + y * y)
 
 
@@ -295,13 +298,10 @@ def _count_turns(tile: Tile, m: Arrays, w: Work, k: LoopRoom, marker_rows: Index
         for row in rows:
             if row >= m.held_rows:
                 derive(tile, m.derived, w.z, row, row + 1, False)
-        x, y = rows[0] * width, rows[1] * width
-        for lane in range(width):
-            at = marker * width + lane
-            now = 1.0 if w.z[y + lane] >= 0.0 else 0.0
-            if w.z[x + lane] < 0.0:
-                k.turns[at] += 2.0 * np.pi * (k.above[at] - now)
-            k.above[at] = now
+        at, left = marker * width, 1.0 - simd.heaviside(simd.load(tile, w.z, rows[0] * width))
+        above = simd.heaviside(simd.load(tile, w.z, rows[1] * width))
+        simd.add_to(k.turns, at, (2.0 * np.pi) * left * (simd.load(tile, k.above, at) - above))
+        simd.store(k.above, at, above)
 
 
 @njit(cache=True, error_model="numpy")

@@ -63,8 +63,8 @@ class LoopRoom(NamedTuple):
 def sampled(dimensions: int) -> int:
     """Numbers in the sample of a marker.
 
-    Its point, its direction, the continuous angle [rad] of that at the end of the step, its velocity [m/s] and the
-    rate of its direction [rad/s].
+    Its point, its direction, the turns [rad] that bring the angle of that near the continuous one, its velocity [m/s]
+    and the rate of its direction [rad/s].
     """
     return 3 * dimensions + 2
 
@@ -206,7 +206,7 @@ def told(
                 motion[time, marker, i, lane] = record.samples[row + i * width]
                 motion[time, marker, d + 1 + i, lane] = record.samples[row + (2 * d + 1 + i) * width]
             angle = np.arctan2(record.samples[row + (d + 1) * width], record.samples[row + d * width])
-            angle += TURN * np.rint((record.samples[row + 2 * d * width] - angle) / TURN)
+            angle += TURN * np.rint(record.samples[row + 2 * d * width] / TURN)
             motion[time, marker, d, lane] = angle + turns[marker, turn]
             motion[time, marker, 2 * d + 1, lane] = record.samples[row + (3 * d + 1) * width]
         drift, size = 0.0, 1.0

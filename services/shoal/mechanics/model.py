@@ -25,6 +25,7 @@ from shoal.mechanics.functions import Functions, Piecewise
 from shoal.mechanics.numerics import alike, gate, sparse
 from shoal.mechanics.numerics.alike import Alike
 from shoal.mechanics.numerics.pointers import pointer, raw
+from shoal.mechanics.numerics.row_pairs import paired
 from shoal.mechanics.numerics.tile import SINGLE, Array, Flags, Index, Tile, pack, packed, varies
 from shoal.mechanics.rubbing import Rubbing
 from shoal.mechanics.saddle import Saddle
@@ -210,7 +211,7 @@ class Model:
     def _alike(self) -> Alike:
         """What solves for the accelerations of all lanes, where they have the same mass matrix."""
         if self.mass_values.shape[1] > 1:
-            return Alike(0, _EMPTY, np.zeros(0), np.zeros(0), np.zeros(0))
+            return Alike(0, _EMPTY, np.zeros(0), paired(_EMPTY, np.zeros(0)), np.zeros(0))
         components, entries = alike.analyse(self.unknowns, self.dimensions, self.mass_entries)
         size = self.unknowns // components
         pattern, slots = sparse.analyse(size, entries)
@@ -218,7 +219,7 @@ class Model:
         factor = matrix.copy()
         _factor_mass(SINGLE, pattern, factor)
         dense = sparse.dense(pattern, matrix) if size <= alike.FEW else np.zeros((0, 0))
-        return Alike(components, pattern, matrix, factor, alike.spread_inverse(dense, components))
+        return Alike(components, pattern, matrix, paired(pattern, factor), alike.spread_inverse(dense, components))
 
     def tile(self, tile: Tile, lanes: slice) -> Arrays:
         """The arrays of one tile of lanes. Raises InputError if a mass matrix is singular."""

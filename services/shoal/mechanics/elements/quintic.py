@@ -12,11 +12,20 @@ from numba import njit
 
 from shoal.mechanics import plane
 from shoal.mechanics.elements import beam, beam_tangent
-from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, rest, together
+from shoal.mechanics.elements.batch import (
+    VARIANT,
+    add_rows,
+    add_sum,
+    coefficient,
+    coordinate,
+    of_one_variant,
+    rest,
+    together,
+)
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.strain import bend, reference, stretch
 from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import EIGHT, root, spread
+from shoal.mechanics.numerics.simd import EIGHT, inverse_root, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section
@@ -88,7 +97,7 @@ def at_both(x, c):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy", forceinline=True)
 def _point(damped, px, py, cx, cy, ux, uy, vx, vy, inverse, angle, axial, bending, eta):  # type: ignore[no-untyped-def]
     """Derivatives of the energy by r' and by L r'' at a point, and the power lost; u, v: rates of r' and L r''."""
-    shrink = 1.0 / root(px * px + py * py)
+    shrink = inverse_root(px * px + py * py)
     rate, change = ux * px + uy * py, ux * cy - uy * cx + px * vy - py * vx
     n, lost = stretch(damped, shrink, rate, inverse, axial, eta)
     m, turn, more = bend(damped, shrink * shrink, px * cy - py * cx, rate, change, inverse, angle, bending, eta)
@@ -189,27 +198,35 @@ def _force(
         add_sum(tile, lane, count, w, power, lost)
 
 
+@njit(error_model="numpy", forceinline=True)
+def _forces(tile, curved, damped, rule, family, number, members, z, zdot, f, w, power):  # type: ignore[no-untyped-def]
+    """Of `members` elements of one variant: its constants are made ready once for all of them."""
+    count = members if len(tile) == 1 else 1
+    for first in range(number, number + members, count):
+        for lane in range(0, len(tile) - family.spare, len(EIGHT)):
+            _force(tile, curved, damped, rule, family, first, count, lane, z, zdot, f, w, power)
+
+
 @njit(cache=True, error_model="numpy")
 def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array, power: Array, moving: bool) -> None:
     """See `families.add_force`."""
     number = 0
     while number < family.size:
-        count, variant = together(tile, family, number), family.plan[PLAN * number + VARIANT]
-        for lane in range(0, len(tile) - family.spare, len(EIGHT)):
-            at = family, number, count, lane, z, zdot, f, w, power
-            if variant == FOUR:
-                _force(tile, False, False, _FOUR_PAIRS, *at)
-            elif variant == FIVE:
-                _force(tile, False, False, _FIVE_PAIRS, *at)
-            elif variant == FOUR_DAMPED and moving:
-                _force(tile, True, True, _FOUR_PAIRS, *at)
-            elif variant == FIVE_DAMPED and moving:
-                _force(tile, True, True, _FIVE_PAIRS, *at)
-            elif variant in (FOUR_CURVED, FOUR_DAMPED):
-                _force(tile, True, False, _FOUR_PAIRS, *at)
-            else:
-                _force(tile, True, False, _FIVE_PAIRS, *at)
-        number += count
+        members, variant = of_one_variant(family, number), family.plan[PLAN * number + VARIANT]
+        at = family, number, members, z, zdot, f, w, power
+        if variant == FOUR:
+            _forces(tile, False, False, _FOUR_PAIRS, *at)
+        elif variant == FIVE:
+            _forces(tile, False, False, _FIVE_PAIRS, *at)
+        elif variant == FOUR_DAMPED and moving:
+            _forces(tile, True, True, _FOUR_PAIRS, *at)
+        elif variant == FIVE_DAMPED and moving:
+            _forces(tile, True, True, _FIVE_PAIRS, *at)
+        elif variant in (FOUR_CURVED, FOUR_DAMPED):
+            _forces(tile, True, False, _FOUR_PAIRS, *at)
+        else:
+            _forces(tile, True, False, _FIVE_PAIRS, *at)
+        number += members
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -13,12 +13,12 @@ from numba import njit
 
 from shoal.errors import InputError
 from shoal.mechanics.elements import beam, spatial
-from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, together
-from shoal.mechanics.elements.cubic import FULL_RULE, REDUCED_RULE, at_both
+from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, coordinate, of_one_variant
+from shoal.mechanics.elements.cubic import FULL_RULE, REDUCED_RULE
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.spatial import bend
 from shoal.mechanics.elements.strain import stretch
-from shoal.mechanics.numerics.simd import EIGHT, root, spread
+from shoal.mechanics.numerics.simd import EIGHT, inverse_root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section
@@ -36,6 +36,14 @@ _GAUSS = np.polynomial.legendre.leggauss
 _FULL_AXIAL, _FULL_BENDING = beam.pairs(*_GAUSS(5)), beam.pairs(*_GAUSS(3))
 _REDUCED_AXIAL = beam.pairs(np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3)
 _REDUCED_BENDING = beam.pairs(*_GAUSS(2))
+
+
+@njit(error_model="numpy", forceinline=True)
+def _at_both(x, a0, a1, a2, a3, a4):  # type: ignore[no-untyped-def]
+    """A polynomial of xi at +xi and at -xi."""
+    square = x * x
+    even, odd = a0 + square * a2 + (square * square) * a4, x * (a1 + square * a3)
+    return even + odd, even - odd
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -107,15 +115,15 @@ def _force(
         p2 = _dot(0, 2, x, y, v, a, b, c) + _dot(2, 0, x, y, v, a, b, c) + l0
         l0 = 4.0 * l0
     # In the middle both strains share the root.
-    middle, shrink = axial.shape[0] - 1, 1.0 / root(s0)
+    middle, shrink = axial.shape[0] - 1, inverse_root(s0)
     n0, lost = stretch(damped, shrink, p0, one, ea * axial[middle, 1], eta)
     n1, n2, n3, n4, t0, t1, t2 = none, none, none, none, none, none, none
     for g in range(middle):
         xi, square = axial[g, 0], axial[g, 0] * axial[g, 0]
-        here, there = at_both(xi, s0, s1, s2, s3, s4)
-        rate, other = at_both(xi, p0, p1, p2, p3, p4)
-        first, power_first = stretch(damped, 1.0 / root(here), rate, one, ea * axial[g, 1], eta)
-        second, power_second = stretch(damped, 1.0 / root(there), other, one, ea * axial[g, 1], eta)
+        here, there = _at_both(xi, s0, s1, s2, s3, s4)
+        rate, other = _at_both(xi, p0, p1, p2, p3, p4)
+        first, power_first = stretch(damped, inverse_root(here), rate, one, ea * axial[g, 1], eta)
+        second, power_second = stretch(damped, inverse_root(there), other, one, ea * axial[g, 1], eta)
         lost = lost + (power_first + power_second)
         even, odd = first + second, xi * (first - second)
         n0, n1, n2 = n0 + even, n1 + odd, n2 + square * even
@@ -126,12 +134,12 @@ def _force(
         n0, n1, t0, lost = n0 + by_a, n1 + 2.0 * by_b, t0 + by_c, lost + more
     for g in range(last):
         xi, square = bending[g, 0], bending[g, 0] * bending[g, 0]
-        here, there = at_both(xi, s0, s1, s2, s3, s4)
-        b, b_there = at_both(xi, s1, 2.0 * s2, 3.0 * s3, 4.0 * s4, none)
-        c, c_there = at_both(xi, k0, k1, k2, none, none)
-        rate, other = at_both(xi, p0, p1, p2, p3, p4)
-        turning, twisting = at_both(xi, 2.0 * p1, 4.0 * p2, 6.0 * p3, 8.0 * p4, none)
-        change, changing = at_both(xi, l0, l1, l2, none, none)
+        here, there = _at_both(xi, s0, s1, s2, s3, s4)
+        b, b_there = _at_both(xi, s1, 2.0 * s2, 3.0 * s3, 4.0 * s4, none)
+        c, c_there = _at_both(xi, k0, k1, k2, none, none)
+        rate, other = _at_both(xi, p0, p1, p2, p3, p4)
+        turning, twisting = _at_both(xi, 2.0 * p1, 4.0 * p2, 6.0 * p3, 8.0 * p4, none)
+        change, changing = _at_both(xi, l0, l1, l2, none, none)
         by_a, by_b, by_c, more = bend(damped, 1.0 / here, b, c, rate, turning, change, ei * bending[g, 1], eta)
         of_a, of_b, of_c, most = bend(
             damped, 1.0 / there, b_there, c_there, other, twisting, changing, ei * bending[g, 1], eta
@@ -151,21 +159,29 @@ def _force(
         add_sum(tile, lane, count, w, power, lost)
 
 
+@njit(error_model="numpy", forceinline=True)
+def _forces(tile, damped, axial, bending, family, number, members, z, zdot, f, w, power):  # type: ignore[no-untyped-def]
+    """Of `members` elements of one variant: its constants are made ready once for all of them."""
+    count = members if len(tile) == 1 else 1
+    for first in range(number, number + members, count):
+        for lane in range(0, len(tile) - family.spare, len(EIGHT)):
+            _force(tile, damped, axial, bending, family, first, count, lane, z, zdot, f, w, power)
+
+
 @njit(cache=True, error_model="numpy")
 def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array, power: Array, moving: bool) -> None:
     """See `families.add_force`."""
     number = 0
     while number < family.size:
-        count, variant = together(tile, family, number), family.plan[PLAN * number + VARIANT]
-        for lane in range(0, len(tile) - family.spare, len(EIGHT)):
-            at = family, number, count, lane, z, zdot, f, w, power
-            if variant == REDUCED:
-                _force(tile, False, _REDUCED_AXIAL, _REDUCED_BENDING, *at)
-            elif variant == DAMPED and moving:
-                _force(tile, True, _FULL_AXIAL, _FULL_BENDING, *at)
-            else:
-                _force(tile, False, _FULL_AXIAL, _FULL_BENDING, *at)
-        number += count
+        members, variant = of_one_variant(family, number), family.plan[PLAN * number + VARIANT]
+        at = family, number, members, z, zdot, f, w, power
+        if variant == REDUCED:
+            _forces(tile, False, _REDUCED_AXIAL, _REDUCED_BENDING, *at)
+        elif variant == DAMPED and moving:
+            _forces(tile, True, _FULL_AXIAL, _FULL_BENDING, *at)
+        else:
+            _forces(tile, False, _FULL_AXIAL, _FULL_BENDING, *at)
+        number += members
 
 
 implement(

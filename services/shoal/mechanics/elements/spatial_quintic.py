@@ -6,12 +6,12 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics.elements import beam, spatial
-from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, together
+from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficient, of_one_variant
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.quintic import at_both, collect, component, nodal, recommended
 from shoal.mechanics.elements.spatial import bend
 from shoal.mechanics.elements.strain import stretch
-from shoal.mechanics.numerics.simd import EIGHT, root, spread
+from shoal.mechanics.numerics.simd import EIGHT, inverse_root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section
@@ -39,7 +39,7 @@ def _dot(u, v):  # type: ignore[no-untyped-def]
 def _point(damped, p, c, u, v, axial, bending, eta):  # type: ignore[no-untyped-def]
     """Derivatives of the energy by p and by c at a point, and the power lost; u, v: rates of p and c."""
     square, rate = _dot(p, p), _dot(p, u)
-    flat, shrink = 1.0 / square, 1.0 / root(square)
+    flat, shrink = 1.0 / square, inverse_root(square)
     n, lost = stretch(damped, shrink, rate, spread(EIGHT, 1.0), axial, eta)
     turning, change = _dot(p, v) + _dot(c, u), _dot(c, v)
     by_a, m, by_c, more = bend(damped, flat, _dot(p, c), _dot(c, c), rate, turning, change, bending, eta)
@@ -111,23 +111,31 @@ def _force(
         add_sum(tile, lane, count, w, power, lost)
 
 
+@njit(error_model="numpy", forceinline=True)
+def _forces(tile, damped, rule, family, number, members, z, zdot, f, w, power):  # type: ignore[no-untyped-def]
+    """Of `members` elements of one variant: its constants are made ready once for all of them."""
+    count = members if len(tile) == 1 else 1
+    for first in range(number, number + members, count):
+        for lane in range(0, len(tile) - family.spare, len(EIGHT)):
+            _force(tile, damped, rule, family, first, count, lane, z, zdot, f, w, power)
+
+
 @njit(cache=True, error_model="numpy")
 def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array, power: Array, moving: bool) -> None:
     """See `families.add_force`."""
     number = 0
     while number < family.size:
-        count, variant = together(tile, family, number), family.plan[PLAN * number + VARIANT]
-        for lane in range(0, len(tile) - family.spare, len(EIGHT)):
-            at = family, number, count, lane, z, zdot, f, w, power
-            if variant == FOUR_DAMPED and moving:
-                _force(tile, True, _FOUR_PAIRS, *at)
-            elif variant == FIVE_DAMPED and moving:
-                _force(tile, True, _FIVE_PAIRS, *at)
-            elif variant in (FOUR, FOUR_DAMPED):
-                _force(tile, False, _FOUR_PAIRS, *at)
-            else:
-                _force(tile, False, _FIVE_PAIRS, *at)
-        number += count
+        members, variant = of_one_variant(family, number), family.plan[PLAN * number + VARIANT]
+        at = family, number, members, z, zdot, f, w, power
+        if variant == FOUR_DAMPED and moving:
+            _forces(tile, True, _FOUR_PAIRS, *at)
+        elif variant == FIVE_DAMPED and moving:
+            _forces(tile, True, _FIVE_PAIRS, *at)
+        elif variant in (FOUR, FOUR_DAMPED):
+            _forces(tile, False, _FOUR_PAIRS, *at)
+        else:
+            _forces(tile, False, _FIVE_PAIRS, *at)
+        number += members
 
 
 implement(

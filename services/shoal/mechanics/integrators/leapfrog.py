@@ -15,7 +15,7 @@ from shoal.mechanics import dynamics, gates
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.integrators.scheme import Facts, implement
 from shoal.mechanics.model import Arrays, Model
-from shoal.mechanics.numerics.simd import add_scaled, assign
+from shoal.mechanics.numerics.simd import EIGHT, add_scaled, add_to, assign, load, store
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.scene import Solver
 
@@ -42,13 +42,25 @@ def settings(solver: Solver, model: Model, tile: Tile, lanes: slice) -> Leapfrog
     return Leapfrog(solver.rank_tolerance, np.zeros(1))
 
 
+@njit(error_model="numpy", forceinline=True)
+def _kick_and_drift(z: Array, zdot: Array, a: Array, h: float, count: int) -> None:
+    """zdot += h/2 a, then z += h zdot, in one way through the memory. Pointers."""
+    whole = count - count % len(EIGHT)
+    for i in range(0, whole, len(EIGHT)):
+        rate = load(EIGHT, zdot, i) + (0.5 * h) * load(EIGHT, a, i)
+        store(zdot, i, rate)
+        add_to(z, i, h * rate)
+    for i in range(whole, count):
+        zdot[i] += 0.5 * h * a[i]
+        z[i] += h * zdot[i]
+
+
 @njit(cache=True, error_model="numpy")
 def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, t: float, h: float) -> float:
     """One step of h [s] from the time t."""
     end = m.unknowns * len(tile)
     scheme.evaluations[0] += 1
-    add_scaled(w.zdot, 0.5 * h, w.a, end)
-    add_scaled(w.z, h, w.zdot, end)
+    _kick_and_drift(w.z, w.zdot, w.a, h, end)
     if m.constraints.size > 0 or dynamics.loaded(m):
         assign(w.stage, w.zdot, end)
         add_scaled(w.zdot, 0.5 * h, w.a, end)

@@ -13,8 +13,9 @@ import numpy as np
 from numba import njit
 from numba.extending import overload
 
-from shoal.mechanics.numerics import simd, sparse
+from shoal.mechanics.numerics import row_pairs, simd, sparse
 from shoal.mechanics.numerics.pointers import shift
+from shoal.mechanics.numerics.row_pairs import RowPairs
 from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
 
@@ -27,14 +28,14 @@ BLOCK = 4
 class Alike(NamedTuple):
     """components: how many rows in a row share the matrix; 0 where lanes differ, then there is nothing else here.
 
-    matrix: in the pattern, (slots,). factor: as `sparse.factor` leaves it, (slots,). inverse: column by column, every
+    matrix: in the pattern, (slots,). factor: by pairs of rows. inverse: column by column, every
     number `components` times, up to whole blocks of vectors; empty where there are more than FEW rows.
     """
 
     components: int
     pattern: sparse.Pattern
     matrix: Array
-    factor: Array
+    factor: RowPairs
     inverse: Array
 
 
@@ -102,9 +103,9 @@ def solve(tile: Tile, space: tuple[int, ...], alike: Alike, w: Array, x: Array) 
         else:
             _multiply_inverse(_group(space), alike, w, x)
     elif alike.components == 1:
-        sparse.solve_alike(tile, alike.pattern, alike.factor, x, 0)
+        row_pairs.solve(tile, alike.factor, x)
     else:
-        sparse.solve_alike(_side_by_side(tile, space), alike.pattern, alike.factor, x, 0)
+        row_pairs.solve(_side_by_side(tile, space), alike.factor, x)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

@@ -15,7 +15,7 @@ from numba import njit
 
 from shoal.mechanics.numerics import simd
 from shoal.mechanics.numerics.tile import Array, Index, Tile
-from shoal.mechanics.numerics.vector import add_product, copy, scale, scale_alike, subtract_dot, subtract_dot_alike
+from shoal.mechanics.numerics.vector import add_product, copy, scale, subtract_dot
 
 if TYPE_CHECKING:
     import scipy.sparse
@@ -149,19 +149,6 @@ def solve(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) ->
     """Replace the right-hand side in the rows of x from `first` on by the solution. Pointers."""
     _substitute(tile, pattern, factors, x, first)
     backward(tile, pattern, factors, factors, x, first)
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def solve_alike(tile: Tile, pattern: Pattern, factors: Array, x: Array, first: int) -> None:
-    """As `solve` with one factor (slots,) for all lanes, which spares most of the memory traffic. Pointers."""
-    size = pattern.size
-    for i in range(size):
-        begin, end = pattern.across[i], pattern.across[i + 1]
-        subtract_dot_alike(tile, x, first + i, factors, pattern.slot, pattern.other, begin, end, first)
-    for k in range(size - 1, -1, -1):
-        scale_alike(tile, x, first + k, factors, k)
-        begin, end = pattern.column[k], pattern.column[k + 1]
-        subtract_dot_alike(tile, x, first + k, factors, pattern.by_column, pattern.row, begin, end, first)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})

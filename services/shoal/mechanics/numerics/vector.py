@@ -91,67 +91,23 @@ def subtract_product(typing_context, tile, y, i, a, j, x, k):  # type: ignore[no
     return _subtract_product(tile, (y, i, a, j, x, k))
 
 
-def _splat(builder: Any, value: Any, width: int) -> Any:
-    """One number in all lanes."""
-    vector = ir.VectorType(value.type, width)
-    first = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
-    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
-    return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), everywhere)
-
-
-def _dot(alike: bool) -> Any:
-    """Row i of x -= sum over p of a * x; a: rows of numbers, or one number for all lanes."""
-
-    def build(tile: Any, *pairs: Any) -> Any:
-        width = tile.count
-
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            _, x, i, a, slots, rows, begin, end, first = arguments
-            target = _row(builder, x, i, width)
-            total = cgutils.alloca_once_value(builder, builder.load(target, align=8))
-            with cgutils.for_range(builder, end, start=begin) as loop:
-                slot = builder.sext(builder.load(builder.gep(slots, [loop.index])), first.type)
-                row = builder.sext(builder.load(builder.gep(rows, [loop.index])), first.type)
-                if alike:
-                    factor = _splat(builder, builder.load(builder.gep(a, [slot])), width)
-                else:
-                    factor = builder.load(_row(builder, a, slot, width), align=8)
-                value = builder.load(_row(builder, x, builder.add(first, row), width), align=8)
-                product = builder.fmul(factor, value, flags=_CONTRACT)
-                builder.store(builder.fsub(builder.load(total), product, flags=_CONTRACT), total)
-            builder.store(builder.load(total), target, align=8)
-            return context.get_dummy_value()
-
-        return types.void(tile, *pairs), generate
-
-    return build
-
-
-_own_dot, _alike_dot = _dot(False), _dot(True)
-
-
 @intrinsic
 def subtract_dot(typing_context, tile, x, i, a, slots, rows, begin, end, first):  # type: ignore[no-untyped-def]
     """Row i of x -= sum over begin <= p < end of (row slots[p] of a) * (row first + rows[p] of x)."""
-    return _own_dot(tile, x, i, a, slots, rows, begin, end, first)
-
-
-@intrinsic
-def subtract_dot_alike(typing_context, tile, x, i, a, slots, rows, begin, end, first):  # type: ignore[no-untyped-def]
-    """The same with entries of a that are one number for all lanes."""
-    return _alike_dot(tile, x, i, a, slots, rows, begin, end, first)
-
-
-@intrinsic
-def scale_alike(typing_context, tile, y, i, a, j):  # type: ignore[no-untyped-def]
-    """Row i of y *= entry j of a, one number for all lanes."""
     width = tile.count
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        _, y, i, a, j = arguments
-        target = _row(builder, y, i, width)
-        factor = _splat(builder, builder.load(builder.gep(a, [j])), width)
-        builder.store(builder.fmul(builder.load(target, align=8), factor), target, align=8)
+        _, x, i, a, slots, rows, begin, end, first = arguments
+        target = _row(builder, x, i, width)
+        total = cgutils.alloca_once_value(builder, builder.load(target, align=8))
+        with cgutils.for_range(builder, end, start=begin) as loop:
+            slot = builder.sext(builder.load(builder.gep(slots, [loop.index])), first.type)
+            row = builder.sext(builder.load(builder.gep(rows, [loop.index])), first.type)
+            factor = builder.load(_row(builder, a, slot, width), align=8)
+            value = builder.load(_row(builder, x, builder.add(first, row), width), align=8)
+            product = builder.fmul(factor, value, flags=_CONTRACT)
+            builder.store(builder.fsub(builder.load(total), product, flags=_CONTRACT), total)
+        builder.store(builder.load(total), target, align=8)
         return context.get_dummy_value()
 
-    return types.void(tile, y, i, a, j), generate
+    return types.void(tile, x, i, a, slots, rows, begin, end, first), generate
