@@ -13,6 +13,7 @@ from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.gates import Seek, Sought, ready
 from shoal.mechanics.halts import Halts
 from shoal.mechanics.integrators import Choice, choose, facts
+from shoal.mechanics.least.principle import PROJECTION
 from shoal.mechanics.march import March
 from shoal.mechanics.marched import Marched, framed
 from shoal.mechanics.model import Arrays, Model
@@ -20,6 +21,8 @@ from shoal.mechanics.numerics.tile import Array, Tile, pack
 from shoal.scene import Solver
 
 T = TypeVar("T")
+DENSE = ("radau5",)
+"""Integrators that hold constraints by dense matrices, however many there are."""
 _LINE = 8
 """Numbers in a line of the processor's cache."""
 
@@ -40,6 +43,18 @@ def put_at_start(model: Model, tile: Tile, part: slice, arrays: Arrays, room: Wo
     if model.forces.size:
         derived_rows(tile, arrays, room)
         room.memory[:] = forces.initial_memory(tile, arrays.forces, room.z, pack(model.start_angles, part, tile))
+
+
+def lean(arrays: Arrays, room: Work) -> Work:
+    """The same room without its dense matrices, whose size is the square of the machine's, where no step enters them.
+
+    The accelerations of machines with many constraints and the removal of drift are sparse saddle point problems.
+    """
+    if arrays.saddle.size == 0 or arrays.method != PROJECTION:
+        return room
+    none, gauss = np.zeros(0), room.gauss
+    lane = gauss.lane._replace(rows=np.zeros((0, 0)), triangle=np.zeros((0, 0)))
+    return room._replace(gauss=gauss._replace(response=none, gram=none, lane=lane))
 
 
 class Workspace:
@@ -66,6 +81,8 @@ class Workspace:
             )
         self._model, self._part, self._tile = model, part, tile
         arrays, room = at_start(model, tile, part)
+        if seek is None and choice.name not in DENSE:
+            room = lean(arrays, room)
         if spare:
             arrays = arrays._replace(elements=tuple(family._replace(spare=spare) for family in arrays.elements))
         scheme = choose(solver, model, tile, part, choice.name)

@@ -9,6 +9,10 @@ import pytest
 from shoal.mechanics import saddle
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.assembly.space.redundancy import redundant
+from shoal.mechanics.halts import halts
+from shoal.mechanics.integrators import Choice
+from shoal.mechanics.numerics.tile import SINGLE
+from shoal.mechanics.workspace import Workspace
 from shoal.scene import Scene
 
 
@@ -48,3 +52,17 @@ def test_a_long_chain_has_no_redundant_joint_until_one_holds_it_twice() -> None:
     third = again | {"first": {"body": "ground", "point": [0.7, 0.0, 0.0]}}
     held = chain(40, "spherical", K0=again, K1=other, K2=third)
     assert {"K0", "K1", "K2"} >= set(redundant(held, build(held).q0[:, 0])) - {"J0", "J1"} != set()
+
+
+def room(count: int, **solver: Any) -> int:
+    """Numbers that a march of a chain holds."""
+    scene = chain(count, "revolute").with_values({"solver.step": 1e-3, **solver})
+    model, name = build(scene), scene.solver.integrator
+    chosen, none = Choice(name, "named", np.inf), halts(model, 1e-3, 1e-3, False)
+    return Workspace(scene.solver, model, chosen, SINGLE, slice(0, 1), np.array([1e-3]), none).size
+
+
+def test_the_room_of_a_march_grows_with_the_number_of_bodies() -> None:
+    explicit = {"solver.integrator": "rk4"}
+    assert room(80, **explicit) / room(40, **explicit) == pytest.approx(2.0, rel=0.05)
+    assert room(40, **{"solver.integrator": "radau5"}) > 4 * room(40, **explicit)  # its steps are dense

@@ -4,6 +4,8 @@ Every figure is the median time of one step on one core in one process, over a r
 same state: a chain that hangs in revolute joints about alternating axes, from a gently curved start at rest.
 
 - ours: classical Runge-Kutta, four accelerations a step, with the energy balance of every step
+- natural coordinates: the machine as scenes describe it, points and directions with constraints, the same method; the
+  rest of a call is taken off by a shorter run
 - MuJoCo: `mj_step` with its RK4 integrator, same step, contacts and constraints off, no geoms. It factors a mass
   matrix, whose cost grows with the cube of the depth of a tree; its users' machines are wider than deep
 - Exudyn, tree: ObjectKinematicTree, also minimal coordinates and RK44, with the sparse solver
@@ -20,17 +22,21 @@ import statistics
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 from shoal.engines.exudyn.build import library
+from shoal.engines.prepared import Prepared
 from shoal.engines.tree.articulated import accelerate
 from shoal.engines.tree.description import SpatialChain
 from shoal.engines.tree.march import march
 from shoal.engines.tree.simulate import simulate
 from shoal.engines.tree.tableau import RK4
 from shoal.engines.tree.tree import build, room
+from shoal.scene import Scene
 
 from shoal_validation.benchmarks.timing import median_time
 
@@ -87,6 +93,7 @@ def measure(sizes: tuple[int, ...] = BODIES, repeats: int = 5) -> Iterator[Chain
         yield ChainRow("ours, one step", bodies, ours, 1.0, 0.0)
         few = min(200, max(10, 400_000 // bodies**2))
         for name, run, count in (
+            ("natural coordinates, one step", natural_run, 40),
             ("MuJoCo, one step", mujoco_run, few),
             ("Exudyn, tree, one step", exudyn_tree_run, few),
             ("Exudyn, bodies, one step", exudyn_bodies_run, 20),
@@ -112,6 +119,28 @@ def own_step(bodies: int, steps: int, repeats: int) -> tuple[float, Callable[[fl
         march(model.tree, work, RK4, np.concatenate([model.q0, model.v0, [0.0]]), end, STEP, 0.0)
 
     return median_time(run, repeats) / steps, lambda at: simulate(what, [at], step=STEP).point("tip")[0]
+
+
+def natural_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:
+    """Seconds a step of the same chain as a scene, and the tip at the end."""
+    start, before = simulate(chain(bodies), [0.0], step=STEP), {"body": "ground", "point": [0.0, 0.0, 0.0]}
+    parts: dict[str, Any] = {"bodies": {}, "joints": {}, "initial": {}}
+    for k in range(bodies):
+        name, turn = f"B{k}", start.rotation(f"B{k}")[0]
+        parts["bodies"][name] = {"kind": "rigid-body", "mass": 1.0, "inertia": MOMENTS, "centre_of_mass": [0.5, 0, 0],
+                                 "named_points": {"end": [1.0, 0.0, 0.0]}}  # fmt: skip
+        parts["joints"][f"J{k}"] = {"kind": "revolute", "first": before, "second": {"body": name},
+                                    "axis": (turn @ _axis(k)).tolist()}  # fmt: skip
+        parts["initial"][name] = {"rotation": Rotation.from_matrix(turn).as_rotvec().tolist(), "spin": [0, 0, 0]}
+        before = {"body": name, "point": "end"}
+    solver = {"integrator": "rk4", "step": STEP, "duration": steps * STEP}
+    scene = {"name": "chain", "dimensions": 3, "gravity": GRAVITY, "markers": {"tip": before}, "solver": solver}
+    run, few = Prepared(Scene.parse(scene | parts), threads=1), steps // 4
+    longer, shorter = (median_time(partial(run, times=[n * STEP]), repeats) for n in (steps, few))
+    found = run(times=[steps * STEP])
+    if not found.ok:
+        raise RuntimeError(found.message)
+    return (longer - shorter) / (steps - few), found.marker("tip")[-1]
 
 
 def mujoco_run(bodies: int, steps: int, repeats: int) -> tuple[float, Array]:

@@ -21,7 +21,7 @@ CLOSE = 1e-11
 """Converged: a correction of the bodies [rms displacement / size of the machine] below this,"""
 STALLED = 1e-7
 """or one below this that round-off keeps from getting smaller."""
-ZERO = 1e-12
+ZERO = 1e-13
 """Squared frequencies below this times the largest one (at least 1 rad^2/s^2) are zero."""
 LONGEST = 0.2
 """Longest step of the descent, as a fraction of the machine's size,"""

@@ -34,6 +34,12 @@ WAY = 0.3
 """Longest way (rms) of the bodies in one load step, relative to the machine's size."""
 SMALLEST = 1.0 / 1024
 """Smallest load step."""
+KICK = 1e-3
+"""An unstable place is left by so much, relative to the machine's size,"""
+ALIKE = 1e-3
+"""in the sum of all modes whose squared frequencies differ by less than this from the lowest."""
+PULLED = 1e-3
+"""Part of the unbalanced forces from which they tell to which side a machine buckles."""
 GAPE = 1e-9
 """Joints that gape by more than this [m, relative to the machine's size] are not closed."""
 
@@ -82,25 +88,50 @@ class _Search:
             if has_potential:
                 if found is not None:
                     message = "snapped or buckled on the way; "
-                found = self._descended(q if found is None else found.q)
+                    q = self._nudged(found.q)
+                found = self._descended(q)
             elif found is None:
                 found = self._count(self.balance.newton(q))
         for attempt in range(4):
             if not found.converged:
                 break
-            eigenvalues, lowest = self._eigen(found.q)
+            eigenvalues, _ = self._eigen(found.q)
             zero = zero_level(eigenvalues)
             if not (leave_unstable and has_potential) or not np.any(np.real(eigenvalues) < -zero):
                 break
             message = "left an unstable equilibrium; "
-            kick = 1e-3 * self.balance.size / np.max(np.abs(lowest)) * (1 + attempt)
-            found = self._descended(found.q + kick * lowest)
+            found = self._descended(found.q + KICK * (1 + attempt) * self._soft(found.q)[0])
         if found.converged:
             refined = self._count(self.balance.newton(found.q, most=6))
             if refined.converged and self._turn(found.q, refined.q) < 1e-3:
                 found = refined
                 self._follow(found.q)
         return self._judge(found, message)
+
+    def _nudged(self, q: Array) -> Array:
+        """A place to descend from: to the side where nothing tells which one, as it is when something buckles."""
+        move, pull = self._soft(q)
+        return q + KICK * move if pull < PULLED else q
+
+    def _soft(self, q: Array) -> tuple[Array, float]:
+        """The displacement of the lowest mode as large as the machine, and the part of the forces that pull that way.
+
+        Of the two sides it is that to which a marker moves along an axis of the ground, and of modes that are as low,
+        as those of a round column, the sum that moves it most: other meshes buckle to the same side.
+        """
+        view = self.balance.look(q)
+        values, modes = scipy.linalg.eigh(self.balance.hessian(q, view))
+        alike = values - values[0] < ALIKE * abs(values[0])
+        shapes = view.freedom.basis @ modes[:, alike]
+        moves = np.tensordot(self.marker_points.matrix, shapes, 1).reshape(-1, shapes.shape[1])
+        if np.max(np.abs(moves)) < 1e-6 * np.max(np.abs(shapes)):
+            moves = shapes
+        sizes = np.linalg.norm(moves, axis=1)
+        along = moves[int(np.argmax(sizes > 0.9 * np.max(sizes)))]
+        lowest = shapes @ along
+        pull = abs(float(along @ (modes[:, alike].T @ view.unbalanced))) / float(np.linalg.norm(along))
+        total = float(np.linalg.norm(view.unbalanced))
+        return lowest * (self.balance.size / float(np.max(np.abs(lowest)))), pull / total if total > 0 else 0.0
 
     def _start_angle(self, scene: Scene, at: Attachment) -> float:
         """Of a machine in space: about z."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,21 +11,23 @@ from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import fixed
 from shoal.mechanics.assembly.groups import Orientations, is_stiff, product, transposed
+from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.joints import Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.plane import vector
-from shoal.scene import GROUND, Scene
+from shoal.scene import GROUND, Attachment, Rod, Scene
 
 
 class Attitudes:
     """Rotations (3, 3, lanes) and spins [rad/s] (3, lanes) of all bodies at time zero.
 
-    A body that says nothing is turned as a joint that locks it tells, else not at all. kept: bodies that joints lock.
-    Raises InputError if joints keep other angles between the same two bodies.
+    A body that says nothing is turned as the angle of a joint tells from its neighbour, else not at all, as in the
+    plane. kept: bodies that joints lock. Raises InputError if joints keep other angles between the same two bodies.
     """
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
+        self._begin = self._told()
         self.kept = Orientations(directors={GROUND: tuple(fixed(axis) for axis in np.eye(3)[..., None])}, dimensions=3)
         for name, condition in joints.of_scene(scene):
             if isinstance(condition, Turned):
@@ -36,27 +39,23 @@ class Attitudes:
             self._members.setdefault(self.kept.root(body)[0], []).append(body)
 
     def rotation(self, body: str) -> Array:
-        """The rotation whose columns are the axes of a body."""
-        if body == GROUND:
-            return np.eye(3)[..., None]
+        """The rotation whose columns are the axes of a body; of bodies that joints lock the first that states one."""
         root, relative = self.kept.root(body)
         if root == GROUND:
             return relative
-        for member in (body, *self._members.get(root, ())):
-            if (stated := self._stated(member)) is not None:
-                return product(stated, product(transposed(self.kept.root(member)[1]), relative))
-        return relative
+        members = (body, *self._members.get(root, ()))
+        says = [member for member in members if self.stated(member) is not None]
+        firm = [member for member in says if not {"angle", "rotation"} & {*self._scene.initial[member].guess}]
+        teller = next(iter([*firm, *says, root]))
+        return product(self._begin[teller], product(transposed(self.kept.root(teller)[1]), relative))
 
     def spin(self, body: str) -> Array:
         """The angular velocity of a body along the axes of the ground."""
         root = self.kept.root(body)[0]
         if root != GROUND:
             for member in (body, *self._members.get(root, ())):
-                start = self._scene.start(member)
-                if start.spin is not None:
-                    return vector(*start.spin)
-                if np.any(start.rate):
-                    return vector(0.0, 0.0, start.rate)
+                if (stated := self.stated_spin(member)) is not None:
+                    return stated
         return np.zeros((3, 1))
 
     def image(self, body: str, axis: Any) -> Array:
@@ -65,20 +64,54 @@ class Attitudes:
             return vector(1.0, 0.0, 0.0)
         return turns.back(self.rotation(body), turns.unit(vector(*axis)))
 
-    def _stated(self, body: str) -> Array | None:
+    def stated(self, body: str) -> Array | None:
+        """The rotation that the scene states of a body, if it does."""
         start = self._scene.initial.get(body)
         if start is None or (start.rotation is None and start.angle is None):
             return None
         return turns.of_vector(vector(*start.rotation)) if start.rotation is not None else turns.about_z(start.angle)
 
+    def stated_spin(self, body: str) -> Array | None:
+        """The angular velocity that the scene states of a body, if it does."""
+        start = self._scene.initial.get(body)
+        if start is None or (start.spin is None and start.rate is None):
+            return None
+        return vector(*start.spin) if start.spin is not None else vector(0.0, 0.0, start.rate)
+
+    def _told(self) -> dict[str, Array]:
+        """The rotation of every body as it is stated, as the angle of a joint tells it from a neighbour, or none."""
+        none = np.eye(3)[..., None]
+        found = {body: stated for body in self._scene.bodies if (stated := self.stated(body)) is not None}
+        found[GROUND] = none
+        waiting = [body for body in self._scene.bodies if body not in found]
+        while waiting:
+            body, turn = next(self._tied(found), (waiting[0], none))
+            found[body] = turn
+            waiting.remove(body)
+        return found
+
+    def _tied(self, found: dict[str, Array]) -> Iterator[tuple[str, Array]]:
+        """Bodies that a joint with an angle turns from one of those found."""
+        for _, tie in joints.of_scene(self._scene):
+            if not isinstance(tie, Turned) or tie.angle is None:
+                continue
+            turn = turns.about_z(tie.angle)
+            for here, there, way in ((tie.first, tie.second, turn), (tie.second, tie.first, transposed(turn))):
+                if here.body in found and there.body not in found:
+                    ahead = product(found[here.body], product(section(self._scene, here), way))
+                    yield there.body, product(ahead, transposed(section(self._scene, there)))
+
     def _between(self, condition: Turned) -> Array:
-        """The rotation that a joint keeps: about z by its angle, else that of the start, else none."""
+        """The rotation that a joint keeps: about z by its angle, else that of the start."""
         if condition.angle is not None:
             return turns.about_z(condition.angle)
-        first, second = (
-            np.eye(3)[..., None] if side.body == GROUND else self._stated(side.body)
-            for side in (condition.first, condition.second)
-        )
-        if second is None or first is None:
-            return np.eye(3)[..., None]
+        first, second = (self._begin[side.body] for side in (condition.first, condition.second))
         return product(transposed(first), second)
+
+
+def section(scene: Scene, side: Attachment) -> Array:
+    """The axes in a body's frame of the section at a place of a flexible rod at rest; of other bodies their own."""
+    body = None if side.body == GROUND else scene.bodies[side.body]
+    if not isinstance(body, Rod) or body.element == "rigid":
+        return np.eye(3)[..., None]
+    return unstrained(body, scene.location(side)[0])[1]

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from shoal.mechanics.assembly.space.placement import place_in_space
-from shoal.mechanics.assembly.space.start import slopes
+from shoal.mechanics.assembly.space.start import slopes, value_of
 from shoal.mechanics.assembly.terms import Term
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene
 from shoal.scene.joints import places
 
+Row = tuple[str, list[tuple[int, float]]]
+"""Who holds it; unknowns and derivatives, those of an unknown add up."""
 DEPENDENT = 1e-7
 """Singular values of the rows of unit length below this are of rows that depend on others."""
 SHARE = 1e-3
@@ -26,23 +30,41 @@ def redundant(scene: Scene, q: Array) -> tuple[str, ...]:
     terms = [one for one in place_in_space(scene).terms.held if isinstance(one, Term)]
     if not terms:
         return ()
-    share = _shares(terms, q)
-    guilty = {term.name for term, part in zip(terms, share, strict=True) if part > SHARE}
+    rows = _rows(scene, terms, q)
+    share = _shares(rows, len(q))
+    guilty = {name for (name, _), part in zip(rows, share, strict=True) if part > SHARE}
     return tuple(
         name for name, joint in scene.joints.items() if name in guilty or guilty & {side.body for side in places(joint)}
     )
 
 
-def _shares(terms: list[Term], q: Array) -> Array:
-    """The part of every row in all dependences, (constraints,)."""
+def _rows(scene: Scene, terms: list[Term], q: Array) -> list[Row]:
+    """The rows of the constraints at q. Of a driven angle, whose cosine and sine are held, that of the angle itself."""
+    found: list[Row] = []
+    driven: dict[str, list[Term]] = {}
+    for term in terms:
+        joint = scene.joints.get(term.name)
+        if joint is not None and joint.kind == "driven-angle" and term.drive is not None:
+            driven.setdefault(term.name, []).append(term)
+        else:
+            found.append((term.name, list(slopes(term, q[:, None], 0))))
+    for name, (cosine, sine) in driven.items():
+        c, s = (value_of(replace(term, constant=0.0, drive=None), q, 0) for term in (cosine, sine))
+        parts = [(k, factor * x) for term, factor in ((cosine, -s), (sine, c)) for k, x in slopes(term, q[:, None], 0)]
+        found.append((name, parts))
+    return found
+
+
+def _shares(found: list[Row], unknowns: int) -> Array:
+    """The part of every row in all dependences, (rows,)."""
     import scipy.sparse
 
-    parts = [(row, *slope) for row, term in enumerate(terms) for slope in slopes(term, q[:, None], 0)]
+    parts = [(row, *slope) for row, (_, slopes_of_row) in enumerate(found) for slope in slopes_of_row]
     rows, columns, values = (np.array(one) for one in zip(*parts, strict=True))
-    slope = scipy.sparse.csr_array((values, (rows, columns)), shape=(len(terms), len(q)))
+    slope = scipy.sparse.csr_array((values, (rows, columns)), shape=(len(found), unknowns))
     length = np.sqrt(np.asarray((slope * slope).sum(axis=1)).ravel()) + 1e-300
     slope = scipy.sparse.diags_array(1 / length) @ slope
-    if len(terms) > DENSE:
+    if len(found) > DENSE:
         vectors, sizes = _smallest(slope @ slope.T)
         if not np.all(sizes < DEPENDENT):
             return np.asarray(np.linalg.norm(vectors[:, sizes < DEPENDENT], axis=1))

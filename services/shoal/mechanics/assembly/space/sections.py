@@ -9,7 +9,7 @@ import numpy as np
 from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.groups import is_stiff
-from shoal.mechanics.assembly.space.attitudes import Attitudes
+from shoal.mechanics.assembly.space.attitudes import Attitudes, section
 from shoal.mechanics.elements import SPATIAL
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.unstrained import unstrained
@@ -45,9 +45,7 @@ def node_of(rod: Rod, place: Place) -> int | None:
 
 def image(scene: Scene, attitudes: Attitudes, side: Attachment, axis: Any) -> Array:
     """The unit vector of an axis, as it points at the start, in the frame of a body or of the section at a place."""
-    found = attitudes.image(side.body, axis)
-    rod = flexible(scene, side.body)
-    return found if rod is None else turns.back(unstrained(rod, scene.location(side)[0])[1], found)
+    return turns.back(section(scene, side), attitudes.image(side.body, axis))
 
 
 def chosen_elements(scene: Scene, attitudes: Attitudes) -> dict[str, Element]:
@@ -94,9 +92,7 @@ def shared(
 
 def turn_of(attitudes: Attitudes, scene: Scene, side: Attachment) -> Array:
     """The rotation whose columns are the axes of a body, or of the section at a place of a rod, at the start."""
-    found = attitudes.rotation(side.body)
-    rod = flexible(scene, side.body)
-    return found if rod is None else turns.product(found, unstrained(rod, scene.location(side)[0])[1])
+    return turns.product(attitudes.rotation(side.body), section(scene, side))
 
 
 def arc(rod: Rod, node: int) -> Number:

@@ -44,13 +44,26 @@ def place_started(scene: Scene) -> SpatialPlacement:
 
 
 class _Stated(NamedTuple):
-    """A component of a stated vector as a row of the coordinates, (unknowns,), and its value."""
+    """A component of a stated vector, a sum of factors times coordinates, and its value."""
 
-    row: Array
+    parts: list[tuple[int, float]]
     value: float
     quantity: Quantity
     body: str
     firm: bool
+
+    def off(self, q: Array) -> float:
+        """How far it is from its value at the coordinates, or rates, q."""
+        return float(sum(factor * q[unknown] for unknown, factor in self.parts)) - self.value
+
+
+def _dense(stated: list[_Stated], unknowns: int) -> Array:
+    """Their rows, (stated, unknowns)."""
+    rows = np.zeros((len(stated), unknowns))
+    for row, one in zip(rows, stated, strict=True):
+        for unknown, factor in one.parts:
+            row[unknown] += factor
+    return rows
 
 
 class _Closing:
@@ -94,7 +107,7 @@ class _Closing:
 
     def _keeps(self, lane: int) -> bool:
         """Whether the poses are those that are stated."""
-        away = (abs(one.row @ self.q[:, lane] - one.value) for one in self._rows(_POSES, lane))
+        away = (abs(one.off(self.q[:, lane])) for one in self._rows(_POSES, lane))
         return all(off <= CLOSED * max(self.size, 1.0) for off in away)
 
     def _close(self, lane: int) -> bool:
@@ -120,7 +133,7 @@ class _Closing:
 
     def _corrected(self, q: Array, stated: list[_Stated]) -> bool:
         """Whether the stated poses miss by rounding only. Raises InputError if they do not."""
-        off = [abs(float(one.row @ q) - one.value) / self._unit(one.quantity) for one in stated]
+        off = [abs(one.off(q)) / self._unit(one.quantity) for one in stated]
         if max(off, default=0.0) > ROUNDING:
             worst = stated[int(np.argmax(off))]
             unit = "m" if worst.quantity == "position" else "rad"
@@ -147,11 +160,11 @@ class _Closing:
         return self.size if quantity == "position" else 1.0
 
     def _newton(self, q: Array, lane: int, stated: list[_Stated]) -> Array | None:
-        held = np.array([one.row for one in stated]).reshape(-1, len(q))
+        held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
         small = CLOSED * self.scale
         for _ in range(ITERATIONS):
-            gap = np.array([_value_of(term, q, lane) for term in self.terms])
+            gap = np.array([value_of(term, q, lane) for term in self.terms])
             away = held @ q - wanted
             if np.all(np.abs(gap) <= small) and np.all(np.abs(away) <= CLOSED * max(self.size, 1.0)):
                 return q
@@ -175,7 +188,6 @@ class _Closing:
     def _rows(self, quantities: tuple[Quantity, ...], lane: int) -> list[_Stated]:
         """What is stated of these quantities."""
         found = []
-        count = len(self.q)
         for body, start in self.scene.initial.items():
             frame = self.placement.frames[body]
             for quantity in quantities:
@@ -183,11 +195,9 @@ class _Closing:
                     continue
                 for vector, target in self._targets(body, frame, quantity, value, lane):
                     for k in range(3):
-                        row = np.zeros(count)
-                        for unknown, coefficient in vector.terms.items():
-                            row[unknown] += _lane(coefficient, lane)[k]
+                        parts = [(unknown, float(_lane(one, lane)[k])) for unknown, one in vector.terms.items()]
                         wanted = target[k] - _lane(vector.constant, lane)[k] * (quantity in _POSES)
-                        found.append(_Stated(row, float(wanted), quantity, body, quantity not in start.guess))
+                        found.append(_Stated(parts, float(wanted), quantity, body, quantity not in start.guess))
         return found
 
     def _targets(
@@ -200,22 +210,26 @@ class _Closing:
         if isinstance(frame, PointFrame) or not isinstance(frame, RigidFrame):
             return []
         if quantity in ("angle", "rotation"):
-            rotation = self.placement.attitudes.rotation(body)
+            rotation = self.placement.attitudes.stated(body)
+            assert rotation is not None
             return [(one, _lane(rotation[:, k], lane)) for k, one in enumerate(frame.directors)]
-        spin = _lane(self.placement.attitudes.spin(body), lane)
+        turning = self.placement.attitudes.stated_spin(body)
+        assert turning is not None
+        spin = _lane(turning, lane)
         return [(one, np.cross(spin, _at(one, self.q, lane))) for one in frame.directors]
 
     def _move(self, lane: int) -> bool:
         """Rates that meet the constraints and what is stated; false if there are none."""
         q, v = self.q[:, lane], self.v[:, lane].copy()
-        slope = self.jacobian(self.q, lane) / self.scale[:, None] if len(self.terms) else np.zeros((0, len(q)))
         driven = np.array([_drive_rate(term) for term in self.terms]) / self.scale
         stated = [one for one in self._rows(("velocity", "spin", "rate"), lane) if one.firm]
         pace = max(1.0, float(np.max(np.abs(v), initial=0.0)))
-        kept = all(abs(one.row @ v - one.value) <= CLOSED * pace for one in stated)
-        if kept and np.all(np.abs(slope @ v + driven) <= CLOSED * pace):
+        kept = all(abs(one.off(v)) <= CLOSED * pace for one in stated)
+        moving = np.array([sum(x * v[k] for k, x in slopes(term, self.q, lane)) for term in self.terms]) / self.scale
+        if kept and np.all(np.abs(moving + driven) <= CLOSED * pace):
             return True
-        held = np.array([one.row for one in stated]).reshape(-1, len(q))
+        slope = self.jacobian(self.q, lane) / self.scale[:, None] if len(self.terms) else np.zeros((0, len(q)))
+        held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
         rows, right = np.vstack([slope, held]), np.concatenate([-driven, wanted])
         root = np.linalg.cholesky(self._mass(lane))
@@ -294,7 +308,7 @@ def _value(term: Term, q: Array) -> Array:
     return np.atleast_1d(np.sum(u * (term.form @ w), axis=0) + term.constant + drive)
 
 
-def _value_of(term: Term, q: Array, lane: int) -> float:
+def value_of(term: Term, q: Array, lane: int) -> float:
     """A constraint at time zero at the coordinates (unknowns,) of a lane."""
     constant = np.atleast_1d(term.constant)
     drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
