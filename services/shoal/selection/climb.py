@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from shoal.trajectory import Array
 WORK_LIMIT = 1.5e8
 """Work of one run beyond which the climb gives up, in steps of one cable element: about ten seconds."""
 REJECTED = 3
-"""So many refinements in a row whose run is rejected end the climb."""
+"""So many refinements in a row whose run is rejected end the climb where another theory is left."""
 AGREE = 0.5
 """Two neighbours agree when they are closer than this fraction of the tolerance."""
 FINE, GAIN = 16, 3.0
@@ -84,7 +85,8 @@ def climb(
 ) -> Yardstick | str:
     """Refine the rods until two neighbours agree; else say why that was not to be had.
 
-    impatient: also where a doubling of the elements gains little, as where no limit is near.
+    impatient: another theory is left; so also where runs are rejected, or a doubling of the elements gains little, as
+    where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one.
     """
     count = dict.fromkeys(rods, REFINEMENTS[0])
     growing, gap, last_gap, rejected = rods, np.inf, np.nan, 0
@@ -102,7 +104,7 @@ def climb(
             return _too_much(levels, work)
         fine = runs(levels, HALF, YARDSTICK)
         rejected = 0 if fine.ok else rejected + 1
-        if rejected == REJECTED:
+        if impatient and rejected == REJECTED:
             return f"the runs are rejected: {fine.trajectory.message}"
         last_gap, gap = gap, distance(coarse.trajectory, fine.trajectory)
         coarse.error = gap
@@ -133,3 +135,16 @@ def _next(
 def _too_much(levels: Levels, work: float) -> str:
     flexible = words({rod: level for rod, level in levels.items() if level.element != "rigid"})
     return f"the next refinement ({flexible}) takes {work:.1g} element steps, more than {WORK_LIMIT:.1e}"
+
+
+def settled(refined: Sequence[Rung]) -> tuple[float, str]:
+    """The estimated error of the last of some refinements [m], and why: what the last doublings moved the markers by.
+
+    Where three fell, the smaller of the two factors tells what is left; else all that the last one moved is taken.
+    """
+    gaps = [distance(a.trajectory, b.trajectory) for a, b in pairwise(refined)][-3:]
+    said = f"twice as many elements moved the markers by {gaps[-1]:.1g} m"
+    if len(gaps) < 3 or not 0 < gaps[-1] < max(gaps) < np.inf:
+        return gaps[-1], said
+    fall = min(gaps[0] / gaps[1], gaps[1] / gaps[2])
+    return gaps[-1] / float(np.clip(fall - 1.0, 1.0, 15.0)), f"{said}, each time {fall:.2g} times less at least"
