@@ -151,21 +151,20 @@ def test_what_is_left_is_told_by_how_fast_the_distances_fell(places: list[float]
 
 @pytest.mark.slow
 def test_a_soft_rod_that_kinks_is_met_by_a_mesh_that_follows_it() -> None:
-    """Seed 31 of the random machines: meshes of up to 32 elements lose energy in the kink, finer ones agree."""
+    """Seed 31 of the random machines: coarse meshes lose energy in the kink; Exudyn's are 1e-4 m off."""
+    pytest.importorskip("exudyn")
+    from shoal.engines.exudyn import ExudynEngine
+
     machine = draw(31)
     found = select(machine.scene, machine.tolerance)
     assert found.met
-    rejected = [rung for rung in found.rungs if rung.role == "yardstick" and not rung.ok]
-    assert rejected
-    fine = machine.scene.with_values(
-        {
-            f"bodies.{rod}.{field}": value
-            for rod in "ABC"
-            for field, value in (("element", "simo-reissner"), ("elements", 256))
-        }
-        | {"solver.integrator": "leapfrog", "solver.step": 4e-6}
-    )
-    assert found.trajectory.distance(GaussEngine().simulate(fine, found.trajectory.times)) < machine.tolerance
+    assert any(rung.role == "yardstick" and not rung.ok for rung in found.rungs)
+    fine = {f"bodies.{rod}.element": "simo-reissner" for rod in "ABC"} | {
+        f"bodies.{rod}.elements": 128 for rod in "ABC"
+    }
+    beams = ExudynEngine(beam="geometrically-exact", modified_newton=True)
+    judge = beams.simulate(machine.scene.with_values(fine | {"solver.step": 1e-4}), found.trajectory.times)
+    assert found.trajectory.distance(judge) < machine.tolerance + 1e-4
 
 
 @pytest.mark.parametrize("limit", list(LADDERS))
