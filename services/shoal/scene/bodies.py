@@ -118,8 +118,8 @@ class Rod(Record):
             )
         if self.element == "modal" and self.elements != 1:
             raise ValueError(
-                f"elements: a modal rod is one element, found {self.elements}; set elements to 1 as well (modes tell how "
-                "finely it bends)"
+                f"elements: a modal rod is one element, found {self.elements}; set elements to 1 as well (modes tell "
+                "how finely it bends)"
             )
         if self.element == "modal" and self.axial_modes > self.modes + 1:
             raise ValueError(
