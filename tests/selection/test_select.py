@@ -130,9 +130,9 @@ def test_command_line_prints_the_ladder() -> None:
     ("places", "left"),
     [
         ([0.0, 0.8, 1.0, 1.04], 0.04 / 3),  # falls of 4 and 5: the smaller one counts
-        ([0.0, 0.4, 0.7, 0.9], 0.2),  # falls below 2 promise nothing
-        ([0.0, 0.1, 0.6, 0.7], 0.1),  # nor do gaps that grew
-        ([0.0, 0.3], 0.3),
+        ([0.0, 0.4, 0.7, 0.9], 0.6),  # slow falls promise little
+        ([0.0, 0.1, 0.6, 0.7], 0.4),  # gaps that grew nothing
+        ([0.0, 0.3], 1.2),
     ],
 )
 def test_what_is_left_is_told_by_how_fast_the_distances_fell(places: list[float], left: float) -> None:

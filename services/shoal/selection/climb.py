@@ -25,6 +25,8 @@ FINE, GAIN = 16, 3.0
 """From so many elements on a doubling that gains less than this factor is little."""
 HALF = 0.5 * STEP_MARGIN
 """A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
+SLOW, FAST = 1.25, 16.0
+"""No error of a climb that ended unsettled is taken to fall slower, or faster, from one refinement to the next."""
 UNKNOWN_FALL = 4.0
 """By which factor an error is taken to fall from one refinement to the next before two falls were seen."""
 
@@ -109,7 +111,7 @@ def climb(
         last_gap, gap = gap, distance(coarse.trajectory, fine.trajectory)
         coarse.error = gap
         if gap <= AGREE * tolerance:
-            fall = np.clip(last_gap / gap, 3.0, 16.0) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
+            fall = np.clip(last_gap / gap, 2.0, FAST) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
             fine.error = gap / (fall - 1.0)
             return Yardstick(fine, float(fine.error), {**fixed, **runs.refined(base)})
         if impatient and max(count.values()) >= FINE and last_gap < GAIN * gap < np.inf:
@@ -140,11 +142,10 @@ def _too_much(levels: Levels, work: float) -> str:
 def settled(refined: Sequence[Rung]) -> tuple[float, str]:
     """The estimated error of the last of some refinements [m], and why: what the last doublings moved the markers by.
 
-    Where three fell, the smaller of the two factors tells what is left; else all that the last one moved is taken.
+    Of two factors by which the distances fell the smaller one tells what is left; without them it is taken to be SLOW.
     """
     gaps = [distance(a.trajectory, b.trajectory) for a, b in pairwise(refined)][-3:]
-    said = f"twice as many elements moved the markers by {gaps[-1]:.1g} m"
-    if len(gaps) < 3 or not 0 < gaps[-1] < max(gaps) < np.inf:
-        return gaps[-1], said
-    fall = min(gaps[0] / gaps[1], gaps[1] / gaps[2])
-    return gaps[-1] / float(np.clip(fall - 1.0, 1.0, 15.0)), f"{said}, each time {fall:.2g} times less at least"
+    falls = [a / b for a, b in pairwise(gaps) if 0 < b < np.inf and a < np.inf]
+    fall = min(falls) if len(falls) > 1 else SLOW
+    said = f"twice as many elements moved the markers by {gaps[-1]:.1g} m, each time {fall:.2g} times less at least"
+    return gaps[-1] / float(np.clip(fall, SLOW, FAST) - 1.0), said
