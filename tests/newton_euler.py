@@ -62,7 +62,7 @@ class NewtonEuler:
         def change(t: float, y: Array) -> Array:
             return np.concatenate([y[n:], self.solve(y[:n], y[n:], t)[0]])
 
-        found = solve_ivp(change, (0.0, times[-1]), self.start, t_eval=times, method="DOP853", rtol=1e-11, atol=1e-12)
+        found = solve_ivp(change, (0.0, times[-1]), self.start, t_eval=times, method="DOP853", rtol=1e-13, atol=1e-14)
         assert found.success
         return [(y[:n], y[n:], t) for y, t in zip(found.y.T, times.tolist(), strict=True)]
 

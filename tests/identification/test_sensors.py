@@ -169,7 +169,7 @@ def test_sensors_of_random_machines_show_what_newton_and_euler_say(seed: int) ->
         a, exerted = oracle.solve(q, v, t)
         felt = oracle.specific_force(place, drawn.tilt, q, v, a)
         wanted.append([*felt, *np.concatenate([exerted[joint] for joint in joints]), oracle.rate(place, v)])
-    np.testing.assert_allclose(found, wanted, atol=1e-7)
+    np.testing.assert_allclose(found, wanted, atol=2e-8)
 
 
 SPAN, HEIGHT, WIDTH, YOUNG = 1.0, 0.02, 0.03, 2e9

@@ -210,7 +210,10 @@ BODY = load_scene("flexible-slider-crank").model_dump(mode="json")["bodies"]["ro
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda rod: rod | {"elements": 2}, "bodies.A.rod.elements: a modal rod is one element; found 2"),
+        (
+            lambda rod: rod | {"elements": 2},
+            "bodies.A.rod.elements: a modal rod is one element, found 2; set elements to 1 as well",
+        ),
         (lambda rod: rod | {"curvature": [0.1]}, "curvature: a modal rod is straight"),
         (lambda rod: rod | {"axial_modes": 6}, "axial_modes: 6 is more than 5"),
         (lambda rod: rod | {"ends": ["clamped", "pinned"]}, "ends: clamped, pinned keep a rod"),

@@ -53,24 +53,27 @@ def _matrix(z: Any, *, viscous: bool) -> Any:
     return out.reshape(12, 12)
 
 
-def _state(seed: int) -> Any:
-    """r, r' and d of both nodes of an element that is bent, stretched and sheared."""
+def _state(seed: int, length: float = LENGTH) -> Any:
+    """r, r' and d of both nodes of an element that is bent, stretched and sheared, and pressed to a length [m]."""
     rng = np.random.default_rng(seed)
     nodes = []
     for node in range(2):
-        along = np.array([1.0, 0.0]) + rng.uniform(-0.3, 0.3, 2)
+        normal = np.array([1.0, 0.0]) + rng.uniform(-0.3, 0.3, 2)
+        along = length / LENGTH * normal
         nodes += [
-            np.array([LENGTH * node, 0.0]) + rng.uniform(-0.02, 0.02, 2),
+            np.array([length * node, 0.0]) + rng.uniform(-0.02, 0.02, 2),
             along,
-            along + rng.uniform(-0.2, 0.2, 2),
+            normal + rng.uniform(-0.2, 0.2, 2),
         ]
     return np.array(nodes)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
-def test_force_stiffness_and_damping_are_derivatives_and_turn_with_the_rod(seed: int) -> None:
-    z, rate, still = _state(seed), np.random.default_rng(seed + 9).normal(size=(6, 2)), np.zeros((6, 2))
+@pytest.mark.parametrize(
+    ("seed", "length"), [(0, LENGTH), (1, LENGTH), (2, LENGTH), (3, 0.5 * LENGTH), (4, 0.1 * LENGTH)]
+)
+def test_force_stiffness_and_damping_are_derivatives_and_turn_with_the_rod(seed: int, length: float) -> None:
+    z, rate, still = _state(seed, length), np.random.default_rng(seed + 9).normal(size=(6, 2)), np.zeros((6, 2))
     force, lost = _force(z, still)
     assert lost == 0
     gradient = doors.differences(_energy, z.ravel(), 1e-3)

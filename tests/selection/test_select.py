@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,13 @@ from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.selection import select
+from shoal.selection.climb import settled
 from shoal.selection.levels import LADDERS, RIGID, below, cable, quintic
 from shoal.selection.prior import estimate
 from shoal.selection.run import distance
 from shoal.selection.work import INTEGRATOR, Forecast
 from shoal_validation.problems import get_problem
+from shoal_validation.selection.machines import draw
 
 HEADLINE = load_scene("flexible-double-pendulum")
 
@@ -121,6 +124,47 @@ def test_command_line_prints_the_ladder() -> None:
     assert data["status"] == "ok"
     assert data["markers"]["B"]["t"] == [0.25, 0.5]
     assert data["selection"]["levels"]["AB"]["element"] != "rigid"
+
+
+@pytest.mark.parametrize(
+    ("places", "left"),
+    [
+        ([0.0, 0.8, 1.0, 1.04], 0.04 / 3),  # falls of 4 and 5: the smaller one counts
+        ([0.0, 0.4, 0.7, 0.9], 0.6),  # slow falls promise little
+        ([0.0, 0.1, 0.6, 0.7], 0.4),  # gaps that grew nothing
+        ([0.0, 0.3], 1.2),
+    ],
+)
+def test_what_is_left_is_told_by_how_fast_the_distances_fell(places: list[float], left: float) -> None:
+    class At:
+        ok = True
+
+        def __init__(self, x: float) -> None:
+            self.x = x
+
+        def distance(self, other: Any) -> float:
+            return abs(self.x - other.x)
+
+    rungs: Any = [SimpleNamespace(trajectory=At(x)) for x in places]
+    assert settled(rungs)[0] == pytest.approx(left)
+
+
+@pytest.mark.slow
+def test_a_soft_rod_that_kinks_is_met_by_a_mesh_that_follows_it() -> None:
+    """Seed 31 of the random machines: coarse meshes lose energy in the kink; Exudyn's are 1e-4 m off."""
+    pytest.importorskip("exudyn")
+    from shoal.engines.exudyn import ExudynEngine
+
+    machine = draw(31)
+    found = select(machine.scene, machine.tolerance)
+    assert found.met
+    assert any(rung.role == "yardstick" and not rung.ok for rung in found.rungs)
+    fine = {f"bodies.{rod}.element": "simo-reissner" for rod in "ABC"} | {
+        f"bodies.{rod}.elements": 128 for rod in "ABC"
+    }
+    beams = ExudynEngine(beam="geometrically-exact", modified_newton=True)
+    judge = beams.simulate(machine.scene.with_values(fine | {"solver.step": 1e-4}), found.trajectory.times)
+    assert found.trajectory.distance(judge) < machine.tolerance + 1e-4
 
 
 @pytest.mark.parametrize("limit", list(LADDERS))

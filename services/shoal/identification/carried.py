@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.estimated import read_estimate
 from shoal.scene import expression
 
 if TYPE_CHECKING:
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from shoal.identification.spread.value import Value
     from shoal.scene import Scene
     from shoal.trajectory import Array
-
-LARGEST = 200_000_000
-"""Bytes of a file of values; a larger one is none."""
 
 
 @dataclass(frozen=True)
@@ -159,19 +156,8 @@ def carried(found: Estimate | Path | str) -> Carried:
 def read_values(path: Path | str) -> Carried:
     """What an estimate written by `shoal identify --json` or `--out FILE.json` carries. Raises InputError."""
     path = Path(path)
-    try:
-        if path.stat().st_size > LARGEST:
-            raise InputError(f"values: {path} is no estimate: it is too large")
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"values: {path} cannot be read: {error.strerror or error}") from None
-    except (ValueError, RecursionError):
-        raise InputError(f"values: {path} is no JSON; give what `shoal identify --out FILE.json` wrote") from None
-    if not isinstance(data, dict) or not isinstance(data.get("parameters"), dict) or "verdict" not in data:
-        raise InputError(f"values: {path} is no estimate; give what `shoal identify --out FILE.json` wrote")
-    values, left = data.get("values"), data.get("left_out")
-    if not isinstance(values, dict) or not isinstance(left, dict):
-        raise InputError(f"values: {path} holds no `values`, an older version wrote it; identify once more")
+    data = read_estimate(path, "values", "values")
+    values, left = data["values"], data["left_out"]
     for name, number in values.items():
         if not _is_number(number):
             raise InputError(f"values: {path}: {name}: a finite number is needed, found {str(number)[:60]!r}")

@@ -17,14 +17,13 @@ import numpy as np
 from scipy import special, stats
 
 from shoal.errors import InputError
+from shoal.estimated import read_estimate
 from shoal.response.inputs import Joint, Parameter
 from shoal.response.marginals import Frozen, Marginal, Normal
 from shoal.scene import Scene
 from shoal.trajectory import Array
 
 ENDINGS = ".json", ".nc"
-LARGEST = 200_000_000
-"""Bytes of a file; a larger one is none."""
 DRAWS = 20_000
 """Of more, as many are taken, evenly."""
 LEAST = 100
@@ -69,18 +68,7 @@ def from_posterior(file: str, scene: Scene) -> list[Parameter]:
 
 def _estimate(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """Raises InputError."""
-    try:
-        if path.stat().st_size > LARGEST:
-            raise InputError(f"vary: {path} is no estimate: it is too large")
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"vary: {path} cannot be read: {error.strerror or error}") from None
-    except (ValueError, RecursionError):
-        raise InputError(f"vary: {path} is no JSON; give what `shoal identify --out FILE.json` wrote") from None
-    if not isinstance(data, dict) or "verdict" not in data:
-        raise InputError(f"vary: {path} is no estimate; give what `shoal identify --out FILE.json` wrote")
-    if not isinstance(data.get("joint"), dict) or not isinstance(data.get("left_out"), dict):
-        raise InputError(f"vary: {path} holds no `joint`, an older version wrote it; identify once more")
+    data = read_estimate(path, "vary", "joint")
     if data.get("status") != "ok":
         raise InputError(
             f"vary: {path}: its verdict is {data['verdict']!r}: the spread of its values cannot be trusted"

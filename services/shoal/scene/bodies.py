@@ -117,7 +117,10 @@ class Rod(Record):
                 f"rotary_inertia: {self.element} has none; use simo-reissner, or a rigid rod, or rotary_inertia: false"
             )
         if self.element == "modal" and self.elements != 1:
-            raise ValueError(f"elements: a modal rod is one element; found {self.elements}, state its modes instead")
+            raise ValueError(
+                f"elements: a modal rod is one element, found {self.elements}; set elements to 1 as well (modes tell "
+                "how finely it bends)"
+            )
         if self.element == "modal" and self.axial_modes > self.modes + 1:
             raise ValueError(
                 f"axial_modes: {self.axial_modes} is more than {self.modes + 1}, the even stretch and one for each mode"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,13 +18,15 @@ from shoal.trajectory import Array
 WORK_LIMIT = 1.5e8
 """Work of one run beyond which the climb gives up, in steps of one cable element: about ten seconds."""
 REJECTED = 3
-"""So many refinements in a row whose run is rejected end the climb."""
+"""So many refinements in a row whose run is rejected end the climb where another theory is left."""
 AGREE = 0.5
 """Two neighbours agree when they are closer than this fraction of the tolerance."""
 FINE, GAIN = 16, 3.0
 """From so many elements on a doubling that gains less than this factor is little."""
 HALF = 0.5 * STEP_MARGIN
 """A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
+SLOW, FAST = 1.25, 16.0
+"""No error of a climb that ended unsettled is taken to fall slower, or faster, from one refinement to the next."""
 UNKNOWN_FALL = 4.0
 """By which factor an error is taken to fall from one refinement to the next before two falls were seen."""
 
@@ -84,7 +87,8 @@ def climb(
 ) -> Yardstick | str:
     """Refine the rods until two neighbours agree; else say why that was not to be had.
 
-    impatient: also where a doubling of the elements gains little, as where no limit is near.
+    impatient: another theory is left; so also where runs are rejected, or a doubling of the elements gains little, as
+    where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one.
     """
     count = dict.fromkeys(rods, REFINEMENTS[0])
     growing, gap, last_gap, rejected = rods, np.inf, np.nan, 0
@@ -102,12 +106,12 @@ def climb(
             return _too_much(levels, work)
         fine = runs(levels, HALF, YARDSTICK)
         rejected = 0 if fine.ok else rejected + 1
-        if rejected == REJECTED:
+        if impatient and rejected == REJECTED:
             return f"the runs are rejected: {fine.trajectory.message}"
         last_gap, gap = gap, distance(coarse.trajectory, fine.trajectory)
         coarse.error = gap
         if gap <= AGREE * tolerance:
-            fall = np.clip(last_gap / gap, 3.0, 16.0) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
+            fall = np.clip(last_gap / gap, 2.0, FAST) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
             fine.error = gap / (fall - 1.0)
             return Yardstick(fine, float(fine.error), {**fixed, **runs.refined(base)})
         if impatient and max(count.values()) >= FINE and last_gap < GAIN * gap < np.inf:
@@ -133,3 +137,15 @@ def _next(
 def _too_much(levels: Levels, work: float) -> str:
     flexible = words({rod: level for rod, level in levels.items() if level.element != "rigid"})
     return f"the next refinement ({flexible}) takes {work:.1g} element steps, more than {WORK_LIMIT:.1e}"
+
+
+def settled(refined: Sequence[Rung]) -> tuple[float, str]:
+    """The estimated error of the last of some refinements [m], and why: what the last doublings moved the markers by.
+
+    Of two factors by which the distances fell the smaller one tells what is left; without them it is taken to be SLOW.
+    """
+    gaps = [distance(a.trajectory, b.trajectory) for a, b in pairwise(refined)][-3:]
+    falls = [a / b for a, b in pairwise(gaps) if 0 < b < np.inf and a < np.inf]
+    fall = min(falls) if len(falls) > 1 else SLOW
+    said = f"twice as many elements moved the markers by {gaps[-1]:.1g} m, each time {fall:.2g} times less at least"
+    return gaps[-1] / float(np.clip(fall, SLOW, FAST) - 1.0), said

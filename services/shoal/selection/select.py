@@ -14,7 +14,7 @@ from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import left_out
 from shoal.errors import InputError
 from shoal.scene import Rod, Scene
-from shoal.selection.climb import YARDSTICK, Progress, Runs, climb
+from shoal.selection.climb import YARDSTICK, Progress, Runs, climb, settled
 from shoal.selection.levels import SHEARS, SLENDER, Levels, open_rods, rigid
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
@@ -232,8 +232,9 @@ def _flexible(
         if len(refined) < 2:
             stiff, _ = _rigid(runs, rigid(runs.limits), tolerance, worst)
             return stiff, yardstick
-        refined[-1].error = distance(refined[-2].trajectory, refined[-1].trajectory) + known
-        return refined[-1], yardstick
+        left, why = settled(refined)
+        refined[-1].error = left + known
+        return refined[-1], why if refined[-1].error <= tolerance else yardstick
     yardstick.error += known
     chosen = trim(runs, yardstick, rods, tolerance)
     if chosen is None:

@@ -1,10 +1,10 @@
 """Simo and Reissner's rod in the plane: stretch, shear, bending, and the inertia of sections that turn.
 
 Reissner 1972; Simo 1985. A node has r, r' and d, the unit normal of its section. The centreline is the cubic Hermite
-curve, and the angle from its tangent to the normal of the section changes linearly along an element: with it, uniform
-shear and the bending that goes with it are exact, so that nothing locks, and errors fall with the fourth power of the
-length. Strains are in `simo_reissner_strains`; the rules are those of the reduced cable. Kelvin-Voigt damping adds the
-retardation times the rate to every strain.
+curve, and the shear changes linearly along an element: with it, uniform shear and the bending that goes with it are
+exact, so that nothing locks, and errors fall with the fourth power of the length. Strains are in
+`simo_reissner_strains`; the rules are those of the reduced cable. Kelvin-Voigt damping adds the retardation times the
+rate to every strain.
 
 The mass is constant: that of the cable, and rho I of a normal that is linear in the coordinates, r' and the line
 through d - r' at both nodes. No constraint holds |d| = 1, but the stiffness kappa G A per length: a section that turns
@@ -27,6 +27,7 @@ from shoal.mechanics.elements.simo_reissner_strains import (
     AXIAL,
     BENDING,
     STRAINS,
+    TURNED,
     change,
     gradient,
     rates,
@@ -216,16 +217,17 @@ implement(
 )
 
 
-_RULE = beam.lobatto(beam.CUBIC, len(BENDING))
-
-
 def _at_rest(length: Number, nodal: list[Number]) -> list[Number]:
     """The strains of the unstrained element, whose sections are at right angles to its axis."""
     first, slope, _, second, other, _ = nodal
-    told = beam.reference(beam.CUBIC, _RULE, [first, slope, second, other], length)
-    relaxed, angles = told[0::2], told[1::2]
-    stretches = [strain for inverse in relaxed[: len(AXIAL)] for strain in (1.0 / inverse - 1.0, 0.0 * inverse)]
-    return [*stretches, *angles[len(AXIAL) :]]
+    middle = 1.5 * (second - first) / length - 0.25 * (slope + other)
+    turn, beta = _angle(slope, other), _angle(slope + other, middle)
+    none = 0.0 * turn
+    return [none, none, np.hypot(*middle) - 1.0, none, none, none, turn + TURNED * beta, turn - TURNED * beta]
+
+
+def _angle(a: Number, b: Number) -> Number:
+    return np.arctan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])
 
 
 def entry(

@@ -3,9 +3,12 @@
 An element is 12 numbers, or SIMD vectors: r1, r1', d1, r2, r2', d2. Its strains are stretch and shear at three points
 of Lobatto, and bending at two of Gauss, times the length L:
 
-    |r'| cos(delta) - 1,    -|r'| sin(delta),    (r' x L r'')/|r'|^2 + delta2 - delta1,
+    a cos(beta) + t sin(beta) - 1,    t cos(beta) - a sin(beta),    phi + 4 beta (1 - 2 x),
 
-with delta the angle from r' to d, of which the one in the middle is the mean of those at the nodes.
+with a and t the parts of r' along a normal and across it, and phi the angle from d1 to d2. At the nodes the normal is
+d/|d| and beta is 0. In the middle it is that of d1/|d1| + d2/|d2|, from which the section turns by beta more, so far
+that its shear is tau, the mean of the nodes': tan(beta) = (t - tau)/(a + g^3) with g = 1 - |r'|^2 where that is above
+0, else 0. Without g a rod that is pressed to no length would have no tangent to turn with, and no stable step.
 """
 
 from __future__ import annotations
@@ -24,102 +27,111 @@ STRAINS = 8
 AXIAL = np.array([[0.0, 1 / 6], [0.5, 4 / 6], [1.0, 1 / 6]])
 BENDING = np.array([[0.5 - 0.5 / np.sqrt(3), 0.5], [0.5 + 0.5 / np.sqrt(3), 0.5]])
 """Points and weights."""
+TURNED = 4.0 * (1.0 - 2.0 * BENDING[0, 0])
+"""By how much beta bends at the first point of Gauss, and the other way at the second."""
 
 
 @njit(error_model="numpy", forceinline=True)
-def _chord(z, inverse):  # type: ignore[no-untyped-def]
-    """(r2 - r1)/L; inverse: 1/L."""
-    return times(inverse, plus(z[6:8], -1.0, z[0:2]))
+def _unit(d):  # type: ignore[no-untyped-def]
+    """d/|d|."""
+    return times(1.0 / root(dot(d, d)), d)
 
 
 @njit(error_model="numpy", forceinline=True)
-def _turned(s, d):  # type: ignore[no-untyped-def]
-    """The angle from s to d, below a right one, with its cosine and sine."""
-    size = 1.0 / root(dot(s, s) * dot(d, d))
-    c, n = size * dot(s, d), size * cross(s, d)
-    return 2.0 * arctangent(n / (1.0 + c)), c, n
+def _by_angle(d):  # type: ignore[no-untyped-def]
+    """The derivative of the angle of d."""
+    return times(1.0 / dot(d, d), quarter(d))
 
 
 @njit(error_model="numpy", forceinline=True)
-def _angles(z):  # type: ignore[no-untyped-def]
-    """delta2 - delta1, and cosines and sines of delta at the points of Lobatto."""
-    a1, c1, n1 = _turned(z[2:4], z[4:6])
-    a2, c2, n2 = _turned(z[8:10], z[10:12])
-    half = 1.0 / root((c1 + c2) * (c1 + c2) + (n1 + n2) * (n1 + n2))
-    return a2 - a1, (c1, (c1 + c2) * half, c2), (n1, (n1 + n2) * half, n2)
+def _middle(z, inverse):  # type: ignore[no-untyped-def]
+    """r' in the middle; inverse: 1/L."""
+    p, _ = curve(AXIAL[1, 0], times(inverse, plus(z[6:8], -1.0, z[0:2])), z[2:4], z[8:10])
+    return p
 
 
 @njit(error_model="numpy", forceinline=True)
-def _bend(p, q):  # type: ignore[no-untyped-def]
-    """L times the turning of the tangent over the length, p x q/|p|^2, and its derivatives by p and q."""
-    square = 1.0 / dot(p, p)
-    psi = cross(p, q) * square
-    return psi, plus(times(-square, quarter(q)), -2.0 * psi * square, p), times(square, quarter(p))
+def _between(e1, e2):  # type: ignore[no-untyped-def]
+    """The angle from e1 to e2, below two right ones."""
+    return 2.0 * arctangent(cross(e1, e2) / (1.0 + dot(e1, e2)))
 
 
 @njit(error_model="numpy", forceinline=True)
-def _by_angle(u):  # type: ignore[no-untyped-def]
-    """The derivative of the angle of u."""
-    return times(1.0 / dot(u, u), quarter(u))
+def _short(a, t):  # type: ignore[no-untyped-def]
+    """1 - |r'|^2 where that is above 0, else 0."""
+    g = 1.0 - a * a - t * t
+    return 0.5 * (g + root(g * g))
+
+
+@njit(error_model="numpy", forceinline=True)
+def _bent(p, m, tau):  # type: ignore[no-untyped-def]
+    """In the middle: a, t, cos(beta), sin(beta), beta, and 1 over the length of (a + g^3, t - tau)."""
+    a, t = dot(m, p), cross(m, p)
+    g = _short(a, t)
+    x, y = a + g * g * g, t - tau
+    size = 1.0 / root(x * x + y * y)
+    cosine, sine = x * size, y * size
+    return a, t, cosine, sine, 2.0 * arctangent(sine / (1.0 + cosine)), size
+
+
+@njit(error_model="numpy", forceinline=True)
+def _by(bent):  # type: ignore[no-untyped-def]
+    """The derivatives of beta by a, t and tau."""
+    a, t, cosine, sine, _, size = bent
+    g = _short(a, t)
+    steep = 6.0 * g * g
+    return size * sine * (steep * a - 1.0), size * (cosine + sine * steep * t), -size * cosine
 
 
 @njit(error_model="numpy", forceinline=True)
 def strains(z, inverse):  # type: ignore[no-untyped-def]
     """The strains of elements; inverse: 1/L."""
-    chord, s1, s2 = _chord(z, inverse), z[2:4], z[8:10]
-    apart, c, n = _angles(z)
-    pm, _ = curve(AXIAL[1, 0], chord, s1, s2)
-    n1, nm, n2 = root(dot(s1, s1)), root(dot(pm, pm)), root(dot(s2, s2))
-    p, q = curve(BENDING[0, 0], chord, s1, s2)
-    first = cross(p, q) / dot(p, p) + apart
-    p, q = curve(BENDING[1, 0], chord, s1, s2)
-    second = cross(p, q) / dot(p, p) + apart
-    ends = n2 * c[2] - 1.0, -n2 * n[2]
-    return (n1 * c[0] - 1.0, -n1 * n[0], nm * c[1] - 1.0, -nm * n[1], *ends, first, second)
+    e1, e2, p = _unit(z[4:6]), _unit(z[10:12]), _middle(z, inverse)
+    one, two = (dot(e1, z[2:4]) - 1.0, cross(e1, z[2:4])), (dot(e2, z[8:10]) - 1.0, cross(e2, z[8:10]))
+    a, t, cosine, sine, beta, _ = _bent(p, _unit(plus(e1, 1.0, e2)), 0.5 * (one[1] + two[1]))
+    mid, phi = (a * cosine + t * sine - 1.0, t * cosine - a * sine), _between(e1, e2)
+    return (*one, *mid, *two, phi + TURNED * beta, phi - TURNED * beta)
 
 
 @njit(error_model="numpy", forceinline=True)
-def _turning(z, v):  # type: ignore[no-untyped-def]
-    """The rates of delta at both nodes."""
-    first = dot(_by_angle(z[4:6]), v[4:6]) - dot(_by_angle(z[2:4]), v[2:4])
-    return first, dot(_by_angle(z[10:12]), v[10:12]) - dot(_by_angle(z[8:10]), v[8:10])
+def _seen(p, u, e, w):  # type: ignore[no-untyped-def]
+    """How the parts of p along e and across it change, when p does by u and e turns by w."""
+    return dot(e, u) + cross(e, p) * w, cross(e, u) - dot(e, p) * w
 
 
 @njit(error_model="numpy", forceinline=True)
-def _drawn(p, u, c, n, w):  # type: ignore[no-untyped-def]
-    """Rates of stretch and shear at a point: u that of r', w that of delta."""
-    size = root(dot(p, p))
-    grown = dot(p, u) / size
-    return grown * c - size * n * w, -grown * n - size * c * w
+def _mid_change(bent, along, across, dtau):  # type: ignore[no-untyped-def]
+    """The changes of stretch and shear in the middle and of beta, when a, t and tau do so."""
+    a, t, cosine, sine, _, _ = bent
+    by_a, by_t, by_tau = _by(bent)
+    turn = by_a * along + by_t * across + by_tau * dtau
+    longer = cosine * along + sine * across + (t * cosine - a * sine) * turn
+    return longer, cosine * across - sine * along - (a * cosine + t * sine) * turn, turn
 
 
 @njit(error_model="numpy", forceinline=True)
 def rates(z, v, inverse):  # type: ignore[no-untyped-def]
     """The rates of the strains, v being those of z."""
-    chord, s1, s2, moving = _chord(z, inverse), z[2:4], z[8:10], _chord(v, inverse)
-    _, c, n = _angles(z)
-    w1, w2 = _turning(z, v)
-    pm, _ = curve(AXIAL[1, 0], chord, s1, s2)
-    um, _ = curve(AXIAL[1, 0], moving, v[2:4], v[8:10])
-    p, q = curve(BENDING[0, 0], chord, s1, s2)
-    u, a = curve(BENDING[0, 0], moving, v[2:4], v[8:10])
-    _, by_p, by_q = _bend(p, q)
-    first = dot(by_p, u) + dot(by_q, a) + w2 - w1
-    p, q = curve(BENDING[1, 0], chord, s1, s2)
-    u, a = curve(BENDING[1, 0], moving, v[2:4], v[8:10])
-    _, by_p, by_q = _bend(p, q)
-    second = dot(by_p, u) + dot(by_q, a) + w2 - w1
-    one, two = _drawn(s1, v[2:4], c[0], n[0], w1), _drawn(pm, um, c[1], n[1], 0.5 * (w1 + w2))
-    return (*one, *two, *_drawn(s2, v[8:10], c[2], n[2], w2), first, second)
+    e1, e2, p = _unit(z[4:6]), _unit(z[10:12]), _middle(z, inverse)
+    m, w1, w2 = _unit(plus(e1, 1.0, e2)), dot(_by_angle(z[4:6]), v[4:6]), dot(_by_angle(z[10:12]), v[10:12])
+    one, two = _seen(z[2:4], v[2:4], e1, w1), _seen(z[8:10], v[8:10], e2, w2)
+    along, across = _seen(p, _middle(v, inverse), m, 0.5 * (w1 + w2))
+    bent = _bent(p, m, 0.5 * (cross(e1, z[2:4]) + cross(e2, z[8:10])))
+    longer, slid, turn = _mid_change(bent, along, across, 0.5 * (one[1] + two[1]))
+    return (*one, longer, slid, *two, w2 - w1 + TURNED * turn, w2 - w1 - TURNED * turn)
 
 
 @njit(error_model="numpy", forceinline=True)
-def _section(p, c, n, axial, shear, stretch, slide):  # type: ignore[no-untyped-def]
-    """At a point of Lobatto: its energy, and the derivatives by |r'| and by delta; stretch, slide: free strains."""
-    size = root(dot(p, p))
-    e, g = size * c - 1.0 - stretch, -size * n - slide
-    force, across = axial * e, shear * g
-    return 0.5 * (force * e + across * g), force * c - across * n, -size * (force * n + across * c)
+def _node(s, e, axial, shear, stretch, slide):  # type: ignore[no-untyped-def]
+    """At a node: energy, and the forces along e and across it; stretch, slide: free strains."""
+    longer, slid = dot(e, s) - 1.0 - stretch, cross(e, s) - slide
+    return 0.5 * (axial * longer * longer + shear * slid * slid), axial * longer, shear * slid
+
+
+@njit(error_model="numpy", forceinline=True)
+def _back(p, e, along, across):  # type: ignore[no-untyped-def]
+    """The derivatives by p and by the angle of e, of what changes so with the parts of p along e and across it."""
+    return plus(times(along, e), across, quarter(e)), along * cross(e, p) - across * dot(e, p)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -131,51 +143,94 @@ def _held(d, stiffness):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy", forceinline=True)
+def _stresses(bent, phi, stiff, free):  # type: ignore[no-untyped-def]
+    """In the middle: tension, shear force and the moments at the points of Gauss."""
+    _, ea, ga, ei = stiff
+    a, t, cosine, sine, beta, _ = bent
+    force = AXIAL[1, 1] * ea * (a * cosine + t * sine - 1.0 - free[2])
+    across = AXIAL[1, 1] * ga * (t * cosine - a * sine - free[3])
+    first = BENDING[0, 1] * ei * (phi + TURNED * beta - free[6])
+    return force, across, first, BENDING[1, 1] * ei * (phi - TURNED * beta - free[7])
+
+
+@njit(error_model="numpy", forceinline=True)
+def _by_parts(bent, force, across, first, second):  # type: ignore[no-untyped-def]
+    """The derivatives of the energy by a, t and tau, and what turns beta."""
+    a, t, cosine, sine, _, _ = bent
+    by_a, by_t, by_tau = _by(bent)
+    turn = force * (t * cosine - a * sine) - across * (a * cosine + t * sine) + TURNED * (first - second)
+    by_a, by_t = force * cosine - across * sine + turn * by_a, force * sine + across * cosine + turn * by_t
+    return by_a, by_t, turn * by_tau, turn
+
+
+@njit(error_model="numpy", forceinline=True)
 def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
     """The energy of elements and its derivatives by their rows; stiff: 1/L, EA L, kappa G A L, EI/L."""
     inverse, ea, ga, ei = stiff
     s1, d1, s2, d2 = z[2:4], z[4:6], z[8:10], z[10:12]
-    chord = _chord(z, inverse)
-    apart, c, n = _angles(z)
-    pm, _ = curve(AXIAL[1, 0], chord, s1, s2)
-    wa, wm = AXIAL[0, 1], AXIAL[1, 1]
-    u1, f1, by1 = _section(s1, c[0], n[0], wa * ea, wa * ga, free[0], free[1])
-    um, fm, bym = _section(pm, c[1], n[1], wm * ea, wm * ga, free[2], free[3])
-    u2, f2, by2 = _section(s2, c[2], n[2], wa * ea, wa * ga, free[4], free[5])
-    energy = u1 + um + u2
+    e1, e2, p = _unit(d1), _unit(d2), _middle(z, inverse)
+    m, w = _unit(plus(e1, 1.0, e2)), AXIAL[0, 1]
+    bent = _bent(p, m, 0.5 * (cross(e1, s1) + cross(e2, s2)))
+    force, across, first, second = _stresses(bent, _between(e1, e2), stiff, free)
+    squares = force * force / (AXIAL[1, 1] * ea) + across * across / (AXIAL[1, 1] * ga)
+    squares = squares + (first * first + second * second) / (BENDING[0, 1] * ei)
+    u1, f1, q1 = _node(s1, e1, w * ea, w * ga, free[0], free[1])
+    u2, f2, q2 = _node(s2, e2, w * ea, w * ga, free[4], free[5])
+    by_a, by_t, by_tau, _ = _by_parts(bent, force, across, first, second)
+    by_p, by_m = _back(p, m, by_a, by_t)
+    by_s1, by1 = _back(s1, e1, f1, q1 + 0.5 * by_tau)
+    by_s2, by2 = _back(s2, e2, f2, q2 + 0.5 * by_tau)
     none = times(0.0, s1)
-    g, g1, g2 = collect(AXIAL[1, 0], times(fm / root(dot(pm, pm)), pm), none, none, none, none)
-    by_apart = 0.0 * inverse
-    for k in range(len(BENDING)):
-        p, q = curve(BENDING[k, 0], chord, s1, s2)
-        psi, by_p, by_q = _bend(p, q)
-        angle = psi + apart - free[6 + k]
-        m = BENDING[k, 1] * ei * angle
-        energy = energy + 0.5 * m * angle
-        by_apart = by_apart + m
-        g, g1, g2 = collect(BENDING[k, 0], times(m, by_p), times(m, by_q), g, g1, g2)
-    by1, by2 = by1 + 0.5 * bym - by_apart, by2 + 0.5 * bym + by_apart
-    g1 = plus(plus(g1, f1 / root(dot(s1, s1)), s1), -by1, _by_angle(s1))
-    g2 = plus(plus(g2, f2 / root(dot(s2, s2)), s2), -by2, _by_angle(s2))
+    g, g1, g2 = collect(AXIAL[1, 0], by_p, none, none, by_s1, by_s2)
+    by1, by2 = by1 + 0.5 * by_m - first - second, by2 + 0.5 * by_m + first + second
     h1, n1 = _held(d1, 0.5 * ga)
     h2, n2 = _held(d2, 0.5 * ga)
     n1, n2 = plus(n1, by1, _by_angle(d1)), plus(n2, by2, _by_angle(d2))
     ends = times(inverse, g)
-    return energy + h1 + h2, (-ends[0], -ends[1], *g1, *n1, *ends, *g2, *n2)
+    return 0.5 * squares + u1 + u2 + h1 + h2, (-ends[0], -ends[1], *g1, *n1, *ends, *g2, *n2)
 
 
 @njit(error_model="numpy", forceinline=True)
-def _section_change(p, u, c, n, w, axial, shear, stretch, slide):  # type: ignore[no-untyped-def]
-    """The changes of the derivatives by r' and by delta at a point of Lobatto; u, w: those of r' and delta."""
-    size = root(dot(p, p))
-    _, by_n, by = _section(p, c, n, axial, shear, stretch, slide)
-    t = times(1.0 / size, p)
-    grown = dot(t, u)
-    e, g = _drawn(p, u, c, n, w)
-    force, across = axial * e, shear * g
-    more = force * c - across * n + by / size * w
-    turn = grown * by / size - size * (force * n + across * c) - size * by_n * w
-    return plus(times(more, t), by_n / size, plus(u, -grown, t)), by, turn
+def _by_change(bent, along, across, dtau):  # type: ignore[no-untyped-def]
+    """The changes of the derivatives of beta, when a, t and tau do so."""
+    a, t, cosine, sine, _, size = bent
+    g, grown = _short(a, t), a * along + t * across
+    steep, steeper = 6.0 * g * g, -24.0 * g * grown
+    _, _, turn = _mid_change(bent, along, across, dtau)
+    smaller = -size * (cosine * (along - steep * grown) + sine * (across - dtau))
+    by_a, by_t, by_tau = _by(bent)
+    by_a = smaller * by_a + size * (cosine * turn * (steep * a - 1.0) + sine * (steeper * a + steep * along))
+    turned = cosine * turn * steep * t - sine * turn
+    by_t = smaller * by_t + size * (turned + sine * (steeper * t + steep * across))
+    return by_a, by_t, smaller * by_tau + size * sine * turn
+
+
+@njit(error_model="numpy", forceinline=True)
+def _parts_change(bent, along, across, dtau, dphi, stiff, stresses):  # type: ignore[no-untyped-def]
+    """The changes of the derivatives of `_by_parts` and of the moments, when a, t, tau and phi do so."""
+    _, ea, ga, ei = stiff
+    a, t, cosine, sine, _, _ = bent
+    force, shear, _, _ = stresses
+    _, _, _, moment = _by_parts(bent, *stresses)
+    by_a, by_t, by_tau = _by(bent)
+    dby_a, dby_t, dby_tau = _by_change(bent, along, across, dtau)
+    longer, slid, turn = _mid_change(bent, along, across, dtau)
+    dforce, dshear = AXIAL[1, 1] * ea * longer, AXIAL[1, 1] * ga * slid
+    first, second = BENDING[0, 1] * ei * (dphi + TURNED * turn), BENDING[1, 1] * ei * (dphi - TURNED * turn)
+    stretch, slide = a * cosine + t * sine, t * cosine - a * sine
+    more = dforce * slide + force * slid - dshear * stretch - shear * longer + TURNED * (first - second)
+    by_along = dforce * cosine - force * sine * turn - dshear * sine - shear * cosine * turn
+    by_across = dforce * sine + force * cosine * turn + dshear * cosine - shear * sine * turn
+    by_along, by_across = by_along + more * by_a + moment * dby_a, by_across + more * by_t + moment * dby_t
+    return by_along, by_across, more * by_tau + moment * dby_tau, first + second
+
+
+@njit(error_model="numpy", forceinline=True)
+def _back_change(p, u, e, w, along, across, dalong, dacross):  # type: ignore[no-untyped-def]
+    """How `_back` changes, when p does by u, e turns by w, and along and across change so."""
+    more, turn = _back(p, e, dalong, dacross)
+    a, t = _seen(p, u, e, w)
+    return plus(more, w, plus(times(along, quarter(e)), -across, e)), turn + along * t - across * a
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -195,43 +250,43 @@ def _held_change(d, u, stiffness):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy", forceinline=True)
+def _node_change(s, u, d, w, numbers, by_tau, dby_tau):  # type: ignore[no-untyped-def]
+    """At a node: the changes of the derivatives by r' and by the angle of d, and the latter; numbers: see `_node`."""
+    e = _unit(d)
+    _, force, across = _node(s, e, *numbers)
+    across = across + 0.5 * by_tau
+    longer, slid = _seen(s, u, e, w)
+    _, by = _back(s, e, force, across)
+    axial, shear, _, _ = numbers
+    more, turn = _back_change(s, u, e, w, force, across, axial * longer, shear * slid + 0.5 * dby_tau)
+    return more, turn, by
+
+
+@njit(error_model="numpy", forceinline=True)
 def change(z, v, stiff, free):  # type: ignore[no-untyped-def]
     """How the derivatives of the energy change when z does by v: the stiffness times v."""
-    inverse, ea, ga, ei = stiff
+    inverse, ea, ga, _ = stiff
     s1, d1, s2, d2 = z[2:4], z[4:6], z[8:10], z[10:12]
-    v1, e1, v2, e2 = v[2:4], v[4:6], v[8:10], v[10:12]
-    chord, moving = _chord(z, inverse), _chord(v, inverse)
-    apart, c, n = _angles(z)
-    w1, w2 = _turning(z, v)
-    pm, _ = curve(AXIAL[1, 0], chord, s1, s2)
-    um, _ = curve(AXIAL[1, 0], moving, v1, v2)
-    wa, wm = AXIAL[0, 1], AXIAL[1, 1]
-    p1, by1, turn1 = _section_change(s1, v1, c[0], n[0], w1, wa * ea, wa * ga, free[0], free[1])
-    p2, by2, turn2 = _section_change(s2, v2, c[2], n[2], w2, wa * ea, wa * ga, free[4], free[5])
-    p, bym, turnm = _section_change(pm, um, c[1], n[1], 0.5 * (w1 + w2), wm * ea, wm * ga, free[2], free[3])
+    v1, v2, p, u = v[4:6], v[10:12], _middle(z, inverse), _middle(v, inverse)
+    e1, e2, w = _unit(d1), _unit(d2), AXIAL[0, 1]
+    m, w1, w2 = _unit(plus(e1, 1.0, e2)), dot(_by_angle(d1), v1), dot(_by_angle(d2), v2)
+    bent = _bent(p, m, 0.5 * (cross(e1, s1) + cross(e2, s2)))
+    stresses = _stresses(bent, _between(e1, e2), stiff, free)
+    by_a, by_t, by_tau, _ = _by_parts(bent, *stresses)
+    _, by_m = _back(p, m, by_a, by_t)
+    mean = 0.5 * (w1 + w2)
+    along, across = _seen(p, u, m, mean)
+    dtau = 0.5 * (_seen(s1, v[2:4], e1, w1)[1] + _seen(s2, v[8:10], e2, w2)[1])
+    dby_a, dby_t, dby_tau, moment = _parts_change(bent, along, across, dtau, w2 - w1, stiff, stresses)
+    by_p, turn_m = _back_change(p, u, m, mean, by_a, by_t, dby_a, dby_t)
+    by_s1, turn1, by1 = _node_change(s1, v[2:4], d1, w1, (w * ea, w * ga, free[0], free[1]), by_tau, dby_tau)
+    by_s2, turn2, by2 = _node_change(s2, v[8:10], d2, w2, (w * ea, w * ga, free[4], free[5]), by_tau, dby_tau)
     none = times(0.0, s1)
-    g, g1, g2 = collect(AXIAL[1, 0], p, none, none, none, none)
-    by_apart, turn = 0.0 * inverse, 0.0 * inverse
-    for k in range(len(BENDING)):
-        p, q = curve(BENDING[k, 0], chord, s1, s2)
-        u, a = curve(BENDING[k, 0], moving, v1, v2)
-        psi, by_p, by_q = _bend(p, q)
-        square = 1.0 / dot(p, p)
-        grown, psidot = 2.0 * dot(p, u) * square, dot(by_p, u) + dot(by_q, a)
-        m = BENDING[k, 1] * ei * (psi + apart - free[6 + k])
-        more = BENDING[k, 1] * ei * (psidot + w2 - w1)
-        by_apart, turn = by_apart + m, turn + more
-        first = plus(plus(times(-square, quarter(a)), -2.0 * psidot * square, p), -2.0 * psi * square, u)
-        second = plus(times(square, quarter(u)), -grown, by_q)
-        first = plus(first, -grown, by_p)
-        g, g1, g2 = collect(
-            BENDING[k, 0], plus(times(more, by_p), m, first), plus(times(more, by_q), m, second), g, g1, g2
-        )
-    by1, by2 = by1 + 0.5 * bym - by_apart, by2 + 0.5 * bym + by_apart
-    turn1, turn2 = turn1 + 0.5 * turnm - turn, turn2 + 0.5 * turnm + turn
-    g1 = plus(plus(plus(g1, 1.0, p1), -turn1, _by_angle(s1)), -by1, _angle_change(s1, v1))
-    g2 = plus(plus(plus(g2, 1.0, p2), -turn2, _by_angle(s2)), -by2, _angle_change(s2, v2))
-    n1 = plus(plus(_held_change(d1, e1, 0.5 * ga), turn1, _by_angle(d1)), by1, _angle_change(d1, e1))
-    n2 = plus(plus(_held_change(d2, e2, 0.5 * ga), turn2, _by_angle(d2)), by2, _angle_change(d2, e2))
+    g, g1, g2 = collect(AXIAL[1, 0], by_p, none, none, by_s1, by_s2)
+    bending = stresses[2] + stresses[3]
+    by1, by2 = by1 + 0.5 * by_m - bending, by2 + 0.5 * by_m + bending
+    turn1, turn2 = turn1 + 0.5 * turn_m - moment, turn2 + 0.5 * turn_m + moment
+    n1 = plus(plus(_held_change(d1, v1, 0.5 * ga), turn1, _by_angle(d1)), by1, _angle_change(d1, v1))
+    n2 = plus(plus(_held_change(d2, v2, 0.5 * ga), turn2, _by_angle(d2)), by2, _angle_change(d2, v2))
     ends = times(inverse, g)
     return (-ends[0], -ends[1], *g1, *n1, *ends, *g2, *n2)
