@@ -1,4 +1,4 @@
-"""`python -m shoal_validation.uncertain [--studies N] [--runs N] [--only PART] [--quick] [--page FILE]`.
+"""`python -m shoal_validation.uncertain [--studies N] [--runs N] [--only PART] [--quick] [--first SEED] [--page FILE]`.
 
 Prints accuracy by number of runs of every method for intervals on every problem (`methods`), and N random studies of
 machines in closed form by `auto`, whose bounds 100 000 random runs try to leave (`studies`); writes both into FILE
@@ -34,6 +34,7 @@ def main(arguments: list[str]) -> bool:
     """Measure, print, write; whether nothing is wrong in silence where `auto` told it."""
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.uncertain", description=__doc__)
     parser.add_argument("--studies", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first study")
     parser.add_argument("--runs", type=int, default=RUNS, help="random runs against every study")
     parser.add_argument("--only", choices=["methods", "studies"])
     parser.add_argument("--quick", action="store_true")
@@ -45,7 +46,7 @@ def main(arguments: list[str]) -> bool:
         told["uncertain-methods"] = methods_table(lines)
         good = all(line.verdict != "silent" for line in lines if line.method == "auto")
     if chosen.only != "methods":
-        found = tried(20 if chosen.quick else chosen.studies, chosen.runs, FEW if chosen.quick else None)
+        found = tried(20 if chosen.quick else chosen.studies, chosen.runs, FEW if chosen.quick else None, chosen.first)
         told["uncertain-studies"] = studies_text(found, chosen.runs)
         good = good and all(one.kept for one in found)
     publish(chosen.page, told)
@@ -64,9 +65,9 @@ def compared(*, quick: bool) -> list[Line]:
     return lines
 
 
-def tried(count: int, runs: int, most: int | None = None) -> list[Judged]:
+def tried(count: int, runs: int, most: int | None = None, first: int = 0) -> list[Judged]:
     """So many random studies against so many runs each; most: parameters. One that fails is printed."""
-    found, seed = list[Judged](), 0
+    found, seed = list[Judged](), first
     while len(found) < count:
         asked = drawn(seed)
         seed += 1
