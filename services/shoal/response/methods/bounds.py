@@ -32,6 +32,8 @@ ROUNDS = 6
 """Parts of the fair number of runs: as many extremal points are run at once, at most."""
 SPARED = 20
 """One in so many of the fair number of runs is kept for extremal points of the last degree."""
+CLEARLY = 0.5
+"""Share of the error of a polynomial that one of lower degree has to have to take its place."""
 APART = 1e-3
 """Germs that are nearer to each other are one extremal point."""
 MORE = 8
@@ -97,17 +99,18 @@ def _carried(study: Study, degree: int) -> bool:
 
 
 def _foretold(study: Study, degree: int) -> Expansion:
-    """Every column by this degree, or by one less where that foretells better what is left out of its fit."""
-    runs, parameters = study.runs, len(study.inputs)
-    best = fit(study.inputs, runs.germs, runs.values, total_degree(parameters, degree))
-    if degree == 1:
-        return best
-    other = fit(study.inputs, runs.germs, runs.values, total_degree(parameters, degree - 1))
-    lower = other.left_out < 0.5 * best.left_out
-    fewer = np.zeros_like(best.coefficients)
-    fewer[: len(other.terms)] = other.coefficients
-    coefficients = np.where(lower, fewer, best.coefficients)
-    return Expansion(study.inputs, best.terms, coefficients, np.where(lower, other.left_out, best.left_out))
+    """Every column by this degree, or by a lower one where that foretells much better what is left out of its fit."""
+    inputs, runs = study.inputs, study.runs
+    best = fit(inputs, runs.germs, runs.values, total_degree(len(inputs), degree))
+    for lower in range(degree - 1, 0, -1):
+        other = fit(inputs, runs.germs, runs.values, total_degree(len(inputs), lower))
+        better = other.left_out < CLEARLY * best.left_out
+        if better.any():
+            fewer = np.zeros_like(best.coefficients)
+            fewer[: len(other.terms)] = other.coefficients
+            coefficients = np.where(better, fewer, best.coefficients)
+            best = Expansion(inputs, best.terms, coefficients, np.where(better, other.left_out, best.left_out))
+    return best
 
 
 def _run_signs(study: Study, linear: Expansion) -> None:
