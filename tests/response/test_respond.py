@@ -120,6 +120,19 @@ def test_few_terms_of_many() -> None:
     assert answer.runs.evaluations <= 300
 
 
+def test_polynomials_that_run_away_outside_of_all_runs_are_seen() -> None:
+    """Three oscillators after ten cycles: 32 terms of degree 20 tell 300 runs to 1 %, a deviation 13 % too large."""
+    speeds = 60 * np.array([1.0, 1.1, 1.2])
+    function = model(lambda v: sum(np.cos(w * (1 + 0.02 * v[f"x{k}"]))[:, None] for k, w in enumerate(speeds)))
+    answer = respond(function, inputs(**{f"x{k}": Normal(0.0, 1.0) for k in range(3)}), 1)
+    fade = np.exp(-((0.02 * speeds) ** 2) / 2)
+    mean = fade * np.cos(speeds)
+    variance = 0.5 * (1 + fade**4 * np.cos(2 * speeds)) - mean**2
+    assert answer.statistics is not None
+    assert answer.statistics.mean[0] == pytest.approx(mean.sum(), abs=1e-3)
+    assert answer.statistics.std[0] == pytest.approx(math.sqrt(variance.sum()), rel=1e-3)
+
+
 def test_indices_of_ishigamis_function() -> None:
     """S1 = .31390519, S2 = .44241114, ST1 = .55758886 (Ishigami and Homma, 1990, a = 7, b = 0.1)."""
     angle = Uniform(-math.pi, math.pi)
