@@ -91,6 +91,30 @@ def test_no_random_run_lies_beyond_the_outer_bounds(seed: int) -> None:
         assert np.all(values.max(axis=0) <= found.upper + beyond)
 
 
+@pytest.mark.slow
+def test_many_parameters_of_which_few_matter() -> None:
+    """Twelve intervals: a third of the runs that a polynomial in all of them takes, and bounds that hold."""
+    weights = 0.5 * 0.6 ** np.arange(12)
+
+    def function(values: Mapping[str, Array]) -> Array:
+        x = np.stack([values[f"x{k}"] for k in range(12)], axis=1)
+        return np.asarray(np.sin(x @ weights + 0.3) + 0.1 * x[:, 0] * x[:, 1])[:, None]
+
+    answer = respond(model(function), inputs(**{f"x{k}": Interval(-1.0, 1.0) for k in range(12)}), 1)
+    assert "have little effect" in answer.found.why
+    assert answer.runs.evaluations < 1.35 * math.comb(16, 4) / 3
+    corners = function({f"x{k}": np.array([-1.0, 1.0]) for k in range(12)})[:, 0]
+    random = np.random.default_rng(2)
+    drawn = random.uniform(-1, 1, (100_000, 12))
+    found = function({f"x{k}": np.where(random.random(100_000) < 0.8, np.sign(x), x) for k, x in enumerate(drawn.T)})
+    low, high = min(found.min(), corners.min()), max(found.max(), corners.max())
+    assert answer.bounds is not None
+    assert answer.bounds.lower_outer[0] <= low
+    assert answer.bounds.upper_outer[0] >= high
+    assert answer.bounds.lower[0] == pytest.approx(low, abs=1e-3)
+    assert answer.bounds.upper[0] == pytest.approx(high, abs=1e-3)
+
+
 def test_statistics_of_an_oscillator() -> None:
     """cos(sqrt(g / L) t), L normal: mean and variance by Gauss-Hermite quadrature of 200 points."""
     times = np.array([10.0, 100.0])

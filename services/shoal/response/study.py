@@ -19,6 +19,9 @@ FINE_GAP = 1e-6
 """The gap that is aimed at where none is asked for: a share of the width."""
 ROUNDING = 1e-11
 """A spread below this share of the answers is none."""
+LEAST, FAIR = 18, 1.35
+"""Runs that a study may take without further reason: this number, or so many for every term of a polynomial of degree
+four."""
 SAFETY = 3.0
 """An error that was seen is taken so many times."""
 
@@ -56,7 +59,7 @@ class Study:
     @property
     def fair(self) -> int:
         """Runs that a study may take without further reason: some more than a polynomial of degree four has terms."""
-        return max(18, int(1.35 * size(len(self.inputs), 4)))
+        return max(LEAST, int(FAIR * size(len(self.inputs), 4)))
 
     def widths(self, values: Array) -> Array:
         """Of the envelope of these answers, the largest of each group, (columns,)."""

@@ -15,8 +15,9 @@ from shoal.response.design import box_design
 from shoal.response.enclosure import enclosure
 from shoal.response.expansion import Expansion, fit
 from shoal.response.extremes import Extremes, extremes
-from shoal.response.polynomials import HIGHEST, size, total_degree
+from shoal.response.polynomials import HIGHEST
 from shoal.response.runs import TooManyRunsError
+from shoal.response.screening import Screened, screened
 from shoal.response.study import FINE_GAP, Found, Study
 from shoal.trajectory import Array
 
@@ -59,51 +60,52 @@ def bounds(study: Study) -> Found:
     runs, parameters = study.runs, len(study.inputs)
     unit = np.eye(parameters)
     runs(np.vstack([np.zeros((1, parameters)), unit, -unit]))
-    first = _foretold(study, 1)
-    _run_signs(study, first)
-    here, degree, again = _round(study, 1), 1, 0
+    plan = screened(study)
+    _run_signs(plan, _foretold(plan, 1))
+    here, degree, again = _round(plan, 1), 1, 0
     try:
-        while not _done(study, here):
+        while not _done(plan, here):
             # New extremal points teach more than a higher degree, once.
             again = 0 if again or here.found <= FEW else 1
-            degree = degree if again else _next(study, degree)
-            here = _round(study, degree)
+            degree = degree if again else _next(plan, degree)
+            here = _round(plan, degree)
     except TooManyRunsError:
         pass
     top = int(here.surrogate.terms.sum(axis=1).max())
-    why = f"polynomials of total degree {top}; their extremal points are run and entered into the fit"
+    why = f"polynomials of total degree {top}; their extremal points are run and entered into the fit{plan.why}"
     return Found(why, here.surrogate, here.error)
 
 
-def _next(study: Study, degree: int) -> int:
+def _next(plan: Screened, degree: int) -> int:
     """The degree that the runs there are carry, after some for one more at least. Raises TooManyRunsError."""
-    parameters, made = len(study.inputs), len(study.runs.germs)
+    study = plan.study
+    made = len(study.runs.germs)
     wanted = degree + 1
-    while SHARE * size(parameters, wanted + 1) <= made and wanted - degree < 3:
+    while SHARE * plan.size(wanted + 1) <= made and wanted - degree < 3:
         wanted += 1
-    if wanted >= HIGHEST or study.runs.evaluations > MORE * study.fair:
+    if wanted >= HIGHEST or study.runs.evaluations > MORE * plan.fair:
         raise TooManyRunsError
-    missing = math.ceil(SHARE * size(parameters, wanted)) - made
-    if made < study.fair:
+    missing = math.ceil(SHARE * plan.size(wanted)) - made
+    if made < plan.fair:
         # Extremal points come after these, and the fair number holds both.
-        missing = min(missing, study.fair - made - max(1, study.fair // SPARED))
+        missing = min(missing, plan.fair - made - max(1, plan.fair // SPARED))
     if missing > 0:
-        terms = total_degree(parameters, wanted)
+        terms = plan.terms(wanted)
         study.runs(box_design(study.inputs, study.runs.germs, terms, missing, study.seed + wanted))
-    return wanted if _carried(study, wanted) else degree
+    return wanted if _carried(plan, wanted) else degree
 
 
-def _carried(study: Study, degree: int) -> bool:
+def _carried(plan: Screened, degree: int) -> bool:
     """Whether the good runs there are carry that degree."""
-    return len(study.runs.germs) >= SHARE * size(len(study.inputs), degree)
+    return len(plan.study.runs.germs) >= SHARE * plan.size(degree)
 
 
-def _foretold(study: Study, degree: int) -> Expansion:
+def _foretold(plan: Screened, degree: int) -> Expansion:
     """Every column by this degree, or by a lower one where that foretells much better what is left out of its fit."""
-    inputs, runs = study.inputs, study.runs
-    best = fit(inputs, runs.germs, runs.values, total_degree(len(inputs), degree))
+    inputs, runs = plan.study.inputs, plan.study.runs
+    best = fit(inputs, runs.germs, runs.values, plan.terms(degree))
     for lower in range(degree - 1, 0, -1):
-        other = fit(inputs, runs.germs, runs.values, total_degree(len(inputs), lower))
+        other = fit(inputs, runs.germs, runs.values, plan.terms(lower))
         better = other.left_out < CLEARLY * best.left_out
         if better.any():
             fewer = np.zeros_like(best.coefficients)
@@ -113,8 +115,9 @@ def _foretold(study: Study, degree: int) -> Expansion:
     return best
 
 
-def _run_signs(study: Study, linear: Expansion) -> None:
+def _run_signs(plan: Screened, linear: Expansion) -> None:
     """The corners that the signs of the gradients point to, the most frequent ones first."""
+    study = plan.study
     parameters = len(study.inputs)
     slopes = linear.coefficients[1 : parameters + 1].T
     terms = linear.terms[1 : parameters + 1]
@@ -122,16 +125,16 @@ def _run_signs(study: Study, linear: Expansion) -> None:
     if not len(signs):
         return
     ways, count = np.unique(np.vstack([signs, -signs]), axis=0, return_counts=True)
-    most = max(2, min(2 * parameters, study.fair // 4))
+    most = max(2, min(2 * parameters, plan.fair // 4))
     study.runs(ways[np.argsort(-count, kind="stable")[:most]])
 
 
-def _round(study: Study, degree: int) -> Round:
+def _round(plan: Screened, degree: int) -> Round:
     """Fit, find the extremal points, run those that promise most, fit again."""
-    runs, parameters = study.runs, len(study.inputs)
-    surrogate, columns = _foretold(study, degree), runs.values.shape[1]
+    study, runs, parameters = plan.study, plan.study.runs, len(plan.study.inputs)
+    surrogate, columns = _foretold(plan, degree), runs.values.shape[1]
     found = extremes(surrogate, parameters, columns, study.seed + degree, rough=True)
-    new = _promising(study, surrogate, found)
+    new = _promising(plan, surrogate, found)
     made = len(runs.germs)
     if runs(new) == 0:
         # Nothing new is foretold: a few places tell whether that can be believed.
@@ -139,29 +142,30 @@ def _round(study: Study, degree: int) -> Round:
     error = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
     # New runs lie where the polynomial is known best; those left out of the fit lie everywhere.
     error = study.beside(np.maximum(error, surrogate.left_out))
-    if _carried(study, degree):
+    if _carried(plan, degree):
         # What the new runs tell makes the polynomial better; its error is what it was without them.
-        surrogate = _foretold(study, degree)
+        surrogate = _foretold(plan, degree)
     gap = enclosure(study, surrogate, found, error, rough=True).gap
-    if gap.max() <= _enough(study):
+    if gap.max() <= _enough(plan):
         found = extremes(surrogate, parameters, columns, study.seed + degree)
         gap = enclosure(study, surrogate, found, error).gap
     return Round(surrogate, error, gap, len(new))
 
 
-def _promising(study: Study, surrogate: Expansion, found: Extremes) -> Array:
+def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
     """Extremal points that are foretold to widen the attained bounds most, beside what those chosen before do.
 
     Groups take turns, so that one that is hard to tell does not take all runs from those that few more would settle.
     """
-    runs, least = study.runs, 0.25 * (study.gap or FINE_GAP)
+    study, runs = plan.study, plan.study.runs
+    least = 0.25 * (study.gap or FINE_GAP)
     low, high = runs.values.min(axis=0), runs.values.max(axis=0)
     width = np.tile(study.widths(runs.values), 2)
     places = np.concatenate([found.at_lower, found.at_upper])
     told = surrogate(places)
-    most = max(2, study.fair // ROUNDS)
-    if runs.evaluations < study.fair:
-        most = min(most, study.fair - runs.evaluations)
+    most = max(2, plan.fair // ROUNDS)
+    if runs.evaluations < plan.fair:
+        most = min(most, plan.fair - runs.evaluations)
     groups, varies = np.tile(study.groups, 2), width > 0
     turns = dict.fromkeys(np.unique(groups).tolist(), 0)
     chosen: list[Array] = []
@@ -183,18 +187,19 @@ def _promising(study: Study, surrogate: Expansion, found: Extremes) -> Array:
     return np.array(chosen).reshape(-1, len(study.inputs))
 
 
-def _enough(study: Study) -> float:
+def _enough(plan: Screened) -> float:
     """The gap that ends a study: what is asked for or, where nothing is, what a fair number of runs makes it."""
+    study = plan.study
     if study.gap is not None:
         return study.gap
-    return FINE_GAP if study.runs.evaluations < study.fair else HOPELESS
+    return FINE_GAP if study.runs.evaluations < plan.fair else HOPELESS
 
 
-def _done(study: Study, here: Round) -> bool:
-    wanted = _enough(study)
+def _done(plan: Screened, here: Round) -> bool:
+    study, wanted = plan.study, _enough(plan)
     if here.gap.max() <= wanted:
         return True
-    if study.runs.evaluations < ENOUGH * study.fair:
+    if study.runs.evaluations < ENOUGH * plan.fair:
         return False
     # Beyond the horizon no number of runs helps.
     return bool(np.all((here.gap <= wanted) | (study.instants >= horizon(study, here.gap))))
