@@ -79,16 +79,40 @@ def test_no_random_run_lies_beyond_the_outer_bounds(seed: int) -> None:
         return np.asarray(x @ slopes + strength * np.sin(x @ waves + shift))
 
     known = inputs(**{f"p{k}": Interval(-1.0, 1.0) for k in range(count)})
-    answer = respond(model(function), known, 5, seed=seed)
+    answer = respond(model(function), known, 5, seed=seed, gap=0.05)
     found = answer.bounds
     assert found is not None
-    assert found.gap < 0.1
+    assert found.gap <= 0.05
     drawn = function({f"p{k}": random.uniform(-1, 1, 100_000) for k in range(count)})
     corners = function(known.values(random.choice([-1.0, 1.0], (64, count))))
     beyond = found.gap * (found.upper - found.lower)
     for values in (drawn, corners):
         assert np.all(values.min(axis=0) >= found.lower - beyond)
         assert np.all(values.max(axis=0) <= found.upper + beyond)
+
+
+@pytest.mark.slow
+def test_many_parameters_of_which_few_matter() -> None:
+    """Twelve intervals: a third of the runs that a polynomial in all of them takes, and bounds that hold."""
+    weights = 0.5 * 0.6 ** np.arange(12)
+
+    def function(values: Mapping[str, Array]) -> Array:
+        x = np.stack([values[f"x{k}"] for k in range(12)], axis=1)
+        return np.asarray(np.sin(x @ weights + 0.3) + 0.1 * x[:, 0] * x[:, 1])[:, None]
+
+    answer = respond(model(function), inputs(**{f"x{k}": Interval(-1.0, 1.0) for k in range(12)}), 1)
+    assert "have little effect" in answer.found.why
+    assert answer.runs.evaluations < 1.35 * math.comb(16, 4) / 3
+    corners = function({f"x{k}": np.array([-1.0, 1.0]) for k in range(12)})[:, 0]
+    random = np.random.default_rng(2)
+    drawn = random.uniform(-1, 1, (100_000, 12))
+    found = function({f"x{k}": np.where(random.random(100_000) < 0.8, np.sign(x), x) for k, x in enumerate(drawn.T)})
+    low, high = min(found.min(), corners.min()), max(found.max(), corners.max())
+    assert answer.bounds is not None
+    assert answer.bounds.lower_outer[0] <= low
+    assert answer.bounds.upper_outer[0] >= high
+    assert answer.bounds.lower[0] == pytest.approx(low, abs=1e-3)
+    assert answer.bounds.upper[0] == pytest.approx(high, abs=1e-3)
 
 
 def test_statistics_of_an_oscillator() -> None:
@@ -118,6 +142,19 @@ def test_few_terms_of_many() -> None:
     assert answer.statistics.mean[0] == pytest.approx(1 + math.exp(0.045), abs=1e-3 * math.sqrt(variance))
     assert answer.statistics.std[0] == pytest.approx(math.sqrt(variance), rel=1e-3)
     assert answer.runs.evaluations <= 300
+
+
+def test_polynomials_that_run_away_outside_of_all_runs_are_seen() -> None:
+    """Three oscillators after ten cycles: 32 terms of degree 20 tell 300 runs to 1 %, a deviation 13 % too large."""
+    speeds = 60 * np.array([1.0, 1.1, 1.2])
+    function = model(lambda v: sum(np.cos(w * (1 + 0.02 * v[f"x{k}"]))[:, None] for k, w in enumerate(speeds)))
+    answer = respond(function, inputs(**{f"x{k}": Normal(0.0, 1.0) for k in range(3)}), 1)
+    fade = np.exp(-((0.02 * speeds) ** 2) / 2)
+    mean = fade * np.cos(speeds)
+    variance = 0.5 * (1 + fade**4 * np.cos(2 * speeds)) - mean**2
+    assert answer.statistics is not None
+    assert answer.statistics.mean[0] == pytest.approx(mean.sum(), abs=1e-3)
+    assert answer.statistics.std[0] == pytest.approx(math.sqrt(variance.sum()), rel=1e-3)
 
 
 def test_indices_of_ishigamis_function() -> None:

@@ -158,3 +158,26 @@ def test_what_misses_the_gap_is_named_worst_first() -> None:
     assert found.status == "gap-not-reached"
     named = ", ".join(f"{name} {missed[name]:.1e}" for name in worst[:3])
     assert found.message.endswith(f"asked for 1e-06: {named} and {len(worst) - 3} more")
+
+
+@pytest.mark.slow
+def test_the_finer_mesh_tells_which_bounds_move() -> None:
+    """By as much as the finer machine, simulated by itself at the values that are named, lies elsewhere."""
+    vary = {"initial.OA.angle": ("-2%", "2%"), "bodies.AB.length": ("-1%", "1%")}
+    found = uncertain("flexible-double-pendulum", vary, [0.25, 0.5], tolerance=5e-3)
+    assert found.finer is not None
+    assert found.bounds is not None
+    told = found.to_json()
+    assert told["finer_mesh"]["share_of_bounds"] == 1.0
+    name, most = next(iter(told["finer_mesh"]["moved"].items()))
+    marker, quantity, side = name.split(".")
+    at = found.column(marker, quantity, getattr(found.bounds, f"at_{side}").T)[:, list(found.times).index(most["t"])]
+    values = {**dict(zip(vary, at.tolist(), strict=True)), **told["finer_mesh"]["mesh"]}
+    # Twice the elements bear half the step at most.
+    step = {"solver.integrator": "leapfrog", "solver.step": found.stated.solver.step / 8}
+    run = shoal.simulate(found.stated, [0.25, 0.5], values={**values, **step}, verify=False)
+    assert run.ok
+    when, mark = list(found.times).index(most["t"]), run.markers.index(marker)
+    there = run.angles[when, mark, 0] if quantity == "angle" else run.points[when, mark, "xy".index(quantity), 0]
+    bound = found.column(marker, quantity, getattr(found.bounds, side))[when]
+    assert there - bound == pytest.approx(most["by"], rel=0.05)

@@ -157,12 +157,12 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
 
 def _mesh_error(trajectory: Trajectory, scene: Scene, scale: float, second: Second) -> tuple[float | None, str]:
     """The distance from runs on more elements [m]; None and why where there are none."""
-    finer, note = second("mesh", lambda: _finer(scene, 2), 2)
+    finer, note = second("mesh", lambda: on_finer_mesh(scene, 2), 2)
     if finer is None or not finer.ok:
         return None, note or "mesh error not estimated: the run on twice as many elements is rejected"
     mesh_error = trajectory.distance(finer)
     if COARSE * scale < mesh_error:
-        finest, _ = second("mesh", lambda: _finer(scene, 4), 4)
+        finest, _ = second("mesh", lambda: on_finer_mesh(scene, 4), 4)
         if finest is not None and finest.ok:
             mesh_error = max(mesh_error, trajectory.distance(finest))
     return mesh_error, ""
@@ -293,7 +293,7 @@ def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) 
         yield from _able(scene, 0.5 * scene.solver.step)
 
 
-def _finer(scene: Scene, times: int) -> Iterator[Scene]:
+def on_finer_mesh(scene: Scene, times: int) -> Iterator[Scene]:
     """So many times as many elements, or modes."""
     yield from _able(scene.with_values({**refined(scene, times), "solver.inertia_cap": False}), scene.solver.step)
 

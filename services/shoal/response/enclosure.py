@@ -77,31 +77,35 @@ def _widened(
     germs, columns = study.runs.germs, len(margin)
     every, runs = np.arange(columns), cKDTree(np.arccos(germs))
     misfit = np.abs(surrogate(germs) - study.runs.values)
+    which, signs = np.tile(every, 2), np.repeat([1.0, -1.0], columns)
 
     def away(at: Array) -> tuple[Array, IntArray]:
         """Share of the margin at each place, and the nearest run."""
         distance, nearest = runs.query(np.arccos(at), p=np.inf)
         return np.minimum(slope * distance, 1.0), np.asarray(nearest, dtype=np.int64)
 
-    scanned = places(germs.shape[1], study.seed)
+    def objective(at: Array) -> Array:
+        """Of the lower side of all columns, then of the upper one."""
+        share, run = away(at)
+        return signs * surrogate.each(at, which) - margin[which] * share - misfit[run, which]
+
+    own = np.concatenate([found.at_lower, found.at_upper])
+    best, place = objective(own), own.copy()
+    scanned = places(germs.shape[1], study.seed, rough=rough)
     share, run = away(scanned)
     block = max(1, 4_000_000 // columns)
-    ends = []
-    for sign, own in ((1.0, found.at_lower), (-1.0, found.at_upper)):
-
-        def objective(at: Array, side: float = sign) -> Array:
-            which = np.arange(len(at)) % columns
-            share, run = away(at)
-            return side * surrogate.each(at, which) - margin[which] * share - misfit[run, which]
-
-        best, place = np.full(columns, np.inf), np.array(own)
-        for k in range(0, len(scanned), block):
-            some = slice(k, k + block)
-            value = sign * surrogate(scanned[some]) - margin * share[some, None] - misfit[run[some]]
-            least = value.argmin(axis=0)
-            better = value[least, every] < best
-            best[better], place[better] = value[least, every][better], scanned[some][least][better]
-        value, at = np.concatenate([best, objective(own)]), np.concatenate([place, own])
+    for k in range(0, len(scanned), block):
+        some = slice(k, k + block)
+        told = np.ascontiguousarray(surrogate(scanned[some]).T)
+        wide = margin[:, None] * share[some] + np.ascontiguousarray(misfit.T)[:, run[some]]
+        value = np.concatenate([told - wide, -told - wide])
+        least = value.argmin(axis=1)
+        value = value[np.arange(2 * columns), least]
+        better = value < best
+        best[better], place[better] = value[better], scanned[some][least][better]
+    starts = [place] if rough else [place, own]
+    for at in starts:
+        value = best.copy() if at is place else objective(at)
         for step in () if rough else (arm / slope for arm in ARMS):
             for axis in range(germs.shape[1]):
                 for way in (-step, step):
@@ -110,5 +114,5 @@ def _widened(
                     now = objective(beside)
                     better = now < value
                     value[better], at[better] = now[better], beside[better]
-        ends.append(sign * value.reshape(2, columns).min(axis=0))
-    return ends[0], ends[1]
+        best = np.minimum(best, value)
+    return best[:columns], -best[columns:]

@@ -13,8 +13,9 @@ from shoal.response.climb import Objective, climb_down
 from shoal.trajectory import Array
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
-SCANNED = 4096
-"""Quasi-random places that are looked at, beside corners and a grid."""
+SCANNED, FEWER = 2048, 512
+"""Quasi-random places that are looked at within the box, and as many on its faces, beside corners and a grid; while a
+study goes on, fewer and no grid."""
 MOST_CORNERS = 10
 """Parameters up to which all corners are looked at."""
 ROUNDS, IDLE = 24, 4
@@ -60,19 +61,29 @@ def corners(parameters: int) -> Array:
 
 
 def extremes(
-    surrogate: Surrogate, parameters: int, columns: int, seed: int = 0, starts: int = 1, settled: Array | None = None
+    surrogate: Surrogate,
+    parameters: int,
+    columns: int,
+    seed: int = 0,
+    starts: int = 1,
+    settled: Array | None = None,
+    *,
+    rough: bool = False,
 ) -> Extremes:
     """The extremes over [-1, 1]^p: scanned, then sought along each axis and by slopes.
 
     starts: how many places are sought from, the best of as many parts of what is scanned; settled: what a round of
-    searches may still gain, (columns,): before that further rounds are made from elsewhere, None: one is enough
+    searches may still gain, (columns,): before that further rounds are made from elsewhere, None: one is enough; rough:
+    fewer places are scanned
     """
-    best, at = _round(surrogate, places(parameters, seed), columns, starts)
+    best, at = _round(surrogate, places(parameters, seed, rough=rough), columns, starts)
     gained = np.zeros((0, columns))
     if settled is None:
         return Extremes(best[0], -best[1], at[0], at[1], np.zeros(columns))
     for further in range(1, ROUNDS):
-        also, there = _round(surrogate, places(parameters, (seed, further)), columns, starts)
+        # The place of an extreme at one instant is often near that of another.
+        looked_at = np.concatenate([places(parameters, (seed, further)), np.unique(at.reshape(-1, parameters), axis=0)])
+        also, there = _round(surrogate, looked_at, columns, starts)
         gained = np.vstack([gained, np.maximum(best - also, 0.0).max(axis=0)])[-IDLE:]
         at = np.where((also < best)[:, :, None], there, at)
         best = np.minimum(best, also)
@@ -84,8 +95,8 @@ def extremes(
 def _round(surrogate: Surrogate, looked_at: Array, columns: int, starts: int) -> tuple[Array, Array]:
     """The least of both sides, (2, columns), the upper one with its sign turned, and where."""
     parameters = looked_at.shape[1]
-    best = np.full((2, starts, columns), np.inf)
-    at = np.zeros((2, starts, columns, parameters))
+    best = np.full((starts, 2, columns), np.inf)
+    at = np.zeros((starts, 2, columns, parameters))
     block = max(1, 4_000_000 // max(columns, 1))
     every = np.arange(columns)
     for start in range(starts):
@@ -93,29 +104,30 @@ def _round(surrogate: Surrogate, looked_at: Array, columns: int, starts: int) ->
         mine = looked_at[start::starts]
         for k in range(0, len(mine), block):
             some = mine[k : k + block]
-            found = surrogate(some)
-            for side, sign in enumerate((1.0, -1.0)):
-                least = np.argmin(sign * found, axis=0)
-                value = sign * found[least, every]
-                better = value < best[side, start]
-                best[side, start, better], at[side, start, better] = value[better], some[least][better]
-    which = np.tile(every, starts)
-    for side, sign in enumerate((1.0, -1.0)):
-        value, place = best[side].reshape(-1), at[side].reshape(-1, parameters)
-        for step in STEPS:
-            for axis in range(parameters):
-                along(surrogate, sign, axis, step, value, place, which)
-        climb_down(_signed(surrogate, sign, which), place, value)
-        best[side], at[side] = value.reshape(starts, columns), place.reshape(starts, columns, parameters)
-    first = best.argmin(axis=1)
-    return np.take_along_axis(best, first[:, None], 1)[:, 0], np.take_along_axis(at, first[:, None, :, None], 1)[:, 0]
+            found = np.ascontiguousarray(surrogate(some).T)
+            for side, (sign, least) in enumerate(((1.0, found.argmin(axis=1)), (-1.0, found.argmax(axis=1)))):
+                value = sign * found[every, least]
+                better = value < best[start, side]
+                best[start, side, better], at[start, side, better] = value[better], some[least][better]
+    which = np.tile(every, 2 * starts)
+    signs = np.tile(np.repeat([1.0, -1.0], columns), starts)
+    value, place = best.reshape(-1), at.reshape(-1, parameters)
+    for step in STEPS:
+        for axis in range(parameters):
+            along(surrogate, signs, axis, step, value, place, which)
+    climb_down(_signed(surrogate, signs, which), place, value)
+    best, at = value.reshape(starts, 2, columns), place.reshape(starts, 2, columns, parameters)
+    first = best.argmin(axis=0)[None]
+    return np.take_along_axis(best, first, 0)[0], np.take_along_axis(at, first[..., None], 0)[0]
 
 
-def _signed(surrogate: Surrogate, sign: float, columns: IntArray) -> Objective:
-    return lambda at, searches: sign * surrogate.each(at, columns[searches])
+def _signed(surrogate: Surrogate, signs: Array, columns: IntArray) -> Objective:
+    return lambda at, searches: signs[searches] * surrogate.each(at, columns[searches])
 
 
-def along(surrogate: Each, sign: float, axis: int, step: float, best: Array, at: Array, every: IntArray) -> None:
+def along(
+    surrogate: Each, sign: Array | float, axis: int, step: float, best: Array, at: Array, every: IntArray
+) -> None:
     """Improve all columns along one axis: at both sides and where the parabola through the three is least."""
     here, sides, tried = best.copy(), [], []
     for way in (-step, step):
@@ -134,13 +146,13 @@ def along(surrogate: Each, sign: float, axis: int, step: float, best: Array, at:
         best[better], at[better] = value[better], place[better]
 
 
-def places(parameters: int, seed: int | tuple[int, int]) -> Array:
-    """Where a surrogate is looked at: all over the box, its corners among them."""
-    scanned = 2 * qmc.Sobol(parameters, rng=np.random.default_rng(seed)).random(SCANNED) - 1
-    found = [scanned, np.zeros((1, parameters)), np.sign(scanned[: SCANNED // 8])]
+def places(parameters: int, seed: int | tuple[int, int], *, rough: bool = False) -> Array:
+    """Where a surrogate is looked at: all over the box and its faces and edges, its corners among them."""
+    drawn = 2 * qmc.Sobol(parameters, rng=np.random.default_rng(seed)).random(FEWER if rough else SCANNED) - 1
+    found = [drawn, np.clip(2 * drawn, -1, 1), np.zeros((1, parameters)), np.sign(drawn[:FEWER])]
     if parameters <= MOST_CORNERS:
         found.append(corners(parameters))
-    if parameters in GRID:
+    if parameters in GRID and not rough:
         axis = np.linspace(-1, 1, GRID[parameters])
         found.append(np.array(list(product(axis, repeat=parameters))))
     return np.concatenate(found)

@@ -132,6 +132,14 @@ class Inputs:
         """Whether the germ of a parameter is a standard normal variable whatever its distribution."""
         return k in self._correlated
 
+    @property
+    def unbounded(self) -> BoolArray:
+        """Which germs are normal variables, (parameters,)."""
+        return np.array([self._recurrence(k) is HERMITE for k in range(len(self))], dtype=bool)
+
+    def _recurrence(self, k: int) -> Recurrence:
+        return HERMITE if self._standard(k) else self.parameters[k].marginal.basis
+
     def values(self, germs: Array) -> dict[str, Array]:
         """Path -> value of every run; germs: (runs, parameters)."""
         return self._given(self._numbers(germs))
@@ -202,11 +210,10 @@ class Inputs:
     def basis(self, germs: Array, terms: Terms) -> Array:
         """Every product of polynomials at every germ, (runs, terms)."""
         found = np.ones((len(germs), len(terms)))
-        for k, one in enumerate(self.parameters):
-            recurrence: Recurrence = HERMITE if self._standard(k) else one.marginal.basis
+        for k in range(len(self)):
             degree = int(terms[:, k].max())
             if degree:
-                found *= recurrence(germs[:, k], degree)[:, terms[:, k]]
+                found *= self._recurrence(k)(germs[:, k], degree)[:, terms[:, k]]
         return found
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.response.allocation import Allocation
 from shoal.response.boxes import Boxes
+from shoal.response.finer import Finer
 from shoal.response.inputs import Inputs
 from shoal.response.limits import Judged
 from shoal.response.marginals import Interval
@@ -56,7 +57,8 @@ class Response:
     markers, quantities) in this order;
     mesh_error, step_error: of extremal runs [m], None where not estimated; stated: the scene with its model in the
     middle; engine: its name; limits: of what must not happen;
-    allocation: tolerances that keep the limit, where they were asked for
+    allocation: tolerances that keep the limit, where they were asked for; finer: which bounds a finer mesh moves, where
+    a model was asked for
     """
 
     status: str
@@ -83,6 +85,7 @@ class Response:
     limits: tuple[Judged, ...] = ()
     allocation: Allocation | None = None
     boxes: Boxes | None = None
+    finer: Finer | None = None
 
     @property
     def ok(self) -> bool:
@@ -120,6 +123,20 @@ class Response:
         """Which markers' quantities have a larger gap than that, and theirs, worst first. Of intervals only."""
         told = {f"{marker}.{name}": self.gap(marker, name) for marker in self.markers for name in self.quantities}
         return dict(sorted(((name, one) for name, one in told.items() if one > gap), key=lambda pair: -pair[1]))
+
+    def moved(self) -> dict[str, dict[str, Any]]:
+        """Of every marker's quantity the bound that a finer mesh moves furthest [m or rad], and when, sorted so."""
+        assert self.finer is not None
+        found: dict[str, dict[str, Any]] = {}
+        each = len(self.markers) * len(self.quantities)
+        columns = np.arange(each * len(self.times))
+        for k in range(each):
+            most = self.finer.most(columns % each == k)
+            if most is not None:
+                marker, quantity = divmod(k, len(self.quantities))
+                name = f"{self.markers[marker]}.{self.quantities[quantity]}.{most[2]}"
+                found[name] = {"by": most[0], "t": float(self.times[most[1] // each])}
+        return dict(sorted(found.items(), key=lambda pair: -abs(pair[1]["by"])))
 
     def table(self) -> tuple[list[str], Array]:
         """Header and rows over time of what is told of every marker, (instants, columns)."""
@@ -216,6 +233,7 @@ class Response:
             "statistics": self._told_statistics(),
             "mesh_error": plain(self.mesh_error),
             "step_error": plain(self.step_error),
+            "finer_mesh": None if self.finer is None else {**self.finer.to_json(), "moved": self.moved()},
             "limits": [one.to_json() for one in self.limits],
             "allocation": None if self.allocation is None else self.allocation.to_json(),
         }
@@ -250,6 +268,9 @@ class Response:
             "gap": plain(self.gap(marker, quantity)),
             "argument_lower": plain(self.column(marker, quantity, found.at_lower.T).T),
             "argument_upper": plain(self.column(marker, quantity, found.at_upper.T).T),
+            **(
+                {} if self.finer is None else {"lower_moved": at(self.finer.lower), "upper_moved": at(self.finer.upper)}
+            ),
             **({} if found.likely is None else {"lower_95": at(found.likely[0]), "upper_95": at(found.likely[1])}),
         }
 

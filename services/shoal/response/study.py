@@ -19,10 +19,11 @@ FINE_GAP = 1e-6
 """The gap that is aimed at where none is asked for: a share of the width."""
 ROUNDING = 1e-11
 """A spread below this share of the answers is none."""
+LEAST, FAIR = 18, 1.35
+"""Runs that a study may take without further reason: this number, or so many for every term of a polynomial of degree
+four."""
 SAFETY = 3.0
 """An error that was seen is taken so many times."""
-FAIR_GAP = 5e-2
-"""The gap that is good enough, where none is asked for, once many runs are made."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Study:
     @property
     def fair(self) -> int:
         """Runs that a study may take without further reason: some more than a polynomial of degree four has terms."""
-        return max(18, int(1.3 * size(len(self.inputs), 4)))
+        return max(LEAST, int(FAIR * size(len(self.inputs), 4)))
 
     def widths(self, values: Array) -> Array:
         """Of the envelope of these answers, the largest of each group, (columns,)."""
@@ -70,6 +71,20 @@ class Study:
         np.maximum.at(largest, self.groups, spread)
         np.maximum.at(size, self.groups, np.abs(values).max(axis=0))
         return np.where(largest > ROUNDING * size, largest, 0.0)[self.groups]
+
+    def beside(self, error: Array) -> Array:
+        """The largest of each instant and its neighbours in the same group, (columns,).
+
+        Where runs happen to be foretold well, others need not be.
+        """
+        found = error.copy()
+        order = np.lexsort((self.instants, self.groups))
+        one, next_one = order[:-1], order[1:]
+        same = self.groups[one] == self.groups[next_one]
+        one, next_one = one[same], next_one[same]
+        found[one] = np.maximum(found[one], error[next_one])
+        found[next_one] = np.maximum(found[next_one], error[one])
+        return found
 
     def intervals_only(self, method: str) -> None:
         """Raises InputError where a parameter is random."""

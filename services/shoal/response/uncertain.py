@@ -31,6 +31,7 @@ from shoal.response.allocation import (
 )
 from shoal.response.attained import DRAWN
 from shoal.response.between import between
+from shoal.response.finer import repeated
 from shoal.response.inputs import Correlations, Inputs, Parameter
 from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
@@ -85,8 +86,9 @@ def uncertain(
     `--vary` takes; times: instants [s], else the scene's own; method: one of `METHODS`; gap: between outer and attained
     bounds, as a share of the largest width, that must be reached; correlations: of pairs of random parameters;
     degree, count: of a method that has one; tolerance: error [m] that the markers of the middle machine may have, for
-    which the cheapest model is found; verify: estimate mesh and step errors of extremal runs; most: runs that may be
-    made; limits: what must not happen, such as "B.y < -1.2"; limit_method: one of `WAYS`; limit_runs: for each of them;
+    which the cheapest model is found (runs that attain bounds are then repeated on a finer mesh); verify: estimate mesh
+    and step errors of extremal runs; most: runs that may be made; limits: what must not happen, such as "B.y < -1.2";
+    limit_method: one of `WAYS`; limit_runs: for each of them;
     allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of tightening each;
     target: probability of passing it that is allowed; checkpoint: file that keeps the runs, from which the
     same study goes on; time_limit [s]: after which it ends with what is known; progress: is told how many runs there
@@ -131,8 +133,10 @@ def uncertain(
     if bounds is not None and math.isfinite(answer.horizon):
         bounds = _beyond(wanted, inputs, bounds, machine)
     mesh, step, rejected = _errors(machine, answer, seed) if verify and not keep.over else (None, None, "")
-    judged, allocation = list[Judged](), None
+    judged, allocation, finer = list[Judged](), None, None
     try:
+        if tolerance is not None and bounds is not None and verify and not keep.over:
+            finer = repeated(machine, answer.runs)
         for passed in asked:
             how = dict[str, Any](way=limit_method, most=limit_runs, seed=seed, verify=verify, progress=progress)
             if inputs.mixed:
@@ -179,6 +183,7 @@ def uncertain(
         limits=tuple(judged),
         allocation=allocation,
         boxes=answer.boxes,
+        finer=finer,
     )
     if status == "gap-not-reached" and bounds is not None and gap is not None:
         response = replace(response, message=message + _named(response.missed(gap)))

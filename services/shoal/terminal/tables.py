@@ -156,6 +156,11 @@ def response_table(response: Response) -> None:
     told_of = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
     if told_of:
         screen.say(f"estimated errors of the runs that decide: {', '.join(told_of)}")
+    if response.finer is not None:
+        moved = [f"{name} by {one['by']:.1e} at {one['t']:g} s" for name, one in list(response.moved().items())[:3]]
+        screen.say(
+            f"{response.finer.runs} runs that attain bounds, on twice as fine a mesh, move most: {', '.join(moved)}"
+        )
 
 
 def _limit(judged: Judged) -> None:

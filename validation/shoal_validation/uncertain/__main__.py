@@ -1,8 +1,9 @@
-"""`python -m shoal_validation.uncertain [--studies N] [--runs N] [--only PART] [--quick] [--page FILE]`.
+"""`python -m shoal_validation.uncertain [--studies N] [--runs N] [--only PART] [--quick] [--first SEED] [--page FILE]`.
 
-Prints accuracy by number of runs of every method for intervals on every problem (`methods`), and N random studies of
-machines in closed form by `auto`, whose bounds 100 000 random runs try to leave (`studies`); writes both into FILE
-(docs/uncertain.md). An hour; quick: 20 studies of at most three parameters and the problems of one.
+Prints accuracy by number of runs of every method for intervals on every problem (`methods`), N random studies of
+machines in closed form by `auto`, whose bounds 100 000 random runs try to leave (`studies`), and ten scenes of other
+shapes whose bounds a fiftieth of these runs try (`scenes`); writes all into FILE (docs/uncertain.md).
+An hour; quick: 20 studies of at most three parameters and the problems of one.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from shoal.response.methods import METHODS
 
 from shoal_validation.document import publish, table
+from shoal_validation.uncertain import scenes
 from shoal_validation.uncertain.measure import Line, measured
 from shoal_validation.uncertain.problems import PROBLEMS
 from shoal_validation.uncertain.studies import RUNS, Judged, drawn, judged
@@ -26,6 +28,8 @@ VARIANTS = {
     "taylor, order 2, subintervals": ("taylor", {"degree": 2, "count": 400}),
 }
 """Rows of methods with options of their own."""
+SHARE = 50
+"""One in so many runs tries each of the scenes, whose runs are dear."""
 FEW = 3
 """Parameters of quick studies, at most."""
 
@@ -34,20 +38,25 @@ def main(arguments: list[str]) -> bool:
     """Measure, print, write; whether nothing is wrong in silence where `auto` told it."""
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.uncertain", description=__doc__)
     parser.add_argument("--studies", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first study")
     parser.add_argument("--runs", type=int, default=RUNS, help="random runs against every study")
-    parser.add_argument("--only", choices=["methods", "studies"])
+    parser.add_argument("--only", choices=["methods", "studies", "scenes"])
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--page", type=Path, default=Path("docs/uncertain.md"))
     chosen = parser.parse_args(arguments)
     told, good = {}, True
-    if chosen.only != "studies":
+    if chosen.only in (None, "methods"):
         lines = compared(quick=chosen.quick)
         told["uncertain-methods"] = methods_table(lines)
         good = all(line.verdict != "silent" for line in lines if line.method == "auto")
-    if chosen.only != "methods":
-        found = tried(20 if chosen.quick else chosen.studies, chosen.runs, FEW if chosen.quick else None)
+    if chosen.only in (None, "studies"):
+        found = tried(20 if chosen.quick else chosen.studies, chosen.runs, FEW if chosen.quick else None, chosen.first)
         told["uncertain-studies"] = studies_text(found, chosen.runs)
         good = good and all(one.kept for one in found)
+    if chosen.only in (None, "scenes"):
+        made = [scenes.tried(asked, max(chosen.runs // SHARE, scenes.BLOCK)) for asked in scenes.STUDIES]
+        told["uncertain-scenes"] = scenes_table(made)
+        good = good and all(one.kept for one in made)
     publish(chosen.page, told)
     return good
 
@@ -64,9 +73,9 @@ def compared(*, quick: bool) -> list[Line]:
     return lines
 
 
-def tried(count: int, runs: int, most: int | None = None) -> list[Judged]:
+def tried(count: int, runs: int, most: int | None = None, first: int = 0) -> list[Judged]:
     """So many random studies against so many runs each; most: parameters. One that fails is printed."""
-    found, seed = list[Judged](), 0
+    found, seed = list[Judged](), first
     while len(found) < count:
         asked = drawn(seed)
         seed += 1
@@ -80,6 +89,21 @@ def tried(count: int, runs: int, most: int | None = None) -> list[Judged]:
                 f"{one.gap:.1e}, but a run lies {one.beyond:.1e} beyond ({one.why})\n"
             )
     return found
+
+
+def scenes_table(made: Sequence[scenes.Tried]) -> str:
+    """A row for each scene."""
+    rows = []
+    for one in made:
+        found = one.response
+        assert found.bounds is not None
+        known = f"{found.bounds.gap:.0e}" if found.horizon > 0 else "not known"
+        rows.append(
+            [one.name, found.status, str(found.evaluations), known, f"{found.horizon:g}"]
+            + [f"{max(of, 0.0):.0e}" if found.horizon > 0 else "" for of in (one.short, one.beyond)]
+        )
+    titles = ["machine", "status", "runs", "gap", "horizon [s]", "a run beyond attained bounds", "beyond outer ones"]
+    return table(titles, rows)
 
 
 def methods_table(lines: Sequence[Line]) -> str:

@@ -15,19 +15,28 @@ from shoal.response.design import box_design
 from shoal.response.enclosure import enclosure
 from shoal.response.expansion import Expansion, fit
 from shoal.response.extremes import Extremes, extremes
-from shoal.response.polynomials import HIGHEST, size, total_degree
+from shoal.response.polynomials import HIGHEST
 from shoal.response.runs import TooManyRunsError
-from shoal.response.study import FAIR_GAP, FINE_GAP, Found, Study
+from shoal.response.screening import Screened, screened
+from shoal.response.study import FINE_GAP, Found, Study
 from shoal.trajectory import Array
 
 SHARE = 1.25
 """Runs for every term, at least."""
-HOPELESS = 0.1
+HOPELESS = 0.4
 """Instants whose gap is above this share of the width when a fair number of runs is made lie beyond the horizon."""
 ENOUGH = 4
 """Times the fair number of runs after which it is looked for."""
 FEW = 2
 """New extremal points after which the degree grows at once."""
+ROUNDS = 6
+"""Parts of the fair number of runs: as many extremal points are run at once, at most."""
+SPARED = 20
+"""One in so many of the fair number of runs is kept for extremal points of the last degree."""
+CLEARLY = 0.5
+"""Share of the error of a polynomial that one of lower degree has to have to take its place."""
+APART = 1e-3
+"""Germs that are nearer to each other are one extremal point."""
 MORE = 8
 """Times the fair number of runs: no study goes beyond that by itself."""
 
@@ -51,47 +60,64 @@ def bounds(study: Study) -> Found:
     runs, parameters = study.runs, len(study.inputs)
     unit = np.eye(parameters)
     runs(np.vstack([np.zeros((1, parameters)), unit, -unit]))
-    first = _foretold(study, 1)
-    _run_signs(study, first)
-    here, degree, again = _round(study, 1), 1, 0
+    plan = screened(study)
+    _run_signs(plan, _foretold(plan, 1))
+    here, degree, again = _round(plan, 1), 1, 0
     try:
-        while not _done(study, here):
+        while not _done(plan, here):
             # New extremal points teach more than a higher degree, once.
             again = 0 if again or here.found <= FEW else 1
-            degree = degree if again else _next(study, degree)
-            here = _round(study, degree)
+            degree = degree if again else _next(plan, degree)
+            here = _round(plan, degree)
     except TooManyRunsError:
         pass
     top = int(here.surrogate.terms.sum(axis=1).max())
-    why = f"polynomials of total degree {top}; their extremal points are run and entered into the fit"
+    why = f"polynomials of total degree {top}; their extremal points are run and entered into the fit{plan.why}"
     return Found(why, here.surrogate, here.error)
 
 
-def _next(study: Study, degree: int) -> int:
-    """The degree that the runs there are carry, at least one more. Raises TooManyRunsError."""
-    parameters, made = len(study.inputs), len(study.runs.germs)
+def _next(plan: Screened, degree: int) -> int:
+    """The degree that the runs there are carry, after some for one more at least. Raises TooManyRunsError."""
+    study = plan.study
+    made = len(study.runs.germs)
     wanted = degree + 1
-    while SHARE * size(parameters, wanted + 1) <= made and wanted - degree < 3:
+    while SHARE * plan.size(wanted + 1) <= made and wanted - degree < 3:
         wanted += 1
-    if wanted >= HIGHEST or study.runs.evaluations > MORE * study.fair:
+    if wanted >= HIGHEST or study.runs.evaluations > MORE * plan.fair:
         raise TooManyRunsError
-    missing = math.ceil(SHARE * size(parameters, wanted)) - made
-    if made < study.fair:
+    missing = math.ceil(SHARE * plan.size(wanted)) - made
+    if made < plan.fair:
         # Extremal points come after these, and the fair number holds both.
-        missing = min(missing, study.fair - made - 1)
+        missing = min(missing, plan.fair - made - max(1, plan.fair // SPARED))
     if missing > 0:
-        terms = total_degree(parameters, wanted)
+        terms = plan.terms(wanted)
         study.runs(box_design(study.inputs, study.runs.germs, terms, missing, study.seed + wanted))
-    return wanted
+    return wanted if _carried(plan, wanted) else degree
 
 
-def _foretold(study: Study, degree: int) -> Expansion:
-    runs = study.runs
-    return fit(study.inputs, runs.germs, runs.values, total_degree(len(study.inputs), degree))
+def _carried(plan: Screened, degree: int) -> bool:
+    """Whether the good runs there are carry that degree."""
+    return len(plan.study.runs.germs) >= SHARE * plan.size(degree)
 
 
-def _run_signs(study: Study, linear: Expansion) -> None:
+def _foretold(plan: Screened, degree: int) -> Expansion:
+    """Every column by this degree, or by a lower one where that foretells much better what is left out of its fit."""
+    inputs, runs = plan.study.inputs, plan.study.runs
+    best = fit(inputs, runs.germs, runs.values, plan.terms(degree))
+    for lower in range(degree - 1, 0, -1):
+        other = fit(inputs, runs.germs, runs.values, plan.terms(lower))
+        better = other.left_out < CLEARLY * best.left_out
+        if better.any():
+            fewer = np.zeros_like(best.coefficients)
+            fewer[: len(other.terms)] = other.coefficients
+            coefficients = np.where(better, fewer, best.coefficients)
+            best = Expansion(inputs, best.terms, coefficients, np.where(better, other.left_out, best.left_out))
+    return best
+
+
+def _run_signs(plan: Screened, linear: Expansion) -> None:
     """The corners that the signs of the gradients point to, the most frequent ones first."""
+    study = plan.study
     parameters = len(study.inputs)
     slopes = linear.coefficients[1 : parameters + 1].T
     terms = linear.terms[1 : parameters + 1]
@@ -99,69 +125,82 @@ def _run_signs(study: Study, linear: Expansion) -> None:
     if not len(signs):
         return
     ways, count = np.unique(np.vstack([signs, -signs]), axis=0, return_counts=True)
-    most = max(2, min(2 * parameters, study.fair // 4))
+    most = max(2, min(2 * parameters, plan.fair // 4))
     study.runs(ways[np.argsort(-count, kind="stable")[:most]])
 
 
-def _round(study: Study, degree: int) -> Round:
+def _round(plan: Screened, degree: int) -> Round:
     """Fit, find the extremal points, run those that promise most, fit again."""
-    runs, parameters = study.runs, len(study.inputs)
-    surrogate = _foretold(study, degree)
-    found = extremes(surrogate, parameters, runs.values.shape[1], study.seed + degree)
-    width = study.widths(runs.values)
-    new = _promising(study, found, width)
+    study, runs, parameters = plan.study, plan.study.runs, len(plan.study.inputs)
+    surrogate, columns = _foretold(plan, degree), runs.values.shape[1]
+    found = extremes(surrogate, parameters, columns, study.seed + degree, rough=True)
+    new = _promising(plan, surrogate, found)
     made = len(runs.germs)
     if runs(new) == 0:
         # Nothing new is foretold: a few places tell whether that can be believed.
         runs(study.inputs.sobol(parameters + 1, study.seed + 1, runs.evaluations))
     error = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
     # New runs lie where the polynomial is known best; those left out of the fit lie everywhere.
-    error = np.maximum(error, surrogate.left_out)
-    if len(runs.germs) >= SHARE * size(parameters, degree):
+    error = study.beside(np.maximum(error, surrogate.left_out))
+    if _carried(plan, degree):
         # What the new runs tell makes the polynomial better; its error is what it was without them.
-        surrogate = _foretold(study, degree)
-        found = extremes(surrogate, parameters, runs.values.shape[1], study.seed + degree)
+        surrogate = _foretold(plan, degree)
     gap = enclosure(study, surrogate, found, error, rough=True).gap
-    if gap.max() <= (study.gap or FAIR_GAP):
+    if gap.max() <= _enough(plan):
+        found = extremes(surrogate, parameters, columns, study.seed + degree)
         gap = enclosure(study, surrogate, found, error).gap
     return Round(surrogate, error, gap, len(new))
 
 
-def _promising(study: Study, found: Extremes, width: Array) -> Array:
-    """Extremal points that are foretold to widen the attained bounds, apart from each other and from what was run."""
-    runs, wanted = study.runs, study.gap or FINE_GAP
-    gains = np.concatenate([runs.values.min(axis=0) - found.lower, found.upper - runs.values.max(axis=0)])
+def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
+    """Extremal points that are foretold to widen the attained bounds most, beside what those chosen before do.
+
+    Groups take turns, so that one that is hard to tell does not take all runs from those that few more would settle.
+    """
+    study, runs = plan.study, plan.study.runs
+    least = 0.25 * (study.gap or FINE_GAP)
+    low, high = runs.values.min(axis=0), runs.values.max(axis=0)
+    width = np.tile(study.widths(runs.values), 2)
     places = np.concatenate([found.at_lower, found.at_upper])
-    share = np.divide(gains, np.concatenate([width, width]), out=np.zeros_like(gains), where=np.tile(width, 2) > 0)
-    apart = max(1e-3, min(0.1, math.sqrt(wanted)))
-    most = max(2, min(3 * len(study.inputs), study.fair // 8))
-    if runs.evaluations < study.fair:
-        most = min(most, study.fair - runs.evaluations)
+    told = surrogate(places)
+    most = max(2, plan.fair // ROUNDS)
+    if runs.evaluations < plan.fair:
+        most = min(most, plan.fair - runs.evaluations)
+    groups, varies = np.tile(study.groups, 2), width > 0
+    turns = dict.fromkeys(np.unique(groups).tolist(), 0)
     chosen: list[Array] = []
-    beside = runs.germs
-    for k in np.argsort(-share):
-        if share[k] < 0.25 * wanted or len(chosen) == most:
+    while len(chosen) < most:
+        gains = np.concatenate([low - found.lower, found.upper - high])
+        share = np.divide(gains, width, out=np.zeros_like(gains), where=varies)
+        share[share < least] = 0.0
+        best = {group: int(np.where(groups == group, share, 0.0).argmax()) for group in turns}
+        left = [group for group, k in best.items() if share[k] > 0]
+        if not left:
             break
-        if np.min(np.max(np.abs(beside - places[k]), axis=1)) > apart:
+        # Of the groups that were served least the one that gains most.
+        group = min(left, key=lambda one: (turns[one], -share[best[one]]))
+        k, turns[group] = best[group], turns[group] + 1
+        varies[k] = False
+        if np.min(np.max(np.abs(np.vstack([runs.germs, *chosen]) - places[k]), axis=1)) > APART:
             chosen.append(places[k])
-            beside = np.vstack([beside, places[k]])
+            low, high = np.minimum(low, told[k]), np.maximum(high, told[k])
     return np.array(chosen).reshape(-1, len(study.inputs))
 
 
-def _done(study: Study, here: Round) -> bool:
-    """Whether the gap is as asked for or, where none was, as small as a fair number of runs makes it."""
+def _enough(plan: Screened) -> float:
+    """The gap that ends a study: what is asked for or, where nothing is, what a fair number of runs makes it."""
+    study = plan.study
     if study.gap is not None:
-        if here.gap.max() <= study.gap:
-            return True
-        wanted = study.gap
-    else:
-        if here.gap.max() <= FINE_GAP:
-            return True
-        wanted = FAIR_GAP
-    if study.runs.evaluations < study.fair:
+        return study.gap
+    return FINE_GAP if study.runs.evaluations < plan.fair else HOPELESS
+
+
+def _done(plan: Screened, here: Round) -> bool:
+    study, wanted = plan.study, _enough(plan)
+    if here.gap.max() <= wanted:
+        return True
+    if study.runs.evaluations < ENOUGH * plan.fair:
         return False
-    if study.runs.evaluations < ENOUGH * study.fair:
-        return bool(here.gap.max() <= wanted)
     # Beyond the horizon no number of runs helps.
     return bool(np.all((here.gap <= wanted) | (study.instants >= horizon(study, here.gap))))
 
