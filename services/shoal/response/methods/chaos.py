@@ -8,10 +8,12 @@ System Safety 93, 2008.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from shoal.response.expansion import Expansion, fit
+from shoal.response.outermost import hidden, outwards
 from shoal.response.polynomials import size, total_degree
 from shoal.response.sparse import hyperbolic, sparse
 from shoal.response.study import Found, Study
@@ -34,8 +36,6 @@ CANDIDATES = 4
 MOST_CANDIDATES = 1200
 MANY = 3
 """Parameters from which on an expansion with all terms is dear."""
-OUTER = 0.06
-"""Share of the runs that are taken for the outermost."""
 WORSE = 2
 """Degrees in a row that made it worse, after which no higher one is tried."""
 
@@ -62,7 +62,9 @@ def grown(study: Study, fair: int) -> Found:
         found = _best(study)
         if made >= min(fair, made + runs.left) and not study.degree and len(inputs) >= MANY:
             found = _sparser(study, found)
-        found = _outwards(study, found)
+        found = outwards(study.runs.germs, study.runs.values, found)
+        beyond = hidden(found.coefficients.T, inputs, found.terms)
+        found = replace(found, left_out=np.maximum(found.left_out, beyond))
         off = share(study, found)
         most = MORE * fair if off > COARSE and made >= fair else fair
         if off < CONVERGED or made >= most or not runs.left:
@@ -111,27 +113,6 @@ def _sparser(study: Study, full: Expansion) -> Expansion:
         np.where(better, found.coefficients, same),
         np.where(better, found.left_out, full.left_out),
     )
-
-
-def _outwards(study: Study, found: Expansion) -> Expansion:
-    """With the error of the outermost runs where the same terms are fitted to all others.
-
-    Hermite's polynomials of high degree have most of their variance further out than any run, where nothing else holds
-    them.
-    """
-    inputs, germs, values = study.inputs, study.runs.germs, study.runs.values
-    far = np.abs(germs[:, inputs.unbounded]).max(axis=1, initial=0.0)
-    outer = far >= np.sort(far)[-max(1, int(OUTER * len(far)))]
-    if not inputs.unbounded.any() or outer.all():
-        return found
-    basis, left_out = inputs.basis(germs, found.terms), found.left_out.copy()
-    used = found.coefficients != 0
-    for terms in np.unique(used, axis=1).T:
-        columns = (used == terms[:, None]).all(axis=0)
-        told = np.linalg.lstsq(basis[~outer][:, terms], values[~outer][:, columns], rcond=None)[0]
-        missed = basis[outer][:, terms] @ told - values[outer][:, columns]
-        left_out[columns] = np.maximum(left_out[columns], np.sqrt((missed**2).sum(axis=0) / len(germs)))
-    return Expansion(inputs, found.terms, found.coefficients, left_out)
 
 
 def share(study: Study, found: Expansion) -> float:

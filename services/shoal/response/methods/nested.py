@@ -7,6 +7,7 @@ optimization-based interval estimation, Reliability Engineering and System Safet
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from shoal.errors import InputError
 from shoal.response.boxes import HOPELESS, scatter
 from shoal.response.conditional import Above, Conditional, Mean
 from shoal.response.expansion import Expansion, fit
-from shoal.response.extremes import Extremes, extremes
+from shoal.response.extremes import MOST_CORNERS, Extremes, corners, extremes
 from shoal.response.inputs import Inputs
+from shoal.response.outermost import hidden, outwards
 from shoal.response.polynomials import size, total_degree
 from shoal.response.runs import TooManyRunsError
 from shoal.response.study import SAFETY, Found, Study
@@ -64,6 +66,8 @@ def nested(study: Study) -> Found:
             runs.all(_at(inputs, where, study.seed + 7 + decided))
             decided += len(where)
             error = np.maximum(found.left_out, _unseen(study, found, where, before))
+            for given in (sides[1].at_lower, sides[1].at_upper):
+                error = np.maximum(error, _hidden(Conditional(found), given))
             gap = _gap(study, error, sides, made > ENOUGH * fair)
             if gap <= wanted or made >= most or (made >= fair and gap <= max(COARSE, wanted)):
                 break
@@ -94,6 +98,7 @@ def best(study: Study) -> Expansion:
         if known is not None and SHARE * size(parameters, degree) > len(runs.germs):
             break
         found = fit(study.inputs, runs.germs, runs.values, total_degree(parameters, degree))
+        found = _reaching(study, found)
         if known is None:
             known = found
             continue
@@ -109,6 +114,23 @@ def best(study: Study) -> Expansion:
     assert known is not None
     used = int(np.flatnonzero(np.any(known.coefficients != 0, axis=1)).max(initial=0)) + 1
     return Expansion(study.inputs, known.terms[:used], known.coefficients[:used], known.left_out)
+
+
+def _reaching(study: Study, found: Expansion) -> Expansion:
+    """With the error further out than runs tell, at the middle and the ends of the intervals."""
+    if not study.inputs.mixed:
+        return found
+    found, count = outwards(study.runs.germs, study.runs.values, found), int((~study.inputs.random).sum())
+    ends = corners(count) if count < MOST_CORNERS // 2 else np.vstack([np.eye(count), -np.eye(count)])
+    of, columns = Conditional(found), study.runs.values.shape[1]
+    for place in (np.zeros(count), *ends):
+        found = replace(found, left_out=np.maximum(found.left_out, _hidden(of, np.tile(place, (columns, 1)))))
+    return found
+
+
+def _hidden(of: Conditional, given: Array) -> Array:
+    """Of every column at interval germs of its own, (columns, intervals)."""
+    return hidden(of.each(given, np.arange(len(given))), of.random, of.terms)
 
 
 def _extremes(study: Study, found: Expansion) -> list[Extremes]:
