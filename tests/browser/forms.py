@@ -17,3 +17,14 @@ def choose(page: Any, shown: str, *wanted: str) -> list[str]:
         page.get_by_role("option", name=name, exact=True).click()
     page.keyboard.press("Escape")
     return offered
+
+
+def submit(page: Any) -> None:
+    """Click on Submit; a list that was chosen from takes the first click where the button is out of sight."""
+    form = page.url
+    for _ in range(3):
+        page.get_by_role("button", name="Submit").click()
+        page.wait_for_timeout(3000)
+        if page.url != form:
+            return
+    raise AssertionError(f"the form stays: {page.url}")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from forms import choose
+from forms import choose, submit
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import problem_names
 from shoal.scene.load import scene_library
@@ -44,7 +44,7 @@ def test_a_study_is_started_from_prefects_form_and_answers_there(desk: Any, visi
     expect(page.locator("textarea").first).to_have_value("paper-case-1")
     assert set(choose(page, "auto", "least-squares", "iafsa", "auto")) == set(METHODS)
     one.shoot("form")
-    page.get_by_role("button", name="Submit").click()
+    submit(page)
     # The flow names itself when it begins.
     page.get_by_role("link", name="identify paper-case-1").first.click(timeout=PATIENCE)
     expect(page.get_by_text("Completed", exact=True).first).to_be_visible(timeout=PATIENCE)
@@ -86,7 +86,7 @@ def test_a_machine_of_ones_own_is_typed_into_the_form(desk: Any, visit: Callable
         field.press_sequentially(text.replace("mass: 1.0", f"mass: {mass}"))
         expect(field).to_have_value(text.replace("mass: 1.0", f"mass: {mass}"))
         one.shoot(f"typed{mass}")
-        page.get_by_role("button", name="Submit").click()
+        submit(page)
         until(lambda state=state: any(run["state_type"] == state for run in call(runs, wanted)), f"it has {state}")  # type: ignore[misc]
     messages = [run["state"]["message"] for run in call(runs, wanted)]
     assert any("InputError: scene: bodies.OA.mass: " in str(message) for message in messages), messages

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from forms import choose
+from forms import choose, submit
 
 pytestmark = pytest.mark.slow
 
@@ -57,7 +57,8 @@ def test_a_machine_of_ones_own_comes_to_the_dashboard(desk: Any, visit: Callable
     choose(page, "", said(2, "find"))
     expect(page.locator("textarea").first).to_have_value("find")
     one.shoot("form")
-    page.get_by_role("button", name=said(2, "Submit")).click()
+    said(2, "Submit")
+    submit(page)
 
     page.get_by_role("link", name=said(3, "identify find")).first.click(timeout=PATIENCE)
     expect(page.get_by_text(said(3, "Completed"), exact=True).first).to_be_visible(timeout=PATIENCE)

@@ -72,7 +72,7 @@ def test_artifacts_hold_the_full_trajectory_and_pictures(study: Any) -> None:
 
 def test_windows_are_held_out_and_the_posterior_is_drawn_on_the_dashboard() -> None:
     """What the command line can do beside the fit, a flow can too; the data are Exudyn's."""
-    wishes = {"hold_out": "[[0.3, 0.4]]", "sample": "100", "methods": "least-squares"}
+    wishes = {"hold_out": "0.3 to 0.4", "sample": "100", "methods": "least-squares"}
     found = run.run_flow("identify", {"problem": "paper-case-1", **wishes})
     (child,) = _children(found.run_id)
     metrics = child.data.metrics

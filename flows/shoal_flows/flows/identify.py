@@ -8,7 +8,7 @@ from prefect import flow
 from shoal.identification import load_problem
 from shoal.identification.methods import get_method
 
-from shoal_flows.flows.parameters import Count, Data, EngineName, Methods, ProblemName, Seeds, Size, Values, Window
+from shoal_flows.flows.parameters import Data, EngineName, Methods, ProblemName, Seeds, Values, spans
 from shoal_flows.flows.runner import side_by_side
 from shoal_flows.flows.shown import ended, named, progress, show_result
 from shoal_flows.flows.study import open_running
@@ -28,9 +28,9 @@ def identify(
     data: Data = "",
     engine: EngineName = "gauss",
     values: Values = {},  # noqa: B006
-    tolerance: Size = None,
-    hold_out: list[Window] = [],  # noqa: B006
-    sample: Count = 0,
+    tolerance: float = 0.0,
+    hold_out: str = "",
+    sample: int = 0,
 ) -> Study:
     """Find the parameters of a problem from measured motion, by every method with every seed.
 
@@ -42,8 +42,10 @@ def identify(
             library; empty for the data of the problem.
         engine: Who simulates; gauss is Shoal's own solver.
         values: Fields of the scene to set, as {path: value}, such as {"bodies.OA.elements": 8}.
-        tolerance: Error in m that the model may have at the markers; elements, integrator and step are chosen for it.
-        hold_out: Windows [from, to] in s that are predicted instead of fitted, in place of those of the recording.
+        tolerance: Error in m that the model may have at the markers; elements, integrator and step are chosen for it;
+            0 for the scene's own.
+        hold_out: Windows in s that are predicted instead of fitted, such as 0.3 to 0.4, 0.7 to 0.8; empty for those of
+            the recording.
         sample: Draws from the posterior until so many are effective; 0 for none.
     """
     for method in methods:
@@ -51,9 +53,10 @@ def identify(
     problem, data = held("problem", "problems", problem), held("data", "recordings", data)
     load_problem(problem).load_scene(values)
     name = title(problem)
+    windows = spans(hold_out)
     each = product(methods, seeds)
-    cells = [Cell(problem, *one, engine, values, tolerance=tolerance, sample=sample) for one in each]
-    measurement = measure(problem, data or None, [(low, high) for low, high in hold_out] or None)
+    cells = [Cell(problem, *one, engine, values, tolerance=tolerance or None, sample=sample) for one in each]
+    measurement = measure(problem, data or None, windows or None)
     pictures = {"convergence": draw_convergence, "trajectory": draw_trajectory, "residuals": draw_residuals}
     with (
         progress(len(cells), f"{name}: optimisations") as bar,

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, WithJsonSchema
 from shoal.engines import ENGINES
+from shoal.errors import InputError
 from shoal.identification.methods import METHODS
 from shoal.trajectory import Array
 from shoal_validation.nightly.plan import IDENTIFICATION
@@ -47,8 +48,6 @@ Instant = Annotated[float | None, Field(ge=0)]
 Time = Annotated[float, Field(ge=0)]
 Tolerance = Annotated[float, Field(gt=0)]
 Size = Annotated[float | None, Field(gt=0)]
-Count = Annotated[int, Field(ge=0, le=100_000)]
-Window = Annotated[list[float], Field(min_length=2, max_length=2)]
 About = Literal["answer", "start"] | None
 ALL = "all"
 Only = Annotated[
@@ -62,6 +61,18 @@ Only = Annotated[
         }
     ),
 ]
+
+
+def spans(text: str) -> list[tuple[float, float]]:
+    """Windows [s] as a form takes them, `0.3 to 0.4, 0.7 to 0.8`. Raises InputError."""
+    found = []
+    for part in filter(None, map(str.strip, text.split(","))):
+        try:
+            low, high = map(float, part.split(" to "))
+        except ValueError:
+            raise InputError(f"hold_out: needs windows such as 0.3 to 0.4, found {part!r}") from None
+        found.append((low, high))
+    return found
 
 
 class Axis(BaseModel):
