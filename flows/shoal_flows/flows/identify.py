@@ -8,7 +8,7 @@ from prefect import flow
 from shoal.identification import load_problem
 from shoal.identification.methods import get_method
 
-from shoal_flows.flows.parameters import Data, EngineName, Methods, ProblemName, Seeds, Values, spans
+from shoal_flows.flows.parameters import Count, Data, EngineName, Length, Methods, ProblemName, Seeds, Values, spans
 from shoal_flows.flows.runner import side_by_side
 from shoal_flows.flows.shown import ended, named, progress, show_result
 from shoal_flows.flows.study import open_running
@@ -28,9 +28,9 @@ def identify(
     data: Data = "",
     engine: EngineName = "gauss",
     values: Values = {},  # noqa: B006
-    tolerance: float = 0.0,
+    tolerance: Length = 0.0,
     hold_out: str = "",
-    sample: int = 0,
+    sample: Count = 0,
 ) -> Study:
     """Find the parameters of a problem from measured motion, by every method with every seed.
 

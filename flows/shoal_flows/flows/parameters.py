@@ -46,6 +46,8 @@ Seeds = Annotated[list[int], Field(min_length=1)]
 Values = dict[str, Any]
 Instant = Annotated[float | None, Field(ge=0)]
 Time = Annotated[float, Field(ge=0)]
+Length = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=0, le=100_000)]
 Tolerance = Annotated[float, Field(gt=0)]
 Size = Annotated[float | None, Field(gt=0)]
 About = Literal["answer", "start"] | None
@@ -70,7 +72,9 @@ def spans(text: str) -> list[tuple[float, float]]:
         try:
             low, high = map(float, part.split(" to "))
         except ValueError:
-            raise InputError(f"hold_out: needs windows such as 0.3 to 0.4, found {part!r}") from None
+            low, high = np.nan, np.nan
+        if not low < high < np.inf:
+            raise InputError(f"hold_out: needs windows such as 0.3 to 0.4, found {part!r}")
         found.append((low, high))
     return found
 
