@@ -14,9 +14,11 @@ import numpy.typing as npt
 from shoal.engines import get_engine
 from shoal.engines.contract import Engine
 from shoal.errors import InputError
+from shoal.identification.accepted import Accepted, accepts
 from shoal.identification.deadline import Deadline, TimeIsUp
 from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization
+from shoal.identification.placement import Placement, placement
 from shoal.identification.problem import Problem
 from shoal.identification.recording.felt import equipped, from_start
 from shoal.identification.recording.measurement import Measurement, Recording
@@ -34,6 +36,9 @@ AT_ONCE = 2 * len(WIDE)
 _HARDLY = 0.1
 """Of their length: runs that differ by less are simulated at once, at the instants of all; so many of them, at most."""
 _PACES = 16
+
+_KEPT = ("parameters", "rows", "loss_scale", "_native", "_placements", "_accepted")
+"""What models of the same scene, engine and measurement share."""
 
 Progress = Callable[[int, float, float], None]
 """Called with (iteration, best fitness, mean fitness of the iteration)."""
@@ -67,6 +72,8 @@ class ForwardModel:
     """Why a simulation was refused, if one was."""
     reached: tuple[float, float, Array] = field(init=False, default=(0.0, np.inf, np.empty(0)))
     """Of the longest part of the recordings that was fitted: its end [s], the best fitness on it, and the point."""
+
+    _placements: dict[str, Placement] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.counter = EvaluationCounter(self._residuals, cost=self.cost)
@@ -111,7 +118,10 @@ class ForwardModel:
 
     def aside(self, **changes: Any) -> ForwardModel:
         """The model with some of its fields changed, whose runs nobody is charged for."""
-        return replace(self, memory=None, whole=None, **changes)
+        other = replace(self, memory=None, whole=None, **changes)
+        if not changes:
+            other.__dict__.update({name: self.__dict__[name] for name in _KEPT if name in self.__dict__})
+        return other
 
     def residuals(self, points: Array) -> Array:
         """Model minus measurement, (points, rows), and a row for each prior; inf where a simulation failed.
@@ -152,8 +162,11 @@ class ForwardModel:
         scene = scene or self.scene
         scene = scene.with_values(recording.stated.known) if recording.stated.known else scene
         values = self.parameters.scene_values(points, name)
-        for path, factor in (factors or {}).items():
-            values[path] = factor * values.get(path, np.full(len(points), scene.value(path)))
+        factors = factors or {}
+        # What is the same in all lanes belongs into the scene, whose model is kept.
+        if fixed := {path: factor * scene.value(path) for path, factor in factors.items() if path not in values}:
+            scene = scene.with_values(fixed)
+        values |= {path: factor * values[path] for path, factor in factors.items() if path not in fixed}
         seen_by = self.parameters.measurement_values(points, name, recording.stated)
         seen = np.full((len(points), len(times), len(recording.channels)), np.nan)
         pace = np.column_stack([seen_by.pop("clock"), seen_by.pop("delay")])
@@ -230,11 +243,29 @@ class ForwardModel:
         """
         (self.whole or self).placements += len(points)
         recordings = self.measurement.recordings
-        channels = recordings[next(iter(recordings)) if name is None else name].channels
+        name = name or next(iter(recordings))
+        channels = recordings[name].channels
+        if (known := self._placement(points, name)) is not None:
+            return known(points)
         shown = [not channel.is_felt for channel in channels]
         found = np.full((len(points), len(channels)), np.nan)
         if any(shown):
             found[:, shown] = self._native.observe(points, name, np.zeros(1))[:, 0]
+        return found
+
+    def _placement(self, points: Array, name: str) -> Placement | None:
+        """How the channels of a recording follow from the angles of these points, where nothing else differs."""
+        known = self._placements.get(name)
+        if known is not None and known.knows(points):
+            return known
+        recording = self.measurement.recordings[name]
+
+        def place(poses: Array) -> Array:
+            return self._native.observe(poses, name, np.zeros(1))[:, 0]
+
+        found = placement(self.problem, self.parameters, self.scene, name, recording, points, place)
+        if found is not None:
+            self._placements[name] = found
         return found
 
     @cached_property
@@ -257,9 +288,19 @@ class ForwardModel:
         for path, numbers in values.items() if np.any(doubtful) else ():
             # Limits of fields are intervals: where the extremes are accepted, so is what lies between.
             extremes = {float(np.min(numbers[doubtful])), float(np.max(numbers[doubtful]))}
-            if not all(accepts(scene, path, x) for x in extremes):
-                possible[doubtful] &= [accepts(scene, path, float(x)) for x in numbers[doubtful]]
+            if not all(self.accepts(path, x, scene) for x in extremes):
+                possible[doubtful] &= [self.accepts(path, float(x), scene) for x in numbers[doubtful]]
         return possible
+
+    def accepts(self, path: str, value: float, scene: Scene | None = None) -> bool:
+        """Whether a scene, else the model's, may have a value at a path."""
+        if scene is not None and scene is not self.scene:
+            return accepts(scene, path, value)
+        return self._accepted(path, value)
+
+    @cached_property
+    def _accepted(self) -> Accepted:
+        return Accepted(self.scene, [entry.parameter for entry in self.parameters.entries.values()])
 
     def _residuals(self, points: Array) -> Array:
         found = self._remembered(points) if self.memory is not None else self._evaluated(points)
@@ -365,12 +406,3 @@ def _alike(ends: Array) -> Iterator[Array]:
 def _same_in_all(path: str, numbers: Array) -> bool:
     """Whether a field other than a start is that of every lane: such lanes share one model, which is kept."""
     return len(numbers) > 1 and not path.startswith("initial.") and bool(np.all(numbers == numbers[0]))
-
-
-def accepts(scene: Scene, path: str, value: float) -> bool:
-    """Whether a scene may have a value at a path."""
-    try:
-        scene.with_values({path: value})
-    except InputError:
-        return False
-    return True

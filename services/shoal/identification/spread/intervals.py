@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shoal.identification.forward import ForwardModel, accepts
+from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import RESERVED
 from shoal.identification.recording.units import unit
 from shoal.identification.spread.model_error import Corrections
@@ -80,7 +80,7 @@ def _possible(model: ForwardModel, path: str, known: Value) -> bool:
     head, _, name = path.partition(".")
     if head == RESERVED:
         return known.lower > 0.0 or name not in ("clock", "scale")
-    return not path or all(accepts(model.scene, path, end) for end in (known.lower, known.upper))
+    return not path or all(model.accepts(path, end) for end in (known.lower, known.upper))
 
 
 def _own(model: ForwardModel, text: str) -> bool:
