@@ -28,8 +28,10 @@ FEATURES = (
     "nonlinear springs",
     "angles of places",
     "curved flexible rods",
+    "curved rods in space",
     "tapered flexible rods",
     "damped flexible rods",
+    "damped rods in space",
 )
 _FIELDS = {
     "coulomb": "dry friction",
@@ -52,12 +54,14 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
         if isinstance(body, PointMass):
             yield where, "point masses"
         if isinstance(body, Rod) and body.element != "rigid":
-            if body.curvature:
-                yield f"{where}.curvature", "curved flexible rods"
+            spatial = scene.dimensions == 3
+            if not body.straight:
+                bent = next(field for field in ("curvature", "side_curvature", "twist") if getattr(body, field))
+                yield f"{where}.{bent}", "curved rods in space" if spatial else "curved flexible rods"
             if body.tapered:
                 yield where, "tapered flexible rods"
             if body.retardation:
-                yield f"{where}.retardation", "damped flexible rods"
+                yield f"{where}.retardation", "damped rods in space" if spatial else "damped flexible rods"
         if scene.start(name).position is not None:
             yield f"initial.{name}.position", "free bodies"
     if scene.starts_at_rest:
