@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 from shoal.cli import main
+from shoal.engines.compare import compared
+from shoal.scene import Scene, load_scene
 
 
 def shoal(*arguments: str) -> Result:
@@ -55,6 +57,20 @@ def test_compare_shows_three_engines_close_together() -> None:
     found = answer("compare", "single-pendulum", "--at", "0.5,1")
     assert set(found["engines"]) == {"gauss", "exudyn", "casadi"}  # type: ignore[call-overload]
     assert all(row["largest"] < 1e-5 for row in found["differences"])  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("scene", "engines"),
+    [
+        ("single-pendulum", ["gauss", "exudyn", "casadi"]),
+        ("parallelogram", ["gauss", "exudyn"]),
+        ("rigid-double-pendulum", ["gauss", "exudyn", "casadi"]),
+        (load_scene("rigid-double-pendulum").with_values({"dimensions": 3}), ["gauss", "exudyn", "tree"]),
+        ("bricard", ["gauss", "exudyn"]),
+    ],
+)
+def test_engines_that_cannot_run_a_scene_are_not_compared_unless_named(scene: str | Scene, engines: list[str]) -> None:
+    assert compared(load_scene(scene) if isinstance(scene, str) else scene) == engines
 
 
 def test_a_scene_and_a_problem_of_one_name_are_both_printed() -> None:

@@ -39,6 +39,7 @@ from shoal.terminal import screen, tables
 WIDTH = 80
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f]")
 PENDULUM, DOUBLE = "single-pendulum", load_scene("rigid-double-pendulum")
+SPATIAL = DOUBLE.with_values({"dimensions": 3})
 ANGLES = {path: np.array([0.1, 1.0]) for path in ("initial.OA.angle", "initial.AB.angle")}
 
 
@@ -65,6 +66,11 @@ TABLES: dict[str, Callable[[], None]] = {
     "comparison": lambda: tables.comparison_table(compare(DOUBLE, ["gauss", "casadi"], [0.1])),
     "equilibrium": lambda: tables.equilibrium_table(statics(DOUBLE)),
     "modes": lambda: tables.modes_table(modes(DOUBLE)),
+    "sweep in space": lambda: tables.sweep_table(sweep(SPATIAL, ANGLES, get_engine("gauss"), 0.1)),
+    "comparison in space": lambda: tables.comparison_table(compare(SPATIAL, ["gauss", "tree"], [0.1])),
+    "equilibrium in space": lambda: tables.equilibrium_table(statics(SPATIAL)),
+    "reactions in space": lambda: tables.reactions_table(reactions(SPATIAL, [0.1])),
+    "modes in space": lambda: tables.modes_table(modes(SPATIAL)),
     "estimate": lambda: tables.estimate_table(found()),
     "design": lambda: tables.design_table(design(load_problem("paper-case-1"), noise=1e-3)),
 }

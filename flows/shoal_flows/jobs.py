@@ -111,7 +111,7 @@ def simulated(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene
     return wanted, verified(get_engine(engine), wanted)
 
 
-def compared(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -> comparing.Comparison:
+def compared(scene: str, engines: Sequence[str] | None, values: Mapping[str, Any]) -> comparing.Comparison:
     """A scene on several engines. Raises InputError."""
     return comparing.compare(load_scene(scene).with_values(values), engines)
 

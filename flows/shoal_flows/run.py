@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Mapping
-from typing import Any, get_origin, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 import yaml
 from shoal.errors import ComputationError, InputError, ShoalError
@@ -75,7 +75,8 @@ def _parsed(flow: str, function: Callable[..., Any], parameters: Mapping[str, An
                 value = yaml.safe_load(value)
             except yaml.YAMLError:
                 raise InputError(f"{flow}: {name}: {value!r} is not a value (write lists as [a, b])") from None
-        if get_origin(types[name]) is list and not isinstance(value, list | dict):
+        a_list = list in {get_origin(one) for one in (types[name], *get_args(types[name]))}
+        if a_list and value is not None and not isinstance(value, list | dict):
             value = value.split(",") if isinstance(value, str) else [value]
         parsed[name] = value
     return parsed

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from shoal.engines import COMPARED
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Trajectory
@@ -179,12 +178,19 @@ def uncertain(
 
 
 def compare(
-    scene: Scene | str, engines: Sequence[str] = COMPARED, times: Times | None = None, *, values: Values | None = None
+    scene: Scene | str,
+    engines: Sequence[str] | None = None,
+    times: Times | None = None,
+    *,
+    values: Values | None = None,
 ) -> Comparison:
-    """Run a scene on several engines; `differences()` tells how far apart they come out. Raises InputError."""
+    """Run a scene on several engines; `differences()` tells how far apart they come out.
+
+    engines: by name; else our solver and at most two that can run the scene. Raises InputError.
+    """
     from shoal.engines.compare import compare
 
-    return compare(_scene(scene, values), list(engines), times)
+    return compare(_scene(scene, values), engines, times)
 
 
 def statics(

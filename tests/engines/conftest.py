@@ -382,6 +382,8 @@ DIRECTOR = Scene.parse({
     "joints": {"W": {"kind": "weld", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "A"}}},
     "markers": {"e": {"body": "A", "point": "end"}},
 })  # fmt: skip
+CURVED = DIRECTOR.with_values({"bodies.A.side_curvature": [1.0]})
+DAMPED = DIRECTOR.with_values({"bodies.A.retardation": 1e-4})
 TREE = Scene.parse({
     "name": "tree", "dimensions": 3, "gravity": [0.0, 0.0, -9.81],
     "bodies": {name: {"kind": "rigid-body", "mass": 1.0, "inertia": [0.1, 0.2, 0.25]} for name in "AB"},
@@ -401,6 +403,8 @@ ONLY_NATIVE = [
     LOADED,
     SPATIAL,
     DIRECTOR,
+    CURVED,
+    DAMPED,
     pendulum("quintic", CABLE | {"element": "ancf-quintic"}),
     pendulum("full", CABLE | {"element": "ancf-full"}),
     pendulum("dry-pin", joints={"O": PIN["O"] | {"mu": 0.1, "radius": 0.01}}),

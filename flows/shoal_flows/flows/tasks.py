@@ -46,10 +46,12 @@ def optimise(cell: Cell, measurement: Measurement, study: str) -> Fit:
 
 
 @task(task_run_name="compare", cache_policy=NO_CACHE)
-def run_engines(scene: str, engines: Sequence[str], values: Mapping[str, Any]) -> tuple[Comparison, Picture, str]:
+def run_engines(
+    scene: str, engines: Sequence[str] | None, values: Mapping[str, Any]
+) -> tuple[Comparison, Picture, str]:
     """One scene on several engines; with its picture and the id of its run."""
-    with events.work(f"{inputs.title(scene)} on {', '.join(engines)}"):
-        key = fingerprint.of_simulations("compare", scene, values, tuple(engines))
+    with events.work(f"{inputs.title(scene)} on {', '.join(engines or ['several engines'])}"):
+        key = fingerprint.of_simulations("compare", scene, values, tuple(engines or ()))
         comparison = remembered.run(key, jobs.compared, scene, engines, values)
         marker = tracked.tip(comparison.scene)
         picture = workers.run(pictures.draw_engines, comparison, marker)

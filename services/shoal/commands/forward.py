@@ -6,7 +6,6 @@ import click
 
 from shoal.commands import options
 from shoal.commands.options import Out, Times, Values
-from shoal.engines import COMPARED
 from shoal.errors import InputError, check_trusted
 
 
@@ -97,23 +96,24 @@ def sweep(
 
 @click.command()
 @click.argument("scene")
-@click.option("--engines", default=",".join(COMPARED), show_default=True, help="Names, separated by commas.")
+@click.option("--engines", help="Names, separated by commas; else ours and at most two others that can run the scene.")
 @options.values
 @options.at
 @options.as_json
 @options.out(".json", ".png")
-def compare(scene: str, engines: str, values: Values, times: Times, as_json: bool, out: Out) -> None:
+def compare(scene: str, engines: str | None, values: Values, times: Times, as_json: bool, out: Out) -> None:
     """Run SCENE on several engines and show how far apart they are."""
-    from shoal.engines.compare import compare
+    from shoal.engines.compare import compare, compared
     from shoal.pictures import files
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
-    with screen.working(f"running {wanted.name} on {engines}"):
-        for name in engines.split(","):
-            screen.compile_for(name.strip(), [1], wanted)
-        comparison = compare(wanted, [name.strip() for name in engines.split(",")], times)
+    names = compared(wanted) if engines is None else [name.strip() for name in engines.split(",")]
+    with screen.working(f"running {wanted.name} on {', '.join(names)}"):
+        for name in names:
+            screen.compile_for(name, [1], wanted)
+        comparison = compare(wanted, names, times)
     if out is not None:
         files.comparison(comparison, out)
     reasons = [*comparison.refused.values(), *(t.message for t in comparison.trajectories.values() if t.message)]

@@ -55,8 +55,6 @@ ENGINES |= {
     "tree": _tree,
     "mujoco": _mujoco,
 }
-COMPARED = ("gauss", "exudyn", "casadi")
-"""Compared unless somebody names others: three derivations of the same equations."""
 
 
 def _remote(url: str) -> Engine:
@@ -76,4 +74,4 @@ def get_engine(name: str) -> Engine:
     return ENGINES[name]()
 
 
-__all__ = ["COMPARED", "ENGINES", "get_engine"]
+__all__ = ["ENGINES", "get_engine"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeVar
 
 from shoal.engines.contract import Engine
@@ -28,8 +28,10 @@ FEATURES = (
     "nonlinear springs",
     "angles of places",
     "curved flexible rods",
+    "curved rods in space",
     "tapered flexible rods",
     "damped flexible rods",
+    "damped rods in space",
 )
 _FIELDS = {
     "coulomb": "dry friction",
@@ -52,12 +54,14 @@ def needs(scene: Scene) -> Iterator[tuple[str, str]]:
         if isinstance(body, PointMass):
             yield where, "point masses"
         if isinstance(body, Rod) and body.element != "rigid":
-            if body.curvature:
-                yield f"{where}.curvature", "curved flexible rods"
+            spatial = scene.dimensions == 3
+            if not body.straight:
+                bent = next(field for field in ("curvature", "side_curvature", "twist") if getattr(body, field))
+                yield f"{where}.{bent}", "curved rods in space" if spatial else "curved flexible rods"
             if body.tapered:
                 yield where, "tapered flexible rods"
             if body.retardation:
-                yield f"{where}.retardation", "damped flexible rods"
+                yield f"{where}.retardation", "damped rods in space" if spatial else "damped flexible rods"
         if scene.start(name).position is not None:
             yield f"initial.{name}.position", "free bodies"
     if scene.starts_at_rest:
@@ -99,13 +103,18 @@ def loops(scene: Scene) -> Iterator[str]:
 def require(engine: Engine, scene: Scene) -> None:
     """Raises InputError, one line, where a scene needs more than the engine can do."""
     check_acceleration(scene)
-    able = engine.capabilities.all
+    known = engine.capabilities.all
     for field, need in needs(scene):
-        if need not in able:
-            wanted = {what for _, what in needs(scene)}
-            others = [name for name, make in ENGINES.items() if wanted <= make().capabilities.all]
+        if need not in known:
+            others = able(scene)
             use = f"; use {' or '.join(others)}" if others else ""
             raise InputError(f"{field}: engine {engine.name} cannot do {need}{use}")
+
+
+def able(scene: Scene, names: Iterable[str] | None = None) -> list[str]:
+    """Those engines, or all that there are, which can do all that a scene needs."""
+    wanted = {need for _, need in needs(scene)}
+    return [name for name in (ENGINES if names is None else names) if wanted <= ENGINES[name]().capabilities.all]
 
 
 def check_acceleration(scene: Scene) -> None:

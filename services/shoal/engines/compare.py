@@ -10,9 +10,13 @@ from typing import Any
 import numpy as np
 
 from shoal.engines import get_engine
+from shoal.engines.capabilities import able
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory, plain
+
+COMPARED = ("gauss", "exudyn", "casadi", "tree")
+"""Four derivations of the same equations. The first three that can run a scene are compared unless others are named."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +59,19 @@ class Comparison:
         }
 
 
-def compare(scene: Scene, engines: Sequence[str], times: Sequence[float] | Array | None = None) -> Comparison:
-    """Run a scene on every engine. Raises InputError for an unknown engine, or if the scene suits none."""
-    chosen = {name: get_engine(name) for name in engines}
+def compared(scene: Scene) -> list[str]:
+    """Who runs a scene unless others are named: our solver and at most two that can do all that it needs."""
+    return able(scene, COMPARED)[:3]
+
+
+def compare(
+    scene: Scene, engines: Sequence[str] | None = None, times: Sequence[float] | Array | None = None
+) -> Comparison:
+    """Run a scene on those engines, or on those of `compared`.
+
+    Raises InputError for an unknown engine, or if the scene suits none.
+    """
+    chosen = {name: get_engine(name) for name in (compared(scene) if engines is None else engines)}
     trajectories: dict[str, Trajectory] = {}
     refused: dict[str, str] = {}
     for name, engine in chosen.items():

@@ -45,9 +45,18 @@ FEATURES = frozenset(
         "dry friction",
         "nonlinear springs",
         "tapered flexible rods",
+        "machines in space",
     }
 )
-CABLE_FEATURES = frozenset({"machines in space", "curved flexible rods", "damped flexible rods"})
+OWN_FEATURES: dict[Beam, frozenset[str]] = {
+    "ancf-cable": frozenset({"curved flexible rods", "damped flexible rods"}),
+    "geometrically-exact": frozenset({"curved rods in space"}),
+}
+SPATIAL_ELEMENTS: dict[Beam, frozenset[str]] = {
+    "ancf-cable": frozenset(),
+    "geometrically-exact": frozenset({"director-rod"}),
+}
+"""Beside those of the plane."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,10 +91,10 @@ class ExudynEngine:
     def capabilities(self) -> Capabilities:
         """What Exudyn can simulate here."""
         return Capabilities(
-            elements=frozenset(PARTS[self.beam]),
-            joints=frozenset(JOINTS) | (SPATIAL_JOINTS if self.beam == "ancf-cable" else frozenset()),
+            elements=frozenset(PARTS[self.beam]) | SPATIAL_ELEMENTS[self.beam],
+            joints=frozenset(JOINTS) | SPATIAL_JOINTS,
             loads=frozenset(LOADS),
-            features=FEATURES | CABLE_FEATURES if self.beam == "ancf-cable" else FEATURES,
+            features=FEATURES | OWN_FEATURES[self.beam],
             lanes=False,
         )
 
@@ -129,7 +138,7 @@ class ExudynEngine:
     def machine(self, exu: Any, scene: Scene, end: float | None = None, system_of: type[System] = System) -> Machine:
         """The scene as a system of Exudyn's, for runs up to `end` [s]; system_of: see `build`. Raises InputError."""
         if scene.dimensions == 3:
-            return build_in_space(exu, scene, end, system_of)
+            return build_in_space(exu, scene, self.beam, end, system_of)
         return build(exu, scene, self.beam, end, system_of)
 
     def simulate_many(

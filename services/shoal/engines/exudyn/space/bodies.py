@@ -166,13 +166,10 @@ class SpatialCablePart(CablePart):
 
     @classmethod
     def enter(cls, system: System, rod: Rod, frame: BeamFrame, q: Array, v: Array) -> SpatialCablePart:
-        """Enter an unstrained straight rod whose nodes are where its frame is. Raises InputError."""
-        if rod.retardation:
-            # It follows the rate of the curvature's components, which a bent cable has that turns as a whole.
-            raise InputError(
-                f"bodies.{frame.name}.retardation: engine exudyn would damp the turning of bent cables in space; "
-                "use gauss"
-            )
+        """Enter an unstrained straight rod without damping whose nodes are where its frame is.
+
+        Exudyn's damping follows the rate of the curvature's components, which a bent cable has that turns as a whole.
+        """
         sections = Sections.of(rod)
         nodes, columns = [], []
         for vectors in frame.nodes:

@@ -10,8 +10,9 @@ import numpy as np
 from shoal.engines.capabilities import loops
 from shoal.engines.course import Clock
 from shoal.engines.exudyn.bodies import System
-from shoal.engines.exudyn.build import Machine, silence
+from shoal.engines.exudyn.build import Beam, Machine, silence
 from shoal.engines.exudyn.ground import drive, driven
+from shoal.engines.exudyn.space.beam import SpatialBeamPart
 from shoal.engines.exudyn.space.bodies import SolidPart, SpatialCablePart, SpatialGround
 from shoal.engines.exudyn.space.ends import SpatialEnds
 from shoal.engines.exudyn.space.joints import add_friction, add_joint, still
@@ -28,10 +29,12 @@ DEPENDENT = 1e-9
 """Singular values of Exudyn's constraints that are zero, relative to the largest."""
 
 
-def build_in_space(exu: Any, scene: Scene, end: float | None = None, system_of: type[System] = System) -> Machine:
+def build_in_space(
+    exu: Any, scene: Scene, beam: Beam, end: float | None = None, system_of: type[System] = System
+) -> Machine:
     """Enter bodies, gravity, joints and loads at the initial state. Raises InputError.
 
-    end, system_of: as of `build`
+    beam, end, system_of: as of `build`
     """
     items = importlib.import_module("exudyn.itemInterface")
     placement = place_started(scene)
@@ -46,7 +49,10 @@ def build_in_space(exu: Any, scene: Scene, end: float | None = None, system_of: 
         frame = placement.frames[name]
         if isinstance(frame, BeamFrame):
             assert isinstance(body, Rod)
-            parts[name] = SpatialCablePart.enter(system, body, frame, q, v)
+            if beam == "ancf-cable":
+                parts[name] = SpatialCablePart.enter(system, body, frame, q, v)
+            else:
+                parts[name] = SpatialBeamPart.enter(system, body, placement, name, q, v)
         else:
             assert not isinstance(body, ModalBody)
             parts[name] = SolidPart.add(system, body, frame, q, v)

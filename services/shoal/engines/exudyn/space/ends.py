@@ -9,10 +9,12 @@ import numpy as np
 
 from shoal.engines.exudyn.bodies import Place
 from shoal.engines.exudyn.ends import Ends
+from shoal.engines.exudyn.space.beam import SpatialBeamPart
 from shoal.engines.exudyn.space.bodies import Motion, Side, SpatialCablePart, SpatialGround, SpatialHolder
 from shoal.engines.poses import owner
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
+from shoal.mechanics.assembly.space.sections import image
 from shoal.scene import Attachment
 from shoal.trajectory import Array
 
@@ -48,8 +50,8 @@ class SpatialEnds(Ends):
         return part.framed(self.system, place, axes)
 
     def image(self, at: Attachment, axis: Any) -> Array:
-        """The unit vector (3,) in the frame of an attachment's body of an axis that points so at the start."""
-        return np.asarray(self.placement.attitudes.image(at.body, axis)[:, 0])
+        """The unit vector (3,) of an axis as it points at the start, in the frame of a body or of a rod's section."""
+        return np.asarray(image(self.scene, self.placement.attitudes, at, axis)[:, 0])
 
     def moved(self, at: Attachment, q: Array, v: Array) -> Motion:
         """How an attachment moves."""
@@ -63,9 +65,12 @@ class SpatialEnds(Ends):
         return float(np.linalg.norm(self.placement.start_of(other)[0] - self.placement.start_of(one)[0]))
 
     def start_axes(self, at: Attachment) -> Array:
-        """The axes of an attachment's rigid body at the start as columns, (3, 3)."""
+        """The axes of an attachment's rigid body or section at the start as columns, (3, 3)."""
         if self.is_ground(at):
             return np.eye(3)
+        part, place = self.part(at)
+        if isinstance(part, SpatialBeamPart):
+            return part.start_axes(place)
         directors = self.placement.attitudes.kept.of_body(at.body)
         return np.stack([self.placement.start_of(one)[0][:, 0] for one in directors], axis=1)
 

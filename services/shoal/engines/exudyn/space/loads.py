@@ -9,10 +9,9 @@ import numpy as np
 
 from shoal.engines.capabilities import of_kind
 from shoal.engines.exudyn import user
-from shoal.engines.exudyn.chain import gauss
+from shoal.engines.exudyn.chain import Chain, gauss
 from shoal.engines.exudyn.connectors import Exchange, Law, add_spring
 from shoal.engines.exudyn.loads import scaled
-from shoal.engines.exudyn.space.bodies import SpatialCablePart
 from shoal.engines.exudyn.space.ends import SpatialEnds, frame_about
 from shoal.engines.exudyn.space.joints import add_twist, require_rigid, spin
 from shoal.errors import InputError
@@ -97,12 +96,12 @@ def _add_distributed(ends: SpatialEnds, where: str, load: DistributedForce) -> E
     part, rod, system = ends.parts[load.body], ends.scene.bodies[load.body], ends.system
     assert isinstance(rod, Rod)
     force = np.array(padded(load.force, 3), dtype=float)
-    if isinstance(part, SpatialCablePart):
+    if isinstance(part, Chain):
         for element, mass in zip(part.elements, part.sections.mass, strict=True):
             options = scaled(system, (force / mass).tolist(), scale)
             system.accelerate(element, tuple(options.pop("loadVector")), **options)
-        along = [(k + (x + 1) / 2) * part.size for k in range(rod.elements) for x in gauss(3)[0]]
-        weights = np.tile(gauss(3)[1] * part.size / 2, rod.elements)
+        along = [(k + (x + 1) / 2) * part.size for k in range(len(part.elements)) for x in gauss(3)[0]]
+        weights = np.tile(gauss(3)[1] * part.size / 2, len(part.elements))
     else:
         along, weights = [np.float64(0.5 * rod.length)], np.array([rod.length])
         marker = part.hold(system, (0.5 * rod.length, 0.0, 0.0))

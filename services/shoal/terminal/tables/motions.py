@@ -1,0 +1,181 @@
+"""Motions and what a scene is like: ends with their evidence, sweeps, equilibria, what joints bear, frequencies."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shoal.pictures.choice import rows
+from shoal.pictures.estimates import estimates
+from shoal.pictures.start import remarks
+from shoal.terminal import screen
+
+if TYPE_CHECKING:
+    from shoal.engines.compare import Comparison
+    from shoal.engines.sweep import Sweep
+    from shoal.mechanics.analysis.equilibrium import Equilibrium
+    from shoal.mechanics.analysis.joint_reactions import Reactions
+    from shoal.mechanics.analysis.modes import Modes
+    from shoal.scene import Scene
+    from shoal.selection import Selection
+    from shoal.trajectory import Array, Trajectory
+
+_NOTHING = 1e-12
+"""Of the largest force: a force below it is the rounding of the arithmetic, and shown as zero."""
+
+
+def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection | None = None) -> None:
+    """Where the markers end, and the evidence."""
+    if selection is not None:
+        selection_table(selection)
+    table = screen.table(
+        f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s",
+        "marker",
+        *(f"{axis} [m]" for axis in trajectory.axes),
+    )
+    for name in trajectory.markers:
+        table.add_row(name, *(f"{part:z.9f}" for part in trajectory.marker(name)[-1]))
+    screen.out.print(table)
+    verification = trajectory.model.get("verification")
+    unknown = verification is not None and trajectory.ok and verification["time_error"] is None
+    screen.say(
+        f"status {trajectory.status[0]}{', but its time error is not known' if unknown else ''}; energy off by "
+        f"{trajectory.energy_drift[0]:.1e}, constraints by {trajectory.constraint_drift[0]:.1e}"
+    )
+    slowed = trajectory.model.get("slowed_modes")
+    raised = f"; the inertia of {slowed} axial modes is raised to suit the step" if slowed else ""
+    screen.say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms{raised}")
+    screen.say(*remarks(trajectory.model))
+    if verification is not None:
+        screen.say(*estimates(verification))
+
+
+def selection_table(selection: Selection) -> None:
+    """The ladder: what was tried, at what cost, how far off, and why it stopped."""
+    chosen = selection.chosen
+    title = (
+        f"models for {selection.tolerance:g} m at the markers: {len(selection.rungs)} runs, {selection.wall_s:.2f} s"
+    )
+    table = screen.table(title, "model", "unknowns", "steps", "ms", "error [m]", "")
+    for row in rows(selection):
+        table.add_row(*row)
+    screen.out.print(table)
+    screen.say(*(f"{rod} stays rigid: {reason}" for rod, reason in selection.rigid.items()))
+    verdict = "met" if selection.met else "not met"
+    screen.say(f"{verdict}: {chosen.name}, estimated error {chosen.error:.1e} m; {selection.reason}")
+    if selection.shear > selection.tolerance:
+        screen.say(f"beyond the beams' theory: shear and rotary inertia, about {selection.shear:.0e} m")
+    screen.out.print()
+
+
+def sweep_table(sweep: Sweep) -> None:
+    """Displacements of every marker over the grid."""
+    markers = list(sweep.positions)
+    last = markers[-1]
+    axes = "xyz"[: sweep.scene.dimensions]
+    table = screen.table(
+        f"{sweep.scene.name}: displacement of {last} after {sweep.time:g} s",
+        *_short(list(sweep.grid)),
+        *(f"{last}.d{axis} [m]" for axis in axes),
+        "status",
+    )
+    for row in sweep.rows():
+        numbers = [f"{row[path]:.6g}" for path in sweep.grid]
+        moved = [row[f"{last}.d{axis}"] for axis in axes]
+        table.add_row(*numbers, *("-" if m is None else f"{m:.6f}" for m in moved), row["status"])
+    screen.out.print(table)
+    if sweep.check is not None:
+        screen.say(str(sweep.check))
+
+
+def _short(paths: list[str]) -> list[str]:
+    """Paths with their units, by their last two names where those tell them apart: OA.angle [rad]."""
+    from shoal.pictures.units import labelled
+
+    ends = [".".join(path.split(".")[-2:]) for path in paths]
+    names = ends if len(set(ends)) == len(ends) else paths
+    return [labelled(path, name) for path, name in zip(paths, names, strict=True)]
+
+
+def comparison_table(comparison: Comparison) -> None:
+    """Ends by engine, then differences by pair."""
+    last = list(comparison.scene.markers)[-1]
+    axes = "xyz"[: comparison.scene.dimensions]
+    columns = ("engine", *(f"{axis} [m]" for axis in axes), "energy", "time", "status")
+    table = screen.table(f"{comparison.scene.name}: {last} at the end", *columns)
+    for name, trajectory in comparison.trajectories.items():
+        place = (f"{part:.7f}" for part in trajectory.marker(last)[-1])
+        time = f"{trajectory.wall_s * 1e3:.0f} ms"
+        table.add_row(name, *place, f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0]))
+    screen.out.print(table)
+    screen.say(*(f"{name} refused: {reason}" for name, reason in comparison.refused.items()))
+    table = screen.table("distances over all samples", "engines", "marker", "largest [m]", "final [m]")
+    for row in comparison.differences():
+        distances = ("-" if row[key] is None else f"{row[key]:.2e}" for key in ("largest", "final"))
+        table.add_row(" - ".join(row["engines"]), row["marker"], *distances)
+    screen.out.print(table)
+
+
+def equilibrium_table(equilibrium: Equilibrium) -> None:
+    """Where the markers rest, what the joints bear, and the evidence."""
+    axes = [f"{axis} [m]" for axis in "xyz"[: equilibrium.scene.dimensions]]
+    table = screen.table(f"{equilibrium.scene.name} at rest", "marker", *axes, "angle [rad]")
+    for name in equilibrium.markers:
+        place = (f"{part:z.9f}" for part in equilibrium.marker(name))
+        table.add_row(name, *place, f"{equilibrium.angle(name):z.9f}")
+    screen.out.print(table)
+    if equilibrium.reactions is not None:
+        reactions_table([equilibrium.reactions])
+    lowest = equilibrium.eigenvalues[:1].real
+    screen.say(
+        f"status {equilibrium.status}{f' ({equilibrium.message})' if equilibrium.message else ''}; "
+        f"unbalanced {equilibrium.residual:.1e} of all forces, joints gape by {equilibrium.gap:.1e}"
+        + ("" if equilibrium.mesh_error is None else f"; estimated mesh error {equilibrium.mesh_error:.1e} m")
+        + "".join(f"; lowest eigenvalue {value:.4g} rad^2/s^2" for value in lowest)
+        + f"; {equilibrium.iterations} iterations"
+    )
+
+
+def reactions_table(found: list[Reactions]) -> None:
+    """What every joint exerts on its second body; in space the forces, then the torques."""
+    for reactions in found:
+        joints = reactions.joints
+        when = f"on the second body at t = {reactions.time:g} s"
+        forces = np.array([joint.force for joint in joints.values()])
+        torques = np.array([np.atleast_1d(joint.torque) for joint in joints.values()])
+        rounding = _NOTHING * float(np.max(np.abs(np.hstack([forces, torques])), initial=0.0))
+        forces[abs(forces) < rounding], torques[abs(torques) < rounding] = 0.0, 0.0
+        if torques.shape[-1] == 3:
+            _exerted(f"joint forces {when}", ["fx [N]", "fy [N]", "fz [N]"], reactions, forces)
+            _exerted(f"joint torques {when}", ["mx [N m]", "my [N m]", "mz [N m]"], reactions, torques)
+        else:
+            both = np.hstack([forces, torques])
+            _exerted(f"joint forces {when}", ["fx [N]", "fy [N]", "torque [N m]"], reactions, both)
+        if reactions.redundancy:
+            screen.say(
+                f"{reactions.redundancy} more than needed: least forces are shown; "
+                f"redundant: {', '.join(reactions.constraints) or 'none away from this position'}"
+            )
+
+
+def _exerted(title: str, headings: list[str], reactions: Reactions, values: Array) -> None:
+    """A row for every joint; `values` in the order of the joints."""
+    table = screen.table(title, "joint", "kind", *headings, "unique")
+    for (name, joint), row in zip(reactions.joints.items(), values, strict=True):
+        table.add_row(name, joint.kind, *(f"{value:.6g}" for value in row), "yes" if joint.unique else "no")
+    screen.out.print(table)
+
+
+def modes_table(modes: Modes) -> None:
+    """Frequencies, slowest first."""
+    headings = ("mode", "frequency [Hz]", "[rad/s]", "damping ratio", "growth [1/s]", "kind")
+    table = screen.table(f"{modes.scene.name}: small motions about the {modes.about}", *headings)
+    for number, mode in enumerate(modes.modes, 1):
+        numbers = (mode.frequency, mode.angular_frequency, mode.damping_ratio, mode.eigenvalue.real)
+        table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind)
+    screen.out.print(table)
+    if modes.mesh_errors:
+        screen.say(f"estimated mesh error of the eigenvalues: {max(modes.mesh_errors):.1e} of their size, at most")
+    if not modes.balanced:
+        screen.say("the forces do not balance there; these are motions relative to its fall")

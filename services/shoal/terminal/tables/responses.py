@@ -1,0 +1,145 @@
+"""What is known of uncertain machines: bounds or statistics, limits, tolerances, shares of the variance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.markup import escape
+
+from shoal.terminal import screen
+
+if TYPE_CHECKING:
+    from shoal.response import Response
+    from shoal.response.allocation import Allocation
+    from shoal.response.limits import Judged
+    from shoal.response.limits.judged import Between
+
+
+def response_table(response: Response) -> None:
+    """The end: bounds with their gap, or mean, deviation and what it is owed to, or bounds of these."""
+    title = f"{response.scene} at t = {response.times[-1]:g} s, {response.method}"
+    headings: tuple[str, ...]
+    if response.bounds is not None:
+        headings = "lower", "upper", "outer lower", "outer upper"
+        found = response.bounds
+        columns = [found.lower, found.upper, found.lower_outer, found.upper_outer]
+    elif response.boxes is not None:
+        headings = "mean from", "to", "deviation from", "to", "5 % from", "95 % to"
+        mean, std, quantiles = response.boxes.mean, response.boxes.std, response.boxes.quantiles
+        columns = [mean.lower, mean.upper, std.lower, std.upper, quantiles[1].lower, quantiles[-2].upper]
+    else:
+        assert response.statistics is not None
+        headings = "mean", "deviation", "5 %", "95 %"
+        told = response.statistics
+        columns = [told.mean, told.std, told.quantiles[1], told.quantiles[-2]]
+    table = screen.table(title, "", *headings, *(("gap",) if response.bounds is not None else ()))
+    for marker in response.markers:
+        for quantity in response.quantities:
+            unit = "rad" if quantity == "angle" else "m"
+            numbers = (response.column(marker, quantity, column)[-1] for column in columns)
+            form = "z.6f" if response.boxes is None else ".4g"
+            cells = ["-" if np.isnan(x) else f"{x:{form}}" for x in numbers]
+            if response.bounds is not None:
+                gap = response.gap(marker, quantity)
+                cells.append("-" if np.isnan(gap) else f"{gap:.0e}")
+            table.add_row(f"{marker}.{quantity} [{unit}]", *cells)
+    screen.out.print(table)
+    if response.statistics is not None:
+        _shares(response)
+    for judged in response.limits:
+        _limit(judged)
+    if response.allocation is not None:
+        _allocation(response.allocation)
+    screen.say(f"status {response.status}; {response.evaluations} runs in {response.wall_s:.2f} s; {response.why}")
+    for joint in response.inputs.joints:
+        if joint.left:
+            screen.say(
+                f"left out of {joint.source}: {', '.join(f'{name} ({why})' for name, why in joint.left.items())}"
+            )
+    if response.repeated or response.failed:
+        screen.say(f"{response.repeated} runs were repeated with smaller steps, {response.failed} failed all the same")
+    if response.bounds is not None:
+        gap = response.bounds.gap
+        known = (
+            "the gap to the outer ones is not known" if np.isnan(gap) else f"outer ones lie {gap:.1e} of the width off"
+        )
+        screen.say(f"bounds are attained by runs; {known}; they hold until {response.horizon:g} s")
+    if response.boxes is not None:
+        screen.say(
+            f"statistics lie between these values, whatever the intervals are; they are known to "
+            f"{response.boxes.gap:.1e} of the scatter, until {response.horizon:g} s"
+        )
+    errors = {"mesh": response.mesh_error, "step": response.step_error}
+    told_of = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
+    if told_of:
+        screen.say(f"estimated errors of the runs that decide: {', '.join(told_of)}")
+    if response.finer is not None:
+        moved = [f"{name} by {one['by']:.1e} at {one['t']:g} s" for name, one in list(response.moved().items())[:3]]
+        screen.say(
+            f"{response.finer.runs} runs that attain bounds, on twice as fine a mesh, move most: {', '.join(moved)}"
+        )
+
+
+def _limit(judged: Judged) -> None:
+    """What is told of a limit, and the values that show it."""
+    title, shown = f"limit {judged.limit.text}", judged.shown
+    if judged.between is not None:
+        _between(title, judged, judged.between)
+        how = "most probably with"
+    elif judged.passing is not None:
+        lower, upper = judged.passing.estimate.interval
+        screen.say(
+            f"{title}: is passed with probability {judged.passing.estimate.probability:.3g}, with 95 % confidence "
+            f"between {lower[-1]:.3g} and {upper[-1]:.3g}",
+            f"  by {judged.passing.why}; {judged.evaluations} runs",
+            style="bold",
+        )
+        how = "most probably with"
+    else:
+        says = {True: "is kept for all values", False: "is passed", None: "is kept by all runs, which proves nothing"}
+        screen.say(f"{title}: {says[judged.kept]}", style="bold")
+        how = "passed with" if judged.kept is False else "nearest with"
+    if shown is not None:
+        known = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
+        screen.say(f"  {how} {known}: margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s")
+
+
+def _between(title: str, judged: Judged, found: Between) -> None:
+    """Two probabilities and the interval values that they are told at."""
+    (least, largest), (lower, upper) = found.estimates, found.interval
+    screen.say(
+        f"{title}: is passed with a probability between {least:.3g} and {largest:.3g}, with 95 % confidence between "
+        f"{lower:.3g} and {upper:.3g}",
+        style="bold",
+    )
+    for name, at in (("least", found.at_lower), ("largest", found.at_upper)):
+        screen.say(f"  {name} with {', '.join(f'{path} = {value:.6g}' for path, value in at.items())}")
+    screen.say(f"  by {found.places} interval values and {judged.evaluations} runs")
+
+
+def _allocation(found: Allocation) -> None:
+    """Tolerances that keep the limit, and what tightening the stated ones does."""
+    told = found.to_json()
+    table = screen.table(f"tolerances that keep {found.limit}", "", "stated", "found", "factor", "effect of 1 %")
+    for name, one in told["parameters"].items():
+        numbers = one["tolerance_stated"], one["tolerance"], one["factor"], one["effect_of_one_per_cent"]
+        table.add_row(escape(name), *(f"{x:.3g}" for x in numbers))
+    screen.out.print(table)
+    what = "probability" if found.inputs.random.all() else "least margin"
+    screen.say(
+        f"{what} {found.stated:.3g} with the stated tolerances, {found.confirmed:.3g} with those found, which cost "
+        f"{found.cost:.3g} times as much; to tighten first: {told['tighten_first']}; {found.evaluations} runs"
+    )
+
+
+def _shares(response: Response) -> None:
+    """Sobol's total indices at the end."""
+    assert response.statistics is not None
+    marker = response.markers[-1]
+    axes = response.axes
+    table = screen.table(f"share of the variance of {marker} (total Sobol index)", "", *axes)
+    for k, name in enumerate(response.inputs.names):
+        shares = [response.column(marker, axis, response.statistics.total[k])[-1] for axis in axes]
+        table.add_row(escape(name), *("-" if np.isnan(x) else f"{x:.3f}" for x in shares))
+    screen.out.print(table)
