@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from shoal.response.inputs import Inputs
+from shoal.response.inputs import BoolArray, Inputs
 from shoal.response.polynomials import Terms
 from shoal.trajectory import Array
 
@@ -24,13 +24,15 @@ class Expansion:
     """Call it with germs, (places, parameters): the answers there, (places, columns).
 
     terms: degrees, (terms, parameters); coefficients: of the orthonormal products, (terms, columns); left_out: error at
-    each run of the fit to all others, root of the mean square, (columns,)
+    each run of the fit to all others, root of the mean square, (columns,); squares: the same of the squares of what
+    differs from the mean, over twice the deviation, (columns,)
     """
 
     inputs: Inputs
     terms: Terms
     coefficients: Array
     left_out: Array
+    squares: Array | None = None
 
     def __call__(self, germs: Array) -> Array:
         """The answers at these germs."""
@@ -39,6 +41,21 @@ class Expansion:
     def each(self, germs: Array, columns: IntArray) -> Array:
         """One column at each germ, (places,): as cheap as one answer instead of all."""
         return np.asarray(np.einsum("ij,ji->i", self.inputs.basis(germs, self.terms), self.coefficients[:, columns]))
+
+    def where(self, better: BoolArray, other: Expansion) -> Expansion:
+        """This one in some columns, (columns,), the other elsewhere; without terms that no column has."""
+        terms, which = np.unique(np.vstack([self.terms, other.terms]), axis=0, return_inverse=True)
+        coefficients = np.zeros((len(terms), len(better)))
+        mine, others = np.split(which.ravel(), [len(self.terms)])
+        coefficients[mine] = np.where(better, self.coefficients, 0.0)
+        coefficients[others] += np.where(better, 0.0, other.coefficients)
+        used = coefficients.any(axis=1)
+        used[0] = True
+        squares = None
+        if self.squares is not None and other.squares is not None:
+            squares = np.where(better, self.squares, other.squares)
+        left_out = np.where(better, self.left_out, other.left_out)
+        return Expansion(self.inputs, terms[used], coefficients[used], left_out, squares)
 
     @property
     def mean(self) -> Array:
@@ -62,5 +79,14 @@ def fit(inputs: Inputs, germs: Array, values: Array, terms: Terms) -> Expansion:
         coefficients = np.linalg.lstsq(basis, values, rcond=RANK)[0]
     # A run that decides about a term by itself has all of the influence on its own misfit.
     influence = (q**2).sum(axis=1, keepdims=True)
-    left_out = (values - basis @ coefficients) / np.maximum(1 - influence, SOLE)
-    return Expansion(inputs, terms, np.asarray(coefficients), np.sqrt(np.mean(left_out**2, axis=0)))
+    left_out, squares = unexplained(values, (values - basis @ coefficients) / np.maximum(1 - influence, SOLE))
+    return Expansion(inputs, terms, np.asarray(coefficients), left_out, squares)
+
+
+def unexplained(values: Array, missed: Array) -> tuple[Array, Array]:
+    """`left_out` and `squares` of an expansion, from what fits to all other runs miss of each, (runs, columns)."""
+    away = values - values.mean(axis=0)
+    squares = np.sqrt(np.mean((away**2 - (away - missed) ** 2) ** 2, axis=0))
+    deviation = np.sqrt(np.mean(away**2, axis=0))
+    off = np.divide(squares, 2 * deviation, out=np.zeros_like(squares), where=deviation > 0)
+    return np.sqrt(np.mean(missed**2, axis=0)), np.asarray(off)

@@ -207,13 +207,21 @@ class Inputs:
         """Random germs."""
         return self.germs(inside(np.random.default_rng(seed).random((count, len(self)))))
 
+    def highest(self, degree: int) -> tuple[int, ...]:
+        """The highest degree of each parameter's polynomials up to this one: few observations carry few."""
+        return tuple(min(degree, len(self._recurrence(k).a), len(self._recurrence(k).b) - 1) for k in range(len(self)))
+
+    def polynomials(self, k: int, germs: Array, degree: int) -> Array:
+        """Those of one parameter at its germs, (runs,), from degree 0, (runs, degree + 1)."""
+        return self._recurrence(k)(germs, degree)
+
     def basis(self, germs: Array, terms: Terms) -> Array:
         """Every product of polynomials at every germ, (runs, terms)."""
         found = np.ones((len(germs), len(terms)))
         for k in range(len(self)):
             degree = int(terms[:, k].max())
             if degree:
-                found *= self._recurrence(k)(germs[:, k], degree)[:, terms[:, k]]
+                found *= self.polynomials(k, germs[:, k], degree)[:, terms[:, k]]
         return found
 
 

@@ -7,10 +7,12 @@ shows the rest: that in closed form counts all there is beyond.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from shoal.response.expansion import Expansion
-from shoal.response.inputs import Inputs
+from shoal.response.inputs import BoolArray, Inputs
 from shoal.response.polynomials import Terms
 from shoal.trajectory import Array
 
@@ -22,21 +24,23 @@ MISSED = 0.05
 """Share of a deviation that so few places may miss."""
 
 
-def outwards(germs: Array, values: Array, found: Expansion) -> Expansion:
-    """With the error of the outermost runs where the same terms are fitted to all others."""
-    inputs = found.inputs
+def outermost(inputs: Inputs, germs: Array) -> BoolArray:
+    """Which runs are, (runs,); none where all germs are bounded, or where all are as far out."""
     far = np.abs(germs[:, inputs.unbounded]).max(axis=1, initial=0.0)
-    outer = far >= np.sort(far)[-max(1, int(OUTER * len(far)))]
-    if not inputs.unbounded.any() or outer.all():
+    outer = np.asarray(far >= np.sort(far)[-max(1, int(OUTER * len(far)))])
+    return outer & inputs.unbounded.any() & ~outer.all()
+
+
+def outwards(germs: Array, values: Array, found: Expansion) -> Expansion:
+    """With the error of the outermost runs where its terms are fitted to all others."""
+    outer = outermost(found.inputs, germs)
+    if not outer.any():
         return found
-    basis, left_out = inputs.basis(germs, found.terms), found.left_out.copy()
-    used = found.coefficients != 0
-    for terms in np.unique(used, axis=1).T:
-        columns = (used == terms[:, None]).all(axis=0)
-        told = np.linalg.lstsq(basis[~outer][:, terms], values[~outer][:, columns], rcond=None)[0]
-        missed = basis[outer][:, terms] @ told - values[outer][:, columns]
-        left_out[columns] = np.maximum(left_out[columns], np.sqrt((missed**2).sum(axis=0) / len(germs)))
-    return Expansion(inputs, found.terms, found.coefficients, left_out)
+    basis = found.inputs.basis(germs, found.terms)
+    told = np.linalg.lstsq(basis[~outer], values[~outer], rcond=None)[0]
+    missed = basis[outer] @ told - values[outer]
+    beyond = np.sqrt((missed**2).sum(axis=0) / len(germs))
+    return replace(found, left_out=np.maximum(found.left_out, beyond))
 
 
 def hidden(coefficients: Array, inputs: Inputs, terms: Terms) -> Array:

@@ -309,6 +309,7 @@ class Response:
             "mean": at(found.mean),
             "std": at(found.std),
             "mean_error": at(found.error),
+            "std_error": at(found.std_error),
             "quantiles": {f"{q:g}": at(found.quantiles[k]) for k, q in enumerate(QUANTILES)},
             "sobol": {
                 name: {"first": at(found.first[k]), "total": at(found.total[k])}

@@ -20,7 +20,7 @@ NOTHING = 1e-9
 @dataclass(frozen=True)
 class Statistics:
     """mean, std: (columns,); quantiles: (quantiles, columns); first, total: Sobol's indices, (parameters, columns), nan
-    where nothing varies or nothing is known; error: of the mean, one standard deviation, (columns,)
+    where nothing varies or nothing is known; error, std_error: one standard deviation of the mean and of std
     """
 
     mean: Array
@@ -29,6 +29,7 @@ class Statistics:
     first: Array
     total: Array
     error: Array
+    std_error: Array
 
 
 def of_expansion(found: Expansion, inputs: Inputs, error: Array | None, runs: int, seed: int) -> Statistics:
@@ -49,8 +50,14 @@ def of_expansion(found: Expansion, inputs: Inputs, error: Array | None, runs: in
     block = 256
     for k in range(0, len(variance), block):
         quantiles[:, k : k + block] = np.quantile(places @ found.coefficients[:, k : k + block], QUANTILES, axis=0)
-    known = np.full(len(variance), np.nan) if error is None else error / np.sqrt(runs)
-    return Statistics(found.mean, np.sqrt(variance), quantiles, first, total, known)
+    unknown = np.full(len(variance), np.nan)
+    known = unknown if error is None else error / np.sqrt(runs)
+    deviation = unknown
+    if error is not None and found.squares is not None:
+        # What is not explained is missing in the deviation as a whole, and what is explained scatters.
+        missing = np.divide(error**2, 2 * np.sqrt(variance), out=np.zeros_like(error), where=varies)
+        deviation = np.hypot(np.maximum(found.squares, error) / np.sqrt(runs), missing)
+    return Statistics(found.mean, np.sqrt(variance), quantiles, first, total, known, deviation)
 
 
 def of_runs(values: Array, indices: Array | None, parameters: int) -> Statistics:
@@ -58,6 +65,8 @@ def of_runs(values: Array, indices: Array | None, parameters: int) -> Statistics
     unknown = np.full((2, parameters, values.shape[1]), np.nan)
     first, total = unknown if indices is None else indices
     deviation = values.std(axis=0, ddof=1) if len(values) > 1 else np.full(values.shape[1], np.nan)
+    squares = ((values - values.mean(axis=0)) ** 2).std(axis=0)
+    off = np.divide(squares, 2 * deviation, out=np.zeros_like(squares), where=deviation > 0) / np.sqrt(len(values))
     return Statistics(
         values.mean(axis=0),
         deviation,
@@ -65,6 +74,7 @@ def of_runs(values: Array, indices: Array | None, parameters: int) -> Statistics
         first,
         total,
         deviation / np.sqrt(len(values)),
+        off,
     )
 
 

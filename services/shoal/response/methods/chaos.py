@@ -12,10 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from shoal.response.expansion import Expansion, fit
+from shoal.response.degrees import best
+from shoal.response.expansion import Expansion
 from shoal.response.outermost import hidden, outwards
-from shoal.response.polynomials import size, total_degree
-from shoal.response.sparse import hyperbolic, sparse
+from shoal.response.polynomials import size
+from shoal.response.regularised import likeliest, regularised, trimmed
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 
@@ -30,14 +31,8 @@ CONVERGED = 1e-4
 COARSE = 3e-2
 """Above this share, more runs are made: so many times."""
 MORE = 5
-HIGHEST = 20
-CANDIDATES = 4
-"""Terms for every run that a sparse expansion chooses from."""
-MOST_CANDIDATES = 1200
-MANY = 3
-"""Parameters from which on an expansion with all terms is dear."""
-WORSE = 2
-"""Degrees in a row that made it worse, after which no higher one is tried."""
+DECAYS = 6
+"""Columns that tell how their coefficients fall."""
 
 
 def chaos(study: Study) -> Found:
@@ -59,60 +54,49 @@ def grown(study: Study, fair: int) -> Found:
         count = max(min(count, most, made + runs.left), min(least, made + runs.left))
         runs(inputs.sobol(count - made, study.seed, made))
         made = count
-        found = _best(study)
-        if made >= min(fair, made + runs.left) and not study.degree and len(inputs) >= MANY:
-            found = _sparser(study, found)
-        found = outwards(study.runs.germs, study.runs.values, found)
-        beyond = hidden(found.coefficients.T, inputs, found.terms)
-        found = replace(found, left_out=np.maximum(found.left_out, beyond))
+        found = best(study, SHARE, lambda one: _reaching(study, one))
+        if made >= min(fair, made + runs.left) and not study.degree:
+            found = _with_more_terms(study, found)
         off = share(study, found)
         most = MORE * fair if off > COARSE and made >= fair else fair
         if off < CONVERGED or made >= most or not runs.left:
             break
         count = 2 * made
-    used = found.terms[np.any(found.coefficients != 0, axis=1)]
-    degree, kind = int(used.sum(axis=1).max(initial=0)), "sparse " if len(found.terms) > len(runs.germs) else ""
+    degree = int(found.terms.sum(axis=1).max(initial=0))
+    kind = "regularised " if len(found.terms) > len(runs.germs) / SHARE else ""
     return Found(f"{kind}polynomial chaos of degree {degree} fitted to {runs.evaluations} runs", found, found.left_out)
 
 
-def _best(study: Study) -> Expansion:
-    """The expansion with the least error at runs that are left out, among those that the runs there are carry."""
-    runs, inputs, worse = study.runs, study.inputs, 0
-    best: Expansion | None = None
-    for degree in [study.degree] if study.degree else range(1, HIGHEST + 1):
-        if best is not None and SHARE * size(len(inputs), degree) > len(runs.germs):
-            break
-        found = fit(inputs, runs.germs, runs.values, total_degree(len(inputs), degree))
-        better = best is None or share(study, found) < share(study, best)
-        best, worse = (found, 0) if better or best is None else (best, worse + 1)
-        if worse == WORSE:
-            break
-    assert best is not None
-    return best
+def _reaching(study: Study, found: Expansion) -> Expansion:
+    """With the error further out than runs tell."""
+    found = outwards(study.runs.germs, study.runs.values, found)
+    return _with_hidden(found)
 
 
-def _sparser(study: Study, full: Expansion) -> Expansion:
-    """In every column the full expansion, or a sparse one of more terms where that foretells left-out runs better."""
-    runs, inputs, parameters = study.runs, study.inputs, len(study.inputs)
-    degree = int(full.terms.sum(axis=1).max())
-    most = min(CANDIDATES * len(runs.germs), MOST_CANDIDATES)
-    while degree < HIGHEST and len(hyperbolic(parameters, degree + 1)) <= most:
-        degree += 1
-    terms = np.unique(np.vstack([full.terms, hyperbolic(parameters, degree)]), axis=0)
-    terms = terms[np.argsort(terms.sum(axis=1), kind="stable")]
-    if len(terms) == len(full.terms):
-        return full
-    found = sparse(inputs, runs.germs, runs.values, terms, np.flatnonzero(shares(study, full) > CONVERGED))
-    kept = np.array([np.flatnonzero((terms == term).all(axis=1))[0] for term in full.terms])
-    same = np.zeros_like(found.coefficients)
-    same[kept] = full.coefficients
-    better = found.left_out < full.left_out
-    return Expansion(
-        inputs,
-        terms,
-        np.where(better, found.coefficients, same),
-        np.where(better, found.left_out, full.left_out),
-    )
+def _with_hidden(found: Expansion) -> Expansion:
+    beyond = hidden(found.coefficients.T, found.inputs, found.terms)
+    return replace(found, left_out=np.maximum(found.left_out, beyond))
+
+
+def _with_more_terms(study: Study, found: Expansion) -> Expansion:
+    """In every column that one, or a regularised one that foretells better.
+
+    The column that is told worst tells how coefficients fall; what that is good for elsewhere is taken there as well.
+    """
+    runs, inputs = study.runs, study.inputs
+    tried = np.zeros(len(found.left_out), dtype=bool)
+    for _ in range(DECAYS):
+        open_shares = np.where(tried, 0.0, shares(study, found))
+        worst = int(open_shares.argmax())
+        if open_shares[worst] <= CONVERGED:
+            break
+        tried[worst] = True
+        decay = likeliest(inputs, runs.germs, runs.values[:, worst])
+        other = _with_hidden(regularised(inputs, runs.germs, runs.values, decay))
+        better = other.left_out < found.left_out
+        if better.any():
+            found = trimmed(other.where(better, found))
+    return found
 
 
 def share(study: Study, found: Expansion) -> float:

@@ -12,13 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.response import degrees
 from shoal.response.boxes import HOPELESS, scatter
 from shoal.response.conditional import Above, Conditional, Mean
-from shoal.response.expansion import Expansion, fit
+from shoal.response.expansion import Expansion
 from shoal.response.extremes import MOST_CORNERS, Extremes, corners, extremes
 from shoal.response.inputs import Inputs
 from shoal.response.outermost import hidden, outwards
-from shoal.response.polynomials import size, total_degree
+from shoal.response.polynomials import size
 from shoal.response.runs import TooManyRunsError
 from shoal.response.study import SAFETY, Found, Study
 from shoal.trajectory import Array
@@ -39,9 +40,6 @@ APART = 0.15
 """Interval germs that are nearer to each other are one place."""
 ENOUGH = 1
 """Times the fair number of runs after which the horizon is looked for."""
-HIGHEST = 20
-WORSE = 2
-"""Degrees in a row that made it worse, after which no higher one is tried."""
 
 
 def nested(study: Study) -> Found:
@@ -90,30 +88,8 @@ def _towards_ends(inputs: Inputs, germs: Array) -> Array:
 
 
 def best(study: Study) -> Expansion:
-    """In every column the degree with the least error at runs that are left out, among those that the runs carry."""
-    runs, parameters = study.runs, len(study.inputs)
-    known: Expansion | None = None
-    worse = 0
-    for degree in [study.degree] if study.degree else range(1, HIGHEST + 1):
-        if known is not None and SHARE * size(parameters, degree) > len(runs.germs):
-            break
-        found = fit(study.inputs, runs.germs, runs.values, total_degree(parameters, degree))
-        found = _reaching(study, found)
-        if known is None:
-            known = found
-            continue
-        better = found.left_out < known.left_out
-        # Terms of a lower degree come first.
-        same = np.zeros_like(found.coefficients)
-        same[: len(known.terms)] = known.coefficients
-        coefficients = np.where(better, found.coefficients, same)
-        known = Expansion(study.inputs, found.terms, coefficients, np.where(better, found.left_out, known.left_out))
-        worse = 0 if better.any() else worse + 1
-        if worse == WORSE:
-            break
-    assert known is not None
-    used = int(np.flatnonzero(np.any(known.coefficients != 0, axis=1)).max(initial=0)) + 1
-    return Expansion(study.inputs, known.terms[:used], known.coefficients[:used], known.left_out)
+    """In every column of the degree that tells most."""
+    return degrees.best(study, SHARE, lambda found: _reaching(study, found))
 
 
 def _reaching(study: Study, found: Expansion) -> Expansion:

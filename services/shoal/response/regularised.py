@@ -1,0 +1,147 @@
+"""Expansions of more terms than runs, held by how fast the coefficients of a smooth function fall.
+
+The coefficient of a product of polynomials is taken for a normal variable. Its variance is a product over the
+parameters in it: s r^(k - 1) / k! for the degree k, as those of exponentials fall, with the size s and the ratio r of
+each parameter that make the runs most likely. That is a Gaussian process with a kernel for each parameter and their
+products (Durrande, Ginsbourger, Roustant and Carraro, ANOVA kernels and RKHS of zero mean functions for model-based
+sensitivity analysis, Journal of Multivariate Analysis 115, 2013). Errors at runs that are left out follow in closed
+form (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, section 5.4.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_solve, cholesky
+from scipy.optimize import minimize
+from scipy.special import gammaln
+
+from shoal.response.expansion import Expansion, unexplained
+from shoal.response.inputs import Inputs
+from shoal.response.outermost import outermost
+from shoal.response.polynomials import Terms
+from shoal.trajectory import Array
+
+HIGHEST = 24
+"""Degree in each parameter."""
+SIZES, RATIOS, NOISE = (-14.0, 6.0), (-7.0, 4.0), (-27.0, 0.0)
+"""Logarithms within which the most likely values are sought; noise: what is left of the answers' variance."""
+FIRST = -1.0, -1.0, -20.0
+STEPS = 80
+TOLD = 320
+"""So many runs tell the values, and all the coefficients."""
+TERMS = 1500
+"""The largest ones, by their variances."""
+NOTHING = 1e-5
+"""Share of the deviation that all coefficients may have together that are left out."""
+
+
+@dataclass(frozen=True)
+class Decay:
+    """Logarithms of the size and the ratio of every parameter, (parameters, 2), and of the noise."""
+
+    parameters: Array
+    noise: float
+
+    def variances(self, degrees: tuple[int, ...]) -> list[Array]:
+        """Of the coefficients of each parameter's polynomials from degree 1 up to these, (degrees,) each."""
+        found = []
+        for (size, ratio), degree in zip(self.parameters, degrees, strict=True):
+            k = np.arange(degree)
+            found.append(np.exp(size + k * ratio - gammaln(k + 2.0)))
+        return found
+
+
+def likeliest(inputs: Inputs, germs: Array, answers: Array) -> Decay:
+    """Of one column, (runs,), by the likelihood with its overall size left free."""
+    count, some = len(inputs), slice(TOLD)
+    bases, y = _bases(inputs, germs[some]), answers[some] - answers[some].mean()
+
+    def unlikely(x: Array) -> tuple[float, Array]:
+        return _unlikely(Decay(x[:-1].reshape(count, 2), float(x[-1])), bases, y)
+
+    start = np.append(np.tile(FIRST[:2], count), FIRST[2])
+    limits = [*[SIZES, RATIOS] * count, NOISE]
+    found = minimize(unlikely, start, jac=True, method="L-BFGS-B", bounds=limits, options={"maxiter": STEPS}).x
+    return Decay(found[:-1].reshape(count, 2), float(found[-1]))
+
+
+def _bases(inputs: Inputs, germs: Array) -> list[Array]:
+    """Polynomials of every parameter from degree 1, (runs, degrees) each."""
+    degrees = inputs.highest(HIGHEST)
+    return [inputs.polynomials(k, germs[:, k], degree)[:, 1:] for k, degree in enumerate(degrees)]
+
+
+def _unlikely(decay: Decay, bases: list[Array], y: Array) -> tuple[float, Array]:
+    """Twice the negative logarithm of the likelihood, but for a constant, and its slope."""
+    runs, every = len(y), decay.variances(tuple(basis.shape[1] for basis in bases))
+    parts = [(basis * of) @ basis.T for basis, of in zip(bases, every, strict=True)]
+    kernel = np.prod([1 + part for part in parts], axis=0)
+    middle = float(np.mean(np.diag(kernel)))
+    noise = np.exp(decay.noise)
+    try:
+        factor = cholesky(kernel + noise * middle * np.eye(runs), lower=True)
+    except np.linalg.LinAlgError:
+        return 1e10, np.zeros(2 * len(bases) + 1)
+    inverse = cho_solve((factor, True), np.eye(runs))
+    weights = inverse @ y
+    square = float(y @ weights)
+    slope = inverse - runs * np.outer(weights, weights) / square
+    found = np.empty((len(bases), 2))
+    for k, (basis, of) in enumerate(zip(bases, every, strict=True)):
+        others = np.prod([1 + part for j, part in enumerate(parts) if j != k], axis=0)
+        change = parts[k], (basis * (of * np.arange(len(of)))) @ basis.T
+        for j, one in enumerate(change):
+            moved = others * one
+            found[k, j] = np.sum(slope * moved) + noise * np.trace(slope) * np.mean(np.diag(moved))
+    value = runs * np.log(square / runs) + 2 * np.log(np.diag(factor)).sum()
+    return float(value), np.append(found, noise * middle * np.trace(slope))
+
+
+def regularised(inputs: Inputs, germs: Array, values: Array, decay: Decay) -> Expansion:
+    """Of all columns, (runs, columns), with these variances."""
+    terms, variances = _largest(inputs, decay)
+    basis, mean = inputs.basis(germs, terms), values.mean(axis=0)
+    kernel = (basis * variances) @ basis.T
+    kernel += np.exp(decay.noise) * np.mean(np.diag(kernel)) * np.eye(len(germs))
+    factor = cholesky(kernel, lower=True)
+    inverse = cho_solve((factor, True), np.eye(len(germs)))
+    weights = cho_solve((factor, True), values - mean)
+    coefficients = variances[:, None] * (basis.T @ weights)
+    coefficients[0] += mean
+    missed = weights / np.diag(inverse)[:, None]
+    left_out, squares = unexplained(values, missed)
+    outer = outermost(inputs, germs)
+    if outer.any():
+        beyond = np.linalg.solve(inverse[np.ix_(outer, outer)], weights[outer])
+        left_out = np.maximum(left_out, np.sqrt((beyond**2).sum(axis=0) / len(germs)))
+    return Expansion(inputs, terms, coefficients, left_out, squares)
+
+
+def _largest(inputs: Inputs, decay: Decay) -> tuple[Terms, Array]:
+    """The terms with the largest variances, the constant first, and these, (terms,).
+
+    A product of some parameters that is not among the largest of those has no larger successors.
+    """
+    terms, sizes = np.zeros((1, 0), dtype=np.int64), np.zeros(1)
+    for of in decay.variances(inputs.highest(HIGHEST)):
+        logarithms = np.append(0.0, np.log(np.maximum(of, 1e-300)))
+        sums = (sizes[:, None] + logarithms).ravel()
+        kept = np.argsort(-sums, kind="stable")[:TERMS]
+        before, degree = np.divmod(kept, len(logarithms))
+        terms, sizes = np.column_stack([terms[before], degree]), sums[kept]
+    constant = ~terms.any(axis=1)
+    terms = np.vstack([np.zeros((1, len(inputs)), dtype=np.int64), terms[~constant]])
+    return terms, np.exp(np.append(0.0, sizes[~constant]))
+
+
+def trimmed(found: Expansion) -> Expansion:
+    """Without the terms that are nothing beside the deviation of every column; the constant stays."""
+    shares = found.coefficients**2 / np.maximum(found.variance, 1e-300)
+    kept = (shares * len(shares) > NOTHING**2).any(axis=1)
+    kept[0] = True
+    lost = np.sqrt((found.coefficients[~kept] ** 2).sum(axis=0))
+    return Expansion(
+        found.inputs, found.terms[kept], found.coefficients[kept], np.hypot(found.left_out, lost), found.squares
+    )
