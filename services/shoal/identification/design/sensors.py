@@ -127,9 +127,10 @@ def sensors_of(scene: Scene, known: Collection[str]) -> tuple[Scene, list[Sensor
 
 def _on_its_sides(name: str, rod: Rod, places: dict[str, tuple[str, Any]], in_space: bool) -> Iterator[Sensor]:
     """Strain gauges on top of a rod and, in space, beside it; their places are added."""
+    width = rod.width or rod.height
     for share in _ALONG:
         high = rod.height if rod.end_height is None else rod.height + share * (rod.end_height - rod.height)
-        wide = rod.width if rod.end_width is None else rod.width + share * (rod.end_width - rod.width)
+        wide = width if rod.end_width is None else width + share * (rod.end_width - width)
         gauge, at = f"{name}-{100 * share:.0f}-percent", (name, (share * rod.length, 0.0))
         places[gauge] = at
         yield Sensor(gauge, *at, "strain", height=high / 2, in_space=in_space)

@@ -80,7 +80,7 @@ def _on_a_rod(scene: Scene, channel: Channel) -> None:
         if getattr(rod, field):
             raise InputError(f"{what} is told of straight rods; bodies.{at.body}.{field} is not zero")
     share = float(scene.location(at)[0]) / rod.length
-    for field, thick, end in (("height", rod.height, rod.end_height), ("side", rod.width, rod.end_width)):
+    for field, thick, end in (("height", rod.height, rod.end_height), ("side", rod.width or rod.height, rod.end_width)):
         half = 0.5 * (thick + share * ((thick if end is None else end) - thick))
         if abs(getattr(channel, field)) > half * (1 + 1e-9):
             raise InputError(

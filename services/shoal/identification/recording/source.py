@@ -11,8 +11,25 @@ from shoal.scene.record import Angle, NonNegative, Positive, Record
 from shoal.table_units import AccelerationUnit, AngleUnit, ForceUnit, LengthUnit, StrainUnit, TorqueUnit
 
 Quantity = Literal[
-    *("x", "y", "z", "angle", "rate", "ax", "ay", "az", "wx", "wy", "wz"),
-    *("fx", "fy", "fz", "mx", "my", "mz", "torque", "strain"),
+    "x",
+    "y",
+    "z",
+    "angle",
+    "rate",
+    "ax",
+    "ay",
+    "az",
+    "wx",
+    "wy",
+    "wz",
+    "fx",
+    "fy",
+    "fz",
+    "mx",
+    "my",
+    "mz",
+    "torque",
+    "strain",
 ]
 ACCELERATIONS, RATES = ("ax", "ay", "az"), ("wx", "wy", "wz")
 """What an accelerometer shows, and a gyroscope in space."""
