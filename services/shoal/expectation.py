@@ -11,10 +11,11 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.capabilities import require
 from shoal.errors import ComputationError, InputError
-from shoal.identification.recording.felt import check_felt, equipped, from_start
+from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.observation import camera, observe
 from shoal.identification.recording.plausible import check_units
 from shoal.identification.recording.reading import described, sampled
+from shoal.identification.recording.sensor_checks import check_felt
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.identification.recording.units import QUANTITIES as UNITS
 from shoal.scene import Scene
@@ -104,9 +105,12 @@ def _recording(scene: Scene, expected: ExpectedRecording, document: Path) -> Que
     if (first := float(instants[0])) < 0:
         raise InputError(f"path: {expected.path}: delay: the first sample would be {-first:g} s before the motion")
 
-    wanted = from_start(instants, channels)
+    wanted, native = from_start(instants, channels), get_engine("gauss")
+    options = asking(native, own, channels)
 
     def away(trajectory: Trajectory) -> float:
+        if options:
+            trajectory = native.simulate(equipped(own, channels), wanted, **options)
         seen = observe(trajectory, channels, camera(source), own)[0, len(wanted) - len(instants) :]
         return float(np.sqrt(np.nanmean(np.square(seen - found.values), axis=0).max()))
 

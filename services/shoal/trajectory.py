@@ -51,6 +51,7 @@ class Trajectory:
         (samples, markers, lanes); None where the engine does not tell them
     end: the whole state at the last instant, from which `initial_from` lets a scene go on; None where it is not known,
         as of several lanes and of other engines
+    states: coordinates and rates at `times`, of runs of the native engine that were asked for them, else None
     """
 
     engine: str
@@ -68,6 +69,7 @@ class Trajectory:
     velocities: Array | None = None
     rates: Array | None = None
     end: Mapping[str, Any] | None = None
+    states: Any = None
 
     @property
     def axes(self) -> str:

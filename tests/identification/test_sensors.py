@@ -21,7 +21,7 @@ from shoal.errors import InputError
 from shoal.identification import Problem, identify, measure
 from shoal.identification.recording.felt import equipped, from_start
 from shoal.identification.recording.observation import Camera, observe
-from shoal.identification.recording.source import REACTIONS, Channel
+from shoal.identification.recording.source import Channel
 from shoal.mechanics.start.start import complete
 from shoal.scene import Scene
 from shoal.trajectory import Array
@@ -157,7 +157,7 @@ def test_sensors_of_random_machines_show_what_newton_and_euler_say(seed: int) ->
     """A slider-crank, a four-bar linkage and a chain, with friction, springs and motors."""
     drawn = machine(np.random.default_rng(seed))
     joints, times = list(drawn.scene.joints), np.linspace(0.05, 1.0, 20)
-    cells = [Channel(joint=joint, quantity=what) for joint in joints for what in REACTIONS]
+    cells = [Channel(joint=joint, quantity=what) for joint in joints for what in ("fx", "fy", "torque")]
     imu = [Channel(marker="imu", quantity=axis, tilt=drawn.tilt) for axis in ("ax", "ay")]
     found = seen(drawn.scene, (*imu, *cells, GYRO), "gauss", times)
     starts = initial_poses(complete(drawn.scene).scene)
@@ -304,7 +304,7 @@ def test_the_page_of_an_answer_shows_sensors_without_a_marker(stated: Path) -> N
     ("channel", "words"),
     [
         ({"marker": "imu", "quantity": "acceleration"}, "quantity"),
-        ({"marker": "imu", "quantity": "az"}, "quantity"),
+        ({"marker": "imu", "quantity": "az"}, "az is measured in space; "),
         ({"marker": "post", "quantity": "ax"}, "no marker 'post'; there are imu, tip"),
         ({"quantity": "ay"}, "ay is measured at a marker; name it, and no joint"),
         ({"joint": "O", "quantity": "ay"}, "ay is measured at a marker; name it, and no joint"),
@@ -331,15 +331,15 @@ def of_cantilever(**channel: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("channel", "words"),
     [
-        ({"marker": "tip", "quantity": "ax"}, "ax is told of rigid machines; bodies.rod.element is ancf-cable"),
-        ({"joint": "O", "quantity": "fy"}, "fy is told of rigid machines; bodies.rod.element is ancf-cable"),
+        ({"marker": "tip", "quantity": "ax", "tilt": [0.1, 0.0, 0.0]}, "tilt: "),
+        ({"joint": "O", "quantity": "fz"}, "fz is measured in space; "),
         (
             {"marker": "gauge", "quantity": "strain", "height": 0.02},
             "height: 0.02 m is off the rod; at marker gauge it reaches from -0.01 to 0.01 m",
         ),
     ],
 )
-def test_a_gauge_beside_its_rod_and_other_sensors_of_bending_machines_are_refused(
+def test_a_gauge_beside_its_rod_and_sensors_of_space_on_a_rod_are_refused(
     stated: Path, channel: dict[str, Any], words: str
 ) -> None:
     (stated / "cantilever.yaml").write_text(yaml.safe_dump(cantilever().model_dump(mode="json")))

@@ -95,6 +95,7 @@ def test_angles_are_refused_in_space_and_z_in_the_plane(problem: Problem, quanti
         plane.load_scene()
 
 
-def test_experiments_are_designed_in_the_plane_only(problem: Problem) -> None:
-    with pytest.raises(InputError, match="the design of experiments is for planar scenes only"):
-        design(problem, duration=1.0, rate=50.0)
+def test_experiments_are_designed_in_space(problem: Problem) -> None:
+    found = design(problem, duration=1.0, rate=50.0, sensor_noise={"acceleration": 0.05, "rate": 0.005, "force": 0.05})
+    assert found.ok
+    assert {"imu", "force"} <= {sensor.quantity for sensor, _ in found.ranked}

@@ -37,17 +37,24 @@ class GaussEngine:
             lanes=True,
         )
 
-    def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
-        """Run one scene, under `auto` by the first integrator that can; see `Engine`."""
+    def simulate(
+        self, scene: Scene, times: Sequence[float] | Array | None = None, *, whole: bool = False
+    ) -> Trajectory:
+        """Run one scene, under `auto` by the first integrator that can; whole: with its states; see `Engine`."""
         from shoal.engines.prepared import prepared
 
-        return prepared(scene, self.threads)(times=times)
+        return prepared(scene, self.threads)(times=times, whole=whole)
 
     def simulate_many(
-        self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
+        self,
+        scene: Scene,
+        values: Mapping[str, Array],
+        times: Sequence[float] | Array | None = None,
+        *,
+        whole: bool = False,
     ) -> Trajectory:
-        """Run one scene per lane, all in compiled tiles; see `Engine`."""
+        """Run one scene per lane, all in compiled tiles; whole: with their states; see `Engine`."""
         from shoal.engines.prepared import prepared
 
         lanes = {path: np.ravel(np.asarray(numbers, dtype=float)) for path, numbers in values.items()}
-        return prepared(scene, self.threads)(lanes, times)
+        return prepared(scene, self.threads)(lanes, times, whole=whole)

@@ -51,28 +51,34 @@ class Prepared:
         return f"Prepared({self.scene.name})"
 
     def __call__(
-        self, values: Mapping[str, Any] | None = None, times: Sequence[float] | Array | None = None
+        self,
+        values: Mapping[str, Any] | None = None,
+        times: Sequence[float] | Array | None = None,
+        *,
+        whole: bool = False,
     ) -> Trajectory:
         """The motion, as `shoal.simulate` without its second runs gives it, to the last bit.
 
         values: fields of the scene to set, by dotted path; one-dimensional numpy arrays have one number per lane, and
         what is the same in all lanes may be a number. times: sampling instants [s], else the scene's own. New values
         make a new model, but for lanes that only start differently: they share the scene's model and its integrator.
-        Raises InputError.
+        whole: whether the trajectory tells its states, which no swarm does. Raises InputError.
         """
         lanes = {path: value for path, value in values.items() if _of_lanes(value)} if values else {}
         if values and len(lanes) < len(values):
-            return self._with({path: value for path, value in values.items() if path not in lanes})(lanes, times)
+            return self._with({path: value for path, value in values.items() if path not in lanes})(
+                lanes, times, whole=whole
+            )
         wanted = self._wanted(times)
         if lanes:
             count = check_lanes(self.scene, lanes, self._accepted)
             if swarm_motion.asked_for(self.scene):
                 return swarm_motion.simulate(swarm_motion.only_lane(self.scene, lanes, count), wanted)
-            return simulate(self.scene, wanted, lanes, threads=self._threads, machine=self._machine)
+            return simulate(self.scene, wanted, lanes, threads=self._threads, machine=self._machine, whole=whole)
         if swarm_motion.asked_for(self.scene):
             return swarm_motion.simulate(self.scene, wanted)
-        first = simulate(self.scene, wanted, threads=self._threads, machine=self._machine)
-        return persist(self.scene, first, self._threads)
+        first = simulate(self.scene, wanted, threads=self._threads, machine=self._machine, whole=whole)
+        return persist(self.scene, first, self._threads, whole=whole)
 
     def _with(self, values: dict[str, Any]) -> Prepared:
         """The scene with some of its fields set."""

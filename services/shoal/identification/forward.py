@@ -20,7 +20,7 @@ from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization
 from shoal.identification.placement import Placement, placement
 from shoal.identification.problem import Problem
-from shoal.identification.recording.felt import equipped, from_start
+from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import Camera, observe, without_turns
 from shoal.identification.recording.rows import Rows
@@ -193,7 +193,8 @@ class ForwardModel:
         channels = self.measurement.recordings[name].channels
         instants = from_start(times, channels)
         try:
-            trajectory = self._run(equipped(scene, channels), values, instants, lanes)
+            options = asking(self.engine, scene, channels)
+            trajectory = self._run(equipped(scene, channels), values, instants, lanes, options)
             seen = observe(trajectory, channels, view, scene, values)
         except InputError as error:
             asked = self.whole or self
@@ -210,11 +211,15 @@ class ForwardModel:
         seen[np.broadcast_to(failed, len(seen))] = np.nan
         return seen
 
-    def _run(self, scene: Scene, values: dict[str, Array], times: Array, lanes: int) -> Trajectory:
+    def _run(
+        self, scene: Scene, values: dict[str, Array], times: Array, lanes: int, options: dict[str, bool]
+    ) -> Trajectory:
         """One call of the engine, if there is time for it. Raises TimeIsUp, InputError."""
 
         def run(scene: Scene, times: Array) -> Trajectory:
-            return self.engine.simulate_many(scene, values, times) if values else self.engine.simulate(scene, times)
+            if values:
+                return self.engine.simulate_many(scene, values, times, **options)
+            return self.engine.simulate(scene, times, **options)
 
         if self.deadline is None:
             return run(scene, times)

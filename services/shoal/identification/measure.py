@@ -14,7 +14,7 @@ from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.identification.problem import RESERVED, Problem
 from shoal.identification.recording.computed import kept
-from shoal.identification.recording.felt import equipped, from_start
+from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import camera, observe, without_turns
 from shoal.identification.recording.plausible import check_units
@@ -119,7 +119,8 @@ def _computed(problem: Problem, source: EngineSource, scene: Scene, where: str) 
 
     def simulated() -> Array:
         wanted = from_start(instants, channels)
-        trajectory = get_engine(source.engine).simulate(equipped(truth, channels), wanted)
+        engine = get_engine(source.engine)
+        trajectory = engine.simulate(equipped(truth, channels), wanted, **asking(engine, truth, channels))
         if not trajectory.ok:
             raise ComputationError(f"{where}: the data could not be computed: {trajectory.message}")
         seen = without_turns(observe(trajectory, channels, camera(source), truth), channels)

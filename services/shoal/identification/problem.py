@@ -11,15 +11,18 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
-from shoal.identification.recording.felt import check_felt
-from shoal.identification.recording.source import Channel, EngineSource, FileSource, Source
+from shoal.identification.recording.sensor_checks import check_felt
+from shoal.identification.recording.source import IN_SPACE, Channel, EngineSource, FileSource, Source
 from shoal.scene import Scene, expression, load_scene
 from shoal.scene.load import names, read_named
 from shoal.scene.record import Positive, Record, one_line
 from shoal.scene.scene import Name
 from shoal.shelf import NAME, located, shelf
 
-MEASUREMENT = ("clock", "delay", "scale", "x", "y", "tilt", "mounting", "bias_ax", "bias_ay", "bias_rate")
+MEASUREMENT = (
+    *("clock", "delay", "scale", "x", "y", "tilt", "mounting"),
+    *("bias_ax", "bias_ay", "bias_az", "bias_rate", "bias_wx", "bias_wy", "bias_wz"),
+)
 """What a parameter can be that is none of the scene's: the path is `measurement.` and one of these."""
 RESERVED = "measurement"
 _POSITIVE = {
@@ -191,12 +194,13 @@ class Problem(Record):
                 if marker is not None and marker not in scene.markers:
                     known = ", ".join(scene.markers)
                     raise InputError(f"{where}: channels: no marker {marker!r}; there are {known}")
-            if (channel.quantity == "z") > (scene.dimensions == 3):
-                raise InputError(f"{where}: channels: z is measured in space; {scene.name} is a scene in the plane")
-            if channel.quantity in ("angle", "rate") and scene.dimensions == 3:
+            if channel.quantity in IN_SPACE and scene.dimensions == 2:
                 raise InputError(
-                    f"{where}: channels: {channel.quantity} is measured in the plane; in space x, y and z are"
+                    f"{where}: channels: {channel.quantity} is measured in space; {scene.name} is a scene in the plane"
                 )
+            if channel.quantity in ("angle", "rate") and scene.dimensions == 3:
+                instead = "x, y and z are" if channel.quantity == "angle" else "wx, wy and wz are"
+                raise InputError(f"{where}: channels: {channel.quantity} is measured in the plane; in space {instead}")
             if channel.noise is None and self.noise is None and any(p.prior for p in self.parameters.values()):
                 raise InputError(
                     f"{where}: noise: a prior weighs against the data by their noise; state it for {channel.place}"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class Affine:
         matrix = matrix if matrix.ndim == 3 else matrix[..., None]
         return Affine({unknown: mapped(matrix, c) for unknown, c in self.terms.items()}, mapped(matrix, self.constant))
 
-    @property
+    @cached_property
     def own(self) -> tuple[int, ...] | None:
         """The d unknowns that are the components of this vector, if it is just that."""
         axes = np.eye(len(self.constant))[..., None]

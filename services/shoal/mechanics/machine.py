@@ -30,6 +30,7 @@ from shoal.mechanics.model import Arrays, Model
 from shoal.mechanics.numerics.tile import SINGLE, WIDE, Array, Tile, stacked, tiles
 from shoal.mechanics.start import start
 from shoal.mechanics.start.redundancy import redundant_joints
+from shoal.mechanics.states import States, split
 from shoal.mechanics.still import Still
 from shoal.mechanics.verdict import Limits
 from shoal.mechanics.workspace import Workspace
@@ -61,7 +62,7 @@ class Machine:
         self.starts = Starts(scene, model)
         self._limits = Limits(scene, model)
         self._turns = _turns(scene, model)
-        self._idle: dict[tuple[bytes, int, int], tuple[Halts, list[Workspace]]] = {}
+        self._idle: dict[tuple[bytes, int, int, bool], tuple[Halts, list[Workspace]]] = {}
         self._told: dict[bool, bytes] = {}
         self._alike = not model.varies
 
@@ -73,8 +74,11 @@ class Machine:
         threads: int | None = None,
         seek: Callable[[Arrays, Work], Seek] | None = None,
         begin: float | None = None,
+        whole: bool = False,
     ) -> Trajectory:
         """The motion at `times` [s]; model: one that starts differently; begin: when the clock of the run was started.
+
+        whole: whether the trajectory tells its states.
 
         For threads and seek see `simulate`. Raises InputError if the step is beyond the stability limit.
         """
@@ -92,16 +96,18 @@ class Machine:
         numbers = np.empty((NUMBERS, moved.lanes))
         limits, floor = self._limits, self._limits.energy_floor(end)
         left: list[tuple[Array, Array, Array]] = []
+        states = States.room(moved, len(times)) if whole else None
 
         def march(part: slice) -> None:
             count = part.stop - part.start
             tile = SINGLE if count == 1 else WIDE
             spare = HALF if self._halves and 1 < count <= HALF else 0
-            halts, idle = self._workspaces(times, tile, spare)
+            halts, idle = self._workspaces(times, tile, spare, whole)
             space = None if seek is not None or not idle else _taken(idle)
             if space is None:
-                space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek, spare)
+                space = Workspace(self.scene.solver, moved, self.choice, tile, part, times, halts, seek, spare, whole)
             record = space.run(moved, part)
+            record = record if states is None else split(record, states, len(tile), part)
             told(record, len(tile), part.start, turns, limits.anchors, floor, limits.span, motion, numbers)
             if single:
                 left.append(space.left)
@@ -113,6 +119,7 @@ class Machine:
         workers = min(most, len(parts))
         if end == 0.0 and seek is None and self._alike and not self.model.constraints.size:
             self._still.told(moved, turns, limits.anchors, motion, numbers)
+            states = None if states is None else states._replace(q=moved.q0[None].copy(), v=moved.v0[None].copy())
             if single not in self._told:
                 start = np.concatenate([moved.q0[:, 0], moved.v0[:, 0]])
                 self._told[single] = pickle.dumps(self._facts(start if single else None))
@@ -142,6 +149,7 @@ class Machine:
             message=message,
             model=facts,
             end=ended,
+            states=states,
         )
 
     @cached_property
@@ -170,9 +178,9 @@ class Machine:
         explicit = facts_of(self.choice.name).explicit and not facts_of(self.choice.name).adaptive
         return explicit and self._alike and self.model.flexible > 0 and not self.model.constraints.size
 
-    def _workspaces(self, times: Array, tile: Tile, spare: int) -> tuple[Halts, list[Workspace]]:
+    def _workspaces(self, times: Array, tile: Tile, spare: int, whole: bool) -> tuple[Halts, list[Workspace]]:
         """Where the steps of a run end, and the workspaces for it that are idle."""
-        key = times.tobytes(), len(tile), spare
+        key = times.tobytes(), len(tile), spare, whole
         found = self._idle.get(key)
         if found is None:
             halts = halting(self.scene.solver, self.model, self.choice.name, float(times[-1]))

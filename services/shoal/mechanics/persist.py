@@ -22,13 +22,13 @@ DAMPED = 0.9
 TOLERANCE = 1e-8
 
 
-def persist(scene: Scene, first: Trajectory, threads: int | None = None) -> Trajectory:
+def persist(scene: Scene, first: Trajectory, threads: int | None = None, *, whole: bool = False) -> Trajectory:
     """The motion of one scene after its first run; under `auto` the first run that can be believed, if there is one."""
     if first.ok or scene.solver.integrator != "auto" or scene.solver.acceleration != "projection":
         return first
     for settings in _others(scene, first):
         other = scene.with_values({f"solver.{name}": value for name, value in settings.items()})
-        run = simulate(other, first.times, threads=threads)
+        run = simulate(other, first.times, threads=threads, whole=whole)
         if run.ok:
             reason = f"auto: {first.model['integrator']} ended with {first.status[0]}"
             wall_s = first.wall_s + run.wall_s

@@ -41,27 +41,29 @@ def simulate(
     threads: int | None = None,
     seek: Callable[[Arrays, Work], Seek] | None = None,
     machine: Callable[[Scene, float], Machine] = machine,
+    whole: bool = False,
 ) -> Trajectory:
     """Motion of a scene, or of one scene per lane, sampled at `times` [s].
 
     values: path in the scene -> one number per lane. Lanes are computed in tiles, tiles on threads. seek: who seeks the
     accelerations of a single lane in place of Gauss's principle as it is solved here. machine: who keeps the scene.
+    whole: whether the trajectory tells its states.
     Raises InputError if the scene cannot be modelled or its step is beyond the stability limit.
     """
     begin, end = time.perf_counter(), float(times[-1])
     if not values:
-        return machine(scene, end).run(times, threads=threads, seek=seek, begin=begin)
+        return machine(scene, end).run(times, threads=threads, seek=seek, begin=begin, whole=whole)
     lanes = len(next(iter(values.values())))
     found = scene.initial_from is not None
     if all(path.startswith("initial.") for path in values) and not start.gives_numbers(scene) and not found:
         kept = machine(scene, end)
-        return kept.run(times, kept.starts.at(values, lanes), threads=threads, begin=begin)
+        return kept.run(times, kept.starts.at(values, lanes), threads=threads, begin=begin, whole=whole)
     model = capped(build(scene.with_lanes(values), lanes, max(end, scene.solver.duration)))
     if found:
         each = ({path: float(numbers[lane]) for path, numbers in values.items()} for lane in range(lanes))
         model = _begun(model, [scene.with_values(one) for one in each])
     choice = pick(scene.solver, model, step_limit if end > 0 else _unlimited)
-    return Machine(scene, model, choice, alone=False).run(times, threads=threads, begin=begin)
+    return Machine(scene, model, choice, alone=False).run(times, threads=threads, begin=begin, whole=whole)
 
 
 def stable_step(scene: Scene, integrator: str) -> float:

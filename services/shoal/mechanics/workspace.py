@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import forces
+from shoal.mechanics import forces, states
 from shoal.mechanics.dynamics import Work, derived_rows, work_space
 from shoal.mechanics.gates import Seek, Sought, ready
 from shoal.mechanics.halts import Halts
@@ -61,6 +61,7 @@ class Workspace:
     """Room for the march of one tile of a model at given times [s], for one march at a time.
 
     seek: who seeks the accelerations, see `simulate`. spare: lanes at the end of the tile on which no element acts.
+    whole: whether all coordinates are sampled beside the markers, see `states.split`.
     """
 
     def __init__(
@@ -74,6 +75,7 @@ class Workspace:
         halts: Halts,
         seek: Callable[[Arrays, Work], Seek] | None = None,
         spare: int = 0,
+        whole: bool = False,
     ) -> None:
         if seek is not None and model.rubbing.size:
             raise InputError(
@@ -87,7 +89,7 @@ class Workspace:
             arrays = arrays._replace(elements=tuple(family._replace(spare=spare) for family in arrays.elements))
         scheme = choose(solver, model, tile, part, choice.name)
         steps = solver.max_steps if facts(choice.name).adaptive else int(np.ceil(times[-1] / solver.step - 1e-9))
-        rows = model.marker_rows.ravel()
+        rows = np.concatenate([model.marker_rows.ravel(), states.rows(model)]) if whole else model.marker_rows.ravel()
         frame = framed(tile, scheme, arrays, room, solver.step, steps, times.copy(), rows, solver.rank_tolerance, halts)
         own = frame.room, frame.scheme, frame.own, frame.record
         self._block, (room, scheme, loop, record) = gathered(own)

@@ -10,7 +10,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement
-from shoal.identification.recording.source import Channel, EngineSource
+from shoal.identification.recording.source import ACCELERATIONS, FORCES, MOMENTS, RATES, Channel, EngineSource
 from shoal.trajectory import Array
 
 _MOST = 4000
@@ -20,8 +20,10 @@ _MOST = 4000
 POSITION, ANGLE = "position", "angle"
 KINDS = {
     **dict.fromkeys(("x", "y", "z"), POSITION),
-    **dict.fromkeys(("ax", "ay"), "acceleration"),
-    **dict.fromkeys(("fx", "fy"), "force"),
+    **dict.fromkeys(ACCELERATIONS, "acceleration"),
+    **dict.fromkeys(RATES, "rate"),
+    **dict.fromkeys(FORCES, "force"),
+    **dict.fromkeys(MOMENTS, "torque"),
 }
 """What a quantity is as far as noise goes, where that is not the quantity itself."""
 SENSORS = {"acceleration": "m/s^2", "rate": "rad/s", "force": "N", "torque": "N m", "strain": "m/m"}

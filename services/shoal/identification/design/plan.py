@@ -25,7 +25,6 @@ from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.source import Channel, EngineSource
 from shoal.identification.spread.sensitivity import AGREED, sensitivity
 from shoal.scene import Scene
-from shoal.scene.dimensions import require_plane
 from shoal.trajectory import Array, plain
 
 _DURATIONS = (0.25, 0.5, 1.0, 1.5, 2.0)
@@ -111,7 +110,6 @@ def design(
     sizes = stated_noise(problem, noise, angle_noise, sensor_noise)
     duration, rate = today_of(source, measurement, duration, rate)
     stated = problem.load_scene(values)
-    require_plane(stated, "the design of experiments is")
     scene, sensors = sensors_of(stated, sizes)
     present = problem.channels_of(source)
     sensors = _possible(problem, scene, sensors, at)

@@ -5,18 +5,22 @@ They need the motion of every body, or of two places beside the gauge, for which
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shoal.engines.contract import Engine
+from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
-from shoal.identification.recording.source import ACCELERATIONS, STRAIN, Channel
+from shoal.identification.recording.sensor_checks import check_felt
+from shoal.identification.recording.source import MOMENTS, RATES, STRAIN, Channel
 from shoal.scene import Attachment, Rod, Scene
 from shoal.trajectory import Array, Trajectory
 
 if TYPE_CHECKING:
-    from shoal.mechanics.analysis.felt import Course, Felt
+    from shoal.mechanics.analysis.course import Course
+    from shoal.mechanics.analysis.felt import Felt
 
 _GAUGE = 1e-3
 """Length of a strain gauge over that of its rod."""
@@ -24,68 +28,38 @@ _BODY, _BEFORE, _BEHIND = "sensed-body-", "sensed-before-", "sensed-behind-"
 """Of the names of markers that sensors need."""
 
 
-def check_felt(scene: Scene, channels: tuple[Channel, ...]) -> None:
-    """Whether a machine can carry the sensors of some channels. Raises InputError."""
-    for channel in channels:
-        if not channel.is_felt:
-            continue
-        what = f"channels: {channel.quantity}"
-        if scene.dimensions != 2:
-            raise InputError(f"{what} is measured in the plane; in space x, y and z are")
-        if channel.joint is not None and channel.joint not in scene.joints:
-            raise InputError(f"{what}: no joint {channel.joint!r}; there are {', '.join(scene.joints) or 'none'}")
-        body = "" if channel.joint is not None else scene.markers[channel.marker].body
-        bending = {name: one.element for name, one in scene.bodies.items() if one.element != "rigid"}
-        if channel.quantity == STRAIN and body not in bending:
-            known = f"; flexible are {', '.join(bending)}" if bending else ""
-            raise InputError(
-                f"{what} is measured on a flexible rod; {body}, with marker {channel.marker}, is rigid{known}"
-            )
-        if channel.quantity == STRAIN and bending[body] == "modal":
-            raise InputError(f"{what} is told of rods of elements; bodies.{body}.element is modal, use ancf-cable")
-        rod = scene.bodies.get(body)
-        if channel.quantity == STRAIN and isinstance(rod, Rod) and rod.curvature:
-            raise InputError(f"{what} is told of straight rods; bodies.{body}.curvature is not zero")
-        if channel.quantity == STRAIN and isinstance(rod, Rod):
-            _on_its_rod(scene, channel, rod)
-        if channel.quantity != STRAIN and bending:
-            name, element = next(iter(bending.items()))
-            raise InputError(
-                f"{what} is told of rigid machines; bodies.{name}.element is {element}, where strain, x, y, angle and "
-                "rate can be measured"
-            )
-
-
-def _on_its_rod(scene: Scene, channel: Channel, rod: Rod) -> None:
-    """Whether a gauge is within the height of its rod. Raises InputError."""
-    share = float(scene.location(scene.markers[channel.marker])[0]) / rod.length
-    end = rod.height if rod.end_height is None else rod.end_height
-    side = 0.5 * (rod.height + share * (end - rod.height))
-    if abs(channel.height) > side * (1 + 1e-9):
-        raise InputError(
-            f"channels: height: {channel.height:g} m is off the rod; at marker {channel.marker} it reaches from "
-            f"{-side:g} to {side:g} m"
-        )
-
-
-def is_flexible(body: object) -> bool:
-    """Whether a body is a rod that bends."""
-    return isinstance(body, Rod) and body.element != "rigid"
-
-
 def from_start(times: Array, channels: tuple[Channel, ...]) -> Array:
     """Instants [s] that show some channels at `times`: with the start before them, where turns are counted from it."""
-    counted = any(channel.to is not None or channel.is_dynamic for channel in channels)
+    counted = any(channel.to is not None or channel.is_felt for channel in channels)
     return np.append(0.0, times) if counted and times[0] > 0.0 else times
+
+
+def needs_states(scene: Scene, channels: tuple[Channel, ...]) -> bool:
+    """Whether sensors of some channels feel more than the motion of bodies tells: the machine bends or is in space."""
+    if scene.dimensions == 3:
+        return any(channel.is_felt for channel in channels)
+    bends = any(body.element != "rigid" for body in scene.bodies.values())
+    return bends and any(channel.is_dynamic for channel in channels)
+
+
+def asking(engine: Engine, scene: Scene, channels: tuple[Channel, ...]) -> dict[str, bool]:
+    """Options by which an engine's run tells what the sensors of some channels need. Raises InputError if it cannot."""
+    if not needs_states(scene, channels):
+        return {}
+    if not isinstance(engine, GaussEngine):
+        quantity = next(channel.quantity for channel in channels if channel.is_felt)
+        where = "in space" if scene.dimensions == 3 else "of a machine that bends"
+        raise InputError(f"channels: {quantity} {where} is told by the engine gauss alone; found {engine.name}")
+    return {"whole": True}
 
 
 def equipped(scene: Scene, channels: tuple[Channel, ...]) -> Scene:
     """The scene with the markers that the sensors of some channels need."""
     markers: dict[str, Attachment] = {}
-    if any(channel.is_dynamic for channel in channels):
+    if any(channel.is_dynamic for channel in channels) and not needs_states(scene, channels):
         markers |= {f"{_BODY}{name}": Attachment(body=name, point=(0.0, 0.0)) for name in scene.bodies}
     for channel in channels:
-        if channel.quantity == STRAIN:
+        if channel.quantity == STRAIN and scene.dimensions == 2:
             at = scene.markers[channel.marker]
             for prefix, place in zip((_BEFORE, _BEHIND), _ends(scene, at), strict=True):
                 markers[f"{prefix}{channel.marker}"] = Attachment(body=at.body, point=(place, 0.0))
@@ -111,66 +85,96 @@ def felt(
 ) -> dict[int, Array]:
     """Channels of sensors by their number, (samples, lanes), nan where a lane failed. Raises InputError.
 
-    scene, values: of the machine and its lanes; mounting [rad]: of accelerometers, a number or (lanes,)
+    scene, values: of the machine and its lanes; mounting [rad]: of IMUs, a number or (lanes,)
     """
     numbers = [k for k, channel in enumerate(channels) if channel.is_felt]
     if not numbers:
         return {}
     if scene is None:
         raise InputError(f"channels: {channels[numbers[0]].quantity} is not told by a motion alone")
-    found = {k: _strain(trajectory, scene, channels[k]) for k in numbers if channels[k].quantity == STRAIN}
+    planar = scene.dimensions == 2
+    found = {k: _strain(trajectory, scene, channels[k]) for k in numbers if planar and channels[k].quantity == STRAIN}
     dynamic = [k for k in numbers if k not in found]
     if not dynamic:
         return found
     check_felt(scene, tuple(channels[k] for k in dynamic))
-    if trajectory.velocities is None or trajectory.rates is None:
-        quantity = channels[dynamic[0]].quantity
-        raise InputError(f"channels: {quantity} needs rates, of which engine {trajectory.engine} tells none; use gauss")
-    from shoal.mechanics.analysis.felt import machine, machines  # slow to import
-
     # Lanes that differ by their sensors alone share one motion.
     turned = np.atleast_1d(np.asarray(mounting, dtype=float))
     shape = len(trajectory.times), max(trajectory.lanes, len(turned))
     turned = np.broadcast_to(turned, shape[1])
     found |= {k: np.full(shape, np.nan) for k in dynamic}
-    course = _course(trajectory, scene)
-    motion = course.places, course.angles, course.velocities, course.rates
-    whole = [lane for lane in range(trajectory.lanes) if all(np.all(np.isfinite(part[..., lane])) for part in motion)]
-    if not whole:
-        return found
     joints = tuple(dict.fromkeys(c.joint for k in dynamic if (c := channels[k]).joint is not None))
-    alone = (machine(scene, values, course, lane) for lane in whole)
-    lanes = alone if joints else machines(scene, values, course, whole)
-    for lane, one in zip(whole, lanes, strict=True):
+    told = _by_states if needs_states(scene, channels) else _by_course
+    for lane, one in told(trajectory, scene, values, channels[dynamic[0]], bool(joints)):
         views = slice(None) if trajectory.lanes == 1 else slice(lane, lane + 1)
         for k, signal in _of_lane(one, scene, channels, dynamic, joints, turned[views]).items():
             found[k][:, views] = signal
     return found
 
 
+def _by_states(
+    trajectory: Trajectory, scene: Scene, values: Mapping[str, Array], channel: Channel, alone: bool
+) -> Iterator[tuple[int, Felt]]:
+    """The lanes that ran to the end, by their states; alone: each on a model of its own."""
+    from shoal.mechanics.analysis.felt import lane_of, lanes_of  # slow to import
+
+    states = trajectory.states
+    if states is None:
+        raise InputError(f"channels: {channel.quantity} needs all coordinates, which this motion does not tell")
+    finite = np.all(np.isfinite(states.q) & np.isfinite(states.v), axis=(0, 1))
+    whole = np.flatnonzero(finite).tolist()
+    if alone and trajectory.lanes > 1:
+        yield from ((lane, lane_of(states, trajectory.times, scene, values, lane)) for lane in whole)
+    else:
+        yield from zip(whole, lanes_of(states, trajectory.times, whole), strict=True)
+
+
+def _by_course(
+    trajectory: Trajectory, scene: Scene, values: Mapping[str, Array], channel: Channel, alone: bool
+) -> Iterator[tuple[int, Felt]]:
+    """The same of a rigid machine in the plane, by the motion of its bodies, whichever engine tells it."""
+    from shoal.mechanics.analysis.course import machine, machines  # slow to import
+
+    if trajectory.velocities is None or trajectory.rates is None:
+        raise InputError(
+            f"channels: {channel.quantity} needs rates, of which engine {trajectory.engine} tells none; use gauss"
+        )
+    course = _course(trajectory, scene)
+    motion = course.places, course.angles, course.velocities, course.rates
+    whole = [lane for lane in range(trajectory.lanes) if all(np.all(np.isfinite(part[..., lane])) for part in motion)]
+    if alone:
+        yield from ((lane, machine(scene, values, course, lane)) for lane in whole)
+    elif whole:
+        yield from zip(whole, machines(scene, values, course, whole), strict=True)
+
+
 def _of_lane(
     one: Felt, scene: Scene, channels: tuple[Channel, ...], numbers: list[int], joints: tuple[str, ...], turned: Array
 ) -> dict[int, Array]:
-    """What accelerometers, turned by some angles, and load cells show of one lane, (samples, angles or 1) each."""
-    from shoal.mechanics.analysis.load_cells import reactions_along  # slow to import
+    """What the sensors on one lane show, those that are turned by some angles, (samples, angles or 1) each."""
+    from shoal.mechanics.analysis.reactions_along import reactions_along  # slow to import
 
     reactions = reactions_along(one, joints) if joints else {}
     c, s, found = np.cos(turned), np.sin(turned), {}
     for k in numbers:
-        channel = channels[k]
+        channel, axis = channels[k], "xyz".find(channels[k].quantity[1:])
         if channel.joint is not None:
-            force, torque = reactions[channel.joint]
-            signal = torque if channel.quantity == "torque" else force[:, "xy".index(channel.quantity[1])]
-            found[k] = signal[:, None]
+            force, torque, drive = reactions[channel.joint]
+            vector = torque if channel.quantity in MOMENTS else force
+            about = torque if drive is None else drive
+            found[k] = about[:, None] if channel.quantity == "torque" else vector[:, [axis]]
+        elif channel.quantity == STRAIN:
+            found[k] = one.strain(scene.markers[channel.marker], channel.height, channel.side)[:, None]
         else:
-            x, y = one.specific_force(scene.markers[channel.marker], channel.tilt).T[..., None]
-            found[k] = c * x + s * y if channel.quantity == ACCELERATIONS[0] else c * y - s * x
+            sensed = one.spin if channel.quantity in RATES else one.specific_force
+            x, y, *rest = sensed(scene.markers[channel.marker], channel.tilt).T[..., None]
+            found[k] = (c * x + s * y, c * y - s * x, *rest)[axis]
     return found
 
 
 def _course(trajectory: Trajectory, scene: Scene) -> Course:
     """The motion of the bodies."""
-    from shoal.mechanics.analysis.felt import Course  # slow to import
+    from shoal.mechanics.analysis.course import Course  # slow to import
 
     rows = [trajectory.markers.index(f"{_BODY}{name}") for name in scene.bodies]
     assert trajectory.velocities is not None

@@ -17,7 +17,7 @@ from shoal.trajectory import Array, Trajectory
 class Camera(NamedTuple):
     """Where positions are seen from: at rotation(-tilt) (X - [x, y]) / scale, z at z / scale; numbers or (lanes,).
 
-    mounting, bias_ax, bias_ay, bias_rate: of inertial sensors, see `Clocked`
+    mounting and biases: of inertial sensors, see `Clocked`
     """
 
     scale: float | Array = 1.0
@@ -27,7 +27,11 @@ class Camera(NamedTuple):
     mounting: float | Array = 0.0
     bias_ax: float | Array = 0.0
     bias_ay: float | Array = 0.0
+    bias_az: float | Array = 0.0
     bias_rate: float | Array = 0.0
+    bias_wx: float | Array = 0.0
+    bias_wy: float | Array = 0.0
+    bias_wz: float | Array = 0.0
 
 
 STRAIGHT = Camera()
@@ -67,7 +71,7 @@ def observe(
     sensed = felt(trajectory, channels, scene, values or {}, seen_by.mounting)
     for number, channel in enumerate(channels):
         if number in sensed:
-            bias = {"ax": seen_by.bias_ax, "ay": seen_by.bias_ay}.get(channel.quantity, 0.0)
+            bias = getattr(seen_by, f"bias_{channel.quantity}", 0.0)
             columns.append(sensed[number] + bias)
             continue
         index = trajectory.markers.index(channel.marker)

@@ -10,15 +10,41 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from shoal.scene.record import Angle, NonNegative, Positive, Record
 from shoal.table_units import AccelerationUnit, AngleUnit, ForceUnit, LengthUnit, StrainUnit, TorqueUnit
 
-Quantity = Literal["x", "y", "z", "angle", "rate", "ax", "ay", "fx", "fy", "torque", "strain"]
-ACCELERATIONS, REACTIONS, STRAIN = ("ax", "ay"), ("fx", "fy", "torque"), "strain"
-"""What an accelerometer, a load cell in a joint, and a strain gauge show."""
+Quantity = Literal[
+    "x",
+    "y",
+    "z",
+    "angle",
+    "rate",
+    "ax",
+    "ay",
+    "az",
+    "wx",
+    "wy",
+    "wz",
+    "fx",
+    "fy",
+    "fz",
+    "mx",
+    "my",
+    "mz",
+    "torque",
+    "strain",
+]
+ACCELERATIONS, RATES = ("ax", "ay", "az"), ("wx", "wy", "wz")
+"""What an accelerometer shows, and a gyroscope in space."""
+FORCES, MOMENTS, STRAIN = ("fx", "fy", "fz"), ("mx", "my", "mz"), "strain"
+REACTIONS = (*FORCES, *MOMENTS, "torque")
+"""What a load cell in a joint and a strain gauge show."""
+IN_SPACE = ("z", "az", *RATES, "fz", *MOMENTS)
+"""What is measured in space only."""
 _UNITS: dict[str, Any] = {
     **dict.fromkeys(("x", "y", "z"), LengthUnit),
-    **dict.fromkeys(("angle", "rate"), AngleUnit),
+    **dict.fromkeys(("angle", "rate", *RATES), AngleUnit),
     **dict.fromkeys(ACCELERATIONS, AccelerationUnit),
-    **dict.fromkeys(("fx", "fy"), ForceUnit),
-    **{"torque": TorqueUnit, STRAIN: StrainUnit},
+    **dict.fromkeys(FORCES, ForceUnit),
+    **dict.fromkeys((*MOMENTS, "torque"), TorqueUnit),
+    STRAIN: StrainUnit,
 }
 
 
@@ -30,10 +56,12 @@ def units_of(quantity: str) -> tuple[str, ...]:
 class Channel(Record):
     """One measured signal: a marker's x, y, in space z [m], angle [rad] or rate of its angle [rad/s].
 
-    ax, ay [m/s^2]: acceleration less gravity at a marker, along the axes of its body turned by `tilt` [rad], as an
-    accelerometer shows it. fx, fy [N], torque [N m]: what a `joint` exerts on its second body, along the axes of the
-    ground, friction and drive included. strain: of a flexible rod along its axis, at a marker and a
-    `height` above the axis [m].
+    ax, ay, in space az [m/s^2]: acceleration less gravity at a marker, along the axes of its body turned by `tilt`
+    [rad], as an accelerometer shows it; wx, wy, wz [rad/s]: angular velocity in space along these axes, for which the
+    tilt may be a rotation vector. fx, fy [N], torque [N m]: what a `joint` exerts on its second body, along the axes of
+    the ground, friction and drive included; in space fx, fy, fz, mx, my, mz, and of a drive the torque about its axis.
+    strain: of a flexible rod along its axis, at a marker and a `height` above the axis, in space a `side` of it
+    towards the local z axis too [m].
 
     With `to`, an angle or rate is that of the marker's body less that of the body at another marker: of a joint between
     them, what its encoder shows. Neither tilts with the camera.
@@ -49,8 +77,9 @@ class Channel(Record):
     joint: str | None = None
     quantity: Quantity
     to: str | None = None
-    tilt: Angle = 0.0
+    tilt: Angle | tuple[Angle, Angle, Angle] = 0.0
     height: float = 0.0
+    side: float = 0.0
     column: str = ""
     scale: float = 1.0
     offset: float = 0.0
@@ -71,10 +100,11 @@ class Channel(Record):
             raise ValueError(f"joint: {self.quantity} is measured in a joint; name it, and no marker")
         if self.quantity not in REACTIONS and (self.joint is not None or not self.marker):
             raise ValueError(f"marker: {self.quantity} is measured at a marker; name it, and no joint")
-        if self.tilt and self.quantity not in ACCELERATIONS:
+        if self.tilt and self.quantity not in (*ACCELERATIONS, *RATES):
             raise ValueError(f"tilt: of the axes of ax and ay, found {self.quantity}")
-        if self.height and self.quantity != STRAIN:
-            raise ValueError(f"height: of a strain gauge above the axis of its rod, found {self.quantity}")
+        for field in ("height", "side"):
+            if getattr(self, field) and self.quantity != STRAIN:
+                raise ValueError(f"{field}: of a strain gauge above the axis of its rod, found {self.quantity}")
         return self
 
     @model_validator(mode="after")
@@ -89,12 +119,14 @@ class Channel(Record):
     def name(self) -> str:
         """What is measured, in words."""
         height = f" at height {self.height:g} m" if self.height else ""
+        height += f" to the side by {self.side:g} m" if self.side else ""
         return f"{self.quantity} of {self.place}{f' against {self.to}' if self.to else ''}{height}"
 
     @property
     def kind(self) -> str:
         """What is measured in a place, as one word."""
-        height = f"_at_{self.height:g}" if self.height else ""
+        height = f"_at_{self.height:g}" if self.height or self.side else ""
+        height += f"_{self.side:g}" if self.side else ""
         return self.quantity + (f"_against_{self.to}" if self.to else "") + height
 
     @property
@@ -110,7 +142,7 @@ class Channel(Record):
     @property
     def is_felt(self) -> bool:
         """Whether a sensor on the machine shows it that knows no camera: of acceleration, force or strain."""
-        return self.quantity in (*ACCELERATIONS, *REACTIONS, STRAIN)
+        return self.quantity in (*ACCELERATIONS, *RATES, *REACTIONS, STRAIN)
 
     @property
     def is_dynamic(self) -> bool:
@@ -154,8 +186,8 @@ class Clocked(Record):
     A marker at X [m] is recorded at rotation(-tilt) (X - [x, y]) / scale, its z at z / scale, angles less `tilt`:
     clock, delay, scale, x, y and tilt may be parameters, with the paths `measurement.clock` and so on; mounting and
     the biases too.
-    mounting: angle [rad] that accelerometers are turned by beside their own `tilt`
-    bias_ax, bias_ay [m/s^2], bias_rate [rad/s]: what these channels show too much
+    mounting: angle [rad] about its z axis that an IMU is turned by beside its own `tilt`
+    bias_ax, bias_ay, bias_az [m/s^2], bias_rate, bias_wx, bias_wy, bias_wz [rad/s]: what these channels show too much
     known: fields of the scene that are different in this recording
     channels: instead of those of the problem
     hold_out: windows [from, to] in seconds of the recording's clock that are predicted instead of fitted
@@ -170,7 +202,11 @@ class Clocked(Record):
     mounting: float = 0.0
     bias_ax: float = 0.0
     bias_ay: float = 0.0
+    bias_az: float = 0.0
     bias_rate: float = 0.0
+    bias_wx: float = 0.0
+    bias_wy: float = 0.0
+    bias_wz: float = 0.0
     known: dict[str, Any] = {}
     channels: Annotated[list[Channel], Field(min_length=1)] | None = None
     hold_out: Windows = []

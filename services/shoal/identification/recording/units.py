@@ -10,14 +10,19 @@ if TYPE_CHECKING:
 
 QUANTITIES = {
     **{"x": "m", "y": "m", "z": "m", "angle": "rad", "rate": "rad/s"},
-    **{"ax": "m/s²", "ay": "m/s²", "fx": "N", "fy": "N", "torque": "N m", "strain": "m/m"},
+    **dict.fromkeys(("ax", "ay", "az"), "m/s²"),
+    **dict.fromkeys(("wx", "wy", "wz"), "rad/s"),
+    **dict.fromkeys(("fx", "fy", "fz"), "N"),
+    **dict.fromkeys(("mx", "my", "mz", "torque"), "N m"),
+    "strain": "m/m",
 }
 """Of what a channel measures."""
 _FIELDS = {
     "angle": "rad",
     "tilt": "rad",
     "mounting": "rad",
-    **{"bias_ax": "m/s²", "bias_ay": "m/s²", "bias_rate": "rad/s"},
+    **{"bias_ax": "m/s²", "bias_ay": "m/s²", "bias_az": "m/s²"},
+    **dict.fromkeys(("bias_rate", "bias_wx", "bias_wy", "bias_wz"), "rad/s"),
     "direction": "rad",
     "rate": "rad/s",
     "length": "m",

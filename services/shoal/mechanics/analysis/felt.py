@@ -1,97 +1,56 @@
-"""What accelerometers on a rigid machine in the plane feel along its motion, whichever engine computed that.
-
-The motion of the bodies gives the coordinates and their rates, and Gauss's principle the accelerations.
-"""
+"""What sensors on a machine feel along its motion: Gauss's principle tells the accelerations of all coordinates."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 
 import numpy as np
 
-from shoal.errors import InputError
+from shoal.mechanics import plane
+from shoal.mechanics import rotation as turns_of
+from shoal.mechanics.affine import Affine
+from shoal.mechanics.analysis import triads
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.assembly.groups import place_of
-from shoal.mechanics.frames import RigidFrame
-from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.frames import BeamFrame, Frame, PointFrame
+from shoal.mechanics.numerics.tile import Array, Index
+from shoal.mechanics.states import States
 from shoal.scene import Attachment, Scene
+from shoal.scene.dimensions import padded
 
-_TURN = 1.0
+TURN = 1.0
 """The turns of angle forces are counted at poses that are no farther apart [rad]."""
+_GAUGE = 1e-3
+"""Length of a strain gauge over that of its rod."""
 
-
-@dataclass(frozen=True)
-class Course:
-    """How the bodies of a scene move, in its order, at increasing times [s], of which the first is the start.
-
-    places [m]: of the origins of their frames, (samples, bodies, 2, lanes), and velocities [m/s]; angles [rad],
-    continuous, (samples, bodies, lanes), and rates [rad/s]
-    """
-
-    times: Array
-    places: Array
-    velocities: Array
-    angles: Array
-    rates: Array
+Tilt = float | tuple[float, ...]
+"""Angle [rad] of a sensor's axes against those of its body, about z, or in space a rotation vector."""
 
 
 class Felt:
-    """One lane of a machine along its motion. Raises InputError if the scene cannot be modelled.
+    """One lane of a machine along its motion.
 
-    evaluator: of a model one of whose lanes it is
+    evaluator: of a model one of whose lanes it is; times [s]: of the samples, the first is the start; q, v: coordinates
+    and rates, (samples, unknowns); way: tells poses from the start on, see `Evaluator.along`; lane: of the model
     """
 
-    def __init__(self, evaluator: Evaluator, course: Course, lane: int, of_model: int = 0) -> None:
-        """lane: of the course; of_model: of the evaluator's model."""
-        self.evaluator, self.times, self.lane = evaluator, course.times, of_model
+    def __init__(
+        self, evaluator: Evaluator, times: Array, q: Array, v: Array, way: Callable[[], tuple[Array, Index]], lane: int
+    ) -> None:
+        self.evaluator, self.times, self.q, self.v, self.lane = evaluator, times, q, v, lane
+        self._way = way
         self.scene = scene = evaluator.model.stated
-        self.gravity = np.array([float(np.ravel(part)[of_model % np.size(part)]) for part in scene.gravity[:2]])
-        numbers = {name: number for number, name in enumerate(scene.bodies)}
-        order = [numbers[name] for name in evaluator.model.frames]
-        own = (course.places, course.angles, course.velocities, course.rates)
-        self._places, self._angles, velocities, rates = (part[..., lane][:, order] for part in own)
-        vectors = [vector for frame in evaluator.model.frames.values() for vector in frame.vectors]
-        unknowns = evaluator.model.unknowns
-        found = points(vectors, unknowns, of_model)
-        matrix = found.matrix.reshape(found.constant.size, unknowns)
-        if unknowns and np.linalg.matrix_rank(matrix) < unknowns:
-            raise InputError("ground_points: sensors of force know no moving point that no body is joined to")
-        self._inverse, self._constant = np.linalg.pinv(matrix), found.constant
-        self.q = self._coordinates(self._places, self._angles)
-        turning = rates[..., None] * quarter(_direction(self._angles))
-        self.v = self._stacked(velocities, turning) @ self._inverse.T
-
-    def _coordinates(self, places: Array, angles: Array) -> Array:
-        """Of poses of the bodies, (samples, unknowns)."""
-        here = self._stacked(places, _direction(angles))
-        return np.asarray((here - self._constant.ravel()) @ self._inverse.T)
-
-    def _stacked(self, origins: Array, directors: Array) -> Array:
-        """What is known of the vectors of all frames, (samples, 2 vectors)."""
-        parts = list[Array]()
-        for k, frame in enumerate(self.evaluator.model.frames.values()):
-            parts += [origins[:, k], directors[:, k]] if isinstance(frame, RigidFrame) else [origins[:, k]]
-        return np.concatenate(parts, axis=1)
+        stated = padded(scene.gravity, scene.dimensions)
+        self.gravity = np.array([float(np.ravel(part)[lane % np.size(part)]) for part in stated])
 
     @cached_property
     def _along(self) -> tuple[Array, Array]:
-        """Accelerations and turns; between samples that are far apart the bodies turn evenly."""
-        way, sample = [self.q[:1]], [0]
-        turned = np.max(np.abs(np.diff(self._angles, axis=0)), axis=1, initial=0.0)
+        """Accelerations and turns."""
         counted = self.evaluator.model.forces.size > 0
-        for k, count in enumerate(np.ceil(turned / _TURN).astype(int).tolist(), start=1):
-            if counted and count > 1:
-                share = np.arange(1, count)[:, None] / count
-                place = self._places[k - 1] + share[..., None] * (self._places[k] - self._places[k - 1])
-                angle = self._angles[k - 1] + share * (self._angles[k] - self._angles[k - 1])
-                way.append(self._coordinates(place, angle))
-                sample += [-1] * (count - 1)
-            way.append(self.q[k : k + 1])
-            sample.append(k)
-        return self.evaluator.along(np.concatenate(way), np.array(sample), self.v, np.asarray(self.times, dtype=float))
+        way, sample = self._way() if counted else (self.q, np.arange(len(self.q)))
+        return self.evaluator.along(way, sample, self.v, np.asarray(self.times, dtype=float))
 
     @property
     def a(self) -> Array:
@@ -103,39 +62,113 @@ class Felt:
         """The angles that angle forces have counted at every sample [rad], (samples, forces)."""
         return self._along[1]
 
-    def specific_force(self, at: Attachment, tilt: float = 0.0) -> Array:
-        """Acceleration less gravity at a place of a body, along axes turned by `tilt` [rad] from its own.
+    def specific_force(self, at: Attachment, tilt: Tilt = 0.0) -> Array:
+        """Acceleration less gravity at a place of a body, along axes turned by `tilt` from its own.
 
-        [m/s^2], (samples, 2): at rest an accelerometer shows gravity upwards.
+        [m/s^2], (samples, d): at rest an accelerometer shows gravity upwards.
         """
-        model = self.evaluator.model
         name, place = place_of(self.scene, at)
-        frame = model.frames[name]
-        found = points([frame.point(place), frame.direction(place)], model.unknowns, self.lane)
+        frame = self._frame(name)
+        found = points([frame.point(place), frame.direction(place)], self.evaluator.model.unknowns, self.lane)
         acceleration = self.a @ found.matrix[0].T - self.gravity
+        if self.scene.dimensions != plane.DIMENSIONS:
+            axes, _ = self._axes(frame, place)
+            return np.einsum("ij,njk,nk->ni", _sensor(tilt), axes, acceleration)
+        assert not isinstance(tilt, tuple)
         x = self.q @ found.matrix[1].T + found.constant[1]
         x = x / np.linalg.norm(x, axis=1, keepdims=True)
         c, s = np.cos(tilt), np.sin(tilt)
         x = c * x + s * quarter(x)
         return np.stack([dot(x, acceleration), dot(quarter(x), acceleration)], axis=1)
 
+    def spin(self, at: Attachment, tilt: Tilt = 0.0) -> Array:
+        """Angular velocity in space along the same axes [rad/s], (samples, 3)."""
+        name, place = place_of(self.scene, at)
+        axes, change = self._axes(self._frame(name), place)
+        own = [dot(change[:, i], axes[:, j]) for i, j in ((1, 2), (2, 0), (0, 1))]
+        return np.asarray(np.stack(own, axis=1) @ _sensor(tilt).T)
 
-def machines(scene: Scene, values: Mapping[str, Array], course: Course, lanes: list[int]) -> Iterator[Felt]:
-    """Lanes of a scene along their motion, on one model. Raises InputError."""
-    picked = {path: np.asarray(numbers, dtype=float)[lanes] for path, numbers in values.items()}
-    model = build(scene.with_lanes(picked), len(lanes), float(course.times[-1]))
-    for k, lane in enumerate(lanes):
-        yield Felt(Evaluator(model, k), course, lane, k)
+    def strain(self, at: Attachment, height: float, side: float) -> Array:
+        """Of a straight director rod along its axis, at a height (local y) and to a side (z) of it [m], (samples,)."""
+        name, place = place_of(self.scene, at)
+        frame = self._frame(name)
+        assert isinstance(frame, BeamFrame)
+        length = float(np.ravel(frame.length)[self.lane % np.size(frame.length)])
+        gauge = _GAUGE * length
+        middle = min(max(float(place[0]), gauge / 2), length - gauge / 2)
+        ends = [(middle + sign * gauge / 2, 0.0, 0.0) for sign in (-1.0, 1.0)]
+        found = points([frame.point(end) for end in ends], self.evaluator.model.unknowns, self.lane)
+        begin, end = (self.q @ found.matrix[k].T + found.constant[k] for k in range(2))
+        before, behind = (self._axes(frame, one)[0] for one in ends)
+        change, mean = (behind - before) / gauge, (behind + before) / 2
+        about_y, about_z = dot(change[:, 2], mean[:, 0]), dot(change[:, 0], mean[:, 1])
+        return np.asarray(np.linalg.norm(end - begin, axis=1) / gauge - 1.0 - height * about_z + side * about_y)
+
+    def _frame(self, body: str) -> Frame:
+        return self.evaluator.model.frames[body]
+
+    def _axes(self, frame: Frame, place: tuple[float, ...]) -> tuple[Array, Array]:
+        """Unit vectors along the axes of a body at a place in space, as rows, and their rates, (samples, 3, 3)."""
+        if isinstance(frame, PointFrame):
+            fixed = np.broadcast_to(np.eye(3), (len(self.q), 3, 3))
+            return fixed, np.zeros_like(fixed)
+        return triads.along(frame, place, self.q, self.v, self.lane)
 
 
-def machine(scene: Scene, values: Mapping[str, Array], course: Course, lane: int) -> Felt:
-    """A lane of a scene along its motion, on a model of its own. Raises InputError."""
+def lanes_of(states: States, times: Array, lanes: list[int]) -> Iterator[Felt]:
+    """Lanes of a motion whose states are known, on its model."""
+    model = states.model
+    if model.slowed:  # what moves more slowly than it would is felt as it would move
+        model = build(model.stated, model.lanes, float(times[-1]))
+    for lane in lanes:
+        yield _felt(Evaluator(model, lane), states, times, lane, lane)
+
+
+def lane_of(states: States, times: Array, scene: Scene, values: Mapping[str, Array], lane: int) -> Felt:
+    """A lane of a motion whose states are known, on a model of its own. Raises InputError."""
     one = scene.with_values({path: float(numbers[lane]) for path, numbers in values.items()})
-    return Felt(Evaluator.of(one, horizon=float(course.times[-1])), course, lane)
+    return _felt(Evaluator.of(one, horizon=float(times[-1])), states, times, lane, 0)
 
 
-def _direction(angle: Array) -> Array:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+def _felt(evaluator: Evaluator, states: States, times: Array, lane: int, of_model: int) -> Felt:
+    q, v = states.q[..., lane], states.v[..., lane]
+    return Felt(evaluator, times, q, v, lambda: _joined(evaluator, times, q, v, of_model), of_model)
+
+
+def _joined(evaluator: Evaluator, times: Array, q: Array, v: Array, lane: int) -> tuple[Array, Index]:
+    """Poses close enough to count turns: those far apart are joined by cubics."""
+    found = points(_directions(evaluator), evaluator.model.unknowns, lane)
+    line, change = (np.einsum("kdu,nu->nkd", found.matrix, one) for one in (q, v))
+    line = line + found.constant
+    speed = np.max(np.linalg.norm(change, axis=-1) / np.linalg.norm(line, axis=-1), axis=1, initial=0.0)
+    way, sample = [q[:1]], [0]
+    for k, step in enumerate(np.diff(times).tolist(), start=1):
+        count = int(np.ceil(step * max(speed[k - 1], speed[k]) / TURN))
+        if count > 1:
+            x = np.arange(1, count)[:, None] / count
+            left, right = (1 + 2 * x) * (1 - x) ** 2 * q[k - 1], x**2 * (3 - 2 * x) * q[k]
+            way.append(left + right + step * (x * (1 - x) ** 2 * v[k - 1] + x**2 * (x - 1) * v[k]))
+            sample += [-1] * (count - 1)
+        way.append(q[k : k + 1])
+        sample.append(k)
+    return np.concatenate(way), np.array(sample)
+
+
+def _directions(evaluator: Evaluator) -> list[Affine]:
+    """Of all bodies, of flexible ones at every node."""
+    found = list[Affine]()
+    for frame in evaluator.model.frames.values():
+        if isinstance(frame, BeamFrame):
+            found += [node[1] for node in frame.nodes]
+        elif not isinstance(frame, PointFrame):
+            found += frame.directors
+    return found
+
+
+def _sensor(tilt: Tilt) -> Array:
+    """The axes of a sensor as rows, along those of its body."""
+    vector = np.array(tilt if isinstance(tilt, tuple) else (0.0, 0.0, tilt))
+    return np.asarray(turns_of.of_vector(vector[:, None])[..., 0]).T
 
 
 def quarter(vectors: Array) -> Array:

@@ -87,9 +87,19 @@ class Reactions:
 
 
 def reactions_of(
-    evaluator: Evaluator, q: Array, v: Array, a: Array, t: float = 0.0, *, bodies: FreeBodies | None = None
+    evaluator: Evaluator,
+    q: Array,
+    v: Array,
+    a: Array,
+    t: float = 0.0,
+    *,
+    bodies: FreeBodies | None = None,
+    naming: bool = True,
 ) -> Reactions:
-    """Reactions at one state: coordinates, rates and accelerations, each (unknowns,)."""
+    """Reactions at one state: coordinates, rates and accelerations, each (unknowns,).
+
+    naming: whether the constraints that depend on others are named, which takes most of the time
+    """
     bodies = bodies or FreeBodies(evaluator, t)
     rubbing = evaluator.model.forces.size - bodies.evaluator.model.forces.size
     bodies.evaluator.turns = evaluator.turns[rubbing:]
@@ -139,7 +149,7 @@ def reactions_of(
             {unknown[k].name: values[k] for k in mine},
             bool(np.all(free_play[mine] < SHARE)),
         )
-    names = redundant_constraints(evaluator, q, t)
+    names = redundant_constraints(evaluator, q, t) if naming else ()
     return Reactions(t, found, count - rank, names, rest / scale if scale > 0 else 0.0)
 
 

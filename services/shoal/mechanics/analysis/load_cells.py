@@ -1,4 +1,4 @@
-"""What load cells in the joints of a rigid machine in the plane feel along its motion.
+"""What the joints of a rigid machine in the plane exert along its motion.
 
 As `joint_reactions` at one state, by the balance of every body by itself, at all samples at once.
 """
@@ -26,14 +26,19 @@ from shoal.scene import GROUND, Attachment, Revolute, Slider
 
 
 class Reaction(NamedTuple):
-    """What a joint exerts on its second body, friction included: force [N], (samples, 2), torque [N m], (samples,)."""
+    """What a joint exerts on its second body, friction included, at every sample.
+
+    force [N], (samples, d); torque [N m], (samples,), in space a vector, (samples, 3); drive: in space that of a drive
+    about its axis, (samples,)
+    """
 
     force: Array
     torque: Array
+    drive: Array | None = None
 
 
 def reactions_along(felt: Felt, names: tuple[str, ...]) -> dict[str, Reaction]:
-    """What some joints exert; the model has one lane. Raises InputError if the machine cannot tell them apart."""
+    """What some joints exert; the model has one lane. Raises InputError, see `not_unique`."""
     bodies = FreeBodies(felt.evaluator, float(felt.times[-1]))
     rubbing = felt.evaluator.model.forces.size - bodies.evaluator.model.forces.size
     at, rate, change = bodies.state(felt.q, felt.v, felt.a)
@@ -72,10 +77,15 @@ def _require_unique(scene: str, columns: Array, unknown: list[_Part], names: tup
     for name in names:
         mine = [k for k, part in enumerate(unknown) if part.joint == name]
         if np.any(np.abs(right[rank:, mine]) > SHARE):
-            raise InputError(
-                f"channels: the forces of joint {name} are not unique: {scene} holds itself more than it needs to; "
-                "measure another joint, or leave out what is redundant"
-            )
+            raise not_unique(scene, name)
+
+
+def not_unique(scene: str, joint: str) -> InputError:
+    """The refusal of a joint's forces in a machine that cannot tell them from those of others."""
+    return InputError(
+        f"channels: the forces of joint {joint} are not unique: {scene} holds itself more than it needs to; "
+        "measure another joint, or leave out what is redundant"
+    )
 
 
 class _Part(NamedTuple):

@@ -41,8 +41,8 @@ def along(motion: Trajectory, scene: Scene, values: Mapping[str, Array], quantit
 
     values: of the lanes by path
     """
+    from shoal.mechanics.analysis.course import Course, machine, machines
     from shoal.mechanics.analysis.energies import energies_along  # slow to import
-    from shoal.mechanics.analysis.felt import Course, machine, machines
     from shoal.mechanics.analysis.load_cells import reactions_along
 
     if motion.velocities is None or motion.rates is None:

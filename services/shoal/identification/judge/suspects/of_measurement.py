@@ -20,7 +20,11 @@ _SENSORS = {
     "mounting": ({"ax", "ay"}, np.pi / 2),
     "bias_ax": ({"ax"}, 5.0),
     "bias_ay": ({"ay"}, 5.0),
+    "bias_az": ({"az"}, 5.0),
     "bias_rate": ({"rate"}, 1.0),
+    "bias_wx": ({"wx"}, 1.0),
+    "bias_wy": ({"wy"}, 1.0),
+    "bias_wz": ({"wz"}, 1.0),
 }
 """Of inertial sensors: the quantities that show a fault, and how large it may be [rad, m/s^2, rad/s]."""
 

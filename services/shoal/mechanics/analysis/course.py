@@ -1,0 +1,102 @@
+"""The motion of a rigid machine in the plane as any engine tells it, and the coordinates that follow from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.felt import TURN, Felt, quarter
+from shoal.mechanics.assembly.build import build
+from shoal.mechanics.frames import RigidFrame
+from shoal.mechanics.numerics.tile import Array, Index
+from shoal.scene import Scene
+
+
+@dataclass(frozen=True)
+class Course:
+    """How the bodies of a scene move, in its order, at increasing times [s], of which the first is the start.
+
+    places [m]: of the origins of their frames, (samples, bodies, 2, lanes), and velocities [m/s]; angles [rad],
+    continuous, (samples, bodies, lanes), and rates [rad/s]
+    """
+
+    times: Array
+    places: Array
+    velocities: Array
+    angles: Array
+    rates: Array
+
+
+class _Rigid:
+    """The coordinates of one lane of a course."""
+
+    def __init__(self, evaluator: Evaluator, course: Course, lane: int, of_model: int) -> None:
+        """lane: of the course; of_model: of the evaluator's model."""
+        model = evaluator.model
+        numbers = {name: number for number, name in enumerate(model.stated.bodies)}
+        order = [numbers[name] for name in model.frames]
+        own = (course.places, course.angles, course.velocities, course.rates)
+        self._places, self._angles, velocities, rates = (part[..., lane][:, order] for part in own)
+        self._frames = list(model.frames.values())
+        found = points([vector for frame in self._frames for vector in frame.vectors], model.unknowns, of_model)
+        matrix = found.matrix.reshape(found.constant.size, model.unknowns)
+        if model.unknowns and np.linalg.matrix_rank(matrix) < model.unknowns:
+            raise InputError("ground_points: sensors of force know no moving point that no body is joined to")
+        self._inverse, self._constant = np.linalg.pinv(matrix), found.constant
+        self.q = self._coordinates(self._places, self._angles)
+        turning = rates[..., None] * quarter(_direction(self._angles))
+        self.v = self._stacked(velocities, turning) @ self._inverse.T
+
+    def _coordinates(self, places: Array, angles: Array) -> Array:
+        """Of poses of the bodies, (samples, unknowns)."""
+        here = self._stacked(places, _direction(angles))
+        return np.asarray((here - self._constant.ravel()) @ self._inverse.T)
+
+    def _stacked(self, origins: Array, directors: Array) -> Array:
+        """What is known of the vectors of all frames, (samples, 2 vectors)."""
+        parts = list[Array]()
+        for k, frame in enumerate(self._frames):
+            parts += [origins[:, k], directors[:, k]] if isinstance(frame, RigidFrame) else [origins[:, k]]
+        return np.concatenate(parts, axis=1)
+
+    def way(self) -> tuple[Array, Index]:
+        """Poses close enough to count turns, see `Evaluator.along`: far ones are joined by even turns."""
+        way, sample = [self.q[:1]], [0]
+        turned = np.max(np.abs(np.diff(self._angles, axis=0)), axis=1, initial=0.0)
+        for k, count in enumerate(np.ceil(turned / TURN).astype(int).tolist(), start=1):
+            if count > 1:
+                share = np.arange(1, count)[:, None] / count
+                place = self._places[k - 1] + share[..., None] * (self._places[k] - self._places[k - 1])
+                angle = self._angles[k - 1] + share * (self._angles[k] - self._angles[k - 1])
+                way.append(self._coordinates(place, angle))
+                sample += [-1] * (count - 1)
+            way.append(self.q[k : k + 1])
+            sample.append(k)
+        return np.concatenate(way), np.array(sample)
+
+
+def machines(scene: Scene, values: Mapping[str, Array], course: Course, lanes: list[int]) -> Iterator[Felt]:
+    """Lanes of a scene along their motion, on one model. Raises InputError."""
+    picked = {path: np.asarray(numbers, dtype=float)[lanes] for path, numbers in values.items()}
+    model = build(scene.with_lanes(picked), len(lanes), float(course.times[-1]))
+    for k, lane in enumerate(lanes):
+        yield _felt(Evaluator(model, k), course, lane, k)
+
+
+def machine(scene: Scene, values: Mapping[str, Array], course: Course, lane: int) -> Felt:
+    """A lane of a scene along its motion, on a model of its own. Raises InputError."""
+    one = scene.with_values({path: float(numbers[lane]) for path, numbers in values.items()})
+    return _felt(Evaluator.of(one, horizon=float(course.times[-1])), course, lane, 0)
+
+
+def _felt(evaluator: Evaluator, course: Course, lane: int, of_model: int) -> Felt:
+    rigid = _Rigid(evaluator, course, lane, of_model)
+    return Felt(evaluator, course.times, rigid.q, rigid.v, rigid.way, of_model)
+
+
+def _direction(angle: Array) -> Array:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -1,0 +1,48 @@
+"""Coordinates and rates along a motion: sampled as if they were markers, a few at a time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shoal.mechanics.marched import Marched, sampled
+from shoal.mechanics.model import Model
+from shoal.mechanics.numerics.tile import Array, Index
+
+
+class States(NamedTuple):
+    """Of the lanes of a model at sampled times: coordinates and their rates, (samples, unknowns, lanes) each."""
+
+    model: Model
+    q: Array
+    v: Array
+
+    @classmethod
+    def room(cls, model: Model, samples: int) -> States:
+        """Not filled yet."""
+        return cls(model, *(np.full((samples, model.unknowns, model.lanes), np.nan) for _ in range(2)))
+
+
+def rows(model: Model) -> Index:
+    """The rows of points, and of directions which nobody looks at, that hold all coordinates: flat, as a march does."""
+    d = model.dimensions
+    own = np.minimum(np.arange(_count(model) * d), model.unknowns - 1).reshape(-1, d)
+    return np.concatenate([own, own], axis=1).ravel().astype(model.marker_rows.dtype)
+
+
+def split(record: Marched, states: States, width: int, part: slice) -> Marched:
+    """The record of a tile of some width without the coordinates, which go to the lanes of `states` in `part`."""
+    model, d, lanes = states.model, states.model.dimensions, part.stop - part.start
+    size = sampled(d)
+    samples = record.samples.reshape(len(states.q), -1, size, width)
+    markers = samples.shape[1] - _count(model)
+    for found, first in ((states.q, 0), (states.v, 2 * d + 1)):
+        numbers = samples[:, markers:, first : first + d, :lanes]
+        found[..., part] = numbers.reshape(len(found), -1, lanes)[:, : model.unknowns]
+    return record._replace(samples=samples[:, :markers].ravel())
+
+
+def _count(model: Model) -> int:
+    """How many points hold all coordinates."""
+    return -(-model.unknowns // model.dimensions)
