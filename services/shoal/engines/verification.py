@@ -33,7 +33,9 @@ from shoal.scene.refined import refined, unbent
 from shoal.trajectory import Array, Status, Trajectory, plain
 
 WRONG = 0.1
-"""A run whose estimated error is beyond this fraction of the machine's scale is rejected."""
+"""A run whose estimated error is beyond this fraction of the machine's scale, or this angle [rad], is rejected."""
+_NO_PATH = 1e-9
+"""Of the machine's size: markers that stay nearer to a pin go nowhere."""
 MODES_A_CABLE = 2
 """A quintic element stands for so many modes of a rod, to tell how far small bending is off."""
 WORTH = 0.01
@@ -84,17 +86,20 @@ class Verification:
     theory_error: float | None = None
     friction_error: float | None = None
     bending_error: float | None = None
+    angle_error: float | None = None
 
     @property
     def complaint(self) -> str:
         """Why the run is not to be trusted; empty if nothing speaks against it."""
         if self.rejected:
             return f"a more careful run is rejected ({self.rejected}); use a smaller solver.step or tolerance"
-        if self.time_error is not None and self.time_error > WRONG * self.scale:
-            return (
-                f"the time error is about {self.time_error:.2g} m: use a smaller solver.step or tolerance, "
-                "or a shorter solver.duration if the motion is chaotic"
-            )
+        found = (self.time_error or 0.0, WRONG * self.scale, "m"), (self.angle_error or 0.0, WRONG, "rad")
+        for error, allowed, unit in found:
+            if error > allowed:
+                return (
+                    f"the time error is about {error:.2g} {unit}: use a smaller solver.step or tolerance, "
+                    "or a shorter solver.duration if the motion is chaotic"
+                )
         if self.mesh_error is not None and self.mesh_error > WRONG * self.scale:
             return f"the mesh error is about {self.mesh_error:.2g} m: use more elements, or --tolerance to find them"
         if (self.bending_error or 0.0) > WRONG * self.scale:
@@ -138,11 +143,11 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
     native = native or GaussEngine()
     second = partial(_second, native, trajectory, scene)
     careful, note = second("time", lambda: _careful(scene, trajectory), 1)
-    notes, time_error = [note], None
+    notes, time_error, angle_error = [note], None, None
     if careful is not None:
         if careful.status[0] in UNTRUSTED:
             return Verification(None, None, scale, rejected=careful.message)
-        time_error = _time_error(trajectory, careful, scene, scale, second)
+        time_error, angle_error = _time_error(trajectory, careful, scene, scale, second)
     mesh_error = None
     if any(_flexible(scene)):
         mesh_error, note = _mesh_error(trajectory, scene, scale, second)
@@ -152,7 +157,9 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
     bending_error, note = _bending_error(trajectory, scene, second)
     told = "; ".join(note for note in [*notes, note] if note)
     theory_error = left_out(trajectory, scene, native)
-    return Verification(time_error, mesh_error, scale, told, "", theory_error, friction_error, bending_error)
+    return Verification(
+        time_error, mesh_error, scale, told, "", theory_error, friction_error, bending_error, angle_error
+    )
 
 
 def _mesh_error(trajectory: Trajectory, scene: Scene, scale: float, second: Second) -> tuple[float | None, str]:
@@ -244,18 +251,28 @@ def _second(
     return doubtful, note
 
 
-def _time_error(trajectory: Trajectory, careful: Trajectory, scene: Scene, scale: float, second: Second) -> float:
-    """The distance of the two runs as an error of the first."""
-    away = trajectory.distance(careful)
+def _time_error(
+    trajectory: Trajectory, careful: Trajectory, scene: Scene, scale: float, second: Second
+) -> tuple[float, float | None]:
+    """The distance of the two runs as an error of the first [m], and that of its angles [rad]; None in space."""
+    away = _apart(trajectory, careful)
     if not _adaptive(trajectory):
-        return HALVING * away
-    if scene.solver.relative_tolerance > LOOSE:
-        return away
-    if away <= WRONG * scale:
-        return float(away / np.sqrt(SPAN))
-    # A chaotic motion may be lost to the looser run and not yet to this one, which a tighter one tells.
-    tighter, _ = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)
-    return away if tighter is None else min(away, trajectory.distance(tighter))
+        away = HALVING * away
+    elif scene.solver.relative_tolerance <= LOOSE:
+        if np.all(away <= WRONG * np.array([scale, 1.0])):
+            away = away / np.sqrt(SPAN)
+        else:
+            # A chaotic motion may be lost to the looser run and not yet to this one, which a tighter one tells.
+            tighter, _ = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)
+            away = away if tighter is None else np.minimum(away, _apart(trajectory, tighter))
+    return float(away[0]), None if scene.dimensions == 3 else float(away[1])
+
+
+def _apart(one: Trajectory, other: Trajectory) -> Array:
+    """How far the markers of two runs are apart [m], and in the plane how far they are turned [rad], (2,)."""
+    turned = one.angles - other.angles if len(one.axes) == 2 else np.zeros(1)
+    turned = turned - 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
+    return np.array([one.distance(other), np.max(np.abs(turned), initial=0.0)])
 
 
 def _adaptive(trajectory: Trajectory) -> bool:
@@ -320,7 +337,8 @@ def _scale(trajectory: Trajectory, scene: Scene) -> float:
     points = trajectory.points[..., 0]
     sides = (side for joint in scene.joints.values() for side in places(joint))
     anchors = [scene.location(side) for side in sides if side.body == GROUND]
+    least = _NO_PATH * span(scene)
     if not anchors:
-        return float(np.max(np.ptp(points, axis=0)))
+        return max(float(np.max(np.ptp(points, axis=0))), least)
     away = np.min([np.linalg.norm(points - np.array(anchor), axis=2) for anchor in anchors], axis=0)
-    return float(np.max(away))
+    return max(float(np.max(away)), least)

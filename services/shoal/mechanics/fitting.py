@@ -254,6 +254,18 @@ def require_no_jump(function: Function, horizon: float) -> None:
             )
 
 
+def require_positive(function: Function, horizon: float) -> None:
+    """Raises InputError where a length that a function of time prescribes vanishes: no direction is left there."""
+    breaks, powers, _ = fit(function, horizon, function.knots, steep=False)
+    within = np.linspace(-1.0, 1.0, 4 * ORDER + 1)
+    values = np.polynomial.polynomial.polyval(within, powers.T)
+    times = breaks[:-1, None] + np.diff(breaks)[:, None] * (1.0 + within) / 2.0
+    if np.any(gone := values <= 0.0):
+        raise InputError(
+            f"function: a length must stay above 0 m, but is {values[gone][0]:.4g} at t = {times[gone][0]:.4g}"
+        )
+
+
 def antiderivative(piecewise: Piecewise) -> Piecewise:
     """The integral from 0 (or from the end of the range nearest to 0) of a fitted function."""
     breaks, coefficients, kinks = piecewise

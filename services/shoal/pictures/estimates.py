@@ -9,7 +9,10 @@ from typing import Any
 def estimates(verification: Mapping[str, Any]) -> Iterator[str]:
     """Sentences about the errors at the markers and about what the model leaves out; `asdict` of a Verification."""
     errors = {"time": verification["time_error"], "mesh": verification["mesh_error"]}
-    if known := ", ".join(f"{name} {error:.1e} m" for name, error in errors.items() if error is not None):
+    parts = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
+    if verification.get("angle_error") is not None:
+        parts.insert(1, f"{verification['angle_error']:.1e} rad")
+    if known := ", ".join(parts):
         yield f"estimated error at the markers: {known}"
     if verification["note"]:
         yield verification["note"]

@@ -112,7 +112,13 @@ class Function(Record):
         times, values = np.array(self.table).T
         if not self.smooth:
             return np.asarray(np.interp(t.astype(float), times, values))
-        return np.asarray(self._spline()(np.clip(t.astype(float), times[0], times[-1])))
+        # In the precision of t: between uneven rows the terms of a spline cancel.
+        t = np.clip(t.astype(np.result_type(t, float)), times[0], times[-1])
+        row = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
+        value, since = np.zeros_like(t), t - times[row]
+        for power in self._spline().c:
+            value = value * since + power[row]
+        return value
 
     def table_slope(self, t: float, left: bool) -> float:
         """The derivative of a table at one time [s], on its left or right side."""

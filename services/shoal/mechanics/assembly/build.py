@@ -14,7 +14,7 @@ from shoal.mechanics.least import principle
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import index, stacked
 from shoal.mechanics.rubbing import Rubbing
-from shoal.scene import GROUND, Revolute, Scene
+from shoal.scene import GROUND, Distance, Revolute, Scene
 
 
 def with_start(model: Model, scene: Scene, lanes: int) -> Model:
@@ -51,6 +51,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
             field = f"joints.{one.name}" if one.name in scene.joints else one.name.replace(GROUND, "ground_points", 1)
             with naming(field):
                 fitting.require_no_jump(one.drive.function, horizon)
+                if one.name in scene.joints and isinstance(scene.joints[one.name], Distance):
+                    fitting.require_positive(one.drive.function, horizon)
                 loads.fitted.append(fitting.fit(one.drive, horizon, one.drive.knots, steep=False))
     held_rows = rows.size
     marker_rows = [

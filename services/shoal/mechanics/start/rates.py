@@ -22,6 +22,8 @@ SINGULAR = 1e-6
 """Part of a row, of its own length, below which it depends on others."""
 AGREES = 1e-8
 """Of the fastest speed: rows that depend on others and differ by less agree with them."""
+SLOW = 1e-6
+"""Of the machine's size, over the duration: rates below this are round-off of what drives them."""
 BRANCHES = 12
 _LARGEST = 200
 """Rows up to which a motion is tested for the branches of a singular position."""
@@ -48,7 +50,7 @@ class Velocities:
         self.flexible = any(body.element != "rigid" for body in self.scene.bodies.values())
         largest = [np.max(np.abs(one.values), initial=0.0) * self._unit(one) for one in self.statements]
         fastest = max([*largest, float(np.max(np.abs(self.rows.rate), initial=0.0)), float(np.max(np.abs(self.guess)))])
-        self.speed = fastest or 1.0
+        self.speed = max(fastest, SLOW * self.size / float(np.max(self.scene.solver.duration)))
 
     def _unit(self, one: Statement) -> float:
         return self.size if one.quantity == "rate" else 1.0
