@@ -49,7 +49,7 @@ class Expansion:
         mine, others = np.split(which.ravel(), [len(self.terms)])
         coefficients[mine] = np.where(better, self.coefficients, 0.0)
         coefficients[others] += np.where(better, 0.0, other.coefficients)
-        used = coefficients.any(axis=1)
+        used = np.asarray(coefficients.any(axis=1))
         used[0] = True
         squares = None
         if self.squares is not None and other.squares is not None:

@@ -139,7 +139,7 @@ def _largest(inputs: Inputs, decay: Decay) -> tuple[Terms, Array]:
 def trimmed(found: Expansion) -> Expansion:
     """Without the terms that are nothing beside the deviation of every column; the constant stays."""
     shares = found.coefficients**2 / np.maximum(found.variance, 1e-300)
-    kept = (shares * len(shares) > NOTHING**2).any(axis=1)
+    kept = np.asarray((shares * len(shares) > NOTHING**2).any(axis=1))
     kept[0] = True
     lost = np.sqrt((found.coefficients[~kept] ** 2).sum(axis=0))
     return Expansion(

@@ -118,7 +118,7 @@ class Function(Record):
         value, since = np.zeros_like(t), t - times[row]
         for power in self._spline().c:
             value = value * since + power[row]
-        return value
+        return np.asarray(value)
 
     def table_slope(self, t: float, left: bool) -> float:
         """The derivative of a table at one time [s], on its left or right side."""
