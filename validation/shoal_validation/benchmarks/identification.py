@@ -8,6 +8,7 @@ told which branch is right, and their systems are built beforehand. Times are me
 
 from __future__ import annotations
 
+import argparse
 import statistics
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -119,6 +120,7 @@ def _start(problem: Problem, measurement: Measurement) -> Array:
 
 def main() -> None:
     """Measure and print."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     console = Console(highlight=False)
     table = Table("", "evaluations", "error [deg]", "fitness [m^2]", "s", "times", box=box.SIMPLE_HEAD)
     groups = [same_mesh(name) for name in SAME_MESH] + [converged(name) for name in CONVERGED]
