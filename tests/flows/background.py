@@ -67,7 +67,8 @@ def comes_by_itself(prefect: str, name: str, parameters: Mapping[str, object]) -
         return [run for run in ours if run["state_type"] != "CANCELLED"]
 
     run = until(begun, "a run of the schedule")[0]
-    urlopen(Request(f"{schedules}/{schedule['id']}", method="DELETE"), timeout=30).close()
+    delete = Request(f"{schedules}/{schedule['id']}", method="DELETE")
+    until(lambda: urlopen(delete, timeout=30).close() is None, "the schedule is gone")
     return dict(run)
 
 
