@@ -88,3 +88,10 @@ def test_a_kernel_that_was_only_loaded_can_still_be_compiled_into_another() -> N
     for _ in range(2):  # the first may have to compile it
         done = subprocess.run([sys.executable, "-c", LATER], capture_output=True, text=True, check=True)
     assert float(done.stdout) == 4.0  # the inverse of the inverse
+
+
+def test_python_does_not_look_through_all_that_was_imported_once_more_at_its_end() -> None:
+    program = "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count() > 1000))\n"
+    program += "from shoal.cli import main; main(['--version'])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "True"

@@ -22,6 +22,7 @@ from shoal_validation.work_precision.measure import FAMILIES, Study, curve
 from shoal_validation.work_precision.mesh import with_mesh
 from shoal_validation.work_precision.page import failures, tables
 from shoal_validation.work_precision.table import costs
+from shoal_validation.work_precision.within import measure
 
 FLEXIBLE = [name for name, problem in PROBLEMS.items() if problem.flexible]
 POINT = Point(OURS, "leapfrog", "2C/4C", "step 0.001 s", 1.0, 1.0)
@@ -142,3 +143,13 @@ def test_tables_tell_what_an_error_costs() -> None:
     assert "| flexible-case-1 | 1e-03 | 2 ms: leapfrog, 2C/4C, step 0.001 s | not reached |" in text
     assert "| flexible-case-1 | 1e-04 | not reached |" in text
     assert problem.reference.source in text
+
+
+def test_what_an_error_costs_can_be_measured_again() -> None:
+    studies, _ = load(Path(__file__).parents[2] / "docs" / "charts")
+    kept = next(one for one in studies if one.problem.name == "flexible-hanging")
+    known = {point.label: point.error for point in kept.points}
+    rows = list(measure([kept], rounds=1))
+    assert len(rows) == 3 * len(costs(kept)), "ours, 64 of ours and Exudyn's for each error"
+    assert [row.error for row in rows] == pytest.approx([known[row.label] for row in rows], rel=1e-3)
+    assert all(row.error <= row.reach for row in rows)

@@ -45,13 +45,13 @@ class Placement:
         base[list(angles)] = 0.0
         poses = np.repeat(base[None], 1 + 2 * count, axis=0)
         for k, angle in enumerate(angles):
-            poses[1 + k, angle], poses[1 + count + k, angle] = np.pi / 2, np.pi
+            poses[1 + k, angle], poses[1 + count + k, angle] = np.pi / 2, -np.pi / 2
         seen = place(poses)
-        first, upwards, backwards = seen[0], seen[1 : 1 + count], seen[1 + count :]
+        first, upwards, downwards = seen[0], seen[1 : 1 + count], seen[1 + count :]
         turned = np.array([channel.quantity == "angle" for channel in channels])
-        along = np.where(turned, 0.0, (first - backwards) / 2)
-        across = np.where(turned, 0.0, upwards - first + along)
-        turning = np.where(turned, (backwards - first) / np.pi, 0.0)
+        along = np.where(turned, 0.0, first - (upwards + downwards) / 2)
+        across = np.where(turned, 0.0, (upwards - downwards) / 2)
+        turning = np.where(turned, (upwards - downwards) / np.pi, 0.0)
         return cls(angles, base, first - along.sum(axis=0), along, across, turning)
 
     def knows(self, points: Array) -> bool:

@@ -25,6 +25,7 @@ MEASUREMENT = (
 )
 """What a parameter can be that is none of the scene's: the path is `measurement.` and one of these."""
 RESERVED = "measurement"
+_FREE = (".angle", ".rate")
 _POSITIVE = {
     *(
         "length",
@@ -167,14 +168,7 @@ class Problem(Record):
         """The scene to fit, with this problem's and the given values set, and every path checked. Raises InputError."""
         scene = load_scene(self.scene)
         scene = scene.with_values({**self.values, **(values or {})})
-        for name, parameter in self.parameters.items():
-            if parameter.path is None or parameter.of_measurement:
-                continue
-            for bound in (parameter.lower, parameter.upper):
-                try:
-                    scene.with_values({parameter.path: bound})
-                except InputError as error:
-                    raise InputError(f"{self.name}: parameters.{name}: {error}") from None
+        self._check_bounds(scene)
         for path in (*self.ties, *self.constants.values()):
             try:
                 scene.value(path)
@@ -184,6 +178,27 @@ class Problem(Record):
             if channels := self.channels_of(source):
                 self.check_channels(channels, scene, self.name)
         return scene
+
+    def _check_bounds(self, scene: Scene) -> None:
+        """Whether the scene accepts the bounds of each parameter. Raises InputError."""
+        bounds = {
+            name: (parameter.path, parameter.lower, parameter.upper)
+            for name, parameter in self.parameters.items()
+            if parameter.path is not None and not parameter.of_measurement
+        }
+        # A start is free in its angles and rates: one scene for all of them tells as much as one for each.
+        free = {name for name, (path, *_) in bounds.items() if path.startswith("initial.") and path.endswith(_FREE)}
+        try:
+            for side in (1, 2) if free else ():
+                scene.with_values({bounds[name][0]: bounds[name][side] for name in free})
+        except InputError:
+            free = set()
+        for name, (path, *ends) in bounds.items():
+            for bound in ends if name not in free else ():
+                try:
+                    scene.with_values({path: bound})
+                except InputError as error:
+                    raise InputError(f"{self.name}: parameters.{name}: {error}") from None
 
     def check_channels(self, channels: tuple[Channel, ...], scene: Scene, where: str) -> None:
         """Whether a recording can be compared with the scene. Raises InputError."""

@@ -73,13 +73,16 @@ def _check_plane(part: Any, path: str) -> None:
     """Raises ValueError for the first field below `path` that is of space only."""
     if isinstance(part, Record):
         for name in part.model_fields_set:
-            value, where = getattr(part, name), f"{path}.{name}".lstrip(".")
-            if _is_spatial(name, value):
+            value = getattr(part, name)
+            if name in _SPATIAL and _is_spatial(name, value):
+                where = f"{path}.{name}".lstrip(".")
                 raise ValueError(f"{where}: this is for scenes in space; say dimensions: 3")
-            _check_plane(value, where)
+            if isinstance(value, _PARTS):
+                _check_plane(value, f"{path}.{name}".lstrip("."))
     elif isinstance(part, dict):
         for name, value in part.items():
-            _check_plane(value, f"{path}.{name}")
+            if isinstance(value, _PARTS):
+                _check_plane(value, f"{path}.{name}")
     elif isinstance(part, tuple) and part and isinstance(part[0], Record):
         for number, value in enumerate(part):
             _check_plane(value, f"{path}.{number}")
@@ -100,6 +103,9 @@ def _is_spatial(name: str, value: Any) -> bool:
     return name in ("rotation", "spin", "torsion_constant") and not isinstance(value, str | None)
 
 
+_PARTS = (Record, dict, tuple)
+_SPATIAL = {"axis", "z", "inertia", "side_curvature", "twist", "director", "rotation", "spin", "torsion_constant"}
+"""Fields of which `_is_spatial` speaks."""
 _VECTORS = {"gravity", "position", "velocity", "point", "force", "centre_of_mass", "named_points"}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 
@@ -15,6 +16,7 @@ from shoal_validation.benchmarks import forward
 
 def main() -> None:
     """Measure everything, print, and write benchmarks.json."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     console = Console(highlight=False)
     rows = [row for quadrature in ("full", "reduced") for row in forward.measure(forward.scene(quadrature), quadrature)]
     table = Table("case 1, 2/4 cables, 1000 steps", "ms each", "times faster", box=box.SIMPLE_HEAD)

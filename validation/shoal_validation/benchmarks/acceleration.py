@@ -11,6 +11,7 @@ projection by the same step.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -222,6 +223,7 @@ def print_passage(console: Console, rows: Iterator[PassageRow]) -> None:
 
 def main() -> None:
     """Measure and print."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     console = Console(highlight=False, width=160)
     print_cost(console, "rigid double pendulum, 1e-3 s", measure_cost("rigid-double-pendulum", 1e-3, 100))
     print_cost(

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import time
 from collections.abc import Callable
 from typing import Any
@@ -46,6 +47,7 @@ def call(name: str, times: Array) -> tuple[int, float, float]:
 
 def main() -> None:
     """Print the table."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     table = Table("scene", "samples", "steps", "call, us", "march, us", "beyond it, us", box=box.SIMPLE_HEAD)
     for name, times in (
         ("rigid-double-pendulum", np.array([1e-3])),

@@ -22,7 +22,7 @@ from shoal.trajectory import Array
 
 ACCURACY = 1e-8
 """Of the angles, as far as the data tell them [rad]."""
-LONG, SHORT = 500, 20_000
+LONG, SHORT = 500, 16_000
 """Steps of Exudyn's trapezoidal rule over the record: to come near, and for ACCURACY."""
 _DIFFERENCE = 1e-5
 """Of an angle [rad]: far above what a modified Newton iteration leaves open."""

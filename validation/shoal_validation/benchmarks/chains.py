@@ -18,6 +18,7 @@ same state: a chain that hangs in revolute joints about alternating axes, from a
 
 from __future__ import annotations
 
+import argparse
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -268,6 +269,7 @@ def _median(once: Callable[[], float], repeats: int) -> float:
 
 def main() -> None:
     """Measure and print."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     for row in measure():
         print(  # noqa: T201 - a command
             f"{row.bodies:4d} bodies  {row.name:26s} {row.seconds * 1e6:10.1f} us {row.ratio:7.1f} times ours, "

@@ -10,6 +10,7 @@ step, the least of some runs, as the longest take seconds. An implicit step coun
 
 from __future__ import annotations
 
+import argparse
 import itertools
 import statistics
 import time
@@ -129,6 +130,7 @@ def growth(sizes: tuple[int, ...] = ELEMENTS, repeats: int = 7) -> Iterator[Grow
 
 def main() -> None:
     """Measure and print."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     for row in stiff():
         print(  # noqa: T201 - a command
             f"{row.solver:7s} {row.mesh} step {row.step:g} s: {row.error:.1e} m off, loop {row.loop * 1e3:.3f} ms, "

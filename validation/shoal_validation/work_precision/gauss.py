@@ -15,13 +15,13 @@ SCENE_MESH = "2C/4C"
 """The mesh of the paper and of the scenes, on which integrators are compared."""
 MESHES = (
     *("1C/3R", "1C/5R", "2C/4C", "2R/4R", "2C/7R", "1Q/7R", "1Q/8R", "2R/10R", "1Q/7Q", "2Q/4Q", "4R/8R", "2Q/14R"),
-    *("2Q/8Q", "2Q/12Q", "3Q/14Q", "4Q/16Q", "4Q/24Q", "6Q/20Q", "8Q/24Q", "8C/16C", "8R/16R"),
+    *("2Q/8Q", "2Q/12Q", "3Q/12Q", "3Q/14Q", "4Q/16Q", "4Q/24Q", "6Q/20Q", "8Q/24Q", "8C/16C", "8R/16R"),
 )
 """Unequal meshes put the elements where the curvature is, and let the stiff short rod have few."""
-FEW_MESHES = ("1C/5R", "2C/4C", "1Q/7R", "2R/10R", "1Q/7Q", "2Q/14R", "2Q/12Q", "3Q/14Q", "4Q/24Q", "6Q/20Q")
+FEW_MESHES = ("1C/5R", "2C/4C", "1Q/7R", "2R/10R", "1Q/7Q", "2Q/14R", "2Q/12Q", "3Q/12Q", "3Q/14Q", "4Q/24Q", "6Q/20Q")
 CAPPED_MESHES = ("1Q/7Q", "2Q/6Q", "2Q/7Q")
 """With inertia caps, for which few unknowns are needed."""
-MANY_MESHES = ("1C/5R", "2R/10R", "2Q/14R", "2Q/12Q", "4Q/24Q")
+MANY_MESHES = ("1C/5R", "2R/10R", "2Q/14R", "2Q/12Q", "3Q/12Q", "4Q/24Q", "6Q/20Q")
 IMPLICIT_MESHES = ("2R/4R", "4R/8R", "2Q/6Q", "2Q/8Q", "6Q/20Q", "8E/16E")
 EXPLICIT = (500, 600, 700, 800, 900, 1000, 1250, 1500, 1750, 2000, 2500, 3000, 3750, 5000, 7500, 10_000, 20_000)
 IMPLICIT = (50, 100, 150, 250, 500, 1000, 2500)

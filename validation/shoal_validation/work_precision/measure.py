@@ -116,7 +116,7 @@ def point(problem: Problem, method: Method, setting: float, seconds: float, run:
         family=method.family,
         method=method.name,
         mesh=method.mesh,
-        setting=f"{method.unit} {setting:.3g}" + (" s" if method.unit == "step" else ""),
+        setting=setting_name(method, setting),
         seconds=seconds / method.lanes,
         error=error,
         mesh_error=_largest(run.path - mesh.points) if mesh else None,
@@ -125,6 +125,11 @@ def point(problem: Problem, method: Method, setting: float, seconds: float, run:
         status=str(Status.OK if believed else outcome),
         message=run.message,
     )
+
+
+def setting_name(method: Method, setting: float) -> str:
+    """How a setting stands in tables, with its unit."""
+    return f"{method.unit} {setting:.3g}" + (" s" if method.unit == "step" else "")
 
 
 def _loop(problem: Problem, method: Method, setting: float, repeats: int) -> float | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import count
 
 _SAME = 1e-16
@@ -48,6 +49,7 @@ def chi_square_above(freedom: float, chance: float) -> float:
     return x
 
 
+@lru_cache(maxsize=1024)
 def student_above(freedom: float, chance: float) -> float:
     """What Student's t with so many degrees of freedom is above with a chance, below 0.15."""
     z = math.sqrt(chi_square_above(1.0, 2.0 * chance))

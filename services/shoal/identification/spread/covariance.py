@@ -65,6 +65,8 @@ def blocks_of(model: ForwardModel, count: int) -> list[Block]:
 def correlate(block: Block, rho: float, columns: Array) -> Array:
     """R X with R = rho^|gap|, for columns X (n, k), in one pass forwards and one backwards."""
     decay = rho**block.gaps
+    if not np.any(decay):
+        return columns
     ahead, behind = np.zeros_like(columns), np.zeros_like(columns)
     for i, a in enumerate(decay):
         ahead[i + 1] = a * (ahead[i] + columns[i])
