@@ -41,7 +41,13 @@ class Watch:
 def watched(machine: Machine, limit: Limit) -> Machine:
     """The same machine, of which the margins of a limit are told."""
     told = Watch(limit, len(machine.times)).margins
-    return replace(machine, scene=limit.scene(machine.scene), times=limit.instants(machine.times), told=told)
+    return replace(
+        machine,
+        scene=limit.scene(machine.scene),
+        times=limit.instants(machine.times),
+        engine=limit.engine(machine.engine, machine.scene),
+        told=told,
+    )
 
 
 def require(machine: Machine, limit: Limit, inputs: Inputs) -> None:
@@ -56,7 +62,7 @@ def _show(limit: Limit, machine: Machine, inputs: Inputs, germ: Array, verify: b
     if verify:
         return show(limit, machine.scene, machine.times, machine.engine, inputs, named)
     scene = limit.scene(machine.scene.with_values(inputs.at(named)))
-    motion = machine.engine.simulate(scene, limit.instants(machine.times))
+    motion = limit.engine(machine.engine, scene).simulate(scene, limit.instants(machine.times))
     return _shown(limit, machine.times, inputs, named, scene, motion)
 
 
@@ -102,7 +108,8 @@ def judge(
 def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Inputs, named: Array) -> Shown:
     """Run a scene once more, with care, with these values of the parameters, (parameters,). Raises InputError."""
     here = limit.scene(scene.with_values(inputs.at(named)))
-    return _shown(limit, times, inputs, named, here, verified(engine, here, limit.instants(times)))
+    motion = verified(limit.engine(engine, here), here, limit.instants(times))
+    return _shown(limit, times, inputs, named, here, motion)
 
 
 def _shown(limit: Limit, times: Array, inputs: Inputs, named: Array, scene: Scene, motion: Trajectory) -> Shown:
