@@ -13,6 +13,7 @@ def choose(page: Any, shown: str, *wanted: str) -> list[str]:
     page.keyboard.press("ArrowDown")
     page.get_by_role("option").first.wait_for()
     offered = [text.strip() for text in page.get_by_role("option").all_inner_texts()]
+    assert set(wanted) <= set(offered), offered
     for name in wanted:
         page.get_by_role("option", name=name, exact=True).click()
     page.keyboard.press("Escape")
@@ -28,3 +29,9 @@ def submit(page: Any) -> None:
         if page.url != form:
             return
     raise AssertionError(f"the form stays: {page.url}")
+
+
+def finished(page: Any, state: str = "Completed") -> None:
+    """Wait for the run whose page it is, and reload: Prefect asks for artifacts every five seconds, but only while it runs."""
+    page.locator(".page-heading-flow-run").get_by_text(state, exact=True).wait_for()
+    page.reload()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from forms import choose, submit
+from forms import choose, finished, submit
 from shoal.identification.methods import METHODS
 from shoal.identification.problem import problem_names
 from shoal.scene.load import scene_library
@@ -33,6 +33,7 @@ def test_a_study_is_started_from_prefects_form_and_answers_there(desk: Any, visi
 
     one = visit()
     page = one.page
+    page.set_default_timeout(PATIENCE)
     page.goto(f"{desk.at['PREFECT']}/deployments")
     page.get_by_role("link", name="identify").first.click()
     page.get_by_role("button", name="Run", exact=True).first.click()
@@ -47,7 +48,7 @@ def test_a_study_is_started_from_prefects_form_and_answers_there(desk: Any, visi
     submit(page)
     # The flow names itself when it begins.
     page.get_by_role("link", name="identify paper-case-1").first.click(timeout=PATIENCE)
-    expect(page.get_by_text("Completed", exact=True).first).to_be_visible(timeout=PATIENCE)
+    finished(page)
     page.get_by_text("Artifacts", exact=True).first.click()
     expect(page.get_by_text("theta1 = 0.786015, theta2 = 0.523347").first).to_be_visible()
     one.shoot("artifacts")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from forms import choose, submit
+from forms import choose, finished, submit
 
 pytestmark = pytest.mark.slow
 
@@ -61,7 +61,7 @@ def test_a_machine_of_ones_own_comes_to_the_dashboard(desk: Any, visit: Callable
     submit(page)
 
     page.get_by_role("link", name=said(3, "identify find")).first.click(timeout=PATIENCE)
-    expect(page.get_by_text(said(3, "Completed"), exact=True).first).to_be_visible(timeout=PATIENCE)
+    finished(page, said(3, "Completed"))
     page.get_by_text(said(3, "Artifacts"), exact=True).first.click()
     expect(page.get_by_text(re.compile(r"friction = 0\.05(0*)?, angle = -0\.3")).first).to_be_visible()
     one.shoot("answer")

@@ -18,7 +18,7 @@ _MOST = 4000
 
 
 POSITION, ANGLE = "position", "angle"
-KINDS = {
+KINDS: dict[str, str] = {
     **dict.fromkeys(("x", "y", "z"), POSITION),
     **dict.fromkeys(ACCELERATIONS, "acceleration"),
     **dict.fromkeys(RATES, "rate"),

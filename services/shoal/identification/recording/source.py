@@ -31,10 +31,13 @@ Quantity = Literal[
     "torque",
     "strain",
 ]
-ACCELERATIONS, RATES = ("ax", "ay", "az"), ("wx", "wy", "wz")
+ACCELERATIONS: tuple[Quantity, ...] = ("ax", "ay", "az")
+RATES: tuple[Quantity, ...] = ("wx", "wy", "wz")
 """What an accelerometer shows, and a gyroscope in space."""
-FORCES, MOMENTS, STRAIN = ("fx", "fy", "fz"), ("mx", "my", "mz"), "strain"
-REACTIONS = (*FORCES, *MOMENTS, "torque")
+FORCES: tuple[Quantity, ...] = ("fx", "fy", "fz")
+MOMENTS: tuple[Quantity, ...] = ("mx", "my", "mz")
+STRAIN: Quantity = "strain"
+REACTIONS: tuple[Quantity, ...] = (*FORCES, *MOMENTS, "torque")
 """What a load cell in a joint and a strain gauge show."""
 IN_SPACE = ("z", "az", *RATES, "fz", *MOMENTS)
 """What is measured in space only."""

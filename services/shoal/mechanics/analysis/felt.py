@@ -73,7 +73,8 @@ class Felt:
         acceleration = self.a @ found.matrix[0].T - self.gravity
         if self.scene.dimensions != plane.DIMENSIONS:
             axes, _ = self._axes(frame, place)
-            return np.einsum("ij,njk,nk->ni", _sensor(tilt), axes, acceleration)
+            felt: Array = np.einsum("ij,njk,nk->ni", _sensor(tilt), axes, acceleration)
+            return felt
         assert not isinstance(tilt, tuple)
         x = self.q @ found.matrix[1].T + found.constant[1]
         x = x / np.linalg.norm(x, axis=1, keepdims=True)
