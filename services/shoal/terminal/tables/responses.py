@@ -38,8 +38,8 @@ def response_table(response: Response) -> None:
         for quantity in response.quantities:
             unit = "rad" if quantity == "angle" else "m"
             numbers = (response.column(marker, quantity, column)[-1] for column in columns)
-            form = "z.6f" if response.boxes is None else ".4g"
-            cells = ["-" if np.isnan(x) else f"{x:{form}}" for x in numbers]
+            forms = ["z.6f"] * 4 if response.boxes is None else [".4g", ".4g", ".2g", ".2g", ".4g", ".4g"]
+            cells = ["-" if np.isnan(x) else f"{x:{form}}" for x, form in zip(numbers, forms, strict=True)]
             if response.bounds is not None:
                 gap = response.gap(marker, quantity)
                 cells.append("-" if np.isnan(gap) else f"{gap:.0e}")
