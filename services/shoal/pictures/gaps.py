@@ -35,7 +35,7 @@ def gaps(found: Response, marker: str) -> Figure:
     panel.set_xlabel("time [s]")
     panel.set_ylabel(f"at {marker} [m]")
     panel.legend(fontsize=10, ncols=2)
-    gap = float(np.max([found.gap(marker, quantity) for quantity in found.axes]))
-    known = "are not known to be complete" if np.isnan(gap) else f"are known to {gap:.1e} of the width"
+    off = float(np.max([found.gap(marker, quantity) for quantity in found.axes]))
+    known = "are not known to be complete" if np.isnan(off) else f"are known to {off:.1e} of the width"
     headline(figure, f"{found.scene}: bounds of {marker} {known}")
     return figure
