@@ -14,7 +14,9 @@ from matplotlib.patches import Patch, Rectangle
 from shoal_validation.document import table
 from shoal_validation.uncertain.maps import GOOD, INSTANTS, MOST, Cell, Question
 
-SILENT, UNTOLD = "#a50f15", "#777777"
+SILENT = "#a50f15"
+DARK = 30.0
+"""Cycles from which a cell is so dark that its number is white."""
 
 
 def draw(cells: Sequence[Cell], path: Path) -> None:
@@ -38,7 +40,7 @@ def draw(cells: Sequence[Cell], path: Path) -> None:
         figure.legend(
             handles=[
                 Patch(facecolor="white", edgecolor=SILENT, linewidth=2, label="outer bounds wrong, and nothing tells"),
-                Patch(facecolor="white", edgecolor="none", label="grey: no outer bounds are told"),
+                Patch(facecolor="white", edgecolor="none", label="in brackets: no outer bounds are told"),
             ],
             loc="outside lower left",
             ncols=2,
@@ -55,8 +57,9 @@ def _panel(place: Axes, methods: list[str], columns: list[Question], found: dict
     for row, method in enumerate(methods):
         for column, one in enumerate(columns):
             cell = found[method, one]
-            colour = "black" if cell.told else UNTOLD
-            text = f"{cell.horizon:.3g}" if cell.horizon else "-"
+            colour = "white" if cell.horizon > DARK else "black"
+            number = f"{cell.horizon:.2g}" if cell.horizon < 100 else f"{cell.horizon:.0f}"
+            text = "-" if not cell.horizon else number if cell.told else f"({number})"
             place.text(column, row, text, ha="center", va="center", color=colour, fontsize=7)
             if cell.silent:
                 place.add_patch(Rectangle((column - 0.46, row - 0.44), 0.92, 0.88, fill=False, ec=SILENT, lw=1.5))
