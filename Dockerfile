@@ -41,6 +41,7 @@ COPY --chmod=644 prefect.yaml /opt/shoal/prefect.yaml
 ENV PATH=/opt/shoal/venv/bin:${PATH} \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
+    OPENBLAS_NUM_THREADS=1 \
     SHOAL_HOME=/var/lib/shoal \
     SHOAL_LIBRARY=/var/lib/library \
     NUMBA_CACHE_DIR=/tmp/kernels \
