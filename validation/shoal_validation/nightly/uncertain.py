@@ -11,7 +11,7 @@ from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.measure import Measured, timed
 
 NAME, METHOD = "uncertain-bounds", "auto"
-STUDIES, RUNS = 22, 4_000
+STUDIES, RUNS = 11, 2_000
 """Random studies, and random runs that try to leave the bounds of each."""
 FIRST = 9_000
 """Seed of the first."""
