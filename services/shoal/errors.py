@@ -15,6 +15,10 @@ class InputError(ShoalError):
     exit_status = 2
 
 
+class UnstableStepError(InputError):
+    """The step of an explicit integrator is longer than a machine allows."""
+
+
 class ComputationError(ShoalError):
     """The computation ran and cannot be trusted, or could not run to its end."""
 

@@ -99,6 +99,23 @@ def test_an_oscillator_with_a_spring_known_within_bounds() -> None:
     assert answer.runs.evaluations <= 300
 
 
+def test_indices_between_bounds() -> None:
+    """y = k a + b + a b with normal a, b: of the variance k^2 + 2, a alone has k^2, and takes part in k^2 + 1."""
+    known = {"k": Interval(0.5, 2.0), "a": Normal(0.0, 1.0), "b": Normal(0.0, 1.0)}
+    given = Inputs(tuple(Parameter(name, of, {name: 1.0}) for name, of in known.items()))
+    answer = respond(model(lambda v: (v["k"] * v["a"] + v["b"] + v["a"] * v["b"])[:, None]), given, 1)
+    found = answer.boxes
+    assert found is not None
+    assert found.shares is not None
+    low, high = 0.25, 4.0
+    # Share at both ends: first of a, of b; total of a, of b.
+    first = [[low / (low + 2), 1 / (high + 2)], [high / (high + 2), 1 / (low + 2)]]
+    total = [[(low + 1) / (low + 2), 2 / (high + 2)], [(high + 1) / (high + 2), 2 / (low + 2)]]
+    # A hundredth of the largest deviation is added, squared, where shares are not told.
+    assert found.shares[0, :, :, 0] == pytest.approx(np.array(first), abs=1e-3)
+    assert found.shares[1, :, :, 0] == pytest.approx(np.array(total), abs=1e-3)
+
+
 DISTRIBUTIONS = (stats.norm(0.0, 1.0), stats.uniform(-1.0, 2.0), stats.triang(0.3, -1.0, 2.0), stats.beta(2, 3, -1, 2))
 
 

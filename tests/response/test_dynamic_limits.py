@@ -174,8 +174,9 @@ def oscillator(turned: bool) -> dict[str, Any]:
         (PENDULUM, "O.x < 3", r"no marker 'O' \(O is a joint, and x is that of a marker\); there are A"),
         (PENDULUM, "A.energy > 2", "energy is that of the whole machine"),
         (PENDULUM, "force > 2", "write JOINT.force, there are O"),
-        ("flexible-double-pendulum", "O.force > 3", "rigid machines; bodies.OA.element is ancf-cable"),
-        ("spherical-pendulum", "energy > 3", "moves in space"),
+        (PENDULUM, "A.moment > 2", "that of a flexible rod; OA, with marker A, is rigid"),
+        ("flexible-double-pendulum", "B.torsion > 2", "normal, shear, moment, strain, strain_above, strain_below of a"),
+        ("spherical-pendulum", "O.torque > 3", "that of a driven-angle about its axis; joint O is a distance"),
     ],
 )
 def test_what_a_machine_does_not_tell_is_refused(scene: str, text: str, names: str) -> None:

@@ -15,6 +15,7 @@ from shoal.errors import InputError
 from shoal.response import uncertain
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.limits.choice import WAYS, Passing, probability
+from shoal.response.limits.estimate import weighted
 from shoal.response.limits.form import design_points
 from shoal.response.limits.limit import limit
 from shoal.response.limits.margins import Margins
@@ -154,6 +155,13 @@ def test_a_limit_that_is_never_passed() -> None:
     assert found.estimate.probability == 0.0
     assert 0 <= lower[-1] < upper[-1] < 1e-3
     assert "none has passed" in found.why
+
+
+def test_where_all_runs_pass_the_limit_some_others_may_not() -> None:
+    """As many as may hide from n runs: 1 - 0.025^(1 / n) of all (Clopper and Pearson)."""
+    found = weighted(np.full((1000, 1), -1.0), np.ones(1000), "")
+    assert found.interval[0][0] == pytest.approx(0.025 ** (1 / 1000), rel=1e-9)
+    assert found.interval[1][0] == 1.0
 
 
 def test_failed_runs_widen_the_interval() -> None:

@@ -10,10 +10,12 @@ import pytest
 from scipy import stats
 from shoal.errors import ComputationError, InputError
 from shoal.response import respond
+from shoal.response.climb import IntArray
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
 from shoal.response.methods import METHODS
 from shoal.response.runs import Answers, Model
+from shoal.response.valleys import beside
 from shoal.trajectory import Array
 
 OSCILLATOR = np.array([5.0, 20.0, 50.0])
@@ -264,3 +266,17 @@ def test_searches_reach_maxima_inside_and_at_corners() -> None:
     assert found.upper[0] == pytest.approx(top, abs=1e-5)
     again = function({"x": found.at_upper[:, 0], "y": found.at_upper[:, 1]})
     assert np.diagonal(again) == pytest.approx(found.upper, abs=1e-14)
+
+
+def test_of_two_valleys_along_an_axis_the_deeper_one_is_found() -> None:
+    """Every 2 pi / 25 lies a valley; the deepest is that nearest to 0.3, which a search from another never meets."""
+
+    def objective(at: Array, _: IntArray) -> Array:
+        return np.asarray(1 - at[:, 0] - np.cos(25 * at[:, 1]) + 1e-4 * (at[:, 1] - 0.3) ** 2)
+
+    at = np.array([[1.0, -1.0], [1.0, -6 * math.pi / 25]])
+    best = objective(at, np.arange(2))
+    beside(objective, best, at)
+    assert at[:, 0] == pytest.approx([1.0, 1.0])
+    assert at[:, 1] == pytest.approx(2 * math.pi / 25, abs=1e-5)
+    assert best == pytest.approx(objective(at, np.arange(2)), abs=1e-15)

@@ -84,6 +84,7 @@ def test_beyond_the_horizon_nothing_is_claimed() -> None:
         (["bodies.OA.mass=1"], "is not PATH=LOW:HIGH"),
         (["bodies.OA.mass=2:1"], "LOW must be below HIGH"),
         (["bodies.OA.mass=a:b"], "is no number"),
+        (["initial.OA.angle=-2%:2%"], "-2% of what the scene states, which is 0, is nothing"),
         (["bodies.OA.mass=-1:1"], "bodies.OA.mass"),
         (["bodies.XY.mass=1:2"], "XY"),
         (["gravity=1:2"], "no number"),

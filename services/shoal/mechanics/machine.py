@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.errors import InputError
+from shoal.errors import UnstableStepError
 from shoal.mechanics import plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
@@ -80,7 +80,7 @@ class Machine:
 
         whole: whether the trajectory tells its states.
 
-        For threads and seek see `simulate`. Raises InputError if the step is beyond the stability limit.
+        For threads and seek see `simulate`. Raises UnstableStepError if the step is beyond the stability limit.
         """
         begin = time.perf_counter() if begin is None else begin
         end = float(times[-1])
@@ -224,9 +224,9 @@ class Machine:
 
 
 def check_step(scene: Scene, choice: Choice) -> None:
-    """Raises InputError if the step is beyond the stability limit."""
+    """Raises UnstableStepError if the step is beyond the stability limit."""
     if scene.solver.step > choice.limit:
-        raise InputError(
+        raise UnstableStepError(
             f"solver.step: {scene.solver.step:g} s is beyond the stability limit {choice.limit:.3e} s of "
             f"{choice.name} for this scene; use a smaller step or solver.integrator=generalized-alpha"
         )

@@ -35,6 +35,7 @@ def gaps(found: Response, marker: str) -> Figure:
     panel.set_xlabel("time [s]")
     panel.set_ylabel(f"at {marker} [m]")
     panel.legend(fontsize=10, ncols=2)
-    known = "are not known to be complete" if np.isnan(bounds.gap) else f"are known to {bounds.gap:.1e} of the width"
+    off = float(np.max([found.gap(marker, quantity) for quantity in found.axes]))
+    known = "are not known to be complete" if np.isnan(off) else f"are known to {off:.1e} of the width"
     headline(figure, f"{found.scene}: bounds of {marker} {known}")
     return figure

@@ -8,6 +8,11 @@ from matplotlib.figure import Figure
 from shoal.pictures.style import BLUE, VERMILION, canvas, headline, log_ticks, styled
 from shoal.response.limits import Judged
 
+RARE = 0.1
+"""Below this probability the axis is logarithmic."""
+FEW = 20
+"""So many instants are marked, as a line through one of them would not be seen."""
+
 
 @styled
 def probability(found: Judged) -> Figure:
@@ -17,20 +22,24 @@ def probability(found: Judged) -> Figure:
     """
     figure, axes = canvas()
     estimates = found.estimates
+    rare = estimates[-1].probability < RARE
+    few = {"marker": "o", "markersize": 4} if len(found.times) <= FEW else {}
     labels = ["passed by then"] if len(estimates) == 1 else ["least probable", "most probable"]
     seen = False
     for estimate, label, colour in zip(estimates, labels, (BLUE, VERMILION), strict=False):
         some = estimate.passed > 0
+        seen = seen or bool(some.any())
+        some |= np.full(len(some), not rare and bool(some.any()))
         lower, upper = estimate.interval
         axes.fill_between(found.times[some], lower[some], upper[some], color=colour, alpha=0.25, linewidth=0)
         if some.any():
-            axes.plot(found.times[some], estimate.passed[some], color=colour, label=f"{label}; band: 95 % confidence")
-        seen = seen or bool(some.any())
+            label = f"{label}; band: 95 % confidence"
+            axes.plot(found.times[some], estimate.passed[some], color=colour, label=label, **few)
     most = estimates[-1]
     if not seen:
         below = most.interval[1][-1]
         axes.text(0.5, 0.5, f"no run has passed it; below {below:.1e}", ha="center", transform=axes.transAxes)
-    if seen and most.probability < 0.1:
+    if seen and rare:
         least = min(one.probability for one in estimates if one.probability > 0)
         axes.set_yscale("log")
         axes.set_ylim(least * 1e-4, most.interval[1][-1] * 3)

@@ -12,10 +12,10 @@ from itertools import product
 
 import numpy as np
 
-from shoal.response.conditional import BLOCK, Above, Conditional, Mean, Quantile
+from shoal.response.conditional import BLOCK, Above, Conditional, Mean, Quantile, Share
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import MOST_CORNERS, Each, Extremes, along, corners, extremes
-from shoal.response.inputs import Inputs
+from shoal.response.inputs import BoolArray, Inputs
 from shoal.response.kept import TimeIsUpError
 from shoal.response.statistics import DRAWN, QUANTILES
 from shoal.response.study import SAFETY, Found, Study
@@ -31,6 +31,8 @@ STEPS = 0.1, 0.02
 """Of the search from the best of them."""
 HOPELESS = 0.1
 """Instants whose gap is above this share of the scatter lie beyond the horizon."""
+NOTHING = 0.01
+"""Of the largest deviation: at interval values with less, the shares of that are not looked at."""
 PLACES, INNER = 8, 128
 """Interval values that are looked at beyond it, and runs at each."""
 
@@ -54,7 +56,9 @@ class Boxes:
     """names: of the intervals; mean, std, quantiles: of every column; gap: the largest distance between outer bounds
     and extremes within the horizon, as a share of the scatter (the largest spread of the mean and deviation together);
     horizon: the last instant up to which they are known [s], infinite if they always are; places, inner: interval
-    values that were looked at beyond it, and runs at each
+    values that were looked at beyond it, and runs at each; shares: of each random parameter the least and the largest
+    first and total Sobol index, (2 indices, 2 sides, random parameters, columns), nan beyond the horizon, where nothing
+    varies, and of parameters that correlate
     """
 
     names: tuple[str, ...]
@@ -65,6 +69,7 @@ class Boxes:
     horizon: float
     places: int = 0
     inner: int = 0
+    shares: Array | None = None
 
     def named(self) -> dict[str, Ends]:
         """Every statistic by its name."""
@@ -92,7 +97,41 @@ def boxes_of(study: Study, found: Found) -> Boxes:
     end = math.inf if math.isinf(first) else float(study.instants[study.instants < first].max(initial=0.0))
     within = gap[study.instants <= end]
     largest = float(within.max()) if within.size else math.nan
-    return Boxes(tuple(of.intervals.names), mean, std, tuple(told), largest, end)
+    shares = _shares(of, study, sides[1])
+    shares[..., study.instants > end] = np.nan
+    return Boxes(tuple(of.intervals.names), mean, std, tuple(told), largest, end, shares=shares)
+
+
+def _shares(of: Conditional, study: Study, std: Extremes) -> Array:
+    """Least and largest Sobol indices, see `Boxes`.
+
+    Where the deviation is next to nothing beside its largest they are those over all interval values together.
+    """
+    random, columns = of.random, len(std.upper)
+    found = np.full((2, 2, len(random), columns), np.nan)
+    varies = study.largest(std.upper, study.runs.values) > 0
+    if random.correlations:
+        return found
+    expansion, nothing = of.expansion, (NOTHING * std.upper) ** 2
+    among = expansion.terms[:, expansion.inputs.random]
+    whole = np.maximum(_variance(expansion, np.asarray(among.any(axis=1))), 1e-300)
+    for k in range(len(random)):
+        own = of.terms[1:, k] > 0
+        alone = own & (np.delete(of.terms[1:], k, axis=1).sum(axis=1) == 0)
+        own_all = among[:, k] > 0
+        alone_all = own_all & (np.delete(among, k, axis=1).sum(axis=1) == 0)
+        for index, (counted, all_of) in enumerate(((alone, alone_all), (own, own_all))):
+            if not counted.any():
+                continue
+            one = Share(of, counted, np.maximum(nothing, 1e-300), _variance(expansion, all_of) / whole)
+            ends = extremes(one, len(of.intervals), columns, study.seed, rough=True)
+            found[index, 0, k, varies], found[index, 1, k, varies] = ends.lower[varies], ends.upper[varies]
+    return found
+
+
+def _variance(found: Expansion, counted: BoolArray) -> Array:
+    """Of some terms, (columns,)."""
+    return np.asarray((found.coefficients[counted] ** 2).sum(axis=0))
 
 
 def scatter(study: Study, mean: Extremes, std: Extremes) -> Array:

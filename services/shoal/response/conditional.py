@@ -15,7 +15,7 @@ import numpy as np
 
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import IntArray
-from shoal.response.inputs import Inputs
+from shoal.response.inputs import BoolArray, Inputs
 from shoal.response.polynomials import Terms
 from shoal.trajectory import Array
 
@@ -105,6 +105,34 @@ class Above:
         """(places,)."""
         found = self.of.each(germs, columns)
         return np.asarray(self.mean * found[:, 0] + self.deviations * np.sqrt((found[:, 1:] ** 2).sum(axis=1)))
+
+
+@dataclass(frozen=True)
+class Share:
+    """Share that some terms have of the variance of the random parameters at interval germs: a Sobol index.
+
+    counted: the terms, without the constant, (terms - 1,); nothing: a variance beside which there is none to share,
+    (columns,); other: the share that is told where that is so, (columns,)
+    """
+
+    of: Conditional
+    counted: BoolArray
+    nothing: Array
+    other: Array
+
+    def __call__(self, germs: Array) -> Array:
+        """(places, columns)."""
+        squares = np.array([part**2 for part in self.of.parts(germs)[1:]])
+        return self._share(squares[self.counted].sum(axis=0), squares.sum(axis=0), slice(None))
+
+    def each(self, germs: Array, columns: IntArray) -> Array:
+        """(places,)."""
+        squares = self.of.each(germs, columns)[:, 1:] ** 2
+        return self._share(squares[:, self.counted].sum(axis=1), squares.sum(axis=1), columns)
+
+    def _share(self, part: Array, whole: Array, columns: IntArray | slice) -> Array:
+        nothing = self.nothing[columns]
+        return np.asarray((part + nothing * self.other[columns]) / (whole + nothing))
 
 
 @dataclass(frozen=True)

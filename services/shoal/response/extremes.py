@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from shoal.response.climb import Objective, climb_down
+from shoal.response.valleys import beside
 from shoal.trajectory import Array
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
@@ -84,6 +85,7 @@ def extremes(
         # The place of an extreme at one instant is often near that of another.
         looked_at = np.concatenate([places(parameters, (seed, further)), np.unique(at.reshape(-1, parameters), axis=0)])
         also, there = _round(surrogate, looked_at, columns, starts)
+        _beside(surrogate, also, there)
         gained = np.vstack([gained, np.maximum(best - also, 0.0).max(axis=0)])[-IDLE:]
         at = np.where((also < best)[:, :, None], there, at)
         best = np.minimum(best, also)
@@ -119,6 +121,13 @@ def _round(surrogate: Surrogate, looked_at: Array, columns: int, starts: int) ->
     best, at = value.reshape(starts, 2, columns), place.reshape(starts, 2, columns, parameters)
     first = best.argmin(axis=0)[None]
     return np.take_along_axis(best, first, 0)[0], np.take_along_axis(at, first[..., None], 0)[0]
+
+
+def _beside(surrogate: Surrogate, best: Array, at: Array) -> None:
+    """Improve both sides by other valleys, in place."""
+    columns = best.shape[1]
+    every, signs = np.tile(np.arange(columns), 2), np.repeat([1.0, -1.0], columns)
+    beside(_signed(surrogate, signs, every), best.reshape(-1), at.reshape(-1, at.shape[2]))
 
 
 def _signed(surrogate: Surrogate, signs: Array, columns: IntArray) -> Objective:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from shoal.engines.contract import Engine
-from shoal.errors import InputError
+from shoal.errors import InputError, UnstableStepError
+from shoal.response.extremes import IntArray
 from shoal.response.inputs import BoolArray
 from shoal.response.kept import Keep
 from shoal.response.runs import Answers
@@ -74,27 +76,53 @@ class Machine:
         return self.keep(repr(getattr(self.told, "__self__", "markers")) + self.fixed, values, self._some)
 
     def _some(self, values: Mapping[str, Array]) -> Answers:
-        motion = self.engine.simulate_many(self.scene, values, self.times)
-        found, good = self.told(motion, self.scene, values), _good(motion)
-        why, repeated = motion.message, 0
+        lanes = np.arange(len(next(iter(values.values()))))
+        done, why = self._run(self.scene, values, lanes)
+        good, repeated = np.isin(lanes, [lane for lane, one in done.items() if one.good]), 0
         for finer in FINER:
-            left = np.flatnonzero(~good)
+            left = lanes[~good]
             if not left.size:
                 break
+            if not repeated and not done:
+                # Where the machine is too fast as it is stated, so are its steps.
+                self.engine.simulate(self.scene, self.times)
             repeated = max(repeated, left.size)
-            careful = self.scene.with_values(_careful(self.scene, motion, finer))
-            those = {path: at[left] for path, at in values.items()}
             try:
-                again = self.engine.simulate_many(careful, those, self.times)
+                again, why = self._run(self.scene.with_values(_smaller_steps(self.scene, finer)), values, left)
             except InputError as error:
                 why = str(error)
                 break
-            found[left], good[left] = self.told(again, careful, those), _good(again)
-            why = again.message
+            done |= again
+            good = np.isin(lanes, [lane for lane, one in done.items() if one.good])
+        if not done:
+            raise InputError(why)
+        missing = np.full_like(next(iter(done.values())).values, np.nan)
+        found = np.array([done[lane].values if lane in done else missing for lane in lanes.tolist()])
         return Answers(found, good, repeated, "" if good.all() else why)
 
+    def _run(self, scene: Scene, values: Mapping[str, Array], lanes: IntArray) -> tuple[dict[int, _Lane], str]:
+        """Some lanes, without those whose step is too long; why the first failed. Raises InputError."""
+        those = {path: at[lanes] for path, at in values.items()}
+        try:
+            motion = self.engine.simulate_many(scene, those, self.times)
+        except UnstableStepError as error:
+            if len(lanes) == 1:
+                return {}, str(error)
+            halves = [self._run(scene, values, half) for half in np.array_split(lanes, 2)]
+            return halves[0][0] | halves[1][0], halves[0][1] or halves[1][1]
+        told, good = self.told(motion, scene, those), _good(motion)
+        each = zip(lanes.tolist(), told, good.tolist(), strict=True)
+        return {lane: _Lane(row, well) for lane, row, well in each}, motion.message
 
-def _careful(scene: Scene, motion: Trajectory, finer: float) -> dict[str, float]:
+
+class _Lane(NamedTuple):
+    """values: (columns,); good: whether they may be believed."""
+
+    values: Array
+    good: bool
+
+
+def _smaller_steps(scene: Scene, finer: float) -> dict[str, float]:
     """Settings of the solver for runs that failed."""
     solver = scene.solver
     return {
@@ -102,6 +130,17 @@ def _careful(scene: Scene, motion: Trajectory, finer: float) -> dict[str, float]
         "solver.relative_tolerance": max(solver.relative_tolerance / finer, LEAST_TOLERANCE),
         "solver.absolute_tolerance": solver.absolute_tolerance / finer,
     }
+
+
+def stable(scene: Scene, run: Callable[[Scene], Trajectory]) -> tuple[Trajectory, dict[str, float]]:
+    """A run of a scene, and a setting of the solver where its own steps are too long. Raises InputError."""
+    settings: dict[str, float] = {}
+    for finer in FINER:
+        try:
+            return run(scene.with_values(settings) if settings else scene), settings
+        except UnstableStepError:
+            settings = {"solver.step": scene.solver.step / finer}
+    return run(scene.with_values(settings)), settings
 
 
 def _columns(motion: Trajectory, _scene: Scene, _values: Mapping[str, Array]) -> Array:

@@ -212,6 +212,8 @@ def _number(name: str, end: Any, nominal: float) -> float:
         value = nominal + abs(nominal) * float(text[:-1]) / 100 if text.endswith("%") else float(text)
     except ValueError:
         raise InputError(f"vary: {name}: {text!r} is no number; write {FORM}") from None
+    if text.endswith("%") and nominal == 0:
+        raise InputError(f"vary: {name}: {text} of what the scene states, which is 0, is nothing; write numbers")
     if not math.isfinite(value):
         raise InputError(f"vary: {name}: bounds are finite, found {text}")
     return value

@@ -295,6 +295,16 @@ class Response:
                 q: plain(self.column(marker, quantity, getattr(of, f"at_{side}").T).T)
                 for q, of in zip(levels, found.quantiles, strict=True)
             }
+        if found.shares is not None:
+            random = [name for name in self.inputs.names if name not in found.names]
+            told["sobol"] = {
+                name: {
+                    f"{index}_{side}": at(found.shares[i, j, k])
+                    for i, index in enumerate(("first", "total"))
+                    for j, side in enumerate(("lower", "upper"))
+                }
+                for k, name in enumerate(random)
+            }
         return told
 
     def _statistics(self, marker: str, quantity: str) -> dict[str, Any]:

@@ -37,7 +37,7 @@ from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
 from shoal.response.limits import Judged, Limit, judge, limit
 from shoal.response.limits.judge import Reach, require, watched
-from shoal.response.machine import Machine
+from shoal.response.machine import Machine, stable
 from shoal.response.read import parameters
 from shoal.response.respond import MOST, Answer, respond
 from shoal.response.result import Bounds, Response
@@ -225,7 +225,9 @@ def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, 
     step: float | None = None
     for run in chosen:
         given = {path: float(at[0]) for path, at in runs.inputs.values(runs.germs[[run]]).items()}
-        careful = verified(machine.engine, machine.scene.with_values(given), machine.times)
+        careful, _ = stable(
+            machine.scene.with_values(given), lambda scene: verified(machine.engine, scene, machine.times)
+        )
         if not careful.ok:
             return mesh, step, f"a more careful run does not bear one out: {careful.message}"
         estimated = careful.model.get("verification", {})

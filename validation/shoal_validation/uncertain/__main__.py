@@ -2,8 +2,9 @@
 
 Prints accuracy by number of runs of every method for intervals on every problem (`methods`), N random studies of
 machines in closed form by `auto`, whose bounds 100 000 random runs try to leave (`studies`), and ten scenes of other
-shapes whose bounds a fiftieth of these runs try (`scenes`); writes all into FILE (docs/uncertain.md).
-An hour; quick: 20 studies of at most three parameters and the problems of one.
+shapes whose bounds a fiftieth of these runs try (`scenes`), and draws how far ahead every method tells bounds (`map`);
+writes all into FILE (docs/uncertain.md). An hour; quick: 20 studies of at most three parameters, the problems of one,
+and a map of up to two.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pathlib import Path
 from shoal.response.methods import METHODS
 
 from shoal_validation.document import publish, table
-from shoal_validation.uncertain import scenes
+from shoal_validation.uncertain import chart, maps, scenes
 from shoal_validation.uncertain.measure import Line, measured
 from shoal_validation.uncertain.problems import PROBLEMS
 from shoal_validation.uncertain.studies import RUNS, Judged, drawn, judged
@@ -40,8 +41,9 @@ def main(arguments: list[str]) -> bool:
     parser.add_argument("--studies", type=int, default=200)
     parser.add_argument("--first", type=int, default=0, help="seed of the first study")
     parser.add_argument("--runs", type=int, default=RUNS, help="random runs against every study")
-    parser.add_argument("--only", choices=["methods", "studies", "scenes"])
+    parser.add_argument("--only", choices=["methods", "studies", "scenes", "map"])
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--chart", type=Path, default=Path("docs/charts/uncertain-map.png"))
     parser.add_argument("--page", type=Path, default=Path("docs/uncertain.md"))
     chosen = parser.parse_args(arguments)
     told, good = {}, True
@@ -57,6 +59,11 @@ def main(arguments: list[str]) -> bool:
         made = [scenes.tried(asked, max(chosen.runs // SHARE, scenes.BLOCK)) for asked in scenes.STUDIES]
         told["uncertain-scenes"] = scenes_table(made)
         good = good and all(one.kept for one in made)
+    if chosen.only in (None, "map"):
+        cells = maps.surveyed([name for name in METHODS if name not in NOT_FOR_INTERVALS], quick=chosen.quick)
+        told["uncertain-map"] = chart.findings(cells)
+        chart.draw(cells, chosen.chart)
+        good = good and not any(one.silent for one in cells if one.method == "auto")
     publish(chosen.page, told)
     return good
 

@@ -1,4 +1,4 @@
-"""Energies of a rigid machine in the plane along its motion."""
+"""Energies of a machine along its motion."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from shoal.mechanics import plane
 from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.analysis.felt import Felt
+from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.frames import RigidFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import RigidBody, Rod
@@ -33,7 +34,30 @@ class Energies(NamedTuple):
 
 
 def energies_along(felt: Felt) -> Energies:
-    """Of one lane."""
+    """Of one lane; of a model that bends or moves in space its only one."""
+    model = felt.evaluator.model
+    if model.dimensions != plane.DIMENSIONS or model.flexible or model.modal:
+        return _of_bodies(felt)
+    return _of_rigid(felt)
+
+
+def _of_bodies(felt: Felt) -> Energies:
+    """By coordinates of each body's own, which leave nothing of a machine to constants."""
+    bodies = FreeBodies(felt.evaluator, float(felt.times[-1]))
+    free, forces = bodies.evaluator, felt.evaluator.model.forces.size
+    rubbing = forces - free.model.forces.size
+    turns = felt.turns if forces else np.zeros((len(felt.q), 0))
+    at, rate, _ = bodies.state(felt.q, felt.v, felt.v)
+    kinetic, elastic, gravity = np.empty((3, len(at)))
+    for k, (q, v, turned, t) in enumerate(zip(at, rate, turns, felt.times.tolist(), strict=True)):
+        free.turns = turned[rubbing:]
+        found = free.at(q, v, t)
+        # The mass is without the inertia that bodies are lent which have none.
+        kinetic[k], elastic[k], gravity[k] = 0.5 * float(v @ (bodies.mass @ v)), found.strain, found.gravity
+    return Energies(kinetic, elastic, gravity)
+
+
+def _of_rigid(felt: Felt) -> Energies:
     model, kinetic, gravity = felt.evaluator.model, np.zeros(len(felt.times)), np.zeros(len(felt.times))
 
     def number(stated: Any) -> float:

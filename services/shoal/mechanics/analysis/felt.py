@@ -90,16 +90,23 @@ class Felt:
         return np.asarray(np.stack(own, axis=1) @ _sensor(tilt).T)
 
     def strain(self, at: Attachment, height: float, side: float) -> Array:
-        """Of a straight director rod along its axis, at a height (local y) and to a side (z) of it [m], (samples,)."""
+        """Of a straight rod along its axis, at a height (local y) and to a side (z) of it [m], (samples,).
+
+        In space of director rods.
+        """
         name, place = place_of(self.scene, at)
         frame = self._frame(name)
         assert isinstance(frame, BeamFrame)
         length = float(np.ravel(frame.length)[self.lane % np.size(frame.length)])
         gauge = _GAUGE * length
         middle = min(max(float(place[0]), gauge / 2), length - gauge / 2)
-        ends = [(middle + sign * gauge / 2, 0.0, 0.0) for sign in (-1.0, 1.0)]
-        found = points([frame.point(end) for end in ends], self.evaluator.model.unknowns, self.lane)
-        begin, end = (self.q @ found.matrix[k].T + found.constant[k] for k in range(2))
+        ends = [(middle + sign * gauge / 2, *(0.0,) * (len(place) - 1)) for sign in (-1.0, 1.0)]
+        vectors = [*(frame.point(end) for end in ends), *(frame.direction(end) for end in ends)]
+        found = points(vectors, self.evaluator.model.unknowns, self.lane)
+        begin, end, here, there = (self.q @ found.matrix[k].T + found.constant[k] for k in range(4))
+        if self.scene.dimensions == plane.DIMENSIONS:
+            turned = np.arctan2(plane.cross(here.T, there.T), dot(here, there))
+            return np.asarray((np.linalg.norm(end - begin, axis=1) - height * turned) / gauge - 1.0)
         before, behind = (self._axes(frame, one)[0] for one in ends)
         change, mean = (behind - before) / gauge, (behind + before) / 2
         about_y, about_z = dot(change[:, 2], mean[:, 0]), dot(change[:, 0], mean[:, 1])

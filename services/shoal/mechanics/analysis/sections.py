@@ -61,7 +61,9 @@ class SpatialSections(NamedTuple):
         return np.asarray(np.sum(self.tangent * self.moment, axis=1))
 
 
-def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: str) -> Sections | SpatialSections:
+def sections(
+    evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: str, *, bodies: FreeBodies | None = None
+) -> Sections | SpatialSections:
     """Section forces of a flexible rod at a state (coordinates, rates, accelerations). Raises InputError."""
     scene = evaluator.model.scene
     body = scene.bodies.get(rod)
@@ -69,7 +71,7 @@ def sections(evaluator: Evaluator, q: Array, v: Array, a: Array, t: float, rod: 
         raise InputError(f"{rod}: section forces need a flexible rod of the scene")
     if body.element == "modal":
         raise InputError(f"bodies.{rod}.element: section forces are those of elements; use ancf-cable instead of modal")
-    bodies = FreeBodies(evaluator, t)
+    bodies = bodies or FreeBodies(evaluator, t)
     at, rate, change = bodies.state(q, v, a)
     frame = bodies.placement.frames[rod]
     assert isinstance(frame, BeamFrame)

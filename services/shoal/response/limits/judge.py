@@ -14,7 +14,7 @@ from shoal.response.limits.choice import get_way, probability
 from shoal.response.limits.judged import Judged, Shown
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.margins import Margins
-from shoal.response.machine import Machine
+from shoal.response.machine import Machine, stable
 from shoal.response.runs import Model
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
@@ -41,7 +41,13 @@ class Watch:
 def watched(machine: Machine, limit: Limit) -> Machine:
     """The same machine, of which the margins of a limit are told."""
     told = Watch(limit, len(machine.times)).margins
-    return replace(machine, scene=limit.scene(machine.scene), times=limit.instants(machine.times), told=told)
+    return replace(
+        machine,
+        scene=limit.scene(machine.scene),
+        times=limit.instants(machine.times),
+        engine=limit.engine(machine.engine, machine.scene),
+        told=told,
+    )
 
 
 def require(machine: Machine, limit: Limit, inputs: Inputs) -> None:
@@ -56,8 +62,9 @@ def _show(limit: Limit, machine: Machine, inputs: Inputs, germ: Array, verify: b
     if verify:
         return show(limit, machine.scene, machine.times, machine.engine, inputs, named)
     scene = limit.scene(machine.scene.with_values(inputs.at(named)))
-    motion = machine.engine.simulate(scene, limit.instants(machine.times))
-    return _shown(limit, machine.times, inputs, named, scene, motion)
+    engine, when = limit.engine(machine.engine, scene), limit.instants(machine.times)
+    motion, settings = stable(scene, lambda one: engine.simulate(one, when))
+    return _shown(limit, machine.times, inputs, named, scene, motion, settings)
 
 
 def judge(
@@ -102,16 +109,26 @@ def judge(
 def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Inputs, named: Array) -> Shown:
     """Run a scene once more, with care, with these values of the parameters, (parameters,). Raises InputError."""
     here = limit.scene(scene.with_values(inputs.at(named)))
-    return _shown(limit, times, inputs, named, here, verified(engine, here, limit.instants(times)))
+    able, when = limit.engine(engine, here), limit.instants(times)
+    motion, settings = stable(here, lambda one: verified(able, one, when))
+    return _shown(limit, times, inputs, named, here, motion, settings)
 
 
-def _shown(limit: Limit, times: Array, inputs: Inputs, named: Array, scene: Scene, motion: Trajectory) -> Shown:
+def _shown(
+    limit: Limit,
+    times: Array,
+    inputs: Inputs,
+    named: Array,
+    scene: Scene,
+    motion: Trajectory,
+    settings: Mapping[str, float],
+) -> Shown:
     margins = Watch(limit, len(times)).margins(motion, scene, {})[0]
     estimated = motion.model.get("verification", {})
     instant = int(np.argmin(margins))
     return Shown(
         dict(zip(inputs.names, named.tolist(), strict=True)),
-        inputs.at(named),
+        {**inputs.at(named), **settings},
         float(times[instant]),
         float(margins[instant]),
         str(motion.status[0]),

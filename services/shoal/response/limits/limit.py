@@ -11,27 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.engines.contract import Engine
 from shoal.errors import InputError
-from shoal.response.limits.dynamic import ENERGIES, REACTIONS, along, check, equipped
+from shoal.response.limits import dynamic
+from shoal.response.limits.quantities import MARKERS, UNITS, check
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
-UNITS = {
-    "x": "m",
-    "y": "m",
-    "z": "m",
-    "angle": "rad",
-    "vx": "m/s",
-    "vy": "m/s",
-    "vz": "m/s",
-    "speed": "m/s",
-    "rate": "rad/s",
-    **REACTIONS,
-    **ENERGIES,
-}
-"""Of all quantities."""
-QUANTITIES = {2: ("x", "y", "angle", "vx", "vy", "speed", "rate"), 3: ("x", "y", "z", "vx", "vy", "vz", "speed")}
-"""Of a marker, by dimensions."""
 FORM = '"MARKER.QUANTITY < NUMBER", "JOINT.QUANTITY < NUMBER" or "energy < NUMBER", with <, > and abs(...)'
 _EXPRESSION = re.compile(r"^\s*(abs\()?\s*(?:([^\s()<>]+)\.)?(\w+)\s*(\))?\s*(<|>)=?\s*(\S+)\s*$")
 
@@ -58,11 +44,15 @@ class Limit:
     @property
     def is_dynamic(self) -> bool:
         """Whether masses and loads tell it, not the motion of a marker alone."""
-        return self.quantity in REACTIONS or self.quantity in ENERGIES
+        return self.quantity not in {**MARKERS[2], **MARKERS[3]}
 
     def scene(self, scene: Scene) -> Scene:
         """The scene whose motion tells the margins: that one with the markers that it takes."""
-        return equipped(scene) if self.is_dynamic else scene
+        return dynamic.equipped(scene, self.quantity) if self.is_dynamic else scene
+
+    def engine(self, engine: Engine, scene: Scene) -> Engine:
+        """The engine whose motion tells the margins. Raises InputError."""
+        return dynamic.asked(engine, scene, self.quantity) if self.is_dynamic else engine
 
     def instants(self, times: Array) -> Array:
         """Those of a motion that tells the margins at `times` [s]: angles are counted from the start."""
@@ -81,7 +71,7 @@ class Limit:
         if not self.is_dynamic:
             return self.margin(_quantity(motion, self.place, self.quantity).T)
         try:
-            return self.margin(along(motion, scene, values, self.quantity, self.place).T)
+            return self.margin(dynamic.along(motion, scene, values, self.quantity, self.place).T)
         except InputError as error:
             # What mechanics says of load cells it says of channels.
             raise InputError(f"limit: {self.text}: {str(error).removeprefix('channels: ')}") from None
@@ -94,7 +84,7 @@ def limit(text: str, scene: Scene) -> Limit:
         raise InputError(f"limit: {text!r} is not {FORM}")
     _, place, quantity, _, sign, number = found.groups()
     try:
-        _check(place or "", quantity, scene)
+        check(place or "", quantity, scene)
     except InputError as error:
         raise InputError(f"limit: {text}: {error}") from None
     try:
@@ -104,33 +94,6 @@ def limit(text: str, scene: Scene) -> Limit:
     if not np.isfinite(bound):
         raise InputError(f"limit: {text}: {number!r} is no finite number; write {FORM}")
     return Limit(text.strip(), place or "", quantity, sign == ">", bound, bool(found[1]))
-
-
-def _check(place: str, quantity: str, scene: Scene) -> None:
-    """Whether a scene has that. Raises InputError."""
-    of_markers = QUANTITIES[scene.dimensions]
-    if quantity in ENERGIES:
-        if place:
-            raise InputError(f"{quantity} is that of the whole machine, not of {place!r}; write {quantity} alone")
-        check(quantity, scene)
-        return
-    if quantity not in of_markers and quantity not in REACTIONS:
-        raise InputError(
-            f"no quantity {quantity!r}; there are {', '.join(of_markers)} of a marker, {', '.join(REACTIONS)} of a "
-            f"joint, and {', '.join(ENERGIES)} of the machine"
-        )
-    kind, known, others = "marker", list(scene.markers), list(scene.joints)
-    if quantity in REACTIONS:
-        kind, known, others = "joint", others, known
-    there = f"there are {', '.join(known)}" if known else "there are none"
-    if not place:
-        raise InputError(f"{quantity} is that of a {kind}; write {kind.upper()}.{quantity}, {there}")
-    if place not in known:
-        other = "marker" if kind == "joint" else "joint"
-        also = f" ({place} is a {other}, and {quantity} is that of a {kind})" if place in others else ""
-        raise InputError(f"no {kind} {place!r}{also}; {there}")
-    if quantity in REACTIONS:
-        check(quantity, scene)
 
 
 def _quantity(motion: Trajectory, marker: str, quantity: str) -> Array:

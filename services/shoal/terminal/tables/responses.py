@@ -12,6 +12,7 @@ from shoal.terminal import screen
 if TYPE_CHECKING:
     from shoal.response import Response
     from shoal.response.allocation import Allocation
+    from shoal.response.boxes import Boxes
     from shoal.response.limits import Judged
     from shoal.response.limits.judged import Between
 
@@ -38,8 +39,8 @@ def response_table(response: Response) -> None:
         for quantity in response.quantities:
             unit = "rad" if quantity == "angle" else "m"
             numbers = (response.column(marker, quantity, column)[-1] for column in columns)
-            form = "z.6f" if response.boxes is None else ".4g"
-            cells = ["-" if np.isnan(x) else f"{x:{form}}" for x in numbers]
+            forms = ["z.6f"] * 4 if response.boxes is None else [".4g", ".4g", ".2g", ".2g", ".4g", ".4g"]
+            cells = ["-" if np.isnan(x) else f"{x:{form}}" for x, form in zip(numbers, forms, strict=True)]
             if response.bounds is not None:
                 gap = response.gap(marker, quantity)
                 cells.append("-" if np.isnan(gap) else f"{gap:.0e}")
@@ -47,6 +48,8 @@ def response_table(response: Response) -> None:
     screen.out.print(table)
     if response.statistics is not None:
         _shares(response)
+    if response.boxes is not None and response.boxes.shares is not None:
+        _shares_between(response, response.boxes)
     for judged in response.limits:
         _limit(judged)
     if response.allocation is not None:
@@ -131,6 +134,18 @@ def _allocation(found: Allocation) -> None:
         f"{what} {found.stated:.3g} with the stated tolerances, {found.confirmed:.3g} with those found, which cost "
         f"{found.cost:.3g} times as much; to tighten first: {told['tighten_first']}; {found.evaluations} runs"
     )
+
+
+def _shares_between(response: Response, found: Boxes) -> None:
+    """The least and the largest of Sobol's total indices at the end, over all interval values."""
+    assert found.shares is not None
+    marker, axes = response.markers[-1], response.axes
+    table = screen.table(f"share of the variance of {marker} (total Sobol index), from and to", "", *axes)
+    random = [name for name in response.inputs.names if name not in found.names]
+    for k, name in enumerate(random):
+        ends = [[response.column(marker, axis, found.shares[1, side, k])[-1] for side in (0, 1)] for axis in axes]
+        table.add_row(escape(name), *("-" if np.isnan(low) else f"{low:.3f} to {high:.3f}" for low, high in ends))
+    screen.out.print(table)
 
 
 def _shares(response: Response) -> None:

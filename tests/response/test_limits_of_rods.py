@@ -1,0 +1,113 @@
+"""Limits on section forces, strains, joints and energies of machines that bend or move in space, in closed form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.errors import InputError
+from shoal.response import uncertain
+from shoal.response.limits.limit import limit
+from shoal.scene import Scene, load_scene
+
+G, LENGTH, THICK, STIFF = 9.81, 1.0, 0.05, 2e9
+AREA, BENDING = THICK**2, THICK**4 / 12
+
+
+def cantilever(space: bool) -> Scene:
+    """Damped so much that its weight bends it and it comes to rest; half of it bears more than the root's half."""
+    ground = {"body": "ground", "point": [0.0] * (3 if space else 2)}
+    rod = {"kind": "rod", "length": LENGTH, "height": THICK, "width": THICK, "density": 1000.0, "youngs_modulus": STIFF,
+           "elements": 4, "element": "director-rod" if space else "ancf-quintic", "retardation": 0.03}  # fmt: skip
+    return Scene.parse(
+        {
+            "name": "cantilever",
+            "dimensions": 3 if space else 2,
+            "gravity": [0.0, 0.0, -G] if space else [0.0, -G],
+            "bodies": {"rod": rod},
+            "joints": {"clamp": {"kind": "weld", "first": ground, "second": {"body": "rod"}}},
+            "markers": {
+                "middle": {"body": "rod", "point": [0.5, *(0.0,) * (2 if space else 1)]},
+                "root": {"body": "rod", "point": [0.0, *(0.0,) * (2 if space else 1)]},
+            },
+            "solver": {"duration": 0.5, "integrator": "radau5", "relative_tolerance": 1e-7},
+        }
+    )
+
+
+def margins(scene: Scene, limits: list[str], path: str, ends: tuple[float, float]) -> list[float]:
+    """The least ones at rest, of all values of a field between two."""
+    found = uncertain(scene, {path: ends}, [0.5], limits=limits, verify=False)
+    assert found.ok, found.message
+    return [one.margin for one in found.limits]
+
+
+@pytest.mark.parametrize("space", [False])
+def test_a_cantilever_under_its_weight(space: bool) -> None:
+    """The heaviest decides: shear q (L - s), moment q (L - s)^2 / 2, of which the upper side is stretched."""
+    load = 1100.0 * AREA * G
+    shear, moment = load * LENGTH / 2, load * LENGTH**2 / 8
+    strain = load * LENGTH**2 / 2 * THICK / 2 / (STIFF * BENDING)
+    wanted = {
+        "abs(middle.shear) > 50": 50 - shear,
+        "abs(middle.moment) > 20": 20 - moment,
+        "root.strain_above > 0.01": 0.01 - strain,
+        f"abs(clamp.{'my' if space else 'torque'}) > 50": 50 - load * LENGTH**2 / 2,
+    }
+    found = margins(cantilever(space), list(wanted), "bodies.rod.density", (900.0, 1100.0))
+    sizes = [shear, moment, strain, load * LENGTH**2 / 2]
+    for text, margin, exact, size in zip(wanted, found, wanted.values(), sizes, strict=True):
+        # A gauge has a length, bending is not small, and a cubic between four elements' nodes misses a curvature.
+        off = (0.02 if space else 2e-3) if "strain" in text else 5e-4
+        assert margin == pytest.approx(exact, abs=off * size), text
+
+
+def test_the_energy_of_a_machine_that_bends() -> None:
+    """It keeps what it has at the start, where its rods hang straight at some angle: weights alone."""
+    scene, path = load_scene("flexible-double-pendulum"), "initial.OA.angle"
+    rods = [scene.bodies[name] for name in ("OA", "AB")]
+    lower = [float(rod.mass) for rod in rods]
+    lengths = [float(rod.length) for rod in rods]
+    other = float(scene.value("initial.AB.angle"))
+
+    def energy(angle: float) -> float:
+        return G * (lengths[0] * np.sin(angle) * (lower[0] / 2 + lower[1]) + lengths[1] * np.sin(other) * lower[1] / 2)
+
+    found = uncertain(scene, {path: (0.75, 0.8)}, [0.1, 0.2], limits=["energy > 100"], verify=False)
+    assert found.limits[0].margin == pytest.approx(100 - energy(0.8), rel=1e-6)
+
+
+def test_the_force_and_the_energy_of_a_pendulum_in_space() -> None:
+    """m g cos p + m v^2 / L from the conservation of energy, whatever the plane in which it swings."""
+    scene, path, times = load_scene("spherical-pendulum"), "initial.A.velocity.1", [0.2, 0.4]
+    ends = (1.7, 1.8)
+    found = uncertain(scene, {path: ends}, times, limits=["energy > 5", "O.force > 30"], verify=False)
+    assert found.ok, found.message
+    assert found.limits[0].margin == pytest.approx(5 - (0.5 * ends[1] ** 2 - G / 2), abs=1e-8)
+    assert found.bounds is not None
+    # At each instant the same run is at the least height that the bounds tell, and its speed follows.
+    low = found.column("A", "z", found.bounds.lower)
+    speed = np.sqrt(ends[0] ** 2 + 2 * G * (-0.5 - low))
+    assert found.limits[1].margin == pytest.approx(30 - np.max(-G * low + speed**2), abs=0.1)
+
+
+def test_sections_between_loads_are_refused_before_the_study() -> None:
+    scene = cantilever(space=False)
+    push = {"kind": "force", "at": {"body": "rod", "point": [0.6, 0.0]}, "force": [0.0, 1.0]}
+    stated: dict[str, Any] = {**scene.model_dump(mode="json", exclude_unset=True), "loads": {"push": push}}
+    runs: list[int] = []
+    told = r"middle\.moment > 1: section forces of rod at 0\.5 m are not known"
+    with pytest.raises(InputError, match=told):
+        uncertain(
+            *(Scene.parse(stated), {"bodies.rod.density": (900.0, 1100.0)}, [0.1]),
+            **dict[str, Any](limits=["middle.moment > 1"], progress=runs.append),
+        )
+    assert not runs
+
+
+def test_another_engine_tells_no_section_forces() -> None:
+    scene = load_scene("flexible-double-pendulum")
+    with pytest.raises(InputError, match="told by the engine gauss alone; found exudyn"):
+        uncertain(scene, {"initial.OA.angle": (0.75, 0.8)}, [0.1], limits=["O.force > 3"], engine="exudyn")
+    assert limit("B.normal > 3", scene).unit == "N"
