@@ -17,16 +17,20 @@ from shoal.scene import Function, Scene
 GROUND = {"body": "ground", "point": [0.0, 0.0]}
 
 
-def hung(length: Any) -> Scene:
+def hung(length: Any, **start: Any) -> Scene:
     distance = {"kind": "distance", "first": GROUND, "second": {"body": "a"}, "length": length}
-    start = {"position": [0.0, -0.2], "velocity": [0.0, 0.0]}
     bodies, markers = {"a": {"kind": "point-mass", "mass": 1.0}}, {"a": {"body": "a"}}
-    scene = {"bodies": bodies, "markers": markers, "joints": {"d": distance}, "initial": {"a": start}}
+    scene = {
+        "bodies": bodies,
+        "markers": markers,
+        "joints": {"d": distance},
+        "initial": {"a": {"position": [0.0, -0.2], **start}},
+    }
     return Scene.parse({"name": "hung", **scene, "solver": {"samples": 4}})
 
 
 def test_rates_of_zero_agree_with_a_drive_that_rests_at_first() -> None:
-    run = get_engine("gauss").simulate(hung("0.2 + 0.0754*ramp((t - 0.516673)/0.3)"))
+    run = get_engine("gauss").simulate(hung("0.2 + 0.0754*ramp((t - 0.516673)/0.3)", velocity=[0.0, 0.0]))
     assert run.ok
     np.testing.assert_allclose(run.marker("a")[-1], [0.0, -0.2754], atol=1e-9)
 
