@@ -19,13 +19,9 @@ GROUND = {"body": "ground", "point": [0.0, 0.0]}
 
 def hung(length: Any, **start: Any) -> Scene:
     distance = {"kind": "distance", "first": GROUND, "second": {"body": "a"}, "length": length}
+    start = {"position": [0.0, -0.2], **start}
     bodies, markers = {"a": {"kind": "point-mass", "mass": 1.0}}, {"a": {"body": "a"}}
-    scene = {
-        "bodies": bodies,
-        "markers": markers,
-        "joints": {"d": distance},
-        "initial": {"a": {"position": [0.0, -0.2], **start}},
-    }
+    scene = {"bodies": bodies, "markers": markers, "joints": {"d": distance}, "initial": {"a": start}}
     return Scene.parse({"name": "hung", **scene, "solver": {"samples": 4}})
 
 
