@@ -29,9 +29,9 @@ _SETS = (
 _HELD = 0.2
 """Of a window, at its end."""
 _SHOWN = {
-    "kaheman-single": "single pendulum of Kaheman et al.",
-    "kaheman-double": "double pendulum of Kaheman et al.",
-    "ibm-double-pendulum": "filmed double pendulums of IBM",
+    "kaheman-single": "single pendulum of Kaheman et al., 2.5 s",
+    "kaheman-double": "double pendulum of Kaheman et al., 1 s",
+    "ibm-double-pendulum": "filmed double pendulums of IBM, 1 s",
 }
 
 
