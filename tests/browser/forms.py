@@ -32,6 +32,6 @@ def submit(page: Any) -> None:
 
 
 def finished(page: Any, state: str = "Completed") -> None:
-    """Wait for the run whose page it is, and reload: Prefect asks for artifacts at times, but only while it runs."""
+    """Wait for the run whose page it is, and reload: Prefect asks for artifacts every five seconds while it runs."""
     page.locator(".page-heading-flow-run").get_by_text(state, exact=True).wait_for()
     page.reload()
