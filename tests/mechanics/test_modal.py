@@ -1,9 +1,10 @@
-"""Bodies in floating frames: a published figure, Lagrange's equations by scipy, closed forms, Exudyn's cables."""
+"""Bodies in floating frames: a published figure, Lagrange's equations by scipy, closed forms, Exudyn's."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
+import exudyn_frames
 import floating_frame as judge
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.modal.beams import wave_numbers
 from shoal.scene import Scene, load_scene
+from shoal.trajectory import Array
 
 GROUND = {"body": "ground", "point": [0.0, 0.0]}
 ROD = {
@@ -48,8 +50,20 @@ def test_the_flexible_slider_crank_ends_where_it_is_published() -> None:
     assert run.marker("slider")[-1, 0] == pytest.approx(0.169737332842786, abs=1e-8)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_chains_move_as_lagrange_says(seed: int) -> None:
+class Chain(NamedTuple):
+    """Rods hung on the origin and on each other, for us and for a judge."""
+
+    scene: Scene
+    bars: list[judge.Bar]
+    start: Array
+    rates: Array
+
+
+TIMES = np.linspace(0.05, 0.15, 3)
+
+
+def _chain(seed: int) -> Chain:
+    """At random."""
     rng = np.random.default_rng(seed)
     bars, bodies, joints, initial, start, rates = [], {}, {}, {}, list[float](), list[float]()
     count = int(rng.integers(1, 3))
@@ -89,12 +103,31 @@ def test_chains_move_as_lagrange_says(seed: int) -> None:
             "solver": {"integrator": "dop853", "duration": 0.15, **CLOSE},
         }
     )
-    times = np.linspace(0.05, 0.15, 3)
-    run = get_engine("gauss").simulate(scene, times)
+    return Chain(scene, bars, np.array(start), np.array(rates))
+
+
+def _ends(scene: Scene) -> Array:
+    """Of a chain as it moves, (times, rods) complex."""
+    run = get_engine("gauss").simulate(scene, TIMES)
     assert run.ok, run.message
-    expected = judge.motion(bars, np.array(start), np.array(rates), times, 9.81)
-    found = run.points[:, :, 0, 0] + 1j * run.points[:, :, 1, 0]
-    assert np.max(np.abs(found - expected)) < 1e-8
+    return np.asarray(run.points[:, :, 0, 0] + 1j * run.points[:, :, 1, 0])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_chains_move_as_lagrange_says(seed: int) -> None:
+    scene, *chain = _chain(seed)
+    assert np.max(np.abs(_ends(scene) - judge.motion(*chain, TIMES, 9.81))) < 1e-8
+
+
+@pytest.mark.parametrize(("seed", "step"), [(0, 5e-5), (1, 2.5e-5), (2, 1e-4)])
+def test_chains_move_as_exudyns_floating_frames_do(seed: int, step: float) -> None:
+    """Its step has the second order, which two of them take away."""
+    pytest.importorskip("exudyn")
+    scene, *chain = _chain(seed)
+    found = _ends(scene)
+    coarse, fine = (exudyn_frames.motion(*chain, TIMES, 9.81, h) for h in (step, step / 2))
+    assert np.max(np.abs(found - (4 * fine - coarse) / 3)) < 1e-8
+    assert np.max(np.abs(found - coarse)) > 3 * np.max(np.abs(found - fine))
 
 
 @pytest.mark.parametrize(

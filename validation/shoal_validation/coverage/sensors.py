@@ -1,9 +1,10 @@
-"""`python -m shoal_validation.coverage.sensors [--seeds N] [--page FILE]`.
+"""`python -m shoal_validation.coverage.sensors [--seeds N] [--record FILE] [--page FILE]`.
 
 Draws N (200) rigid machines in the plane at random, records each by an IMU of Exudyn's, with noise, and has `identify`
 find mass, inertia and friction from 2 s of it, beginning up to 40 % beside them. Counts how often the 95 % intervals of
-what is called right contain the truth, and names the machines of which something wrong was called right. The table goes
-to standard output and into docs/identification-charts.md. Takes an hour.
+what is called right contain the truth, and names the machines of which something wrong was called right. --record keeps
+every machine in a file, so that the study goes on where it was stopped. The table goes to standard output and into
+docs/identification-charts.md. Takes an hour.
 """
 
 from __future__ import annotations
@@ -12,13 +13,11 @@ import argparse
 import sys
 import tempfile
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import yaml
-from rich.console import Console
-from rich.progress import track
 from shoal.errors import ShoalError
 from shoal.identification import Measurement, Problem, identify
 from shoal.identification.estimate import Estimate
@@ -27,6 +26,7 @@ from shoal.identification.spread.value import Value
 from shoal_validation.coverage.exudyn_imu import imu
 from shoal_validation.coverage.sensed_machines import Machine, machine
 from shoal_validation.document import publish, table
+from shoal_validation.resumed import resumed
 
 NOISE = {"ax": 0.05, "ay": 0.05, "rate": 0.005}
 """Standard deviations [m/s^2], [rad/s], of sensors as they are in telephones."""
@@ -114,14 +114,11 @@ def main(arguments: list[str]) -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.coverage.sensors", description=__doc__)
     parser.add_argument("--seeds", type=int, default=200)
+    parser.add_argument("--record", type=Path, help="file of the machines that are done")
     parser.add_argument("--page", type=Path, default=Path("docs/identification-charts.md"))
     chosen = parser.parse_args(arguments)
-    console = Console(stderr=True)
-    found = []
-    for seed in track(range(chosen.seeds), "machines", console=console, transient=True):
-        found.append(one := trial(seed))
-        errors = ", ".join(f"{name} {error:.2f}" for name, error in one.errors.items())
-        console.print(f"{one.seed:4d} {one.machine}: {one.verdict}; {errors or one.message}", highlight=False)
+    seeds = [str(seed) for seed in range(chosen.seeds)]
+    found = [Trial(**one) for _, one in resumed(seeds, lambda seed: asdict(trial(int(seed))), chosen.record)]
     publish(chosen.page, {"sensors": f"{_intervals(found)}\n\n{_verdicts(found)}"})
 
 
