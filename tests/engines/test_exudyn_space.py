@@ -11,8 +11,8 @@ from shoal.engines import get_engine
 from shoal.engines.compare import compare
 from shoal.errors import InputError
 from shoal.mechanics.simulate import simulate
-from shoal.scene import Scene
-from shoal.trajectory import Array
+from shoal.scene import Scene, load_scene
+from shoal.trajectory import Array, Status
 from shoal_validation.spatial.machines import PUBLISHED, bricard, cable, flexible_pendulum
 
 pytest.importorskip("exudyn")
@@ -275,3 +275,11 @@ def test_geometrically_exact_beams_move_as_director_rods_do(case: dict[str, Any]
 def test_geometrically_exact_beams_hold_what_they_can() -> None:
     with pytest.raises(InputError, match=r"R.retardation: engine exudyn-ge cannot do damped rods in space; use gauss"):
         beside_beams({"retardation": 1e-3}, 0.01)
+
+
+def test_beams_whose_run_ends_early_say_so() -> None:
+    """What Exudyn leaves of the rest of the run has no frames."""
+    pendulum = load_scene("flexible-spherical-double-pendulum").with_values({"solver.step": 0.05})
+    run = get_engine("exudyn-ge").simulate(pendulum, [0.05, 0.5])
+    assert run.status == (Status.FAILED,)
+    assert "terminated at" in run.message

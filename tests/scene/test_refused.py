@@ -212,3 +212,11 @@ def test_value_refuses_unknown_paths(path: str) -> None:
     with pytest.raises(InputError, match="no such field") as refusal:
         CABLE_SCENE.value(path)
     assert str(refusal.value).startswith(f"{path}: ")
+
+
+def test_a_twist_that_elements_cannot_tell_is_refused() -> None:
+    """Beyond half a turn from end to end: 24 rad need eight elements."""
+    strip = load_scene("swinging-strip").with_values({"bodies.strip.twist": [48.0]})
+    with pytest.raises(InputError, match=r"bodies.strip.*24 rad within an element.* use at least 8 elements"):
+        strip.with_values({"bodies.strip.elements": 1})
+    assert strip.with_values({"bodies.strip.elements": 8}).value("bodies.strip.elements") == 8

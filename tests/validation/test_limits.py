@@ -18,7 +18,7 @@ from shoal_validation.nightly.result import Night, Verdict
 from shoal_validation.nightly.run import judged
 from shoal_validation.nightly.theory import MOTIONS
 from shoal_validation.problems import get_problem
-from shoal_validation.problems.in_space import swing
+from shoal_validation.problems.in_space import swing, top
 from shoal_validation.problems.one_angle import G
 
 PROBLEMS = ("pendulum", "double-pendulum", "four-bar-2", "parallelogram", "slider-crank", "squeezer")
@@ -95,6 +95,25 @@ def test_rate_and_growth_follow_from_the_equations_of_the_spherical_pendulum() -
         growth = max(growth, float(np.max(np.abs(away[[0, 2]]))))
     assert MOTIONS["spherical-pendulum"].rate == pytest.approx(rate, rel=0.01)
     assert MOTIONS["spherical-pendulum"].growth == pytest.approx(growth, rel=0.02)
+
+
+def test_growth_follows_from_the_equations_of_the_heavy_top() -> None:
+    """Of the part of its spin that grows most, across its axis; a radian moves it by as much as its axis is long."""
+    times, start = get_problem("heavy-top").times, np.array([0.0, 150.0, -4.61538])
+    rate, growth = float(np.linalg.norm(start)), 0.0
+    for change in 1e-5 * np.eye(3):
+        away = (top(start + change, times) - top(start - change, times)) / 2e-5
+        growth = max(growth, rate * float(np.max(np.linalg.norm(away, axis=1))))
+    assert MOTIONS["heavy-top"].rate == pytest.approx(rate, rel=0.01)
+    assert MOTIONS["heavy-top"].growth == pytest.approx(growth, rel=0.02)
+
+
+def test_a_top_that_spins_fast_precesses_as_textbooks_say() -> None:
+    """Steadily at m g l / (C s), with a nutation that falls with the square of its spin; 15 kg at 1 m, C = 0.46875."""
+    spin, times = 4000.0, np.linspace(0.0, 4.0, 3)
+    azimuth = 15.0 * G / (0.46875 * spin) * times
+    steady = np.stack([-np.sin(azimuth), np.cos(azimuth), 0.0 * times], axis=1)
+    assert top([0.0, spin, 0.0], times) == pytest.approx(steady, abs=2e-3)
 
 
 def test_the_spherical_pendulum_is_where_elliptic_functions_put_it() -> None:

@@ -253,11 +253,11 @@ def test_the_plan_covers_every_problem_and_engine_with_limits_above_the_referenc
         engines = {one.engine for one in motions if one.problem == name}
         # exudyn-ge repeats what exudyn does with rigid bodies; forty loops more slowly than that is worth.
         assert engines >= {"gauss", "exudyn", "casadi"}
-        assert "exudyn-ge" in engines or name == "four-bar-40"
+        assert "exudyn-ge" in engines or name == "four-bar-40" or PROBLEMS[name].scene().dimensions == 3
     for one in motions:
         assert one.limit is None or one.limit >= PROBLEMS[one.problem].reference.error
     quick = plan(quick=True)
-    assert {one.problem for one in quick} == {one.problem for one in lines}
+    assert {one.problem for one in quick} == {one.problem for one in lines if one.unit != "cells"}
     assert len(quick) < len(lines)
 
 

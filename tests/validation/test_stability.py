@@ -32,11 +32,20 @@ FEW: dict[str, tuple[tuple[str, ...], tuple[Any, ...], tuple[Any, ...]]] = {
     "quadrature": (("gauss, cable, full", "gauss, quintic"), (1, 2), (20.0, 500.0)),
     "long-runs": (("leapfrog", "rk4", "generalized-alpha 0.9"), (1e3, 1e4), (1e-3,)),
     "chaos": (("leapfrog", "energy-momentum", "dop853"), (1.0, 8.0), (1e-3, 5e-2)),
+    "space-singular": (
+        ("projection", "kkt", "proximal, drift left", "dop853"),
+        (0.0, 1e-8, 1e-2),
+        ("parallelogram on balls", "bennett"),
+    ),
+    "space-step": (("leapfrog", "rk4", "energy-momentum"), (1e-3, 1e-1), ("spherical-pendulum", "bricard")),
+    "space-spin": (("leapfrog", "rk4", "generalized-alpha 1"), (1e-3, 1e-2), (1.0, 1000.0)),
+    "space-slenderness": (("leapfrog", "generalized-alpha 0.9"), (2e-4, 1e-2), (100.0, 500.0)),
+    "space-twist": (("director rod, generalized-alpha",), (1, 4), (0.0, 24.0)),
     "chaos-flexible": (("leapfrog", "generalized-alpha 1"), (0.5, 2.5), (5e-4, 1e-3)),
 }
 """Methods, x and y of the fast tests; among them cells at which a single run says `ok` and is wrong."""
 
-LONG = ("step-stiffness", "step-slenderness", "tolerance-machine")
+LONG = ("step-stiffness", "step-slenderness", "tolerance-machine", "space-slenderness", "space-twist")
 
 
 def _few(name: str) -> StabilityMap:

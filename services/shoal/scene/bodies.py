@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -178,6 +180,22 @@ class Rod(Record):
             if self.poisson_ratio >= 0.5:
                 raise ValueError(f"poisson_ratio {self.poisson_ratio:g} must be below 0.5 for ancf-full")
         return self
+
+    @model_validator(mode="after")
+    def _turns_are_seen(self) -> Rod:
+        turn, most = self._largest_turn() if self.twist else 0.0, math.pi
+        if turn > most:
+            raise ValueError(
+                f"twist: the section turns by {turn:.3g} rad within an element, where half a turn is the most "
+                f"that it can tell; use at least {math.ceil(self.elements * turn / most)} elements"
+            )
+        return self
+
+    def _largest_turn(self) -> float:
+        """Of the unstrained section about the axis, from one end of an element to the other [rad]."""
+        ends = [self.length * k / self.elements for k in range(self.elements + 1)]
+        turns = [sum(k * s ** (power + 1) / (power + 1) for power, k in enumerate(self.twist)) for s in ends]
+        return max(abs(after - before) for before, after in pairwise(turns))
 
     @property
     def shears(self) -> bool:

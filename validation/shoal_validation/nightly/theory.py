@@ -38,6 +38,7 @@ MOTIONS = {
     # No equation of its own: a change of the crank's rate stays, as in free turning, and counts twice.
     "squeezer": Motion(7e-3, 1140.0, 68.0),
     "spherical-pendulum": Motion(1.0, 7.07, 12.5),
+    "heavy-top": Motion(1.0, 150.1, 131.0),
 }
 
 

@@ -106,6 +106,14 @@ PROBLEMS = {
             in_space.spherical_pendulum,
         ),
         Problem(
+            "heavy-top",
+            "the heavy top of the literature, 15 kg that turn at 150 rad/s",
+            "heavy-top",
+            "C",
+            np.linspace(0.04, 2.0, 50),
+            in_space.heavy_top,
+        ),
+        Problem(
             "bricard",
             "Bricard's mechanism, a loop of six bars whose joints leave no freedom by count",
             "bricard",
@@ -128,6 +136,15 @@ PROBLEMS = {
             "B",
             _HALF_SECOND,
             stored("flexible-spherical"),
+            flexible=True,
+        ),
+        Problem(
+            "swinging-strip",
+            "a curved and twisted strip of rubber, clamped, that bends about both axes and twists",
+            "swinging-strip",
+            "E",
+            _HALF_SECOND,
+            stored("swinging-strip"),
             flexible=True,
         ),
     )

@@ -1,6 +1,8 @@
-"""References of machines in space: a spherical pendulum by its textbook equations, IFToMM's benchmarks as published."""
+"""References of machines in space: pendulum and top by their textbook equations, IFToMM's benchmarks as published."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -10,6 +12,8 @@ from shoal.trajectory import Array
 from shoal_validation.problems.contract import Reference
 from shoal_validation.problems.one_angle import TOLERANCE, G
 from shoal_validation.spatial.machines import PUBLISHED
+
+_TOP = "mass", "inertia", "centre_of_mass"
 
 
 def swing(start: tuple[float, float, float], times: Array) -> Array:
@@ -34,6 +38,33 @@ def spherical_pendulum(times: Array) -> Reference:
     level = np.sin(polar)
     points = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), -np.cos(polar)], axis=1)
     return Reference(points, "equations in two angles, scipy DOP853", 1e-11)
+
+
+def heavy_top(times: Array) -> Reference:
+    """The scene of that name."""
+    spin = load_scene("heavy-top").value("initial.top.spin")
+    return Reference(top(spin, times), "momentum about its point, scipy DOP853", 1e-10)
+
+
+def top(spin: Sequence[float], times: Array) -> Array:
+    """Centre of the top of that scene [m], (times, 3), from a start with an angular velocity [rad/s] without x part.
+
+    A u x u' + C s u is the angular momentum about the point, with the moments A across and C along the axis u and the
+    own spin s, which stays.
+    """
+    scene = load_scene("heavy-top")
+    mass, (across, along, _), axis = (scene.value(f"bodies.top.{name}") for name in _TOP)
+    across += mass * np.dot(axis, axis)
+    turning, weight = along * spin[1], mass * np.array([0.0, 0.0, G])
+
+    def rate(_: float, y: Array) -> Array:
+        u, v = y[:3], y[3:]
+        moment = np.cross(u, -weight)
+        return np.concatenate([v, -(v @ v) * u + np.cross(moment - turning * v, u) / across])
+
+    begin, span = np.concatenate([axis, np.cross(spin, axis)]), (0.0, float(times[-1]))
+    run = solve_ivp(rate, span, begin, "DOP853", t_eval=times, rtol=TOLERANCE, atol=TOLERANCE)
+    return np.asarray(run.y[:3].T)
 
 
 def bricard(times: Array) -> Reference:

@@ -6,6 +6,7 @@ another program judge:
 chains      one to four rigid and flexible bodies, open or closed: `tree` where it can, else Exudyn on the same mesh,
             else Exudyn on cables four times as fine
 directors   the same with director rods
+bent        one or two flat director rods, curved and twisted at rest: Exudyn's geometrically exact beams
 linkages    tops, Bennett's, Bricard's, Sarrus' and spherical linkages, RSSR, slider-cranks, platforms, generic loops:
             Newton's and Euler's equations of every body, written for this study alone
 
@@ -35,7 +36,7 @@ def main(arguments: list[str]) -> None:
     first, last = map(int, asked.seeds.split(":"))
     counts: Counter[str] = Counter()
     for seed in range(first, last):
-        if (asked.kind == "directors" or asked.tolerance) and not flexible(drawn(seed, asked.kind)[1]):
+        if (asked.kind in ("directors", "bent") or asked.tolerance) and not flexible(drawn(seed, asked.kind)[1]):
             continue
         found = met(seed, asked.tolerance, asked.kind) if asked.tolerance else judged(seed, asked.kind)
         counts[found.verdict] += 1

@@ -58,6 +58,33 @@ def with_directors(scene: Scene) -> Scene:
     return scene.with_values({f"bodies.{name}.element": "director-rod" for name in rods})
 
 
+def bent(seed: int) -> Scene:
+    """One or two director rods, curved and twisted at rest, clamped or on balls, a body between them or at the end."""
+    rng = np.random.default_rng(seed)
+    bodies: dict[str, Any] = {}
+    joints: dict[str, Any] = {}
+    initial: dict[str, Any] = {}
+    before = GROUND
+    for k in range(int(rng.integers(1, 4))):
+        name, turn = f"B{k}", Rotation.random(random_state=int(rng.integers(2**31)))
+        bends = k != 1
+        bodies[name], _ = _strip(rng) if bends else _link(rng)
+        kind = str(rng.choice(("weld", "weld", "spherical")))
+        joints[f"J{k}"] = _joint(rng, kind, before, {"body": name})
+        initial[name] = {"rotation": turn.as_rotvec().tolist()}
+        before = {"body": name, "point": "end"}
+    return _scene(seed, bodies, joints, initial, _loads(rng, list(bodies), before))
+
+
+def _strip(rng: Random) -> tuple[dict[str, Any], Any]:
+    """A flat director rod, curved about both axes by up to a radian and twisted by up to two."""
+    rod, end = _rod(rng)
+    turns = rng.uniform(-1.0, 1.0, 3) / rod["length"]
+    shape = {"curvature": [turns[0]], "side_curvature": [turns[1]], "twist": [2 * turns[2]]}
+    rod |= {"element": "director-rod", "width": float(rod["height"] * rng.uniform(1.0, 3.0))}
+    return rod | {"elements": int(rng.integers(4, 9))} | shape, end
+
+
 def _link(rng: Random) -> tuple[dict[str, Any], Any]:
     """A rigid body of any inertia, and where its end is."""
     a, b = rng.uniform(0.01, 0.1, 2)

@@ -16,11 +16,11 @@ from shoal.selection import select
 from shoal.trajectory import Trajectory
 
 from shoal_validation.random_space import linkages
-from shoal_validation.random_space.machines import machine, with_directors
+from shoal_validation.random_space.machines import bent, machine, with_directors
 from shoal_validation.random_space.newton_euler import NewtonEuler
 
-KINDS = ("chains", "linkages", "directors")
-RIGID_STEP, CABLE_STEP = 5e-4, 1e-4
+KINDS = ("chains", "linkages", "directors", "bent")
+RIGID_STEP, CABLE_STEP, BEAM_STEP = 5e-4, 1e-4, 5e-4
 """Of Exudyn as a judge [s]."""
 FINER = 4
 NEWTON = 1e-7
@@ -47,11 +47,12 @@ class Judged:
 
 @dataclass(frozen=True)
 class _Opinion:
-    """Of a judge: its motion or why it has none, and how far it may be off itself, as a part of the scale."""
+    """Of a judge: its motion or why it has none, and how far it may be off itself, as a part of the scale and in m."""
 
     judge: str
     motion: Trajectory | Mapping[str, Any] | str
     share: float = 2e-3
+    known: float = 0.0
 
     @property
     def silence(self) -> str:
@@ -78,15 +79,19 @@ def judged(seed: int, kind: str = "chains") -> Judged:
         return Judged(seed, "not met", "", f"{name}{error}")
     if not run.ok:
         return Judged(seed, "refused", "", f"{name}{run.status[0]}: {run.message}")
-    opinion = _by_newton_and_euler(seed) if kind == "linkages" else _by_engines(scene)
+    opinion = (
+        _by_newton_and_euler(seed) if kind == "linkages" else _by_beams(scene) if kind == "bent" else _by_engines(scene)
+    )
     if opinion.silence:
         return Judged(seed, "not judged", opinion.judge, name + opinion.silence)
     told = run.model["verification"]
     if told["time_error"] is None:
         return Judged(seed, "not met", opinion.judge, f"{name}not estimated: {told['note']}")
     away = opinion.away(run)
-    meshed = opinion.judge == "finer"
-    allowed = 3 * (told["time_error"] + (told["mesh_error"] or 0.0) * meshed) + opinion.share * told["scale"]
+    meshed = opinion.judge in ("finer", "beams")
+    allowed = (
+        3 * (told["time_error"] + (told["mesh_error"] or 0.0) * meshed) + opinion.share * told["scale"] + opinion.known
+    )
     verdict = "right" if away <= allowed else "wrong and called right"
     return Judged(seed, verdict, opinion.judge, f"{name}{away:.2g} m away, allowed {allowed:.2g} m")
 
@@ -96,7 +101,8 @@ def drawn(seed: int, kind: str) -> tuple[str, Scene]:
     if kind == "linkages":
         name, data = linkages.drawn(seed)
         return f"{name}: ", Scene.parse(data)
-    return "", with_directors(machine(seed)) if kind == "directors" else machine(seed)
+    scene = bent(seed) if kind == "bent" else machine(seed)
+    return "", with_directors(scene) if kind == "directors" else scene
 
 
 def flexible(scene: Scene) -> dict[str, Rod]:
@@ -144,6 +150,23 @@ def _by_engines(scene: Scene) -> _Opinion:
         return _Opinion("tree", get_engine("tree").simulate(scene))
     except InputError:
         return _Opinion("finer" if finer else "exudyn", _exudyn(scene, finer))
+
+
+def _by_beams(scene: Scene) -> _Opinion:
+    """Exudyn's geometrically exact beams on these elements and on half as long ones, extrapolated (of second order)."""
+    runs = []
+    for factor in (1, 2):
+        finer = {f"bodies.{name}.elements": factor * rod.elements for name, rod in flexible(scene).items()}
+        values: dict[str, object] = {**finer, "solver.step": BEAM_STEP, "solver.newton_tolerance": NEWTON}
+        try:
+            runs.append(get_engine("exudyn-ge").simulate(scene.with_values(values)))
+        except (InputError, ComputationError) as error:
+            return _Opinion("beams", str(error))
+        if not runs[-1].ok:
+            return _Opinion("beams", f"{runs[-1].status[0]}: {runs[-1].message}")
+    coarse, fine = runs
+    limit = {name: (4 * fine.marker(name) - coarse.marker(name)) / 3 for name in fine.markers}
+    return _Opinion("beams", limit, known=coarse.distance(fine) / 3)
 
 
 def _exudyn(scene: Scene, cables: Mapping[str, int]) -> Trajectory | str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from shoal_validation.stability import (
+    in_space,
     long_runs,
     quadrature,
     rank_tolerance,
+    rods_in_space,
     singular,
     step_machine,
     step_slenderness,
@@ -27,6 +29,11 @@ MAPS = {
         long_runs.LONG,
         long_runs.CHAOTIC,
         long_runs.FLEXIBLE,
+        in_space.SINGULAR,
+        in_space.STEP,
+        in_space.SPIN,
+        rods_in_space.SLENDERNESS,
+        rods_in_space.TWIST,
     )
 }
 

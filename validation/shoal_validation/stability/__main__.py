@@ -25,7 +25,7 @@ DOCS = Path(__file__).parents[3] / "docs"
 
 
 def main() -> None:
-    """Run what was asked for; the page is written after a complete run only."""
+    """Run what was asked for; maps that were not keep in the data and the page what an earlier run found."""
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.stability", description=__doc__)
     parser.add_argument("--only", choices=MAPS, action="append", help="run this map only; may be repeated")
     parser.add_argument("--quick", action="store_true", help="three values of each axis; needs --out")
@@ -35,19 +35,22 @@ def main() -> None:
     if asked.quick and asked.out == DOCS / "charts":
         parser.error("--quick: name a folder by --out; the charts of docs/ come from complete maps")
     began = time.perf_counter()
-    maps = [MAPS[name] for name in asked.only or MAPS]
-    if asked.redraw:
-        kept = json.loads((asked.out / "stability.json").read_text(encoding="utf-8"))
-        results = [stored(one, kept[one.name]) for one in maps]
-    else:
-        results = [survey(one.reduced() if asked.quick else one, _note) for one in maps]
-    for result in results:
+    maps, data = [MAPS[name] for name in asked.only or MAPS], asked.out / "stability.json"
+    kept = json.loads(data.read_text(encoding="utf-8")) if data.exists() else {}
+    asked.out.mkdir(parents=True, exist_ok=True)
+    results = []
+    for one in maps:
+        if asked.redraw:
+            result = stored(one, kept[one.name])
+        else:
+            result = survey(one.reduced() if asked.quick else one, _note)
+            kept[one.name] = result.to_json()
+            data.write_text(json.dumps(kept, separators=(",", ":")) + "\n", encoding="utf-8")
         draw(result, asked.out / f"stability-{result.name}.png")
-    if not asked.only and not asked.redraw:
-        data = {result.name: result.to_json() for result in results}
-        (asked.out / "stability.json").write_text(json.dumps(data, separators=(",", ":")) + "\n", encoding="utf-8")
-        if asked.out == DOCS / "charts":
-            rewrite(DOCS / "stability.md", "stability", section(results))
+        results.append(result)
+    if asked.out == DOCS / "charts":
+        known = [stored(one, kept[name]) for name, one in MAPS.items() if name in kept]
+        rewrite(DOCS / "stability.md", "stability", section(known))
     _note(f"{time.perf_counter() - began:.0f} s")
     Console(highlight=False, width=150).print(table(results))
 

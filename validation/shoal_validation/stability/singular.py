@@ -52,7 +52,8 @@ def left(run: Trajectory) -> bool:
     return bool(np.max(np.linalg.norm(across, axis=1)) > TURNED)
 
 
-def _way(acceleration: str, project: bool) -> Method:
+def way(acceleration: str, project: bool) -> Method:
+    """A way to the acceleration, with drift removed after every step or left; steps by rk4."""
     name = acceleration if project else f"{acceleration}, drift left"
     changes = {"solver.integrator": "rk4", "solver.acceleration": acceleration, "solver.project": project}
     return Method(name, GAUSS, changes)
@@ -67,7 +68,7 @@ ACCELERATION = StabilityMap(
     "way holds. The others leave the branch or their numbers, and the checks tell.",
     DISTANCES,
     MASSES,
-    (*(_way(name, project) for project in (True, False) for name in WAYS), *ADAPTIVE, *both(*EXUDYN)),
+    (*(way(name, project) for project in (True, False) for name in WAYS), *ADAPTIVE, *both(*EXUDYN)),
     machine,
     lambda *_: {"solver.step": STEP},
 )

@@ -1,12 +1,13 @@
 """`python -m shoal_validation.work_precision`: measures every method on every problem, and renews charts and tables.
 
-A whole run writes work-precision.json and the pictures to docs/charts and the tables of docs/accuracy-and-speed.md.
+A whole run writes data and pictures to docs/charts, and the tables of docs/accuracy-and-speed.md (in the plane) and of
+docs/accuracy-in-space.md.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,10 +20,20 @@ from shoal.home import home, prepare_kernel_cache
 from shoal_validation.document import rewrite
 
 if TYPE_CHECKING:
+    from shoal_validation.problems import Problem
     from shoal_validation.work_precision.contract import Point
     from shoal_validation.work_precision.measure import Study
 
-CHAINS = ("pendulum", "double-pendulum")
+GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
+    "plane": {"chains": ("pendulum", "double-pendulum"), "loops": ()},
+    "space": {"spatial": ()},
+}
+"""Pictures of rigid machines by page, and what they hold; an empty one has all others."""
+PAGES = {
+    "plane": ("work-precision", "accuracy-and-speed.md"),
+    "space": ("work-precision-space", "accuracy-in-space.md"),
+}
+"""Name of the data and of the marks in the page, and the page."""
 
 
 def main() -> None:
@@ -37,51 +48,65 @@ def main() -> None:
     partial = bool(asked.only or asked.quick)
     folder: Path = asked.out or (home() / "work-precision" if partial else Path("docs/charts"))
     folder.mkdir(parents=True, exist_ok=True)
-    if asked.redraw:
-        studies, machine = load(folder)
-    else:
-        studies, machine = _measure(asked.only, asked.quick), machine_facts()
-        save(folder, studies, machine)
-    _draw(folder, studies)
-    page = folder.parent / "accuracy-and-speed.md"
-    if not partial and page.exists():
-        rewrite(page, "work-precision", tables(studies, machine))
     console = Console(highlight=False)
-    for one in studies:
-        _print(console, one)
+    for page, problems in _problems(asked.only, asked.page).items():
+        name, document = PAGES[page]
+        if asked.redraw:
+            studies, machine = load(folder, name)
+        else:
+            studies, machine = [], machine_facts()
+            for one in _measure(problems, asked.quick):
+                studies.append(one)
+                save(folder, studies, machine, name)
+        _draw(folder, page, studies)
+        if not partial and (folder.parent / document).exists():
+            rewrite(folder.parent / document, name, tables(studies, machine))
+        for one in studies:
+            _print(console, one)
     console.print(f"written to {folder}")
 
 
 def _asked() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.work_precision", description=__doc__)
     parser.add_argument("--only", metavar="PROBLEM", help="one problem of the library")
+    parser.add_argument("--page", choices=PAGES, help="machines in the plane or in space only")
     parser.add_argument("--quick", action="store_true", help="few meshes, one repeat; for a look")
     parser.add_argument("--redraw", action="store_true", help="charts and tables from the data that lie in the folder")
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="default: docs/charts; in part: the state folder")
     return parser.parse_args()
 
 
-def _measure(only: str | None, quick: bool) -> list[Study]:
+def _problems(only: str | None, page: str | None) -> dict[str, list[Problem]]:
+    """What is measured, by pages."""
     from shoal_validation.problems import PROBLEMS, get_problem
+
+    found: dict[str, list[Problem]] = {}
+    for problem in [get_problem(only)] if only else PROBLEMS.values():
+        of = "space" if problem.scene().dimensions == 3 else "plane"
+        if only or page in (None, of):
+            found.setdefault(of, []).append(problem)
+    return found
+
+
+def _measure(problems: list[Problem], quick: bool) -> Iterator[Study]:
     from shoal_validation.work_precision.measure import study
 
     errors = Console(stderr=True, highlight=False)
-    problems = [get_problem(only)] if only else list(PROBLEMS.values())
     with errors.status("starting") as status:
         note: Callable[[str], None] = status.update if errors.is_terminal else errors.print
-        return [study(problem, quick, note) for problem in problems]
+        for problem in problems:
+            yield study(problem, quick, note)
 
 
-def _draw(folder: Path, studies: list[Study]) -> None:
+def _draw(folder: Path, page: str, studies: list[Study]) -> None:
     from shoal_validation.work_precision import charts
 
     pictures = {one.problem.name: charts.flexible(one) for one in studies if one.problem.flexible}
     rigid = [one for one in studies if not one.problem.flexible]
-    groups = {
-        "chains": [one for one in rigid if one.problem.name in CHAINS],
-        "loops": [one for one in rigid if one.problem.name not in CHAINS],
-    }
-    pictures |= {name: charts.rigid(group) for name, group in groups.items() if group}
+    named = {problem for group in GROUPS[page].values() for problem in group}
+    for name, group in GROUPS[page].items():
+        shown = [one for one in rigid if (one.problem.name in group if group else one.problem.name not in named)]
+        pictures |= {name: charts.rigid(shown)} if shown else {}
     for name, figure in pictures.items():
         figure.savefig(folder / f"work-precision-{name}.png", dpi=110)
 

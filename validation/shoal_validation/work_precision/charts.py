@@ -40,13 +40,17 @@ WIDE = 8.6
 
 
 def flexible(study: Study) -> Figure:
-    """Continuum error above, error in time on the scene's own mesh below."""
-    figure, (above, below) = plt.subplots(2, 1, figsize=(WIDE, 13.5), layout="constrained")
+    """Continuum error above; below error in time on the mesh on which integrators are compared, where it is known."""
+    meshed = any(point.mesh_error for point in study.points)
+    count = 2 if meshed else 1
+    figure, axes = plt.subplots(count, 1, figsize=(WIDE, 6.75 * count), layout="constrained", squeeze=False)
+    above = axes[0, 0]
     _families(above, study, NAMED)
-    above.set_ylabel("largest error of B against the converged beam [m]")
+    above.set_ylabel(f"largest error of {study.problem.marker} against the converged beam [m]")
     above.set_title(_message(study), loc="left")
     above.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=5, frameon=False)
-    _integrators(below, study)
+    if meshed:
+        _integrators(axes[1, 0], study)
     return figure
 
 
@@ -116,7 +120,7 @@ def _integrators(axis: Axes, study: Study) -> None:
         places = [p.seconds * 1e3 for p in points], [max(p.mesh_error or 0.0, reference.error) for p in points]
         look = {"color": LOOKS[family]["color"], "marker": MARKERS[k % 8], "linestyle": LINES[k % 4]}
         axis.plot(*places, **look, markersize=5, linewidth=1.4, label=label)
-    axis.set_ylabel("largest error of B against the same mesh, converged in time [m]")
+    axis.set_ylabel(f"largest error of {study.problem.marker} against the same mesh, converged in time [m]")
     there = [p for p in on_mesh if p.mesh_error is not None and p.mesh_error <= ON_MESH]
     best = {p.family: p for p in sorted(there, key=lambda point: -point.seconds)}
     took = ", ".join(f"{family} {best[family].seconds * 1e3:.3g} ms" for family in (OURS, "Exudyn") if family in best)

@@ -17,7 +17,7 @@ from shoal_validation.work_precision.contract import Point
 from shoal_validation.work_precision.measure import Study
 
 PACKAGES = ("shoal", "numpy", "scipy", "numba", "exudyn", "casadi", "mujoco")
-FILE = "work-precision.json"
+NAME = "work-precision"
 
 
 def machine_facts() -> dict[str, str]:
@@ -25,8 +25,8 @@ def machine_facts() -> dict[str, str]:
     return {"processor": processor(), "cores": str(os.cpu_count()), **versions(PACKAGES)}
 
 
-def save(folder: Path, studies: list[Study], machine: dict[str, str]) -> None:
-    """Write the data of a run."""
+def save(folder: Path, studies: list[Study], machine: dict[str, str], name: str = NAME) -> None:
+    """Write the data of a run as NAME.json."""
     data = {
         "machine": machine,
         "problems": {
@@ -39,12 +39,12 @@ def save(folder: Path, studies: list[Study], machine: dict[str, str]) -> None:
         },
     }
     text = json.dumps(plain(data), separators=(",", ":")).replace('{"family"', '\n{"family"')
-    (folder / FILE).write_text(text + "\n", encoding="utf-8")
+    (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
 
 
-def load(folder: Path) -> tuple[list[Study], dict[str, str]]:
+def load(folder: Path, name: str = NAME) -> tuple[list[Study], dict[str, str]]:
     """The studies of an earlier run and its machine."""
-    data = json.loads((folder / FILE).read_text(encoding="utf-8"))
+    data = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
     empty = {"mesh": "", "error": float("nan")}
     return [
         Study(get_problem(name), [Point(**{**empty, **point}) for point in one["points"]], one["left_out"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from shoal.engines.capabilities import require
 from shoal.engines.exudyn import ExudynEngine
@@ -11,7 +12,7 @@ from shoal.scene import Scene
 from shoal_validation.benchmarks.forward import exudyn_loop
 from shoal_validation.problems import Problem
 from shoal_validation.work_precision.contract import Method, Run, counted
-from shoal_validation.work_precision.mesh import with_mesh
+from shoal_validation.work_precision.mesh import twisted, with_mesh
 
 FAMILY = "Exudyn"
 RADIUS = 0.8
@@ -23,6 +24,7 @@ MESHES = (
 FEW_MESHES = ("2C/4C", "2R/8R", "3R/6R", "4R/12R", "6R/12R", "12R/24R", "24R/48R")
 DAMPED_MESHES = ("2C/4C", "3R/10R", "6R/12R", "24R/48R")
 BEAM_MESHES = ("2G/4G", "4G/8G", "8G/16G")
+TWISTED_MESHES = ("2D", "4D", "8D", "16D")
 FLEXIBLE = (50, 100, 150, 250, 500, 1000, 1500, 2500)
 RIGID = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000)
 
@@ -33,12 +35,15 @@ def methods(problem: Problem, brief: bool) -> list[Method]:
         ExudynEngine(modified_newton=True),
         ExudynEngine(modified_newton=True, integrator="generalized-alpha"),
     )
-    require(cable, problem.scene())
-    if not problem.flexible:
-        steps = counted(problem, RIGID)
-        return [_method(engine, "", steps) for engine in (cable, damped)]
     beam = ExudynEngine(modified_newton=True, beam="geometrically-exact")
     steps = counted(problem, FLEXIBLE)
+    if twisted(problem.scene()):
+        soft = replace(beam, integrator="generalized-alpha")
+        named = (*((beam, mesh) for mesh in TWISTED_MESHES), (soft, TWISTED_MESHES[-1]))
+        return [_method(engine, mesh, steps) for engine, mesh in named]
+    require(cable, problem.scene())
+    if not problem.flexible:
+        return [_method(engine, "", counted(problem, RIGID)) for engine in (cable, damped)]
     return [
         *(_method(cable, mesh, steps) for mesh in (FEW_MESHES if brief else MESHES)),
         *(_method(damped, mesh, steps) for mesh in (DAMPED_MESHES[:2] if brief else DAMPED_MESHES)),

@@ -12,9 +12,15 @@ KINDS: dict[str, dict[str, object]] = {
     "Q": {"element": "ancf-quintic"},
     "E": {"element": "ancf-full", "law": "enhanced"},
     "G": {"element": "ancf-cable"},
+    "D": {"element": "director-rod"},
 }
-"""C and R cables of full and reduced quadrature, Q quintic, E fully parameterised with the enhanced law; G stands for
-Exudyn's geometrically exact beam, which replaces the cables of a scene."""
+"""C and R cables of full and reduced quadrature, Q quintic, E fully parameterised with the enhanced law, D director
+rod. G stands for Exudyn's geometrically exact beam in place of each cable; two of them stand for a director rod."""
+
+
+def twisted(scene: Scene) -> bool:
+    """Whether its rods are director rods, which bend about two axes and twist."""
+    return any(body.element == "director-rod" for body in scene.bodies.values())
 
 
 def with_mesh(scene: Scene, mesh: str) -> Scene:

@@ -36,7 +36,8 @@ def references(studies: list[Study]) -> str:
     for study in studies:
         known = study.problem.reference
         rows.append([study.problem.name, known.source, f"{known.error:.1e}"])
-        mesh = converged(study.problem, SCENE_MESH) if study.problem.flexible else None
+        on_mesh = any(point.mesh_error for point in study.points)
+        mesh = converged(study.problem, SCENE_MESH) if on_mesh else None
         if mesh:
             rows.append([f"{study.problem.name}, {SCENE_MESH} converged in time", mesh.source, f"{mesh.error:.1e}"])
     return table(["problem", "reference", "its own error [m]"], rows)
@@ -58,7 +59,7 @@ def further(studies: list[Study]) -> str:
     rows = []
     for study in studies:
         for line in (line for line in costs(study) if line.many or line.other):
-            many = _named(line.many) if study.problem.flexible else "not measured"
+            many = _named(line.many) if any(p.family == MANY for p in study.points) else "not measured"
             rows.append([line.problem, f"{line.reach:.0e}", many, _named(line.other, family=True)])
     return table(["problem", "error [m]", "ours, each of 64 at once", "best of CasADi, scipy, MuJoCo"], rows)
 

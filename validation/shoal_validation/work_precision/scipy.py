@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from shoal.errors import ComputationError
+from shoal.errors import ComputationError, InputError
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.assembly.placement import place
 from shoal.scene import Scene
@@ -16,7 +16,7 @@ from shoal.trajectory import Array
 
 from shoal_validation.problems import Problem
 from shoal_validation.work_precision.contract import Method, Run
-from shoal_validation.work_precision.mesh import with_mesh
+from shoal_validation.work_precision.mesh import twisted, with_mesh
 
 FAMILY = "scipy"
 Name = Literal["DOP853", "Radau"]
@@ -28,7 +28,9 @@ MOST = 3.0
 
 
 def methods(problem: Problem, brief: bool) -> list[Method]:
-    """DOP853 and Radau; brief: the scene's own mesh."""
+    """DOP853 and Radau; brief: the scene's own mesh. Raises InputError."""
+    if twisted(problem.scene()):
+        raise InputError("director rods are too stiff for what a step costs in Python")
     meshes = (MESHES[:1] if brief else MESHES) if problem.flexible else ("",)
     return [_method(name, mesh) for name in NAMES for mesh in meshes]
 

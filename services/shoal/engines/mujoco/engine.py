@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,9 +66,10 @@ class MujocoEngine:
         """Run what MJCF says, soft constraints and all: their energy and the work of loads are not followed."""
         started = time.perf_counter() if started is None else started
         mujoco, scene = library(), machine.scene
-        model, data = _loaded(mujoco, machine)
+        model, data = loaded(mujoco, machine)
         followed = not (model.neq or model.nu or scene.loads or np.any(model.dof_frictionloss))
-        points, angles, drift, steps = _march(mujoco, model, data, scene, wanted)
+        with quiet(mujoco):
+            points, angles, drift, steps = _march(mujoco, model, data, scene, wanted)
         status, message = Status.OK, ""
         if not np.all(np.isfinite(points)):
             status, message = Status.DIVERGED, "the motion is not finite; use a smaller solver.step"
@@ -96,9 +98,21 @@ class MujocoEngine:
         return one_by_one(self, scene, values, times)
 
 
-def _loaded(mujoco: Any, machine: Mjcf) -> tuple[Any, Any]:
-    """The model and its state at the start."""
+@contextmanager
+def quiet(mujoco: Any) -> Iterator[None]:
+    """No warnings of steps that diverge, which MuJoCo otherwise also writes to a file where one is."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def loaded(mujoco: Any, machine: Mjcf) -> tuple[Any, Any]:
+    """The model and its state at the start; one that diverges is not put back there, as MuJoCo would."""
     model = mujoco.MjModel.from_xml_string(machine.text)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     data = mujoco.MjData(model)
     data.qvel[:] = machine.rates
     return model, data
@@ -110,7 +124,7 @@ def stepped(scene: Scene) -> Mjcf:
     Raises InputError that names what MJCF has not.
     """
     mujoco, machine = library(), Mjcf(scene)
-    model, data = _loaded(mujoco, machine)
+    model, data = loaded(mujoco, machine)
     mujoco.mj_forward(model, data)
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
@@ -36,12 +37,16 @@ SEEN = 1e-9
 
 
 class View(NamedTuple):
-    """A state at rest: its forces, the free directions, the multipliers, and the unbalanced force along Z."""
+    """A state at rest: its forces, the free directions, the multipliers, and the unbalanced force along Z.
+
+    turning: the force along each motion that is left out
+    """
 
     evaluation: Evaluation
     freedom: Freedom
     multipliers: Array
     unbalanced: Array
+    turning: Array
 
 
 class Found(NamedTuple):
@@ -55,11 +60,15 @@ class Found(NamedTuple):
 
 
 class Balance:
-    """The balance of forces of one model at time t [s]. size: of the machine [m]; mass: of all bodies [kg]."""
+    """The balance of forces of one model at time t [s]. size: of the machine [m]; mass: of all bodies [kg].
+
+    left_out: motions z that are not taken, with z' M z = 1, as rows z' M, (motions, unknowns)
+    """
 
     def __init__(self, evaluator: Evaluator, t: float, size: float, mass: float) -> None:
         self.evaluator, self.t = evaluator, t
         self.metric = Metric(evaluator.mass)
+        self.left_out = np.zeros((0, evaluator.model.unknowns))
         self.size, self.unit = size, size * np.sqrt(mass)
         q = evaluator.model.q0[:, 0]
         stiff = abs(evaluator.stiffness(q, t, load=0.0)) @ np.abs(q)
@@ -68,9 +77,20 @@ class Balance:
     def look(self, q: Array, load: float = 1.0) -> View:
         """Forces, free directions and multipliers at q."""
         evaluation = self.evaluator.at(q, t=self.t, load=load)
-        freedom = self.metric.freedom(evaluation.jacobian)
+        freedom, count = self._freedom(evaluation), evaluation.jacobian.shape[0]
         lagrange = freedom.multipliers(evaluation.force)
-        return View(evaluation, freedom, lagrange, freedom.basis.T @ evaluation.force)
+        unbalanced = freedom.basis.T @ evaluation.force
+        return View(evaluation, freedom, lagrange[:count], unbalanced, lagrange[count:])
+
+    def _freedom(self, evaluation: Evaluation) -> Freedom:
+        rows = evaluation.jacobian
+        if len(self.left_out):
+            rows = scipy.sparse.vstack([rows, scipy.sparse.csr_array(self.left_out)])
+        return self.metric.freedom(rows)
+
+    def _closing(self, evaluation: Evaluation, freedom: Freedom) -> Array:
+        """The smallest move that closes the joints."""
+        return freedom.shift(np.append(-evaluation.gap, np.zeros(len(self.left_out))))
 
     def hessian(self, q: Array, view: View, load: float = 1.0) -> Array:
         """The reduced stiffness [rad^2/s^2]."""
@@ -84,7 +104,8 @@ class Balance:
         Where neither acts, over the force that a strain of 1e-9 would take.
         """
         scale = self._scale(view)
-        return float(np.linalg.norm(view.unbalanced)) / scale if scale > 0 else 0.0
+        left = np.append(view.unbalanced, view.turning)
+        return float(np.linalg.norm(left)) / scale if scale > 0 else 0.0
 
     def _scale(self, view: View) -> float:
         parts = (view.evaluation.elastic, view.evaluation.force - view.evaluation.elastic)
@@ -100,7 +121,7 @@ class Balance:
             gap = float(np.max(np.abs(evaluation.gap)))
             if not gap > 1e-14:
                 break
-            move = self.metric.freedom(evaluation.jacobian).shift(-evaluation.gap)
+            move = self._closing(evaluation, self._freedom(evaluation))
             q = q + move
             if np.max(np.abs(move)) < 1e-15 * np.max(np.abs(q), initial=1.0):
                 break
@@ -113,7 +134,7 @@ class Balance:
             view = self.look(q, load)
             stiffness = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
             basis = view.freedom.basis
-            back = view.freedom.shift(-view.evaluation.gap)
+            back = self._closing(view.evaluation, view.freedom)
             along = stiffness @ basis
             try:
                 y = np.linalg.solve(basis.T @ along, view.unbalanced - basis.T @ (stiffness @ back))

@@ -17,6 +17,7 @@ from shoal.mechanics import plane
 from shoal.mechanics.analysis.balance import Balance, Found, zero_level
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.idle_spins import idle_spins
 from shoal.mechanics.analysis.joint_reactions import reactions_of
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
@@ -70,12 +71,14 @@ class _Search:
         mass = sum(float(body.mass) for body in scene.bodies.values())
         self.balance = Balance(evaluator, time, span(scene), mass)
         self.iterations = self.steps = 0
+        self.spinning: list[str] = []
 
     def run(self, leave_unstable: bool) -> Equilibrium:
         q = self._assembled()
         q, gap = self.balance.restore(q)
         if gap > GAPE * self.balance.size:
             return self._ending(q, Held.FAILED, f"the joints cannot be closed: they gape by {gap:.2g}")
+        self.balance.left_out, self.spinning = idle_spins(self.balance, self.placement, q)
         has_potential = not self.evaluator.follows
         message = ""
         found = self._at(q) or self._loaded(q)
@@ -159,6 +162,8 @@ class _Search:
         if len(eigenvalues) and np.real(eigenvalues[0]) <= zero:
             text = f"{message}nothing holds {self._movers(lowest)}; it may rest in other places as well"
             return self._ending(found.q, Held.UNHELD, text, found)
+        if self.spinning:
+            message += f"{', '.join(self.spinning)}: free to spin about its axis, which moves nothing"
         return self._ending(found.q, Held.OK, message.rstrip("; "), found)
 
     def _ending(self, q: Array, status: Held, message: str, found: Found | None = None) -> Equilibrium:

@@ -171,9 +171,11 @@ def _start(placement: SpatialPlacement, name: str, rod: Rod, s: float, q: Array,
 
 
 def _frames(q: Array) -> RigidTransform:
-    """Frames of nodes from their coordinates (rows, 7)."""
-    turn = Rotation.from_quat(q[:, 3:7], scalar_first=True)
-    return RigidTransform.from_components(q[:, :3], turn)
+    """Frames of nodes from their coordinates (rows, 7); those of the ground after a failure, where there are none."""
+    size = np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+    known = np.all(np.isfinite(q), axis=1, keepdims=True) & (size > 0)
+    q = np.where(known, q, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    return RigidTransform.from_components(q[:, :3], Rotation.from_quat(q[:, 3:7], scalar_first=True))
 
 
 def _strain(q: Array, length: float) -> Array:

@@ -1,14 +1,14 @@
-"""`python -m shoal_validation.spatial`: machines in space beside Exudyn, error and processor time.
+"""`python -m shoal_validation.benchmarks.in_space`: machines in space beside Exudyn; `make bench` prints it, too.
 
-Bricard's mechanism, P3 at 1 s: both run in one process on one core; each time is the median of some calls, Exudyn's of
-its solver alone. Exudyn's time at our errors follows from its step nearest to them by its order, two: it grows with the
-root of the error. The flexible spherical double pendulum, 4 and 8 cables: equal steps of both, loops alone and whole
-calls.
+The flexible spherical double pendulum, 4 and 8 cables: equal steps of both, loops alone and whole calls. Bricard's
+mechanism, P3 at 1 s, at equal error: each time is the median of some calls, Exudyn's of its solver alone. Exudyn's time
+at our errors follows from its step nearest to them by its order, two: it grows with the root of the error.
 """
 
 from __future__ import annotations
 
 import statistics
+import sys
 import time
 
 import numpy as np
@@ -18,7 +18,7 @@ from shoal.engines.exudyn.record import choose_steps
 from shoal.engines.prepared import Prepared
 from shoal.scene import load_scene
 
-from shoal_validation.benchmarks import forward
+from shoal_validation.benchmarks.forward import Row, measure
 from shoal_validation.document import table
 from shoal_validation.spatial.machines import PUBLISHED, bricard
 
@@ -26,7 +26,26 @@ TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 STEPS = (1e-2, 4e-3, 2e-3, 1e-3)
 
 
-def own(tolerance: float) -> tuple[float, float]:
+def rows() -> list[Row]:
+    """Both machines, one line a way of running them."""
+    return [*measure(load_scene("flexible-spherical-double-pendulum"), "in space, 4/8 cables"), *_bricard()]
+
+
+def _bricard() -> list[Row]:
+    found, theirs = [], []
+    for step in STEPS:
+        error, seconds = _exudyn(step)
+        theirs.append((error, seconds))
+        found.append(Row(f"Bricard: Exudyn, time loop, step {step:g} s, {error:.1e} m", seconds, 1.0))
+    for tolerance in TOLERANCES:
+        error, seconds = _own(tolerance)
+        nearest = min(theirs, key=lambda one: abs(np.log(one[0] / error)))
+        same = nearest[1] * np.sqrt(nearest[0] / error)
+        found.append(Row(f"Bricard: ours, whole call, tolerance {tolerance:g}, {error:.1e} m", seconds, same / seconds))
+    return found
+
+
+def _own(tolerance: float) -> tuple[float, float]:
     """Error [m] and median time [s] of a run of ours."""
     values = {"solver.relative_tolerance": tolerance, "solver.absolute_tolerance": tolerance / 10}
     run, times = Prepared(bricard().with_values(values), threads=1), []
@@ -38,7 +57,7 @@ def own(tolerance: float) -> tuple[float, float]:
     return float(np.linalg.norm(found.marker("P3")[-1] - PUBLISHED)), statistics.median(times[1:])
 
 
-def exudyn(step: float) -> tuple[float, float]:
+def _exudyn(step: float) -> tuple[float, float]:
     """The same of Exudyn's solver, modified Newton; its answer judged as the engine does."""
     engine, exu, scene = ExudynEngine(modified_newton=True), library(), bricard().with_values({"solver.step": step})
     found, times = engine.simulate(scene, [1.0]), []
@@ -53,29 +72,10 @@ def exudyn(step: float) -> tuple[float, float]:
     return float(np.linalg.norm(found.marker("P3")[-1] - PUBLISHED)), statistics.median(times[1:])
 
 
-def flexible() -> None:
-    """The flexible pendulum on its own mesh."""
-    rows = forward.measure(load_scene("flexible-spherical-double-pendulum"), "4/8 cables")
-    shown = [(row.name, f"{row.seconds * 1e3:.4g}", f"{row.ratio:.3g}") for row in rows]
-    print(table(("flexible spherical double pendulum", "ms each", "times faster"), shown))
-
-
 def main() -> None:
     """Measure and print."""
-    flexible()
-    rows, theirs = [], []
-    for step in STEPS:
-        error, seconds = exudyn(step)
-        theirs.append((error, seconds))
-        rows.append(("exudyn", f"step {step:g} s", f"{error:.2g}", f"{seconds * 1e3:.3g}", ""))
-    for tolerance in TOLERANCES:
-        error, seconds = own(tolerance)
-        nearest = min(theirs, key=lambda one: abs(np.log(one[0] / error)))
-        same = nearest[1] * np.sqrt(nearest[0] / error)
-        rows.append(
-            ("gauss", f"tolerance {tolerance:g}", f"{error:.2g}", f"{seconds * 1e3:.3g}", f"{same / seconds:.3g}")
-        )
-    print(table(("engine", "setting", "error [m]", "time [ms]", "times that of ours"), rows))
+    shown = [(row.name, f"{row.seconds * 1e3:.4g}", f"{row.ratio:.3g}") for row in rows()]
+    sys.stdout.write(table(("machine", "ms each", "times faster"), shown) + "\n")
 
 
 if __name__ == "__main__":
