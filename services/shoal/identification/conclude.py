@@ -196,8 +196,8 @@ def _unseen(model: ForwardModel) -> Sensitivity:
 
 def _predicted(model: ForwardModel, point: Array, name: str) -> Array:
     """Channels of a recording at an answer, (samples, channels); nan where there is no time to run it."""
-    nothing = np.full(model.measurement.recordings[name].values.shape, np.nan)
-    return np.asarray(unless_late(lambda: model.observed(point, name), nothing))
+    nothing = np.full((1, *model.measurement.recordings[name].values.shape), np.nan)
+    return np.asarray(unless_late(lambda: model.observe(point[None], name), nothing)[0])
 
 
 def _fitted(scene: Scene) -> dict[str, Any]:

@@ -37,7 +37,7 @@ _HARDLY = 0.1
 """Of their length: runs that differ by less are simulated at once, at the instants of all; so many of them, at most."""
 _PACES = 16
 
-_KEPT = ("parameters", "rows", "loss_scale", "_native", "_placements", "_accepted", "_seen")
+_KEPT = ("parameters", "rows", "loss_scale", "_native", "_placements", "_accepted")
 """What models of the same scene, engine and measurement share."""
 
 Progress = Callable[[int, float, float], None]
@@ -74,8 +74,6 @@ class ForwardModel:
     """Of the longest part of the recordings that was fitted: its end [s], the best fitness on it, and the point."""
 
     _placements: dict[str, Placement] = field(init=False, default_factory=dict)
-    _seen: tuple[Array, dict[str, Array]] = field(init=False, default=(np.empty((0, 0)), {}))
-    """The points simulated last, and their channels by recording."""
 
     def __post_init__(self) -> None:
         self.counter = EvaluationCounter(self._residuals, cost=self.cost)
@@ -354,15 +352,7 @@ class ForwardModel:
         yield from (points[k : k + size] for k in range(0, len(points), max(size, 1)))
 
     def _simulated_residuals(self, points: Array) -> Array:
-        seen = {name: self.observe(points, name) for name in self.measurement.recordings}
-        self._seen = points.copy(), seen
-        return self.compared(points, seen)
-
-    def observed(self, point: Array, name: str) -> Array:
-        """As `observe`, of one point, (samples, channels), which is not run again if it was among the last."""
-        points, seen = self._seen
-        same = np.flatnonzero(np.all(points == point, axis=1)) if points.shape[1] == len(point) else np.empty(0)
-        return np.asarray(seen[name][same[0]] if same.size else self.observe(point[None], name)[0])
+        return self.compared(points, {name: self.observe(points, name) for name in self.measurement.recordings})
 
     def compared(self, points: Array, seen: Mapping[str, Array]) -> Array:
         """As `residuals`, of points whose channels are known: by recording, as `observe` gives them."""
