@@ -34,8 +34,8 @@ def climb_down(objective: Objective, at: Array, value: Array) -> None:
     """Improve places, (searches, parameters), and values, (searches,), in place."""
     count = len(at)
     every = np.arange(count)
-    slope = _slopes(objective, at, value, every)
-    inverse = _begun(slope)
+    slope, curved = _slopes(objective, at, value, every)
+    inverse = _begun(slope, curved)
     longest, size = np.full(count, np.inf), np.abs(value).max(initial=0.0)
     for _ in range(STEPS):
         some = every
@@ -45,7 +45,7 @@ def climb_down(objective: Objective, at: Array, value: Array) -> None:
         step = np.where(bound, 0.0, -np.einsum("nij,nj->ni", h, free))
         uphill = np.einsum("ni,ni->n", step, free) >= 0
         if uphill.any():
-            inverse[some[uphill]] = _begun(free[uphill])
+            inverse[some[uphill]] = _begun(free[uphill], curved[some[uphill]])
             step[uphill] = -np.einsum("nij,nj->ni", inverse[some[uphill]], free[uphill])
         length = np.abs(step).max(axis=1, initial=0.0)
         step *= np.minimum(1.0, longest[some] / np.maximum(length, 1e-300))[:, None]
@@ -57,7 +57,7 @@ def climb_down(objective: Objective, at: Array, value: Array) -> None:
         if len(moved):
             before, old = at[moved].copy(), slope[moved].copy()
             at[moved], value[moved] = new[better], found[better]
-            slope[moved] = _slopes(objective, at[moved], value[moved], moved)
+            slope[moved], curved[moved] = _slopes(objective, at[moved], value[moved], moved)
             _learn(inverse, moved, at[moved] - before, slope[moved] - old)
         going = np.where(better, gain > SETTLED * size, longest[some] > DIFFERENCE)
         every = some[going & (length > DIFFERENCE**2)]
@@ -65,22 +65,33 @@ def climb_down(objective: Objective, at: Array, value: Array) -> None:
             return
 
 
-def _slopes(objective: Objective, at: Array, value: Array, searches: IntArray) -> Array:
-    """By differences, inwards at a face, (searches, parameters)."""
-    found = np.empty_like(at)
+def _slopes(objective: Objective, at: Array, value: Array, searches: IntArray) -> tuple[Array, Array]:
+    """By differences of second order, inwards at a face, and curvatures along each axis, (searches, parameters).
+
+    Those of first order are off by half a difference times the curvature: across a narrow valley more than what is
+    gained along it.
+    """
+    found, curved = np.empty_like(at), np.empty_like(at)
     for axis in range(at.shape[1]):
-        way = np.where(at[:, axis] > 0, -DIFFERENCE, DIFFERENCE)
-        beside = at.copy()
-        beside[:, axis] += way
-        found[:, axis] = (objective(beside, searches) - value) / way
-    return found
+        place = at[:, axis]
+        one = np.where(place - DIFFERENCE < -1, DIFFERENCE, -DIFFERENCE)
+        other = np.where(np.abs(place - one) > 1, 2 * one, -one)
+        chords = []
+        for way in (one, other):
+            beside = at.copy()
+            beside[:, axis] += way
+            chords.append((objective(beside, searches) - value) / way)
+        found[:, axis] = (chords[0] * other - chords[1] * one) / (other - one)
+        curved[:, axis] = 2 * (chords[1] - chords[0]) / (other - one)
+    return found, curved
 
 
-def _begun(slope: Array) -> Array:
-    """Inverse curvatures with which a first step has its length."""
-    size = np.linalg.norm(slope, axis=1)
+def _begun(slope: Array, curved: Array) -> Array:
+    """Inverse curvatures: a first step has its length, or ends where an axis that is more curved is lowest."""
+    size = np.linalg.norm(slope, axis=1, keepdims=True)
     scale = np.divide(FIRST, size, out=np.zeros_like(size), where=size > 0)
-    return np.asarray(scale[:, None, None] * np.eye(slope.shape[1]))
+    scale = np.divide(scale, np.maximum(scale * curved, 1.0))
+    return np.asarray(scale[:, :, None] * np.eye(slope.shape[1]))
 
 
 def _tried(

@@ -1,7 +1,8 @@
 """Other valleys along the axes through the places where a surrogate is least so far.
 
 Where most parameters are at an end of theirs and one decides the phase, there is a valley for every cycle along that
-axis, all nearly as deep and too narrow for a scan of the whole box.
+axis, all nearly as deep and too narrow for a scan of the whole box. Each has its deepest place elsewhere along it, so
+that one that is less deep here may be the deepest there: several are followed down.
 """
 
 from __future__ import annotations
@@ -15,13 +16,17 @@ LINE = 129
 """Places along each axis."""
 FINER = 0.25, 0.02
 """Lengths, in the distance of two places, in which each valley is looked at again."""
+DEEPEST = 4
+"""Valleys along each axis that are followed, beside that of the place itself."""
+OWN = 0.25 * 2 / (LINE - 1)
+"""A valley so near is the place's own."""
 BLOCK = 200_000
 """Places that are looked at together."""
 
 
 def beside(objective: Objective, best: Array, at: Array) -> None:
-    """Improve values, (searches,), and places, (searches, parameters), in place: downhill from the deepest valley that
-    is foretold along each axis by the parabola through three neighbours.
+    """Improve values, (searches,), and places, (searches, parameters), in place: downhill from the deepest valleys that
+    are foretold along each axis by the parabola through three neighbours.
     """
     line = np.linspace(-1, 1, LINE)
     block = max(1, BLOCK // LINE)
@@ -36,24 +41,26 @@ def _along(objective: Objective, best: Array, at: Array, axis: int, line: Array,
     places = np.repeat(at[some], LINE, axis=0)
     places[:, axis] = np.tile(line, len(some))
     search, where = _valleys(objective(places, np.repeat(some, LINE)).reshape(len(some), LINE), line)
+    other = np.abs(where - at[some[search], axis]) > OWN
+    search, where = some[search[other]], where[other]
     if not len(search):
         return
     for width in FINER:
-        three = np.repeat(at[some][search][None], 3, axis=0)
+        three = np.repeat(at[search][None], 3, axis=0)
         three[:, :, axis] = np.clip(where + width * (line[1] - line[0]) * np.array([[-1], [0], [1]]), -1, 1)
-        sides = objective(three.reshape(-1, at.shape[1]), np.tile(some[search], 3)).reshape(3, -1)
+        sides = objective(three.reshape(-1, at.shape[1]), np.tile(search, 3)).reshape(3, -1)
         where, depth = _vertex(sides, three[:, :, axis])
-    order = np.lexsort((-depth, search))
-    place = at[some]
-    place[search[order], axis] = np.clip(where[order], -1, 1)
-    found = objective(place, some)
-
-    def mine(x: Array, searches: IntArray) -> Array:
-        return objective(x, some[searches])
-
-    climb_down(mine, place, found)
-    better = found < best[some]
-    best[some[better]], at[some[better]] = found[better], place[better]
+    order = np.lexsort((depth, search))
+    search, where = search[order], where[order]
+    chosen = np.arange(len(search)) - np.searchsorted(search, search) < DEEPEST
+    search, place = search[chosen], at[search[chosen]]
+    place[:, axis] = np.clip(where[chosen], -1, 1)
+    found = objective(place, search)
+    climb_down(lambda x, searches: objective(x, search[searches]), place, found)
+    order = np.argsort(-found, kind="stable")
+    order = order[found[order] < best[search[order]]]
+    # The deepest of one search is entered last.
+    best[search[order]], at[search[order]] = found[order], place[order]
 
 
 def _valleys(value: Array, line: Array) -> tuple[IntArray, Array]:
