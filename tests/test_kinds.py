@@ -24,7 +24,7 @@ from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.mechanics.joints import CONDITIONS, SPATIAL
 from shoal.scene import JOINT_KINDS, LOAD_KINDS, Attachment, Scene, load_scene
 from shoal.scene.bodies import Element
-from shoal.scene.dimensions import PLANAR_KINDS, SPATIAL_KINDS
+from shoal.scene.dimensions import SPATIAL_KINDS
 from shoal.scene.joints import sides
 from shoal.scene.record import Record
 from shoal.scene.solver import IntegratorName
@@ -143,7 +143,7 @@ def test_of_every_element_it_is_known_whether_it_shears(element: str) -> None:
 
 
 def test_the_mechanics_knows_every_joint_and_load_of_the_scene() -> None:
-    assert {kind.model_fields["kind"].default for kind in SPATIAL} == set(JOINT_KINDS) - set(PLANAR_KINDS)
+    assert {kind.model_fields["kind"].default for kind in SPATIAL} == set(JOINT_KINDS)
     assert {kind.model_fields["kind"].default for kind in CONDITIONS} == set(JOINT_KINDS) - set(SPATIAL_KINDS)
     assert {kind.model_fields["kind"].default for kind in LOADS} == set(LOAD_KINDS)
 

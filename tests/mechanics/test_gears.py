@@ -143,12 +143,16 @@ def test_a_ratio_is_of_whole_teeth(ratio: Any) -> None:
     assert "\n" not in str(error.value)
 
 
+def test_wheels_of_the_plane_turn_alike_in_space() -> None:
+    flat, run = (get_engine("gauss").simulate(train("-17/40", dimensions=d)) for d in (2, 3))
+    assert run.ok, run.message
+    assert run.points[:, :, :2] == pytest.approx(flat.points, abs=1e-9)
+
+
 def test_what_has_no_teeth_is_refused_in_one_line() -> None:
     rod = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 1e3, "youngs_modulus": 1e9,
            "element": "ancf-cable"}  # fmt: skip
     with pytest.raises(InputError, match=r"^joints\.mesh: turns a flexible rod; weld a rigid body to it instead$"):
         get_engine("gauss").simulate(train(2.0).with_values({"bodies.two": rod, "markers": {"one": {"body": "one"}}}))
-    with pytest.raises(InputError, match="gear is a joint of the plane"):
-        train(2.0, dimensions=3)
     with pytest.raises(InputError, match="ratio of a gear: is of whole teeth"):
         get_engine("gauss").simulate_many(train(2.0), {"joints.mesh.ratio": np.array([1.0, 2.0])}, [0.0, 0.1])

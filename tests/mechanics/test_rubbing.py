@@ -195,5 +195,22 @@ def test_who_cannot_says_so() -> None:
         InputError, match=r"solver\.integrator: energy-momentum knows no friction by the forces of joints"
     ):
         simulate(scene, np.array([0.1]))
-    with pytest.raises(InputError, match=r"joints\.O\.mu: is for scenes in the plane"):
-        pendulum(0.3, 0.05, dimensions=3)
+
+
+def test_a_force_that_others_may_bear_brakes_nothing() -> None:
+    """Of three cranks of a parallelogram two would do."""
+    rod = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.04, "density": 2500.0}
+    bodies, joints = {"C": rod | {"length": 2.0}}, {}
+    for k in range(3):
+        bodies[f"L{k}"] = rod
+        joints[f"O{k}"] = {"first": {"body": "ground", "point": [k, 0.0]}, "second": {"body": f"L{k}"}}
+        joints[f"P{k}"] = {"first": {"body": f"L{k}", "point": "end"}, "second": {"body": "C", "point": [k, 0.0]}}
+    start = {name: {"angle": 0.0 if name == "C" else 1.0} for name in bodies}
+    scene = machine(bodies, joints, {"M": {"body": "C", "point": "end"}}, initial=start)
+    assert simulate(scene, np.array([0.1])).ok
+    dry = scene.with_values({"joints.O0.radius": 0.05}).with_values({"joints.O0.mu": 0.3})
+    with pytest.raises(InputError, match=r"joints\.O0\.mu: the force of O0 is not unique"):
+        simulate(dry, np.array([0.1]))
+    del bodies["L2"], joints["O2"], joints["P2"], start["L2"]
+    joints["O0"] |= {"mu": 0.3, "radius": 0.05}
+    assert simulate(machine(bodies, joints, {"M": {"body": "C"}}, initial=start), np.array([0.1])).ok

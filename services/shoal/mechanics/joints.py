@@ -112,11 +112,13 @@ class Turned:
 class Geared:
     """Whole numbers times the angles of directions add up to what they do at the start, or differ by whole turns.
 
-    So teeth do that mesh: of gears with m and n teeth m turns of one are n turns of the other.
+    So teeth do that mesh: of gears with m and n teeth m turns of one are n turns of the other. axes: in space, what
+    each turns about, as it points at the start.
     """
 
     sides: tuple[Attachment, ...]
     teeth: tuple[int, ...]
+    axes: tuple[Vector3, ...]
 
     @property
     def factors(self) -> tuple[float, ...]:
@@ -188,7 +190,8 @@ def _gear(joint: Gear) -> list[Condition]:
     if np.ndim(joint.ratio):
         raise InputError("ratio of a gear: is of whole teeth, so that it cannot vary; state each in a scene of its own")
     m, n = joint.fraction.numerator, joint.fraction.denominator
-    return [Geared((joint.second, joint.first, joint.carrier), (n, -m, m - n))]
+    first, second = joint.axes
+    return [Geared((joint.second, joint.first, joint.carrier), (n, -m, m - n), (second, first, first))]
 
 
 CONDITIONS: dict[type, Callable[[Any], list[Condition]]] = {
@@ -205,7 +208,8 @@ CONDITIONS: dict[type, Callable[[Any], list[Condition]]] = {
 
 
 def _spatial_slider(joint: Slider) -> list[Any]:
-    line = Along(joint.first, joint.second, joint.direction if joint.axis is None else joint.axis)
+    along = joint.direction if joint.axis is None else joint.axis
+    line = Along(joint.first, joint.second, along, bool(np.any(joint.mu)))
     return [line, Turned(joint.first, joint.second)] if joint.rotation == "locked" else [line]
 
 
@@ -219,7 +223,7 @@ def _planar(joint: Planar) -> list[Any]:
 
 
 SPATIAL: dict[type, Callable[[Any], list[Any]]] = {
-    Revolute: lambda j: [Meet(j.first, j.second), Aligned(j.first, j.second, j.axis)],
+    Revolute: lambda j: [*CONDITIONS[Revolute](j), Aligned(j.first, j.second, j.axis)],
     Spherical: lambda j: [Meet(j.first, j.second)],
     Universal: lambda j: [Meet(j.first, j.second), Square(j.first, j.second, j.axis, j.second_axis)],
     Cylindrical: lambda j: [Along(j.first, j.second, j.axis), Aligned(j.first, j.second, j.axis)],
@@ -230,6 +234,7 @@ SPATIAL: dict[type, Callable[[Any], list[Any]]] = {
     Parallel: lambda j: [Aligned(j.first, j.second, None)],
     Perpendicular: lambda j: [Square(j.first, j.second, None, None)],
     DrivenAngle: lambda j: [Hinged(j.first, j.second, j.angle, j.axis)],
+    Gear: _gear,
     Coupling: CONDITIONS[Coupling],
 }
 """The conditions of every kind of joint in space, where axes point as they do at the start."""

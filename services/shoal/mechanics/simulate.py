@@ -58,7 +58,7 @@ def simulate(
     if all(path.startswith("initial.") for path in values) and not start.gives_numbers(scene) and not found:
         kept = machine(scene, end)
         return kept.run(times, kept.starts.at(values, lanes), threads=threads, begin=begin, whole=whole)
-    model = capped(build(scene.with_lanes(values), lanes, max(end, scene.solver.duration)))
+    model = _built(scene.with_lanes(values), lanes, max(end, scene.solver.duration))
     if found:
         each = ({path: float(numbers[lane]) for path, numbers in values.items()} for lane in range(lanes))
         model = _begun(model, [scene.with_values(one) for one in each])
@@ -101,8 +101,18 @@ def _key(scene: Scene, end: float) -> tuple[str, float]:
 def _model(scene_json: str, horizon: float) -> Model:
     """Repeated runs, runs by other integrators, and lanes that only start differently share the model."""
     scene = Scene.model_validate_json(scene_json)
-    model = capped(build(scene, horizon=horizon))
+    model = _built(scene, 1, horizon)
     return model if scene.initial_from is None else _begun(model, [scene])
+
+
+def _built(scene: Scene, lanes: int, horizon: float) -> Model:
+    """The model of a scene, whose friction must know the forces that it depends on."""
+    model = capped(build(scene, lanes, horizon))
+    if model.rubbing.size:
+        from shoal.mechanics.analysis.joint_reactions import require_unique_friction
+
+        require_unique_friction(model)
+    return model
 
 
 def _begun(model: Model, scenes: list[Scene]) -> Model:

@@ -11,7 +11,6 @@ from shoal.errors import InputError
 from shoal.scene.record import Record
 
 SPATIAL_KINDS = ("spherical", "universal", "cylindrical", "planar")
-PLANAR_KINDS = ("gear",)
 PLANAR_ELEMENTS = ("ancf-full", "simo-reissner", "modal")
 _Z = (0.0, 0.0, 1.0)
 Dimensions = Annotated[Literal[2, 3], BeforeValidator(lambda given: int(given) if given in ("2", "3") else given)]
@@ -35,13 +34,8 @@ def check_dimensions(scene: Any) -> None:
         _check_plane(scene, "")
         return
     for name, joint in scene.joints.items():
-        if joint.kind in PLANAR_KINDS:
-            raise ValueError(f"joints.{name}.kind: {joint.kind} is a joint of the plane; say dimensions: 2")
         if joint.kind != "coupling" and joint.first.body == joint.second.body:
             raise ValueError(f"joints.{name}: closes {joint.first.body!r} upon itself; that is for the plane")
-    for name, joint in scene.joints.items():
-        if getattr(joint, "mu", 0.0):
-            raise ValueError(f"joints.{name}.mu: is for scenes in the plane; say dimensions: 2, or use coulomb")
     for name, load in scene.loads.items():
         for field in ("first_to", "second_to"):
             if getattr(load, field, None) is not None:
@@ -92,7 +86,7 @@ def _check_plane(part: Any, path: str) -> None:
 
 def _is_spatial(name: str, value: Any) -> bool:
     """Whether a field says what nothing in the plane has."""
-    if name == "axis":
+    if name in ("axis", "second_axis"):
         return value is not None and value not in (_Z, "x", "y")
     if name == "z":
         return getattr(value, "number", None) != 0.0
@@ -104,7 +98,8 @@ def _is_spatial(name: str, value: Any) -> bool:
 
 
 _PARTS = (Record, dict, tuple)
-_SPATIAL = {"axis", "z", "inertia", "side_curvature", "twist", "director", "rotation", "spin", "torsion_constant"}
+_SPATIAL = {"axis", "second_axis", "z", "inertia", "side_curvature", "twist", "director", "rotation", "spin"}
+_SPATIAL |= {"torsion_constant"}
 """Fields of which `_is_spatial` speaks."""
 _VECTORS = {"gravity", "position", "velocity", "point", "force", "centre_of_mass", "named_points"}
 

@@ -46,8 +46,9 @@ class Revolute(Tie):
     """Two places stay together; the bodies turn freely but for friction.
 
     axis: in space, that they turn about, as it points at the start. friction: viscous [N m s/rad]; coulomb: dry
-    friction torque [N m], smoothed as tanh(rate / coulomb_speed); mu: in the plane, coefficient of dry friction at a
-    pin of this radius [m], whose torque is mu * radius times the force of the joint, smoothed alike.
+    friction torque [N m], smoothed as tanh(rate / coulomb_speed); mu: coefficient of dry friction at a pin of this
+    radius [m], whose torque is mu * radius times the force of the joint (in space with what pushes along the axis),
+    smoothed alike.
     """
 
     kind: Literal["revolute"] = "revolute"
@@ -139,8 +140,8 @@ class Slider(Tie):
 
     direction: angle [rad] of the line in the first body's frame. axis: in space, the line itself, as it points at the
     start, instead. rotation: whether the second body may turn against the first. friction: viscous [N s/m]; coulomb
-    [N], smoothed as tanh(speed / coulomb_speed); mu: in the plane, coefficient of dry friction, in proportion to the
-    force across the line, smoothed alike.
+    [N], smoothed as tanh(speed / coulomb_speed); mu: coefficient of dry friction, in proportion to the force across
+    the line, smoothed alike.
     """
 
     kind: Literal["slider"] = "slider"
@@ -201,6 +202,11 @@ class DrivenAngle(Tie):
 MOST_TEETH = 1000
 
 
+def _same_direction(one: Vector3, other: Vector3) -> bool:
+    sizes = math.hypot(*one) * math.hypot(*other)
+    return sum(a * b for a, b in zip(one, other, strict=True)) >= (1.0 - 1e-12) * sizes
+
+
 def _fraction(value: Any) -> Any:
     """A ratio as a user may write it: a number, or two whole ones with a slash."""
     if isinstance(value, str):
@@ -216,12 +222,27 @@ class Gear(Tie):
 
     ratio: negative for gears that mesh outside, positive for belts, chains and ring gears; a fraction of whole numbers
     up to 1000, which may be written as text. carrier: the body that carries both bearings, by default the ground.
+    axis: in space, that the first body turns about, as it points at the start; second_axis: of the second, by default
+    the same. Both keep their direction; where they differ, as those of bevel and worm gears, the ground carries them.
     """
 
     kind: Literal["gear"] = "gear"
     turned: ClassVar[tuple[str, ...]] = ("first", "second", "carrier")
     ratio: Annotated[float, BeforeValidator(_fraction)]
     carrier: Attachment = Attachment(body=GROUND, point=(0.0, 0.0))
+    axis: Axis = Z
+    second_axis: Axis | None = None
+
+    @property
+    def axes(self) -> tuple[Vector3, Vector3]:
+        """That of the first body, and that of the second."""
+        return self.axis, self.second_axis or self.axis
+
+    @model_validator(mode="after")
+    def _one_axis_or_the_ground(self) -> Gear:
+        if self.carrier.body != GROUND and not _same_direction(*self.axes):
+            raise ValueError("carrier: gears whose axes differ are carried by the ground")
+        return self
 
     @model_validator(mode="after")
     def _of_whole_numbers(self) -> Gear:

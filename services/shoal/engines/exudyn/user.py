@@ -129,6 +129,36 @@ def products_slope(exu: Any, size: int, first: Any, second: Any) -> Any:
     return lambda mbs, t, item, q, v, of_rates: exu.MatrixContainer(products(size, first, second, q)[1])
 
 
+def teeth(size: int, sides: Any, period: float, q: Any) -> tuple[Any, Any]:
+    """How far teeth are apart, but for multiples of a period [rad], and its derivative.
+
+    size: coordinates of the first node; sides: of both, the factor of its angle, a direction of its body, and the
+    plane's two axes between which that turns.
+    """
+    total, slopes = 0.0, []
+    for part, (factor, image, axes) in zip((q[:size], q[size:]), sides, strict=True):
+        u, by_u = direction(np.array(part), image)
+        x, y = axes @ u
+        total += factor * np.arctan2(y, x)
+        slopes.append(factor * (x * axes[1] - y * axes[0]) @ by_u / (x * x + y * y))
+    return total - period * np.rint(total / period), np.concatenate(slopes)
+
+
+def teeth_gap(size: int, sides: Any, period: float) -> Any:
+    """A constraint: teeth mesh."""
+
+    def gap(mbs: Any, t: float, item: int, q: Any, v: Any, of_rates: bool) -> Any:
+        apart, slopes = teeth(size, sides, period, q)
+        return np.array([slopes @ np.array(v) if of_rates else apart])
+
+    return gap
+
+
+def teeth_slope(exu: Any, size: int, sides: Any, period: float) -> Any:
+    """Its derivative."""
+    return lambda mbs, t, item, q, v, of_rates: exu.MatrixContainer(teeth(size, sides, period, q)[1][None])
+
+
 def cosine(value: OfTime, slope: OfTime) -> Any:
     """That of an angle that is a function of time, and its rate."""
     return lambda t: (np.cos(value(t)), -np.sin(value(t)) * slope(t))

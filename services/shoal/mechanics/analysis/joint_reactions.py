@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.mechanics import joints, plane
 from shoal.mechanics.analysis import plane_forces, space_forces
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.joint_forces import Component, friction, place
+from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import ROUNDS, SETTLED
@@ -163,14 +165,35 @@ def _pressed(scene: Scene, unknown: list[Component], solution: Array) -> dict[st
     return found
 
 
+def require_unique_friction(model: Model) -> None:
+    """Raises InputError where friction depends on the force of a joint that other joints may bear as well."""
+    evaluator = Evaluator(model)
+    sharing = _sharing(evaluator, model.q0[:, 0], 0.0)
+    for first, parts in zip(model.rubbing.first, model.rubbing.parts, strict=True):
+        if np.any(sharing[first : first + parts] > SHARE):
+            name = model.constraint_names[first]
+            raise InputError(
+                f"joints.{name}.mu: the force of {name} is not unique, as {model.scene.name} holds itself more than "
+                "it needs to; leave out what is redundant (in space some hinges can be spherical or cylindrical), or "
+                "use coulomb"
+            )
+
+
 def redundant_constraints(evaluator: Evaluator, q: Array, t: float = 0.0) -> tuple[str, ...]:
     """Names of the constraints that depend on others, at q and, if the machine can move, at a state beside it too."""
-    if evaluator.model.constraints.size == 0:
-        return ()
+    names, sharing = evaluator.model.constraint_names, _sharing(evaluator, q, t)
+    return tuple(dict.fromkeys(name for name, part in zip(names, sharing, strict=True) if part > SHARE))
+
+
+def _sharing(evaluator: Evaluator, q: Array, t: float) -> Array:
+    """The largest part of every constraint in what depends on others, (constraints,)."""
+    none = np.zeros(evaluator.model.constraints.size)
+    if not none.size:
+        return none
     metric = Metric(evaluator.mass)
     freedom = metric.freedom(evaluator.at(q, t=t).jacobian)
     if freedom.dependent.shape[1] == 0:
-        return ()
+        return none
     if freedom.basis.shape[1]:
         # A fixed combination of all free directions, long enough to leave a singular position.
         step = freedom.basis @ np.cos(1.0 + np.arange(freedom.basis.shape[1]))
@@ -179,9 +202,7 @@ def redundant_constraints(evaluator: Evaluator, q: Array, t: float = 0.0) -> tup
             evaluation = evaluator.at(q, t=t)
             q = q + metric.freedom(evaluation.jacobian).shift(-evaluation.gap)
         freedom = metric.freedom(evaluator.at(q, t=t).jacobian)
-    involved = np.max(np.abs(freedom.dependent), axis=1, initial=0.0) > SHARE
-    names = evaluator.model.constraint_names
-    return tuple(dict.fromkeys(name for name, yes in zip(names, involved, strict=True) if yes))
+    return np.asarray(np.max(np.abs(freedom.dependent), axis=1, initial=0.0))
 
 
 def _second(joint: Any) -> Attachment:

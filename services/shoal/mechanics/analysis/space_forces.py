@@ -17,7 +17,7 @@ from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.holding import direction, line_of
 from shoal.mechanics.assembly.space.sections import image
 from shoal.mechanics.frames import BeamFrame, PointFrame
-from shoal.mechanics.joints import Aligned, Along, Hinged, InPlane, Square, Turned
+from shoal.mechanics.joints import Aligned, Along, Geared, Hinged, InPlane, Square, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import GROUND, Attachment, Revolute, Slider
 
@@ -35,6 +35,11 @@ def components(bodies: FreeBodies, name: str, condition: Any, at: Array) -> list
     if isinstance(condition, Hinged):
         axis = _axis(bodies, condition.first, condition.second, condition.axis, at)
         return _torques(bodies, name, condition, axis[None], at)
+    if isinstance(condition, Geared):
+        axes = [_held(bodies, side.body, one, at) for side, one in zip(condition.sides, condition.axes, strict=True)]
+        turns_of = [one @ _turn(bodies, side, at) for one, side in zip(axes, condition.sides, strict=True)]
+        turning = np.array(condition.factors) @ np.array(turns_of)
+        return [Component(name, "torque", turning, _NONE, condition.factors[0] * axes[0])]
     if isinstance(condition, Square):
         one = _held(bodies, condition.first.body, condition.axis, at)
         other = _held(bodies, condition.second.body, condition.second_axis, at)

@@ -14,7 +14,7 @@ from shoal.mechanics.least import principle
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import index, stacked
 from shoal.mechanics.rubbing import Rubbing
-from shoal.scene import GROUND, Distance, Revolute, Scene
+from shoal.scene import GROUND, Distance, Scene
 
 
 def with_start(model: Model, scene: Scene, lanes: int) -> Model:
@@ -84,16 +84,15 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
         constraints=held,
         constraint_names=tuple(one.name for one in placement.terms.held),
         marker_rows=index(marker_rows),
-        rubbing=_rubbing(scene, loads, [one.name for one in placement.terms.held]),
+        rubbing=_rubbing(loads, placement.terms.pressed),
         method=principle.method(scene.solver.acceleration),
         baumgarte=scene.solver.baumgarte,
     )
 
 
-def _rubbing(scene: Scene, loads: Loads, constraints: list[str]) -> Rubbing:
-    """Friction by the force of joints: of a pin both components, of a slider the one across its line."""
+def _rubbing(loads: Loads, pressed: dict[str, tuple[int, int]]) -> Rubbing:
+    """Friction by the force of joints: of a pin all components, of a slider those across its line."""
     names = [name for name, _, _ in loads.rubbing]
-    first = [constraints.index(name) for name in names]
-    parts = [scene.dimensions if isinstance(scene.joints[name], Revolute) else 1 for name in names]
+    first, parts = [pressed[name][0] for name in names], [pressed[name][1] for name in names]
     numbers = index([number for _, number, _ in loads.rubbing])
     return Rubbing(len(names), numbers, index(first), index(parts), stacked([share for _, _, share in loads.rubbing]))

@@ -19,6 +19,7 @@ def hold(scene: Scene, result: Placement) -> None:
     for name, joint in scene.joints.items():
         conditions = joints.conditions(joint)
         for condition in conditions:
+            before = len(result.terms.held)
             if isinstance(condition, Turned):
                 clamped = condition is joints.weld_of(conditions) and _is_clamp(scene, condition, result)
                 _keep_turn(scene, name, condition, clamped, result)
@@ -26,6 +27,7 @@ def hold(scene: Scene, result: Placement) -> None:
                 _keep_mesh(scene, name, condition, result)
             else:
                 _keep(scene, name, condition, result)
+            result.terms.press(name, condition, before)
 
 
 def _keep(scene: Scene, name: str, condition: Meet | Along | Apart | Sum, result: Placement) -> None:

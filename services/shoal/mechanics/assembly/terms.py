@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,10 @@ class Term:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Sum of factor * angle of unit vector + constant = 0, but for multiples of the period [rad]."""
+    """Sum of factor * angle of unit vector + constant = 0, but for multiples of the period [rad].
+
+    In space the vectors are those of the body's turn in coordinates whose third axis is that which it turns about.
+    """
 
     name: str
     parts: tuple[tuple[float, Affine], ...]
@@ -58,10 +62,15 @@ class Mesh:
         """(unknown, row, coefficient): derivatives by an unknown are coefficients times rows, as d is a unit vector."""
         for factor, vector in self.parts:
             if vector.terms:
-                x, y = rows(vector)
-                for unknown, (along, across) in vector.terms.items():
+                x, y, *_ = rows(vector)
+                for unknown, (along, across, *_) in vector.terms.items():
                     yield unknown, y, -factor * along
                     yield unknown, x, factor * across
+
+    def begin(self, value: Callable[[Affine], Array]) -> Mesh:
+        """The same with the constant of a start; value: of a vector there, (d, lanes)."""
+        angles = (factor * plane.angle(value(vector)[:2]) for factor, vector in self.parts)
+        return replace(self, constant=-sum(angles, np.zeros(1)))
 
 
 class Terms:
@@ -69,6 +78,8 @@ class Terms:
 
     def __init__(self) -> None:
         self.held: list[Term | Mesh] = []
+        self.pressed: dict[str, tuple[int, int]] = {}
+        """Joints whose force somebody wants to know: the first and the number of the constraints that it is of."""
 
     def dot(
         self, name: str, u: Affine, w: Affine, lengths: int, constant: Number = 0.0, drive: Composed | None = None
@@ -87,6 +98,11 @@ class Terms:
     def mesh(self, name: str, parts: tuple[tuple[float, Affine], ...], constant: Number, period: float) -> None:
         """Sum of factor * angle of unit vector + constant = 0, but for multiples of the period [rad]."""
         self.held.append(Mesh(name, parts, constant, period))
+
+    def press(self, name: str, condition: Any, before: int) -> None:
+        """Note a joint whose force somebody wants to know. before: constraints that were there before its own."""
+        if getattr(condition, "held", False):
+            self.pressed[name] = before, len(self.held) - before
 
     def vanish(self, name: str, vector: Affine, drives: tuple[Composed, ...] | None = None) -> None:
         """vector + drives(t) = 0, a linear constraint for each component [m]."""

@@ -12,11 +12,11 @@ from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.connectors import Exchange, Law, exchange_of
 from shoal.engines.exudyn.ground import driven
 from shoal.engines.exudyn.space.ends import SpatialEnds, frame_about
-from shoal.engines.exudyn.space.rows import Row, add_rows, hold_node
+from shoal.engines.exudyn.space.rows import Row, Toothed, add_rows, add_teeth, hold_node
 from shoal.errors import InputError
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.space.sections import ALIGNED
-from shoal.mechanics.joints import Aligned, Along, Apart, Hinged, InPlane, Meet, Square, Turned, conditions
+from shoal.mechanics.joints import Aligned, Along, Apart, Geared, Hinged, InPlane, Meet, Square, Turned, conditions
 from shoal.scene import JOINT_KINDS, Attachment, Joint, Revolute, Slider
 from shoal.trajectory import Array
 
@@ -253,6 +253,32 @@ def _hinged(exu: Any, ends: SpatialEnds, where: str, one: Hinged) -> Gap:
     return lambda q, v: np.zeros(len(q))
 
 
+def _meshed(exu: Any, ends: SpatialEnds, where: str, one: Geared) -> Gap:
+    """Angles are counted from the start, so that they add up to nothing."""
+    (second, first, carrier), factors = one.sides, one.factors
+    if not ends.is_ground(carrier):
+        raise InputError(f"{where}.carrier: engine exudyn cannot do gears on a carrier that turns; use gauss")
+    require_rigid(ends, where, first, second)
+    sides, frames = (first, second), [frame_about(turns.unit(np.array(axis))) for axis in one.axes[1::-1]]
+    images = [ends.start_axes(side).T @ frame[:, 0] for side, frame in zip(sides, frames, strict=True)]
+    weights, period = factors[1::-1], 2 * np.pi / one.most
+    toothed = [
+        Toothed(ends.side(side), weight, image, frame[:, :2].T)
+        for side, weight, image, frame in zip(sides, weights, images, frames, strict=True)
+    ]
+    add_teeth(exu, ends.system, (toothed[0], toothed[1]), period)
+
+    def gap(q: Array, v: Array) -> Array:
+        angles = [
+            np.arctan2(*((ends.moved(side, q, v).axes @ image) @ frame[:, [1, 0]]).T)
+            for side, image, frame in zip(sides, images, frames, strict=True)
+        ]
+        apart = sum(weight * angle for weight, angle in zip(weights, angles, strict=True))
+        return np.asarray(np.abs(apart - period * np.rint(apart / period)))
+
+    return gap
+
+
 def _distant(exu: Any, ends: SpatialEnds, where: str, one: Apart) -> Gap:
     length = ends.start_distance(one.first, one.second) if one.length is None else float(one.length(np.zeros(1))[0])
     markers = [ends.hold(one.first), ends.hold(one.second)]
@@ -285,6 +311,7 @@ CONDITIONS: dict[type, Callable[[Any, SpatialEnds, str, Any], Gap]] = {
     Turned: _turned,
     Square: _square,
     Hinged: _hinged,
+    Geared: _meshed,
     Apart: _distant,
 }
 """How a condition is entered; what it returns tells how far it opens."""

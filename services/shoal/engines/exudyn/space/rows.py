@@ -38,6 +38,31 @@ def add_rows(exu: Any, system: System, first: Side, second: Side, rows: list[Row
     )
 
 
+class Toothed(NamedTuple):
+    """A node whose body turns about an axis at rest.
+
+    factor: of its angle. image: a direction of its body across the axis, in its frame; axes: two of the ground's
+    between which that turns, (2, 3).
+    """
+
+    node: Side
+    factor: float
+    image: Array
+    axes: Array
+
+
+def add_teeth(exu: Any, system: System, sides: tuple[Toothed, Toothed], period: float) -> None:
+    """Keep the sum of angles at zero, but for multiples of a period [rad]."""
+    size, parts = sides[0].node.size, [(one.factor, one.image, one.axes) for one in sides]
+    system.add(
+        "ObjectConnectorCoordinateVector",
+        markerNumbers=[system.add("MarkerNodeCoordinates", nodeNumber=one.node.node) for one in sides],
+        scalingMarker0=np.zeros((1, 1)),
+        constraintUserFunction=system.function(user.teeth_gap, size, parts, period),
+        jacobianUserFunction=system.function(user.teeth_slope, exu, size, parts, period),
+    )
+
+
 def hold_node(exu: Any, system: System, ground: Side, cable: Side, normals: Array, base: Array) -> None:
     """Keep a node of a cable in planes at rest through a place (3,) [m]; normals: (planes, 3)."""
     system.add(

@@ -12,7 +12,7 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.frames import BeamFrame, RigidFrame
-from shoal.mechanics.joints import Aligned, Along, Apart, Hinged, InPlane, Meet, Square, Sum, Turned
+from shoal.mechanics.joints import Aligned, Along, Apart, Geared, Hinged, InPlane, Meet, Square, Sum, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import GROUND, Attachment, Scene
 
@@ -20,9 +20,14 @@ from shoal.scene import GROUND, Attachment, Scene
 def hold(scene: Scene, result: SpatialPlacement) -> None:
     """What sharing could not express of the joints' conditions."""
     for name, condition in joints.of_scene(scene):
-        if isinstance(condition, Meet | Turned | Aligned):
-            continue  # shared, or constraints where loops close
-        _keep(scene, name, condition, result)
+        before = len(result.terms.held)
+        if isinstance(condition, Geared):
+            _keep_mesh(name, condition, result)
+        elif isinstance(condition, Meet) and condition.held:
+            result.terms.vanish(name, result.gap(scene, condition))
+        elif not isinstance(condition, Meet | Turned | Aligned):  # shared, or constraints where loops close
+            _keep(scene, name, condition, result)
+        result.terms.press(name, condition, before)
 
 
 def direction(result: SpatialPlacement, body: str, axis: Any) -> Affine:
@@ -95,6 +100,32 @@ def _keep(scene: Scene, name: str, condition: Any, result: SpatialPlacement) -> 
         terms.dot(name, fixed(axes[0][:, None]), total, 1, drive=condition.value.through("neg"))
     else:
         raise joints.unknown(condition)
+
+
+def _keep_mesh(name: str, condition: Geared, result: SpatialPlacement) -> None:
+    """Each angle is that of a vector across an axis at rest, so that two of its components tell it, as in the plane."""
+    parts = []
+    for side, axis, factor in zip(condition.sides, condition.axes, condition.factors, strict=True):
+        if side.body == GROUND or not factor:
+            continue
+        if not isinstance(result.frames[side.body], RigidFrame):
+            raise InputError(f"joints.{name}: turns {side.body}, which is not rigid; weld a rigid body to it instead")
+        if not rests(direction(result, side.body, axis)):
+            raise InputError(
+                f"joints.{name}: {side.body} does not turn about an axis at rest, ({axis[0]:g}, {axis[1]:g}, "
+                f"{axis[2]:g}) at the start; gears in space turn on hinges whose axes the ground holds"
+            )
+        image = result.attitudes.image(side.body, axis)
+        across = of_image(result, side.body, turns.across(image)[0])
+        one, other = turns.across(turns.unit(np.array(axis)[:, None]))
+        frame = np.stack([one, other, turns.cross(one, other)])
+        parts.append((factor, across.turned(frame)))
+    result.terms.mesh(name, tuple(parts), 0.0, 2 * np.pi / condition.most)
+
+
+def rests(vector: Affine) -> bool:
+    """Whether a vector depends on the coordinates by no more than round-off."""
+    return all(np.max(np.abs(coefficient)) <= 1e-12 for coefficient in vector.terms.values())
 
 
 def _line(result: SpatialPlacement, body: str, along: Any) -> Array:

@@ -9,7 +9,7 @@ Garcia de Jalon and Bayo, Kinematic and dynamic simulation of multibody systems,
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
@@ -23,14 +23,14 @@ from shoal.mechanics.assembly.groups import JointPoint, is_stiff, moving, rotate
 from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
-from shoal.mechanics.assembly.space.holding import hold
+from shoal.mechanics.assembly.space.holding import hold, rests
 from shoal.mechanics.assembly.space.rods import hold_rod, place_rod
 from shoal.mechanics.assembly.space.sections import material
 from shoal.mechanics.frames import Place, PointFrame, RigidFrame
-from shoal.mechanics.joints import Aligned, Along, InPlane, Turned
+from shoal.mechanics.joints import Aligned, Along, InPlane, Meet, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.plane import vector
-from shoal.scene import GROUND, Function, PointMass, Rod, Scene
+from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
 
 APART = 0.3
 """Sine of the angle between a vector and the span of those chosen before it, from which it is chosen too."""
@@ -88,10 +88,7 @@ def _next(scene: Scene, waiting: list[str], touching: dict[str, list[JointPoint]
         lambda name: any(point.where is not None for point in touching[name]),
         lambda name: scene.start(name).position is not None,
         lambda name: any(point.line for point in touching[name]),
-        lambda name: any(
-            isinstance(guide, Along | InPlane) and guide.second.body == name and guide.first.body in result.frames
-            for _, guide in joints.of_scene(scene)
-        ),
+        lambda name: next(_guides(scene, name, result), None) is not None,
     ]
     for is_known in known:
         for name in waiting:
@@ -124,11 +121,21 @@ def _pose(scene: Scene, name: str, mine: list[JointPoint], result: SpatialPlacem
 
 
 def _rail(scene: Scene, name: str, result: SpatialPlacement) -> tuple[Array, Array, Place]:
-    """Initial place and velocity of the base point of a line or plane that moves with a body, and the body's place."""
-    for _, guide in joints.of_scene(scene):
-        if isinstance(guide, Along | InPlane) and guide.second.body == name and guide.first.body in result.frames:
-            return *result.start_of(result.point(scene, guide.first)), scene.location(guide.second)
+    """Initial place and velocity of what leads a body, and the body's place there."""
+    for here, there in _guides(scene, name, result):
+        return *result.start_of(result.point(scene, here)), scene.location(there)
     return np.zeros((3, 1)), np.zeros((3, 1)), (0.0, 0.0, 0.0)
+
+
+def _guides(scene: Scene, name: str, result: SpatialPlacement) -> Iterator[tuple[Attachment, Attachment]]:
+    """Places that lead a body, and its own there: base points of lines and planes, and places that constraints join."""
+    for _, guide in joints.of_scene(scene):
+        if not isinstance(guide, Along | InPlane) and not (isinstance(guide, Meet) and guide.held):
+            continue
+        for here, there in ((guide.first, guide.second), (guide.second, guide.first)):
+            known = here.body in result.frames or (isinstance(guide, Meet) and here.body == GROUND)
+            if there.body == name and known and (isinstance(guide, Meet) or here is guide.first):
+                yield here, there
 
 
 def _place_point(name: str, mine: list[JointPoint], pose: Pose, result: SpatialPlacement) -> None:
@@ -190,7 +197,7 @@ class _Rigid:
         axis.holders.add(name)
         onto = normal[:, None] * normal[None]
         quarter = turns.skew(normal)
-        level = not _moves(self.where.turned(onto))
+        level = rests(self.where.turned(onto))
         for point in sorted(others, key=lambda point: point.where is None):
             away = self._away(point)
             height = np.sum(away * image, axis=0)
@@ -210,7 +217,7 @@ class _Rigid:
                 point.where = point.where + result.new_along(0.0 * other, other, rest, speed)
             gap = point.where - self.where
             risen = gap.turned(onto)
-            if _moves(risen):
+            if not rests(risen):
                 result.terms.dot(name, fixed(normal), gap, 1, -height)
             result.chosen.add((name, id(point)))
             first_image = flat / width
@@ -264,11 +271,6 @@ class _Rigid:
     def _new(self, image: Array) -> Affine:
         """A vector of its own for a direction of the body."""
         return self.result.new_vector(arm(self.pose.directors, tuple(image)), arm(self.pose.turning, tuple(image)))
-
-
-def _moves(vector: Affine) -> bool:
-    """Whether a vector depends on the coordinates by more than round-off."""
-    return any(np.max(np.abs(coefficient)) > 1e-12 for coefficient in vector.terms.values())
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from shoal.mechanics.assembly.space.placement import place_in_space
 from shoal.mechanics.assembly.space.start import slopes, value_of
-from shoal.mechanics.assembly.terms import Term
+from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene
 from shoal.scene.joints import places
@@ -27,7 +27,7 @@ SOUGHT, ROUNDS = 24, 4
 
 def redundant(scene: Scene, q: Array) -> tuple[str, ...]:
     """Joints that hold what others hold already at these coordinates, (unknowns,): they share a dependent row."""
-    terms = [one for one in place_in_space(scene).terms.held if isinstance(one, Term)]
+    terms = place_in_space(scene).terms.held
     if not terms:
         return ()
     rows = _rows(scene, terms, q)
@@ -38,13 +38,13 @@ def redundant(scene: Scene, q: Array) -> tuple[str, ...]:
     )
 
 
-def _rows(scene: Scene, terms: list[Term], q: Array) -> list[Row]:
+def _rows(scene: Scene, terms: list[Term | Mesh], q: Array) -> list[Row]:
     """The rows of the constraints at q. Of a driven angle, whose cosine and sine are held, that of the angle itself."""
     found: list[Row] = []
     driven: dict[str, list[Term]] = {}
     for term in terms:
         joint = scene.joints.get(term.name)
-        if joint is not None and joint.kind == "driven-angle" and term.drive is not None:
+        if isinstance(term, Term) and joint is not None and joint.kind == "driven-angle" and term.drive is not None:
             driven.setdefault(term.name, []).append(term)
         else:
             found.append((term.name, list(slopes(term, q[:, None], 0))))

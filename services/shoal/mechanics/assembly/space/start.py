@@ -6,7 +6,7 @@ in the coordinates themselves: poses by Gauss and Newton's method, rates of leas
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.placement import place_in_space
-from shoal.mechanics.assembly.terms import Term
+from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.scene import InitialState, Scene
@@ -72,6 +72,7 @@ class _Closing:
     def __init__(self, scene: Scene, placement: SpatialPlacement) -> None:
         self.scene, self.placement = scene, placement
         self.terms = [one for one in placement.terms.held if isinstance(one, Term)]
+        self.meshes = [one for one in placement.terms.held if isinstance(one, Mesh)]
         self.q, self.v = stacked(placement.positions), stacked(placement.velocities)
         self.size = float(reach.span(scene))
         self.scale = np.array([self.size**term.lengths for term in self.terms])
@@ -89,6 +90,8 @@ class _Closing:
         for moving in np.flatnonzero(~failed):
             failed[moving] |= not self._move(int(moving))
         self.placement.positions, self.placement.velocities = list(self.q), list(self.v)
+        held = self.placement.terms.held  # teeth mesh as the bodies start
+        held[:] = [one.begin(lambda u: _all(u, self.q)) if isinstance(one, Mesh) else one for one in held]
         self.placement.failed = failed
 
     def residual(self, q: Array) -> Array:
@@ -97,10 +100,10 @@ class _Closing:
         lanes = max((len(one) for one in found), default=1)
         return np.stack([np.broadcast_to(one, lanes) for one in found]) if found else np.zeros((0, lanes))
 
-    def jacobian(self, q: Array, lane: int) -> Array:
-        """Their derivatives by the coordinates of a lane, (constraints, unknowns)."""
-        found = np.zeros((len(self.terms), len(q)))
-        for row, term in enumerate(self.terms):
+    def jacobian(self, q: Array, lane: int, terms: Sequence[Term | Mesh]) -> Array:
+        """Derivatives of constraints by the coordinates of a lane, (constraints, unknowns)."""
+        found = np.zeros((len(terms), len(q)))
+        for row, term in enumerate(terms):
             for unknown, slope in slopes(term, q, lane):
                 found[row, unknown] += slope
         return found
@@ -126,9 +129,8 @@ class _Closing:
         found = self._newton(begin, lane, [])
         if found is None:
             off = np.abs(self.residual(begin[:, None])[:, 0]) / self.scale
-            raise InputError(
-                f"joints.{self._name(int(np.argmax(off)))}: cannot be assembled; no poses near the stated ones close it"
-            )
+            worst = self.terms[int(np.argmax(off))].name
+            raise InputError(f"joints.{worst}: cannot be assembled; no poses near the stated ones close it")
         return self._corrected(found, stated)
 
     def _corrected(self, q: Array, stated: list[_Stated]) -> bool:
@@ -168,7 +170,7 @@ class _Closing:
             away = held @ q - wanted
             if np.all(np.abs(gap) <= small) and np.all(np.abs(away) <= CLOSED * max(self.size, 1.0)):
                 return q
-            rows = np.vstack([self.jacobian(q, lane) / self.scale[:, None], held])
+            rows = np.vstack([self.jacobian(q, lane, self.terms) / self.scale[:, None], held])
             move = np.linalg.lstsq(rows, -np.concatenate([gap / self.scale, away]), DEPENDENT)[0]
             longest = float(np.max(np.abs(move), initial=0.0))
             q = q + move * min(1.0, 0.5 * max(self.size, 1.0) / (longest + 1e-300))
@@ -221,14 +223,16 @@ class _Closing:
     def _move(self, lane: int) -> bool:
         """Rates that meet the constraints and what is stated; false if there are none."""
         q, v = self.q[:, lane], self.v[:, lane].copy()
-        driven = np.array([_drive_rate(term) for term in self.terms]) / self.scale
+        terms: list[Term | Mesh] = [*self.terms, *self.meshes]
+        scale = np.append(self.scale, np.ones(len(self.meshes)))
+        driven = np.array([_drive_rate(term) for term in terms]) / scale
         stated = [one for one in self._rows(("velocity", "spin", "rate"), lane) if one.firm]
         pace = max(1.0, float(np.max(np.abs(v), initial=0.0)))
         kept = all(abs(one.off(v)) <= CLOSED * pace for one in stated)
-        moving = np.array([sum(x * v[k] for k, x in slopes(term, self.q, lane)) for term in self.terms]) / self.scale
+        moving = np.array([sum(x * v[k] for k, x in slopes(term, self.q, lane)) for term in terms]) / scale
         if kept and np.all(np.abs(moving + driven) <= CLOSED * pace):
             return True
-        slope = self.jacobian(self.q, lane) / self.scale[:, None] if len(self.terms) else np.zeros((0, len(q)))
+        slope = self.jacobian(self.q, lane, terms) / scale[:, None] if terms else np.zeros((0, len(q)))
         held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
         rows, right = np.vstack([slope, held]), np.concatenate([-driven, wanted])
@@ -240,9 +244,9 @@ class _Closing:
         if left.size and abs(left[worst]) > ROUNDING * pace:
             if self.lanes > 1:
                 return False
-            if worst < len(self.terms) and not stated:
-                raise InputError(f"joints.{self._name(worst)}: cannot begin to move as it is driven")
-            off = np.abs(left[len(self.terms) :])
+            if worst < len(terms) and not stated:
+                raise InputError(f"joints.{terms[worst].name}: cannot begin to move as it is driven")
+            off = np.abs(left[len(terms) :])
             guilty = stated[int(np.argmax(off))]
             raise InputError(
                 f"initial.{guilty.body}.{guilty.quantity}: contradicts the joints and the other rates, by "
@@ -263,9 +267,6 @@ class _Closing:
         for (i, j), value in Masses(self.scene, self.placement, Rows(count)).mass.items():
             matrix[i, j] = matrix[j, i] = _lane(np.atleast_1d(value)[None], lane)[0]
         return matrix
-
-    def _name(self, row: int) -> str:
-        return self.terms[row].name
 
 
 _POSES: tuple[Quantity, ...] = ("position", "rotation", "angle")
@@ -293,8 +294,15 @@ def _all(vector: Affine, q: Array) -> Array:
     return total
 
 
-def slopes(term: Term, q: Array, lane: int) -> Iterator[tuple[int, float]]:
+def slopes(term: Term | Mesh, q: Array, lane: int) -> Iterator[tuple[int, float]]:
     """Unknowns and derivatives of a constraint at the coordinates of a lane; those of an unknown add up."""
+    if isinstance(term, Mesh):
+        for factor, vector in term.parts:
+            x, y, _ = _at(vector, q, lane)
+            for unknown, coefficient in vector.terms.items():
+                along, across, _ = _lane(coefficient, lane)
+                yield unknown, factor * float(x * across - y * along) / float(x * x + y * y)
+        return
     u, w = (_at(vector, q, lane) for vector in (term.u, term.w))
     for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
         for unknown, coefficient in vector.terms.items():
@@ -316,7 +324,7 @@ def value_of(term: Term, q: Array, lane: int) -> float:
     return float(u @ term.form @ w + constant[min(lane, constant.size - 1)] + drive)
 
 
-def _drive_rate(term: Term) -> float:
+def _drive_rate(term: Term | Mesh) -> float:
     """The rate of a constraint's function of time at time zero."""
     if term.drive is None:
         return 0.0
