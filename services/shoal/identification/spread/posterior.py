@@ -6,7 +6,9 @@ know less than their sum of squares says. So its curvature is adjusted to the co
 (Ribatet, Cooley and Davison, Statistica Sinica 22, 2012); with white noise nothing changes.
 
 Sampled by emcee (Foreman-Mackey et al. 2013) in several ensembles that know nothing of each other: by independent draws
-from a distribution that is fitted to the beginning, and by differences of walkers, which follow shapes that it has not.
+from a distribution that is fitted to the posterior, and by differences of walkers, which follow shapes that it has not.
+Where draws about the answer, weighted by the density, are worth much, they tell that distribution and where walkers
+begin; elsewhere a beginning of the chains does.
 """
 
 from __future__ import annotations
@@ -36,17 +38,22 @@ ENSEMBLES, WALKERS = 4, 16
 """Independent ensembles, and the least walkers in each: whole tiles of lanes, also of half of them."""
 MIXED = 1.01
 """R-hat up to which ensembles count as mixed."""
+_TRIED = 8
+"""Weighted draws about the answer for each walker."""
+_ALIKE = 0.5
+"""Effective share of the weighted draws from which the posterior is like the distribution about the answer."""
 _BEGINNING = 40
-"""Steps that are not kept; the second half of them tells what independent draws are made from."""
+"""Steps that are not kept where it is not; the second half of them tells what independent draws are made from."""
 _AT_ONCE = 30
 """Steps between looks at the draws; every look waits longer than the last."""
 _MOST = 400_000
 """Draws after which the search for more ends."""
 _FREEDOM = 5.0
 """Of the Student distribution of independent draws, whose tails should be heavier than those of the posterior."""
-_MOVES = (0.3, 0.6, 0.1)
-"""Shares of independent draws, of differences of walkers, and of stretches: more of the first mix faster where the
-posterior is normal, but leave the tails of bent ones without their due."""
+_MOVES = {True: (0.75, 0.2, 0.05), False: (0.3, 0.6, 0.1)}
+"""Shares of independent draws, of differences of walkers, and of stretches, where the posterior is like what is drawn
+from about the answer, and elsewhere: more of the first mix faster there, but leave the tails of bent ones without their
+due."""
 _NEWS = 0.2
 """Of an interval: a difference to it that is worth a word."""
 
@@ -182,11 +189,18 @@ def posterior(
     target = _target(model, point, at, blocks, least)
     walkers = ENSEMBLES * max(WALKERS, 2 * (len(point) + 1))
     rng = np.random.RandomState(np.random.MT19937(seed))
-    near = _Independent(point, target.spread)
-    first = _sampler(target, near, walkers)
-    end = first.run_mcmc(State(target.possible(near, walkers, rng), random_state=rng.get_state()), _BEGINNING)
-    near = _Independent.of(first.get_chain(discard=_BEGINNING // 2, flat=True), near)
-    sampler = _sampler(target, near, walkers)
+    about = _Independent(point, target.spread)
+    tried = about.draw(_TRIED * walkers, rng)
+    weights = _weights(target(tried) - about.log_density(tried))
+    alike = bool(weights @ weights * len(weights) <= 1.0 / _ALIKE)
+    if alike:
+        end = State(tried[rng.choice(len(tried), walkers, p=weights)], random_state=rng.get_state())
+        near = _Independent.of(tried, about, weights)
+    else:
+        first = _sampler(target, about, walkers, alike)
+        end = first.run_mcmc(State(target.possible(about, walkers, rng), random_state=rng.get_state()), _BEGINNING)
+        near = _Independent.of(first.get_chain(discard=_BEGINNING // 2, flat=True), about)
+    sampler = _sampler(target, near, walkers, alike)
     more, found = _AT_ONCE, None
     try:
         while found is None or not (found.converged or len(found.flat) >= _MOST):
@@ -223,11 +237,11 @@ class _Independent:
         self.centre, self.root, self.inverse = centre, root, np.linalg.inv(root)
 
     @classmethod
-    def of(cls, draws: Array, before: _Independent) -> _Independent:
+    def of(cls, draws: Array, before: _Independent, weights: Array | None = None) -> _Independent:
         """Of the mean and the covariance of draws (draws, parameters); that before where they have none."""
-        covariance = np.atleast_2d(np.cov(draws.T))
+        covariance = np.atleast_2d(np.cov(draws.T, aweights=weights))
         try:
-            return cls(draws.mean(axis=0), np.asarray(np.linalg.cholesky(covariance)))
+            return cls(np.average(draws, axis=0, weights=weights), np.asarray(np.linalg.cholesky(covariance)))
         except np.linalg.LinAlgError:
             return before
 
@@ -246,6 +260,15 @@ class _Independent:
         """New points and the logarithm of the ratio of densities, as emcee wants it."""
         fresh = self.draw(len(points), rng)
         return fresh, self.log_density(points) - self.log_density(fresh)
+
+
+def _weights(logarithms: Array) -> Array:
+    """Of draws, which add up to 1, from their logarithms; all of the first draw where none can be simulated."""
+    most = float(np.max(logarithms))
+    if not np.isfinite(most):
+        return np.asarray(np.eye(len(logarithms))[0])
+    weights = np.exp(logarithms - most)
+    return np.asarray(weights / np.sum(weights))
 
 
 class _Target:
@@ -338,13 +361,13 @@ def _root(matrix: Array, power: float) -> Array:
     return np.asarray((vectors * np.maximum(values, 1e-300) ** power) @ vectors.T)
 
 
-def _sampler(target: Callable[[Array], Array], near: _Independent, walkers: int) -> EnsembleSampler:
+def _sampler(target: Callable[[Array], Array], near: _Independent, walkers: int, alike: bool) -> EnsembleSampler:
     from emcee import EnsembleSampler
     from emcee.moves import DEMove, MHMove, StretchMove
 
     # Halves are every other walker, so that each has its part of every ensemble, in order.
     among = [_apart(move(randomize_split=False)) for move in (DEMove, StretchMove)]
-    moves = list(zip((MHMove(near.propose), *among), _MOVES, strict=True))
+    moves = list(zip((MHMove(near.propose), *among), _MOVES[alike], strict=True))
     return EnsembleSampler(walkers, len(near.centre), target, moves=moves, vectorize=True)
 
 
