@@ -59,8 +59,8 @@ def _largest_eigenvalue(model: Model, damping: bool) -> float:
         room.z[: model.unknowns * len(tile)] = pack(model.q0, part, tile)
         values = (damping_at if damping else stiffness_at)(tile, arrays, tangent, room)
         matrix, mass = unpack(values, part, tile), unpack(tangent.mass, part, tile)
-        for lane in _different(matrix, mass):
-            largest = max(largest, _top(tangent.pattern, matrix[:, lane], mass[:, lane]))
+        lanes = _different(matrix, mass)
+        largest = max(largest, _top(tangent.pattern, matrix[:, lanes], mass[:, lanes]))
     return largest
 
 
@@ -71,24 +71,33 @@ def _different(matrix: Array, mass: Array) -> list[int]:
     )
     found: list[int] = []
     for lane in range(both.shape[1]):
-        if all(np.max(np.abs(both[:, lane] - both[:, other])) > _SAME for other in found):
+        if np.all(np.max(np.abs(both[:, found] - both[:, [lane]]), axis=0, initial=0.0) > _SAME):
             found.append(lane)
     return found
 
 
 def _top(pattern: Pattern, matrix: Array, mass: Array) -> float:
-    """Largest eigenvalue of A x = lambda M x, both symmetric in the slots of a pattern."""
-    n = pattern.size
-    if not np.any(matrix):
+    """Largest eigenvalue of A x = lambda M x over lanes, both symmetric in the slots of a pattern, (slots, lanes)."""
+    n, lanes = pattern.size, np.flatnonzero(np.any(matrix, axis=0))
+    if not lanes.size:
         return 0.0
     if n <= _DENSE:
-        lower = np.linalg.inv(np.linalg.cholesky(sparse.dense(pattern, mass)))
-        return float(np.linalg.eigvalsh(lower @ sparse.dense(pattern, matrix) @ lower.T)[-1])
+        stiff, heavy = (np.array([sparse.dense(pattern, one[:, k]) for k in lanes]) for one in (matrix, mass))
+        lower = np.linalg.inv(np.linalg.cholesky(heavy))
+        return float(np.max(np.linalg.eigvalsh(lower @ stiff @ lower.transpose(0, 2, 1))[:, -1]))
     import scipy.sparse.linalg
 
     start = np.cos(np.arange(n))  # a fixed start vector, so that the same scene gives the same limit
-    stiff, heavy = (sparse.matrix(pattern, values) for values in (matrix, mass))
-    found = scipy.sparse.linalg.eigsh(
-        stiff, k=1, M=heavy, which="LA", v0=start, tol=_ACCURACY, return_eigenvectors=False
-    )
-    return float(found[0])
+    tops = [
+        scipy.sparse.linalg.eigsh(
+            sparse.matrix(pattern, matrix[:, k]),
+            k=1,
+            M=sparse.matrix(pattern, mass[:, k]),
+            which="LA",
+            v0=start,
+            tol=_ACCURACY,
+            return_eigenvectors=False,
+        )[0]
+        for k in lanes
+    ]
+    return float(max(tops))
