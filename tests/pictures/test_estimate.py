@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from shoal.identification.conclude import Wishes
 from shoal.identification.design import design
 from shoal.identification.identify import identify
+from shoal.pictures import files
 from shoal.pictures.answer import Answer
 from shoal.pictures.correlations import strongest
 from shoal.pictures.design import design as draw_design
+from shoal.pictures.design import shown
 from shoal.pictures.gallery import gallery, motions
 from shoal.pictures.gif import gif
 from shoal.pictures.landscape import landscape, survey
@@ -167,3 +170,15 @@ def test_a_design_is_drawn(flexible: Answer) -> None:
     figure = draw_design(found)
     assert f"measure {found.ranked[0][0].label}" in figure.get_suptitle()
     assert all(axes.get_xlabel() for axes in figure.axes)
+
+
+def test_a_design_is_a_page_that_shows_the_best_sensor_of_every_kind(flexible: Answer, tmp_path: Path) -> None:
+    sizes = {"acceleration": 0.05, "rate": 0.005, "strain": 1e-6}
+    found = design(flexible.problem, noise=0.002, sensor_noise=sizes, at={"theta1": 0.78, "theta2": 0.52})
+    kinds = {sensor.quantity for sensor, _ in found.ranked}
+    assert kinds >= {"position", "imu", "strain"}
+    assert {found.ranked[k][0].quantity for k in shown(found)} == kinds
+    files.design(found, tmp_path / "design.html")
+    page = (tmp_path / "design.html").read_text(encoding="utf-8")
+    assert all(sensor.label in page for sensor, _ in found.ranked)
+    assert "http://" not in page.replace("http://www.w3.org", "")

@@ -115,7 +115,7 @@ def identify(
 @options.set_only
 @options.fitted
 @options.as_json
-@options.out(".json", ".png")
+@options.out(".html", ".json", ".png")
 def design(
     problem: str,
     data: str | dict[str, str] | None,

@@ -17,34 +17,46 @@ _SHOWN = 8
 @styled
 def design(found: Design) -> Figure:
     """Left, the weakest parameter by each candidate, alone and beside the best; right, over the duration."""
-    figure, (above, below) = canvas(3.4 + 0.42 * min(_SHOWN, len(found.ranked)) + 2.2, nrows=2)
-    _candidates(above, found)
-    _durations(below, found)
-    headline(figure, _says(found))
+    rows = shown(found)
+    figure, (above, below) = canvas(4.4 + 0.6 * len(rows) + 2.2, nrows=2)
+    _candidates(above, found, rows)
+    _durations(below, found, rows[: len(LINES)])
+    headline(figure, says(found))
     return figure
 
 
-def _candidates(panel: Axes, found: Design) -> None:
-    shown = found.ranked[:_SHOWN]
+def shown(found: Design) -> list[int]:
+    """Of the sensors: the best of every kind, and of the others the best, as far as there is room; by rank."""
+    first = {sensor.quantity: k for k, (sensor, _) in reversed([*enumerate(found.ranked)])}
+    best = sorted(first.values())
+    others = (k for k in range(len(found.ranked)) if k not in best)
+    return sorted([*best, *others][:_SHOWN])
+
+
+def _candidates(panel: Axes, found: Design, rows: list[int]) -> None:
+    shown = [found.ranked[k] for k in rows]
     beside = dict(found.second)
     places = np.arange(len(shown))
     alone = [found.aim.score(precision) for _, precision in shown]
     pairs = [found.aim.score(beside[candidate]) if candidate in beside else np.nan for candidate, _ in shown]
     dots: dict[str, Any] = {"linestyle": "none", "markersize": 9}
     panel.plot(alone, places, marker="o", color=BLUE, label="alone", **dots)
-    panel.plot(pairs, places, marker="D", color=ORANGE, label=f"beside {shown[0][0].label}", **dots)
+    panel.plot(pairs, places, marker="D", color=ORANGE, label="beside the best", **dots)
     panel.axvline(found.aim.score(found.now), color=BLACK, linestyle="--", linewidth=1, label="as now")
     panel.set_xscale("log")
     log_ticks(panel)
-    panel.set_yticks(places, [candidate.label for candidate, _ in shown])
-    panel.set_ylim(len(shown) - 0.5, -0.5)
-    panel.set_xlabel(f"{_score(found)}; to the left is better")
-    panel.legend(loc="upper center", bbox_to_anchor=(0.4, -0.28), ncols=3)
+    panel.set_yticks([])
+    for place, (candidate, _) in zip(places, shown, strict=True):
+        over = panel.get_yaxis_transform()
+        panel.annotate(candidate.label, (0, place), (4, 8), textcoords="offset points", fontsize=11, xycoords=over)
+    panel.set_ylim(len(shown) - 0.6, -0.8)
+    panel.set_xlabel(f"{score_of(found)}; to the left is better")
+    panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
 
 
-def _durations(panel: Axes, found: Design) -> None:
-    for (candidate, _), row, look in zip(found.ranked, found.course, LINES, strict=False):
-        panel.plot(found.times, row, label=candidate.label, **look)
+def _durations(panel: Axes, found: Design, rows: list[int]) -> None:
+    for k, look in zip(rows, LINES, strict=False):
+        panel.plot(found.times, found.course[k], label=found.ranked[k][0].label, **look)
     panel.axvline(found.duration, color=GREY, linewidth=1)
     panel.annotate(
         "today",
@@ -61,15 +73,17 @@ def _durations(panel: Axes, found: Design) -> None:
         panel.set_ylim(finite.min() / 2, min(finite.max(), 1e4 * finite.min()))
     log_ticks(panel)
     panel.set_xlabel("duration of the measurement [s]")
-    panel.set_ylabel(_score(found))
-    panel.legend(ncols=2, fontsize=10.5)
+    panel.set_ylabel(score_of(found))
+    panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), fontsize=10.5)
 
 
-def _score(found: Design) -> str:
+def score_of(found: Design) -> str:
+    """What is compared, in words."""
     return f"std of {found.aim.parameter} / range" if found.aim.parameter else "largest std / range"
 
 
-def _says(found: Design) -> str:
+def says(found: Design) -> str:
+    """What to measure, in a line."""
     best, precision = found.ranked[0]
     gain = found.aim.score(found.now) / found.aim.score(precision)
     parts = [f"{found.problem}: measure {best.label}"]

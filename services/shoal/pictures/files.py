@@ -135,7 +135,12 @@ def design(found: Design, path: Path) -> None:
 
         return png(design(found))
 
-    save(path, {".json": _json(found), ".png": drawn})
+    def page() -> bytes:
+        from shoal.pictures.designed import designed
+
+        return designed(found).encode()
+
+    save(path, {".json": _json(found), ".png": drawn, ".html": page})
 
 
 def sweep(result: Sweep, path: Path) -> None:
