@@ -51,17 +51,18 @@ def _shared(matrix: Any, components: int) -> alike.Alike:
 
 
 @pytest.mark.parametrize("tile", [SINGLE, WIDE], ids=["single", "lanes"])
-@pytest.mark.parametrize("components", [1, 2])
+@pytest.mark.parametrize("components", [1, 2, 3])
 @pytest.mark.parametrize("size", [1, 2, 5, 8, 16, 17, 31, 32, 33, 70])
 def test_solution_and_product_equal_numpy(size: int, components: int, tile: Tile) -> None:
     matrix = _chain(size)
     shared, whole = _shared(matrix, components), np.kron(matrix, np.eye(components))
     right = np.random.default_rng(1).normal(size=(len(whole), len(tile)))
     x, room, product = right.flatten(), np.full(4 * alike.FEW + 1, np.pi), np.empty(right.size)
-    _solve(tile, (0, 0), shared, room, x)
+    space = (0,) * max(components, 2)
+    _solve(tile, space, shared, room, x)
     np.testing.assert_allclose(x.reshape(right.shape), np.linalg.solve(whole, right), rtol=1e-12, atol=1e-14)
     assert room[-1] == np.pi
-    _multiply(tile, (0, 0), shared, right.flatten(), product)
+    _multiply(tile, space, shared, right.flatten(), product)
     np.testing.assert_allclose(product.reshape(right.shape), whole @ right, rtol=1e-12, atol=1e-13)
 
 

@@ -103,9 +103,12 @@ def solve(tile: Tile, space: tuple[int, ...], alike: Alike, w: Array, x: Array) 
         else:
             _multiply_inverse(_group(space), alike, w, x)
     elif alike.components == 1:
-        row_pairs.solve(tile, alike.factor, x)
+        row_pairs.solve(tile, alike.factor, x, len(tile))
+    elif len(tile) == 1 or _divides(space):
+        row_pairs.solve(_side_by_side(tile, space), alike.factor, x, len(space) * len(tile))
     else:
-        row_pairs.solve(_side_by_side(tile, space), alike.factor, x)
+        # Vectors whose length is no power of two are filled up by the compiler, at several times the cost.
+        row_pairs.solve(tile, alike.factor, x, len(space) * len(tile))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

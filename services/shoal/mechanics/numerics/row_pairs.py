@@ -60,28 +60,34 @@ def _grouped(mine: Index, other: Index, values: Array, count: int, n: int) -> tu
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def solve(tile: Tile, pairs: RowPairs, x: Array) -> None:
-    """Replace the right-hand side in x, (rows, lanes), by the solution. Pointers."""
-    width, odd = len(tile), pairs.odd
+def solve(tile: Tile, pairs: RowPairs, x: Array, width: int) -> None:
+    """Replace the right-hand side in x, (rows, width), by the solution; width: a multiple of the tile's. Pointers.
+
+    A row is taken tile by tile: the parts do not wait for each other, and each fits into the processor's registers.
+    """
+    odd = pairs.odd
     for q in range(odd, pairs.size):
         at = (2 * q - odd) * width
-        first, second = load(tile, x, at), load(tile, x, at + width)
-        for p in range(pairs.before[q], pairs.before[q + 1]):
-            known = load(tile, x, pairs.left[p] * width)
-            first, second = first - pairs.lefts[2 * p] * known, second - pairs.lefts[2 * p + 1] * known
-        store(x, at, first)
-        store(x, at + width, second - pairs.own[q] * first)
+        for part in range(0, width, len(tile)):
+            first, second = load(tile, x, at + part), load(tile, x, at + width + part)
+            for p in range(pairs.before[q], pairs.before[q + 1]):
+                known = load(tile, x, pairs.left[p] * width + part)
+                first, second = first - pairs.lefts[2 * p] * known, second - pairs.lefts[2 * p + 1] * known
+            store(x, at + part, first)
+            store(x, at + width + part, second - pairs.own[q] * first)
     for q in range(pairs.size - 1, odd - 1, -1):
         at = (2 * q - odd) * width
-        first = pairs.diagonal[2 * q] * load(tile, x, at)
-        second = pairs.diagonal[2 * q + 1] * load(tile, x, at + width)
-        for p in range(pairs.after[q], pairs.after[q + 1]):
-            known = load(tile, x, pairs.below[p] * width)
-            first, second = first - pairs.belows[2 * p] * known, second - pairs.belows[2 * p + 1] * known
-        store(x, at, first - pairs.own[q] * second)
-        store(x, at + width, second)
+        for part in range(0, width, len(tile)):
+            first = pairs.diagonal[2 * q] * load(tile, x, at + part)
+            second = pairs.diagonal[2 * q + 1] * load(tile, x, at + width + part)
+            for p in range(pairs.after[q], pairs.after[q + 1]):
+                known = load(tile, x, pairs.below[p] * width + part)
+                first, second = first - pairs.belows[2 * p] * known, second - pairs.belows[2 * p + 1] * known
+            store(x, at + part, first - pairs.own[q] * second)
+            store(x, at + width + part, second)
     if odd:
-        alone = pairs.diagonal[1] * load(tile, x, 0)
-        for p in range(pairs.after[0], pairs.after[1]):
-            alone = alone - pairs.belows[2 * p + 1] * load(tile, x, pairs.below[p] * width)
-        store(x, 0, alone)
+        for part in range(0, width, len(tile)):
+            alone = pairs.diagonal[1] * load(tile, x, part)
+            for p in range(pairs.after[0], pairs.after[1]):
+                alone = alone - pairs.belows[2 * p + 1] * load(tile, x, pairs.below[p] * width + part)
+            store(x, part, alone)
