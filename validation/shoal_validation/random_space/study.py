@@ -23,8 +23,8 @@ KINDS = ("chains", "linkages", "directors", "bent")
 RIGID_STEP, CABLE_STEP, BEAM_STEP = 5e-4, 1e-4, 5e-4
 """Of Exudyn as a judge [s]."""
 FINER = 4
-NEWTON = 1e-7
-"""Where its iterations stop: round-off of stiff cables reaches no further."""
+ATTEMPTS = (1.0, 1e-7), (1.0, 1e-6), (0.2, 1e-6)
+"""Parts of these steps, and where its iterations stop: round-off of stiff cables may reach no further."""
 MESHES = 16, 32
 """Cables of every rod of the judge of a tolerance, and of the run that says how well it knows."""
 
@@ -157,13 +157,10 @@ def _by_beams(scene: Scene) -> _Opinion:
     runs = []
     for factor in (1, 2):
         finer = {f"bodies.{name}.elements": factor * rod.elements for name, rod in flexible(scene).items()}
-        values: dict[str, object] = {**finer, "solver.step": BEAM_STEP, "solver.newton_tolerance": NEWTON}
-        try:
-            runs.append(get_engine("exudyn-ge").simulate(scene.with_values(values)))
-        except (InputError, ComputationError) as error:
-            return _Opinion("beams", str(error))
-        if not runs[-1].ok:
-            return _Opinion("beams", f"{runs[-1].status[0]}: {runs[-1].message}")
+        found = _by_exudyn("exudyn-ge", scene.with_values(finer), BEAM_STEP)
+        if isinstance(found, str) or not found.ok:
+            return _Opinion("beams", found)
+        runs.append(found)
     coarse, fine = runs
     limit = {name: (4 * fine.marker(name) - coarse.marker(name)) / 3 for name in fine.markers}
     return _Opinion("beams", limit, known=coarse.distance(fine) / 3)
@@ -171,11 +168,20 @@ def _by_beams(scene: Scene) -> _Opinion:
 
 def _exudyn(scene: Scene, cables: Mapping[str, int]) -> Trajectory | str:
     """Exudyn with so many cables for these rods, and the others as they are stated."""
-    step = CABLE_STEP if flexible(scene) else RIGID_STEP
-    values: dict[str, object] = {"solver.step": step, "solver.newton_tolerance": NEWTON}
+    values: dict[str, object] = {}
     for rod, count in cables.items():
         values |= {f"bodies.{rod}.element": "ancf-cable", f"bodies.{rod}.elements": count}
+    return _by_exudyn("exudyn", scene.with_values(values), CABLE_STEP if flexible(scene) else RIGID_STEP)
+
+
+def _by_exudyn(engine: str, scene: Scene, step: float) -> Trajectory | str:
+    """The motion by one of its engines, by the first attempt that ends, or why there is none."""
     try:
-        return get_engine("exudyn").simulate(scene.with_values(values))
+        for part, newton in ATTEMPTS:
+            values = {"solver.step": part * step, "solver.newton_tolerance": newton}
+            found = get_engine(engine).simulate(scene.with_values(values))
+            if found.ok:
+                break
     except (InputError, ComputationError) as error:
         return str(error)
+    return found
