@@ -10,6 +10,7 @@ import numpy as np
 
 from shoal.engines.capabilities import FEATURES
 from shoal.engines.contract import Capabilities
+from shoal.engines.one_by_one import one_by_one
 from shoal.scene import JOINT_KINDS, LOAD_KINDS, Scene
 from shoal.scene.bodies import Element
 from shoal.trajectory import Array, Trajectory
@@ -53,8 +54,13 @@ class GaussEngine:
         *,
         whole: bool = False,
     ) -> Trajectory:
-        """Run one scene per lane, all in compiled tiles; whole: with their states; see `Engine`."""
+        """Run one scene per lane, all in compiled tiles; whole: with their states; see `Engine`.
+
+        Lanes that differ inside functions of time, or in entries of matrices, are run one by one.
+        """
         from shoal.engines.prepared import prepared
 
         lanes = {path: np.ravel(np.asarray(numbers, dtype=float)) for path, numbers in values.items()}
+        if not whole and scene.alone(lanes) is not None:
+            return one_by_one(self, scene, lanes, times)
         return prepared(scene, self.threads)(lanes, times, whole=whole)

@@ -12,6 +12,7 @@ import numpy as np
 from shoal.engines import swarm_motion
 from shoal.engines.capabilities import check_acceleration
 from shoal.engines.contract import check_lanes, sampling_times
+from shoal.errors import InputError
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.persist import persist
 from shoal.mechanics.simulate import machine, simulate
@@ -70,6 +71,9 @@ class Prepared:
                 lanes, times, whole=whole
             )
         wanted = self._wanted(times)
+        alone = self.scene.alone(lanes)
+        if alone is not None:
+            raise InputError(f"{alone}: cannot differ from lane to lane; call once for each of its values")
         if lanes:
             count = check_lanes(self.scene, lanes, self._accepted)
             if swarm_motion.asked_for(self.scene):

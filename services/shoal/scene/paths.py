@@ -9,23 +9,52 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.errors import InputError
+from shoal.scene.function import Function
 from shoal.scene.initial import Begin, InitialState
 from shoal.scene.record import Record
 
 
 def with_lanes(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any:
     """A copy of what a scene holds, with an array of a number by lane at a path, unchecked."""
+    if not path:
+        return lanes
     head, *rest = path
     if isinstance(place, tuple):
-        return tuple(lanes if k == int(head) else entry for k, entry in enumerate(place))
+        return tuple(with_lanes(entry, rest, lanes) if k == int(head) else entry for k, entry in enumerate(place))
     if isinstance(place, Mapping):
         inner = place.get(head, InitialState())
         return {**place, head: with_lanes(inner, rest, lanes)}
     inside = getattr(place, head)
     if inside is None and head == "velocity":
         inside = (0.0, 0.0)
-    value = with_lanes(inside, rest, lanes) if rest else lanes
-    return place.model_copy(update={head: value})
+    return place.model_copy(update={head: with_lanes(inside, rest, lanes)})
+
+
+def lanes_of(part: Any) -> int:
+    """Number of lanes in a part of a scene with arrays in place of numbers; 0 if there are none."""
+    if isinstance(part, np.ndarray):
+        return part.size
+    if isinstance(part, Record):
+        return max((lanes_of(getattr(part, name)) for name in type(part).model_fields), default=0)
+    if isinstance(part, Mapping):
+        return max((lanes_of(one) for one in part.values()), default=0)
+    return max((lanes_of(one) for one in part), default=0) if isinstance(part, tuple) else 0
+
+
+def shared(place: Any, path: list[str]) -> bool:
+    """Whether lanes cannot differ in the number at a path: it lies in a function of time, or in a list of lists."""
+    for part, below in zip(path, [*path[1:], ""], strict=True):
+        if isinstance(place, Mapping):
+            place = place.get(part)
+        elif isinstance(place, tuple):
+            if below:
+                return True
+            place = place[int(part)]
+        else:
+            place = getattr(place, part, None)
+        if isinstance(place, Function):
+            return True
+    return False
 
 
 def key(place: Any, part: str, path: str, parent: str) -> Any:

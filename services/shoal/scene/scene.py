@@ -31,7 +31,7 @@ from shoal.scene.initial import (
 )
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
 from shoal.scene.loads import DistributedForce, Force, Load
-from shoal.scene.paths import key, unknown, with_lanes
+from shoal.scene.paths import key, shared, unknown, with_lanes
 from shoal.scene.record import Record, Vector, one_line
 from shoal.scene.solids import ModalBody
 from shoal.scene.solver import Solver
@@ -278,6 +278,10 @@ class Scene(Record):
         for path, lanes in values.items():
             scene = with_lanes(scene, path.split("."), np.asarray(lanes, dtype=float))
         return scene
+
+    def alone(self, paths: Iterable[str]) -> str | None:
+        """The first path whose number has to be the same in all lanes, as those in functions of time and matrices."""
+        return next((path for path in paths if shared(self, path.split("."))), None)
 
     def _has(self, path: str, value: Any) -> bool:
         """Whether the scene states this value there already."""

@@ -105,7 +105,7 @@ class Loads:
             for j, (other, other_rest) in enumerate(measured[: i + 1]):
                 # 1/2 q'Kq = 1/2 sum of (sum_j K_ij) q_i^2 - 1/2 sum over i > j of K_ij (q_i - q_j)^2
                 both = [np.sum(part[i], axis=0) if i == j else -part[i, j] for part in (stiffness, damping)]
-                if np.any(both):
+                if any(np.any(part) for part in both):
                     base, natural = (nowhere, rest) if i == j else (other, rest - other_rest)
                     law = [both[0], 0.0, both[1], natural, 0.0, 1.0, 0.0]
                     self._measure(name, PLACE, [base, one, frame.directors[0]], law, 0.0)

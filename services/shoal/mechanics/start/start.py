@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel
 
 from shoal.errors import InputError
 from shoal.mechanics import plane
@@ -25,6 +24,7 @@ from shoal.scene import GROUND, InitialState, Scene
 from shoal.scene.ended import End
 from shoal.scene.initial import POSES, RATES, Quantity
 from shoal.scene.joints import places
+from shoal.scene.paths import lanes_of
 
 _EFFORT = 8_000
 """Gaps (`Assembly.effort`) after which no fewer statements are sought that contradict each other."""
@@ -56,8 +56,8 @@ def started(scene: Scene) -> Start:
 
 def complete(scene: Scene) -> Start:
     """The same with every quantity of every body filled in."""
-    count = _lanes(scene)
-    lanes = count or 1
+    count = lanes_of((scene.initial, scene.bodies, scene.joints))
+    lanes = max(count, 1)
     assembly = Assembly(scene, lanes)
     placed = assembly.run()
     if not count and not placed.ok[0]:
@@ -131,21 +131,6 @@ def is_direct(scene: Scene) -> bool:
         if start.position is not None or start.velocity is not None:
             placed.append(group[name] if start.position is not None else group[GROUND])
     return len(set(placed)) == len(placed)
-
-
-def _lanes(scene: Scene) -> int | None:
-    """Number of lanes of a scene with arrays in place of numbers; None if there are none."""
-
-    def sizes(value: Any) -> int:
-        if isinstance(value, np.ndarray):
-            return value.size
-        if isinstance(value, BaseModel):
-            return max((sizes(getattr(value, name)) for name in type(value).model_fields), default=0)
-        if isinstance(value, dict):
-            return max((sizes(one) for one in value.values()), default=0)
-        return max((sizes(one) for one in value), default=0) if isinstance(value, tuple) else 0
-
-    return max(sizes(part) for part in (scene.initial, scene.bodies, scene.joints)) or None
 
 
 def _pose_refused(assembly: Assembly) -> InputError:

@@ -22,6 +22,7 @@ from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
 from shoal.scene import InitialState, Scene
 from shoal.scene.initial import Quantity
+from shoal.scene.paths import lanes_of
 
 CLOSED = 1e-11
 """A joint that gapes by less, relative to the size of the machine, is closed."""
@@ -66,6 +67,16 @@ def _dense(stated: list[_Stated], unknowns: int) -> Array:
     return rows
 
 
+class _Rates(NamedTuple):
+    """What rates have to meet: constraints, their scales, how they are driven, what is stated, and the pace."""
+
+    terms: list[Term | Mesh]
+    scale: Array
+    driven: Array
+    stated: list[_Stated]
+    pace: float
+
+
 class _Closing:
     """Coordinates and rates that meet the constraints of a placement, from those it has."""
 
@@ -77,6 +88,10 @@ class _Closing:
         self.size = float(reach.span(scene))
         self.scale = np.array([self.size**term.lengths for term in self.terms])
         lanes = max(self.q.shape[1], self.v.shape[1], *(len(np.atleast_1d(one)) for one in self.residual(self.q)), 1)
+        self.lanes = 0
+        self._spread(lanes)
+
+    def _spread(self, lanes: int) -> None:
         self.q, self.v = (np.repeat(x, lanes // x.shape[1], 1) for x in (self.q, self.v))
         self.lanes = lanes
 
@@ -87,6 +102,10 @@ class _Closing:
         for lane in range(self.lanes):
             if off[min(lane, len(off) - 1)] > CLOSED or not self._keeps(lane):
                 failed[lane] |= not self._close(lane)
+        heavy = lanes_of(self.scene.bodies)
+        if heavy > self.lanes and not failed[0] and not self._moves(0):  # the least kinetic energy depends on masses
+            self._spread(heavy)
+            failed = np.repeat(failed, heavy)
         for moving in np.flatnonzero(~failed):
             failed[moving] |= not self._move(int(moving))
         self.placement.positions, self.placement.velocities = list(self.q), list(self.v)
@@ -220,18 +239,25 @@ class _Closing:
         spin = _lane(turning, lane)
         return [(one, np.cross(spin, _at(one, self.q, lane))) for one in frame.directors]
 
-    def _move(self, lane: int) -> bool:
-        """Rates that meet the constraints and what is stated; false if there are none."""
-        q, v = self.q[:, lane], self.v[:, lane].copy()
+    def _rates(self, lane: int) -> _Rates:
         terms: list[Term | Mesh] = [*self.terms, *self.meshes]
         scale = np.append(self.scale, np.ones(len(self.meshes)))
         driven = np.array([_drive_rate(term) for term in terms]) / scale
         stated = [one for one in self._rows(("velocity", "spin", "rate"), lane) if one.firm]
-        pace = max(1.0, float(np.max(np.abs(v), initial=0.0)))
+        return _Rates(terms, scale, driven, stated, max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0))))
+
+    def _moves(self, lane: int) -> bool:
+        """Whether the rates meet the constraints and what is stated."""
+        (terms, scale, driven, stated, pace), v = self._rates(lane), self.v[:, lane]
         kept = all(abs(one.off(v)) <= CLOSED * pace for one in stated)
         moving = np.array([sum(x * v[k] for k, x in slopes(term, self.q, lane)) for term in terms]) / scale
-        if kept and np.all(np.abs(moving + driven) <= CLOSED * pace):
+        return bool(kept and np.all(np.abs(moving + driven) <= CLOSED * pace))
+
+    def _move(self, lane: int) -> bool:
+        """Rates that meet the constraints and what is stated; false if there are none."""
+        if self._moves(lane):
             return True
+        (terms, scale, driven, stated, pace), q, v = self._rates(lane), self.q[:, lane], self.v[:, lane].copy()
         slope = self.jacobian(self.q, lane, terms) / scale[:, None] if terms else np.zeros((0, len(q)))
         held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
