@@ -111,6 +111,8 @@ def _statistics(study: Study, found: Found) -> Statistics:
     told = sampled = of_runs(runs.values, found.indices, len(study.inputs))
     if isinstance(found.surrogate, Expansion):
         told = of_expansion(found.surrogate, study.inputs, found.error, runs.evaluations, study.seed)
+        if found.errors is not None:
+            told = replace(told, error=found.errors[0], std_error=found.errors[1])
         if found.indices is None:
             sampled = replace(sampled, first=told.first, total=told.total)
         told = told if found.coarse is None else either(found.coarse, sampled, told)

@@ -94,6 +94,13 @@ class Runs:
                 kept.append(germ)
         return np.array(kept).reshape(-1, germs.shape[1])
 
+    def part(self, which: BoolArray) -> Runs:
+        """Some of the good runs, (runs,), for fits to fewer of them."""
+        germs, values = self.germs[which], self.values[which]
+        return Runs(
+            self.model, self.inputs, self.most, None, 0, "", [germs], [values], [np.ones(len(germs), dtype=bool)]
+        )
+
     @property
     def left(self) -> int:
         """Runs that may still be made."""

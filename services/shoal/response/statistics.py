@@ -13,6 +13,8 @@ from shoal.trajectory import Array
 QUANTILES = 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99
 DRAWN = 2**14
 """Places at which an expansion is evaluated for quantiles."""
+SURE = 2.0
+"""Standard errors within which 95 % lie."""
 NOTHING = 1e-9
 """A deviation below this share of the largest of its group has no shares to tell of."""
 
@@ -20,7 +22,7 @@ NOTHING = 1e-9
 @dataclass(frozen=True)
 class Statistics:
     """mean, std: (columns,); quantiles: (quantiles, columns); first, total: Sobol's indices, (parameters, columns), nan
-    where nothing varies or nothing is known; error, std_error: one standard deviation of the mean and of std
+    where nothing varies or nothing is known; error, std_error: within which mean and std lie with 95 % confidence
     """
 
     mean: Array
@@ -51,30 +53,32 @@ def of_expansion(found: Expansion, inputs: Inputs, error: Array | None, runs: in
     for k in range(0, len(variance), block):
         quantiles[:, k : k + block] = np.quantile(places @ found.coefficients[:, k : k + block], QUANTILES, axis=0)
     unknown = np.full(len(variance), np.nan)
-    known = unknown if error is None else error / np.sqrt(runs)
+    known = unknown if error is None else SURE * error / np.sqrt(runs)
     deviation = unknown
     if error is not None and found.squares is not None:
         # What is not explained is missing in the deviation as a whole, and what is explained scatters.
         missing = np.divide(error**2, 2 * np.sqrt(variance), out=np.zeros_like(error), where=varies)
-        deviation = np.hypot(np.maximum(found.squares, error) / np.sqrt(runs), missing)
+        deviation = SURE * np.hypot(np.maximum(found.squares, error) / np.sqrt(runs), missing)
     return Statistics(found.mean, np.sqrt(variance), quantiles, first, total, known, deviation)
 
 
 def of_runs(values: Array, indices: Array | None, parameters: int) -> Statistics:
     """Of runs that are drawn from the distributions; indices: Sobol's, (2, parameters, columns)."""
+    # Runs that tell indices share their parameters with others.
+    independent = len(values) if indices is None else 2 * len(values) / (parameters + 2)
     unknown = np.full((2, parameters, values.shape[1]), np.nan)
     first, total = unknown if indices is None else indices
     deviation = values.std(axis=0, ddof=1) if len(values) > 1 else np.full(values.shape[1], np.nan)
     squares = ((values - values.mean(axis=0)) ** 2).std(axis=0)
-    off = np.divide(squares, 2 * deviation, out=np.zeros_like(squares), where=deviation > 0) / np.sqrt(len(values))
+    off = np.divide(squares, 2 * deviation, out=np.zeros_like(squares), where=deviation > 0) / np.sqrt(independent)
     return Statistics(
         values.mean(axis=0),
         deviation,
         np.quantile(values, QUANTILES, axis=0),
         first,
         total,
-        deviation / np.sqrt(len(values)),
-        off,
+        SURE * deviation / np.sqrt(independent),
+        SURE * off,
     )
 
 

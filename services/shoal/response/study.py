@@ -107,6 +107,7 @@ class Found:
     surrogate: of the answers, if it made one; error: what that is off by at runs it had not seen, (columns,); why: what
     it did, in words; indices: first and total Sobol indices by sampling, (2, parameters, columns);
     quantiles: that take the place of those of the runs, (levels, columns);
+    errors: within which mean and deviation lie with 95 % confidence, (columns,) each;
     coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,)
     """
 
@@ -118,6 +119,7 @@ class Found:
     foretold: bool = False
     share: float = 0.0
     quantiles: Array | None = None
+    errors: tuple[Array, Array] | None = None
 
 
 Method = Callable[[Study], Found]

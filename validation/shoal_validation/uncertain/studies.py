@@ -189,6 +189,9 @@ def attempted(asked: Drawn, runs: int) -> tuple[Array, Array]:
             germs = best[random.integers(0, len(best), BLOCK)] + size * random.uniform(-1, 1, (BLOCK, len(inputs)))
             germs = np.clip(germs, -1, 1)
         found = asked.motion(inputs.values(germs), asked.times)
+        # A closed form may not reach a singular place, such as a pendulum that stands upright.
+        finite = np.isfinite(found).all(axis=1)
+        germs, found = germs[finite], found[finite]
         for side, sign in enumerate((1, -1)):
             least = np.argmin(sign * found, axis=0)
             value = found[least, np.arange(len(low))]

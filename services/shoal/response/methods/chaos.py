@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shoal.response import moments
 from shoal.response.degrees import best
 from shoal.response.expansion import Expansion
 from shoal.response.outermost import hidden, outwards
@@ -22,7 +23,7 @@ from shoal.trajectory import Array
 
 SHARE = 2.0
 """Runs for every term, at least."""
-FIRST = 16
+FIRST = 128
 """Runs to begin with; they are doubled."""
 RUNS = 300
 """That are made unless the expansion is coarse by then."""
@@ -64,7 +65,14 @@ def grown(study: Study, fair: int) -> Found:
         count = 2 * made
     degree = int(found.terms.sum(axis=1).max(initial=0))
     kind = "regularised " if len(found.terms) > len(runs.germs) / SHARE else ""
-    return Found(f"{kind}polynomial chaos of degree {degree} fitted to {runs.evaluations} runs", found, found.left_out)
+    why = f"{kind}polynomial chaos of degree {degree} fitted to {runs.evaluations} runs"
+    return Found(why, found, found.left_out, errors=moments.errors(study, found, _fitted))
+
+
+def _fitted(study: Study) -> Expansion:
+    """To the runs of a part of a study."""
+    found = best(study, SHARE, lambda one: _reaching(study, one))
+    return found if study.degree else _with_more_terms(study, found)
 
 
 def _reaching(study: Study, found: Expansion) -> Expansion:
