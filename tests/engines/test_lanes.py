@@ -83,7 +83,6 @@ def test_lanes_of_given_modes_are_runs_of_their_own(path: str) -> None:
 def test_damping_of_modes_differs_from_lane_to_lane() -> None:
     """A vibrating modal rod: the more it is damped, the less of it is left."""
     rod = {"kind": "rod", "length": 1.0, "height": 0.01, "width": 0.01, "density": 7800.0, "youngs_modulus": 2e11}
-    foot = {"body": "ground", "point": [0.0, 0.0]}
     scene = Scene.parse(
         {
             "name": "reed",

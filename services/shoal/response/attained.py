@@ -9,7 +9,6 @@ import numpy as np
 
 from shoal.response.enclosure import Enclosure, enclosure, foretold
 from shoal.response.extremes import Extremes, Surrogate, extremes
-from shoal.response.methods.bounds import HOPELESS
 from shoal.response.result import Bounds
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array
@@ -20,6 +19,8 @@ TESTED, APART = 1, 0.05
 """Extremal points that are run for each parameter, and how far apart, where a surrogate of cycles tells the bounds."""
 STARTS = 8
 """Searches for the extremes of a surrogate of cycles."""
+BELIEVED = 0.2
+"""Of the width: the largest gap of bounds that are told. A surrogate that misses more has not seen what is there."""
 
 
 def bounds_of(study: Study, found: Found) -> Bounds:
@@ -116,7 +117,7 @@ def _tested(study: Study, surrogate: Surrogate, named: Extremes, error: Array) -
 
 def _horizon(study: Study, gap: Array) -> float:
     """The last instant up to which outer and attained bounds meet [s]; infinite if they do at all, or are unknown."""
-    first = study.instants[np.nan_to_num(gap) > max(study.gap or 0.0, HOPELESS)].min(initial=math.inf)
+    first = study.instants[np.nan_to_num(gap) > max(study.gap or 0.0, BELIEVED)].min(initial=math.inf)
     if math.isinf(first):
         return math.inf
     return float(study.instants[study.instants < first].max(initial=0.0))
