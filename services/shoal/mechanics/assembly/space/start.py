@@ -103,7 +103,8 @@ class _Closing:
             if off[min(lane, len(off) - 1)] > CLOSED or not self._keeps(lane):
                 failed[lane] |= not self._close(lane)
         heavy = lanes_of(self.scene.bodies)
-        if heavy > self.lanes and not failed[0] and not self._moves(0):  # the least kinetic energy depends on masses
+        # The least kinetic energy depends on masses.
+        if heavy > self.lanes and not failed[0] and not self._moves(0, self._rates(0)):
             self._spread(heavy)
             failed = np.repeat(failed, heavy)
         for moving in np.flatnonzero(~failed):
@@ -246,18 +247,19 @@ class _Closing:
         stated = [one for one in self._rows(("velocity", "spin", "rate"), lane) if one.firm]
         return _Rates(terms, scale, driven, stated, max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0))))
 
-    def _moves(self, lane: int) -> bool:
+    def _moves(self, lane: int, wanted: _Rates) -> bool:
         """Whether the rates meet the constraints and what is stated."""
-        (terms, scale, driven, stated, pace), v = self._rates(lane), self.v[:, lane]
+        (terms, scale, driven, stated, pace), v = wanted, self.v[:, lane]
         kept = all(abs(one.off(v)) <= CLOSED * pace for one in stated)
         moving = np.array([sum(x * v[k] for k, x in slopes(term, self.q, lane)) for term in terms]) / scale
         return bool(kept and np.all(np.abs(moving + driven) <= CLOSED * pace))
 
     def _move(self, lane: int) -> bool:
         """Rates that meet the constraints and what is stated; false if there are none."""
-        if self._moves(lane):
+        asked = self._rates(lane)
+        if self._moves(lane, asked):
             return True
-        (terms, scale, driven, stated, pace), q, v = self._rates(lane), self.q[:, lane], self.v[:, lane].copy()
+        (terms, scale, driven, stated, pace), q, v = asked, self.q[:, lane], self.v[:, lane].copy()
         slope = self.jacobian(self.q, lane, terms) / scale[:, None] if terms else np.zeros((0, len(q)))
         held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
