@@ -83,9 +83,9 @@ def test_machine_code_is_made_of_what_is_asked_for_alone(emitted: list[str]) -> 
     assert kernel(1) == 2.0
 
 
-def _run(place: Path, first: str, second: str) -> list[str]:
+def _printed(place: Path, program: str) -> list[str]:
     done = subprocess.run(
-        [sys.executable, "-c", RUN.format(first=first, second=second)],
+        [sys.executable, "-c", program],
         cwd=place,
         env={**os.environ, "NUMBA_CACHE_DIR": str(place / "cache")},
         stdout=subprocess.PIPE,
@@ -93,6 +93,10 @@ def _run(place: Path, first: str, second: str) -> list[str]:
         check=True,
     )
     return done.stdout.splitlines()
+
+
+def _run(place: Path, first: str, second: str) -> list[str]:
+    return _printed(place, RUN.format(first=first, second=second))
 
 
 def test_the_cache_keeps_parts_and_entries_apart(tmp_path: Path) -> None:
@@ -103,3 +107,49 @@ def test_the_cache_keeps_parts_and_entries_apart(tmp_path: Path) -> None:
     assert _run(tmp_path, "kernel", "kernel") == ["9.0 9.0", "negative", "1 1 0", "False True True"]
     # an entry is loaded with all that it calls
     assert _run(tmp_path, "kernel", "inner") == ["9.0 5.0", "negative", "0 0 0", "False False False"]
+
+
+ALIKE = """
+from numba import njit
+
+def made(sign):
+    @njit
+    def moved(x):
+        return x + sign
+    return moved
+
+up, down = made(1.0), made(-1.0)
+
+@njit(cache=True)
+def rise(x):
+    return up(x)
+
+@njit(cache=True)
+def fall(x):
+    return down(x)
+
+@njit(cache=True)
+def first(x):
+    return rise(x)
+
+@njit(cache=True)
+def second(x):
+    return fall(x)
+
+@njit(cache=True)
+def both(x):
+    return 10.0 * rise(x) + fall(x)
+"""
+CALL = """
+from shoal.mechanics import compilation
+compilation.watch()
+import alike
+print(alike.{name}(5.0))
+"""
+
+
+def test_functions_that_differ_in_what_they_enclose_stay_apart(tmp_path: Path) -> None:
+    """Sums and products of vectors are such: one name, the same types. Numba tells them apart within a process only."""
+    (tmp_path / "alike.py").write_text(ALIKE)
+    found = [_printed(tmp_path, CALL.format(name=name)) for name in ("first", "second", "both")]
+    assert found == [["6.0"], ["4.0"], ["64.0"]]

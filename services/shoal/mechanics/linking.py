@@ -5,18 +5,25 @@ they are optimised and emitted once by themselves and once more within each call
 Python or a gate asks for is optimised and emitted, with all that it calls; the parts stay intermediate code, in the
 cache as well. A part that is called from Python later is compiled again, with its doors.
 
+Parts of several processes meet in one module there, by their names. Numba tells functions of the same name, which
+differ in what they enclose, by a number that every process counts from 1: the sum of two vectors would become the
+product that another process has under this number. Here each process begins at a place of its own.
+
 Numba offers no setting for this: private names of version 0.68 are replaced.
 """
 
 from __future__ import annotations
 
+import itertools
+import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import caching, codegen, cpu, dispatcher, sigutils
+from numba.core import bytecode, caching, codegen, cpu, dispatcher, sigutils
 from numba.core.environment import lookup_environment
 
 _LINKED = "linked"
@@ -46,7 +53,7 @@ def level(function: Any, signature: Any) -> Iterator[None]:
 
 @cache
 def link() -> None:
-    """From now on functions within functions are linked only."""
+    """From now on functions within functions are linked only, and numbered as in no other process."""
     numbas_flags = dispatcher._FunctionCompiler._customize_flags  # type: ignore[attr-defined]
     numbas_executable = cpu.CPUContext.get_executable
     numbas_set_env = codegen.JITCPUCodegen.set_env
@@ -104,6 +111,8 @@ def link() -> None:
         _gather(library)
         numbas_linking(self, library)
 
+    _number()
+    os.register_at_fork(after_in_child=_number)
     dispatcher._FunctionCompiler._customize_flags = customize_flags  # type: ignore[attr-defined]
     cpu.CPUContext.get_executable = get_executable
     codegen.JITCPUCodegen.set_env = set_env
@@ -112,6 +121,11 @@ def link() -> None:
     codegen.CPUCodeLibrary.serialize_using_object_code = serialize
     codegen.CPUCodeLibrary._unserialize = classmethod(unserialize)
     codegen.CPUCodeLibrary.add_linking_library = add_linking_library
+
+
+def _number() -> None:
+    """Numba's numbers of functions begin where no other process begins."""
+    bytecode.FunctionIdentity._unique_ids = itertools.count(secrets.randbits(62))
 
 
 def _gather(library: Any) -> None:
