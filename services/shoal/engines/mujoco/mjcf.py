@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from typing import Any
 from xml.etree import ElementTree
 
@@ -11,7 +10,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from shoal.engines.capabilities import check_acceleration
-from shoal.engines.tree.scene import Begin, started
+from shoal.engines.mujoco.links import Freedom, Link, Tree, local, where
+from shoal.engines.mujoco.refused import require_counterparts
+from shoal.engines.tree.scene import started
 from shoal.errors import InputError
 from shoal.mechanics.assembly.masses import second_moments
 from shoal.mechanics.reach import span
@@ -33,9 +34,7 @@ from shoal.scene import (
     Weld,
 )
 from shoal.scene.dimensions import padded
-from shoal.scene.joints import Cylindrical, Planar, Universal
 from shoal.scene.sections import Tube
-from shoal.trajectory import Array
 
 THINNEST = 1e-14
 """Of mass times size squared: the least moment of inertia, of which MuJoCo needs one about every axis."""
@@ -46,21 +45,6 @@ STIFF = 2.0
 START = "start"
 """The keyframe with the rates of the start, which MJCF has no other place for."""
 
-Freedom = tuple[str, Array]
-"""slide, hinge or ball, and its axis (3,) at the start."""
-
-
-@dataclass
-class _Link:
-    """A body, what it hangs on, and how: by a joint of the scene from a place of the parent, or free."""
-
-    name: str
-    parent: str
-    joint: str = ""
-    freedoms: list[Freedom] = field(default_factory=list)
-    place: Array = field(default_factory=lambda: np.zeros(3))
-    """Of the joint at the start [m]."""
-
 
 class Mjcf:
     """A scene as MJCF at its start. Raises InputError that names what MJCF has not.
@@ -70,14 +54,14 @@ class Mjcf:
 
     def __init__(self, scene: Scene) -> None:
         check_acceleration(scene)
+        require_counterparts(scene)
         self.scene = scene
-        self._refuse()
         self._begin, self._axis, self.initial = started(scene)
         self.soft: list[str] = []
         self.rates: list[float] = []
         self._sites: dict[str, list[tuple[str, Any]]] = {}
         self._springs: dict[str, list[tuple[float, float, float]]] = {}
-        links = list(self._links())
+        links = list(Tree(scene, self._begin, self._axis).links())
         self._hung = {link.joint: link for link in links if link.joint}
         parts = self._tendons_and_actuators()
         for name, at in scene.markers.items():
@@ -108,125 +92,7 @@ class Mjcf:
         ElementTree.indent(root)
         self.text = ElementTree.tostring(root, encoding="unicode") + "\n"
 
-    def _refuse(self) -> None:
-        scene = self.scene
-        for name, body in scene.bodies.items():
-            if name == "world":
-                raise InputError("bodies.world: MJCF calls the ground so; give the body another name")
-            if body.element != "rigid":
-                raise InputError(f"bodies.{name}.element: MJCF has no {body.element}; rigid bodies only")
-        if scene.initial_from is not None:
-            raise InputError("initial.from: MJCF states a start; it has neither statics nor other runs")
-        for name in scene.ground_points:
-            raise InputError(f"ground_points.{name}: MJCF has no functions of time")
-        for name, joint in scene.joints.items():
-            if joint.kind == "gear":
-                raise InputError(f"joints.{name}: a gear is not written as MJCF; there its teeth would give way")
-            if joint.kind in ("driven-angle", "coupling", "parallel", "perpendicular"):
-                raise InputError(f"joints.{name}: MJCF has no {joint.kind}")
-            if isinstance(joint, Revolute | Slider) and joint.share:
-                raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
-            if isinstance(joint, Distance) and joint.length is not None and joint.length.number is None:
-                raise InputError(f"joints.{name}.length: MJCF has no functions of time")
-        for name, load in scene.loads.items():
-            where = f"loads.{name}"
-            if load.kind == "distributed-force":
-                raise InputError(f"{where}: MJCF has no distributed-force")
-            if isinstance(load, TorsionSpring) and (load.first_to or load.second_to):
-                raise InputError(f"{where}: MJCF has no springs between directions from place to place")
-            for key in ("cubic", "elastic"):
-                if getattr(load, key, None):
-                    raise InputError(f"{where}.{key}: MJCF has linear springs only")
-            for key in ("scale", "torque"):
-                if (f := getattr(load, key, None)) is not None and f.number is None:
-                    raise InputError(f"{where}.{key}: MJCF has no functions of time")
-
-    def _links(self) -> Iterator[_Link]:
-        """Bodies from the ground outwards; what MuJoCo's constraints can close as well is cut first."""
-        joints: dict[str, Any] = {name: joint for name, joint in self.scene.joints.items() if self._hangs(joint)}
-        order = sorted(joints, key=lambda name: isinstance(joints[name], Revolute | Spherical | Weld))
-        group = {name: name for name in (GROUND, *self.scene.bodies)}
-        tree: dict[str, list[str]] = {name: [] for name in group}
-        for name in order:
-            first, second = (group[side.body] for side in (joints[name].first, joints[name].second))
-            if first != second:
-                group = {body: second if owner == first else owner for body, owner in group.items()}
-                for side in (joints[name].first, joints[name].second):
-                    tree[side.body].append(name)
-        reached: set[str] = set()
-        for root in (GROUND, *self.scene.bodies):
-            if root in reached:
-                continue
-            if root != GROUND:
-                yield self._free(root)
-            waiting = [root]
-            reached.add(root)
-            while waiting:
-                parent = waiting.pop(0)
-                for name in tree[parent]:
-                    sides = joints[name].first, joints[name].second
-                    child = sides[1] if sides[0].body == parent else sides[0]
-                    if child.body not in reached:
-                        yield self._hang(name, parent, child)
-                        reached.add(child.body)
-                        waiting.append(child.body)
-
-    def _hangs(self, joint: Any) -> bool:
-        """Whether a body may hang on another by a joint."""
-        sides = (getattr(joint, "first", None), getattr(joint, "second", None))
-        masses = any(side is None or isinstance(self.scene.bodies.get(side.body), PointMass) for side in sides)
-        return not (masses or isinstance(joint, Distance))
-
-    def _free(self, body: str) -> _Link:
-        begin, flat = self._begin[body], self.scene.dimensions == 2
-        if isinstance(self.scene.bodies[body], PointMass):
-            return _Link(body, GROUND, "", [("slide", axis) for axis in np.eye(3)[: 2 if flat else 3]], begin.origin)
-        if flat:
-            freedoms = [("slide", np.eye(3)[0]), ("slide", np.eye(3)[1]), ("hinge", np.eye(3)[2])]
-            return _Link(body, GROUND, "", freedoms, begin.origin)
-        return _Link(body, GROUND, "", [("free", np.zeros(3))], begin.origin)
-
-    def _hang(self, name: str, parent: str, child: Attachment) -> _Link:
-        joint: Any = self.scene.joints[name]
-        freedoms = list(self._freedoms(name, joint))
-        if joint.first.body != parent:
-            freedoms.reverse()
-        # Where the second place slides on a line or a plane of the first body, turns are about the second one.
-        turned = joint.second if isinstance(joint, Slider | Cylindrical | Planar) else child
-        return _Link(child.body, parent, name, freedoms, self._where(turned))
-
-    def _freedoms(self, name: str, joint: Any) -> Iterator[Freedom]:
-        """From the first body to the second."""
-        z, flat = np.array([0.0, 0.0, 1.0]), self.scene.dimensions == 2
-        turn: Freedom = ("hinge", z) if flat else ("ball", z)
-        if isinstance(joint, Revolute):
-            yield "hinge", self._axis(joint.first, joint.axis)
-        elif isinstance(joint, Spherical):
-            yield "ball", z
-        elif isinstance(joint, Universal):
-            yield "hinge", self._axis(joint.first, joint.axis)
-            yield "hinge", self._axis(joint.second, joint.second_axis)
-        elif isinstance(joint, Slider):
-            if joint.axis is None:
-                line = np.array([np.cos(joint.direction), np.sin(joint.direction), 0.0])
-                yield "slide", self._begin[joint.first.body].axes @ line
-            else:
-                yield "slide", self._axis(joint.first, joint.axis)
-            if joint.rotation == "free":
-                yield turn
-        elif isinstance(joint, Cylindrical):
-            axis = self._axis(joint.first, joint.axis)
-            yield from (("slide", axis), ("hinge", axis))
-        elif isinstance(joint, Planar):
-            axis = self._axis(joint.first, joint.axis)
-            across = np.linalg.svd(axis[None])[2][1:]
-            yield from (("slide", one) for one in across)
-            if joint.rotation != "locked":
-                yield ("hinge", axis) if joint.rotation == "axis" else turn
-        else:
-            assert isinstance(joint, Weld), name
-
-    def _grow(self, element: ElementTree.Element, body: str, links: list[_Link]) -> None:
+    def _grow(self, element: ElementTree.Element, body: str, links: list[Link]) -> None:
         """The sites of a body and the bodies that hang on it."""
         begin = self._begin[body]
         for name, place in self._sites.get(body, []):
@@ -264,7 +130,7 @@ class Mjcf:
         options = {"pos": _numbers(centre), "mass": repr(float(body.mass)), "diaginertia": _numbers(moments)}
         _under(element, "inertial", **options, quat=_quaternion(turn))
 
-    def _joint(self, element: ElementTree.Element, link: _Link, number: int, freedom: Freedom) -> None:
+    def _joint(self, element: ElementTree.Element, link: Link, number: int, freedom: Freedom) -> None:
         kind, axis = freedom
         own, parent = self._begin[link.name], self._begin[link.parent]
         turning = own.spin - parent.spin
@@ -284,7 +150,7 @@ class Mjcf:
         speed = own.speed(link.place) - parent.speed(link.place)
         self.rates += {"slide": [speed @ axis], "hinge": [turning @ axis], "ball": [*(own.axes.T @ turning)]}[kind]
 
-    def _forces(self, link: _Link, joint: Any) -> dict[str, str]:
+    def _forces(self, link: Link, joint: Any) -> dict[str, str]:
         """Friction of a joint, and the torsion springs that act in it."""
         springs = self._springs.get(link.joint, [])
         stiffness = sum(spring[0] for spring in springs)
@@ -316,7 +182,7 @@ class Mjcf:
             _under(element, "geom", type="sphere", size=thick, **seen)
             return
         centre = np.array(padded(body.centre_of_mass, 3), dtype=float)
-        places = [self._local(at) for at in self._attached(name)]
+        places = [local(self.scene, at) for at in self._attached(name)]
         for place in {tuple(place): place for place in places}.values():
             if np.linalg.norm(place - centre) > 1e-9 * span(self.scene):
                 ends = _numbers([*centre, *place])
@@ -359,10 +225,10 @@ class Mjcf:
         if getattr(joint, "friction", 0.0) or getattr(joint, "coulomb", 0.0):
             raise InputError(f"joints.{name}.friction: MJCF has none in a joint that closes a loop")
         if isinstance(joint, Weld) and not masses:
-            anchor = _numbers(self._local(joint.second))
+            anchor = _numbers(local(self.scene, joint.second))
             yield _element("weld", name=name, **bodies, anchor=anchor, **self._stiff())
         elif isinstance(joint, Revolute | Spherical | Weld):
-            place = self._where(joint.first)
+            place = where(self.scene, self._begin, joint.first)
             places = [place]
             if isinstance(joint, Revolute) and self.scene.dimensions == 3 and not masses:
                 places.append(place + 0.2 * span(self.scene) * self._axis(joint.first, joint.axis))
@@ -428,19 +294,11 @@ class Mjcf:
         taken = {known for sites in self._sites.values() for known, _ in sites}
         while name in taken:
             name += "-"
-        self._sites.setdefault(at.body, []).append((name, self._local(at)))
+        self._sites.setdefault(at.body, []).append((name, local(self.scene, at)))
         return name
 
-    def _local(self, at: Attachment) -> Array:
-        place = at.point if at.body == GROUND else self.scene.location(at)
-        return np.array([float(x) for x in padded(place, 3)])
-
-    def _where(self, at: Attachment) -> Array:
-        begin: Begin = self._begin[at.body]
-        return begin.point(self._local(at))
-
     def _apart(self, first: Attachment, second: Attachment) -> float:
-        return float(np.linalg.norm(self._where(second) - self._where(first)))
+        return float(np.linalg.norm(where(self.scene, self._begin, second) - where(self.scene, self._begin, first)))
 
 
 def _element(tag: str, **attributes: str) -> ElementTree.Element:

@@ -1,0 +1,40 @@
+"""What scenes have and MuJoCo's format has not."""
+
+from __future__ import annotations
+
+from shoal.errors import InputError
+from shoal.scene import Distance, Revolute, Scene, Slider, TorsionSpring
+
+
+def require_counterparts(scene: Scene) -> None:
+    """Raises InputError that names what of a scene MJCF has not, as far as that shows before its tree is built."""
+    for name, body in scene.bodies.items():
+        if name == "world":
+            raise InputError("bodies.world: MJCF calls the ground so; give the body another name")
+        if body.element != "rigid":
+            raise InputError(f"bodies.{name}.element: MJCF has no {body.element}; rigid bodies only")
+    if scene.initial_from is not None:
+        raise InputError("initial.from: MJCF states a start; it has neither statics nor other runs")
+    for name in scene.ground_points:
+        raise InputError(f"ground_points.{name}: MJCF has no functions of time")
+    for name, joint in scene.joints.items():
+        if joint.kind == "gear":
+            raise InputError(f"joints.{name}: a gear is not written as MJCF; there its teeth would give way")
+        if joint.kind in ("driven-angle", "coupling", "parallel", "perpendicular"):
+            raise InputError(f"joints.{name}: MJCF has no {joint.kind}")
+        if isinstance(joint, Revolute | Slider) and joint.share:
+            raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
+        if isinstance(joint, Distance) and joint.length is not None and joint.length.number is None:
+            raise InputError(f"joints.{name}.length: MJCF has no functions of time")
+    for name, load in scene.loads.items():
+        where = f"loads.{name}"
+        if load.kind == "distributed-force":
+            raise InputError(f"{where}: MJCF has no distributed-force")
+        if isinstance(load, TorsionSpring) and (load.first_to or load.second_to):
+            raise InputError(f"{where}: MJCF has no springs between directions from place to place")
+        for key in ("cubic", "elastic"):
+            if getattr(load, key, None):
+                raise InputError(f"{where}.{key}: MJCF has linear springs only")
+        for key in ("scale", "torque"):
+            if (f := getattr(load, key, None)) is not None and f.number is None:
+                raise InputError(f"{where}.{key}: MJCF has no functions of time")
