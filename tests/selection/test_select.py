@@ -90,10 +90,21 @@ def test_chaos_is_owned_up_to() -> None:
 
 
 def test_what_would_take_too_long_is_not_tried_and_not_met() -> None:
-    selection = select(_with_modulus(1e19), 1e-9)
+    selection = select(_with_modulus(1e19), 1e-9, patience=5.0)
     assert not selection.met
     assert all(level == RIGID for rung in selection.rungs for level in rung.levels.values())
-    assert "element steps, more than" in selection.trajectory.message
+    assert "element steps, about" in selection.trajectory.message
+
+
+def test_patience_is_stated_with_a_tolerance() -> None:
+    with pytest.raises(InputError, match="patience: needs a time above 0 s"):
+        select(HEADLINE, 1e-3, patience=0.0)
+    run = CliRunner().invoke(main, ["simulate", "flexible-double-pendulum", "--patience", "5"])
+    assert isinstance(run.exception, SystemExit | InputError)
+    assert run.exit_code != 0
+    hasty = select(HEADLINE, 1e-6, [0.1], patience=1e-3)
+    assert not hasty.met
+    assert "more than 0.001 s" in hasty.reason
 
 
 def test_rods_that_cannot_bend_say_why() -> None:
@@ -156,7 +167,7 @@ def test_what_is_left_is_told_by_how_fast_the_distances_fell(places: list[float]
 class Meshes:
     """Runs whose distance from the truth is a function of the levels."""
 
-    forecast = SimpleNamespace(work=lambda _: 0.0)
+    forecast, patience = SimpleNamespace(work=lambda _: 0.0), 1.0
 
     def __init__(self, error: Any) -> None:
         self.error = error

@@ -15,8 +15,12 @@ from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
 
-WORK_LIMIT = 1.5e8
-"""Work of one run beyond which the climb gives up, in steps of one cable element: about ten seconds."""
+PATIENCE = 60.0
+"""Seconds that one run may take before the climb gives up, unless others are stated."""
+PACE = 3e7
+"""Steps of one cable element in a second, about: the answer must not depend on how busy the computer is."""
+TELL = 5.0
+"""A run of so many seconds is announced before it begins."""
 REJECTED = 3
 """So many refinements in a row whose run is rejected end the climb where another theory is left."""
 AGREE = 0.5
@@ -55,12 +59,21 @@ class Yardstick:
 class Runs:
     """Runs of one scene on different levels, each made once.
 
-    limits: the open rods with the element whose limit is their truth; rungs: all runs, in the order they were made
+    limits: the open rods with the element whose limit is their truth; rungs: all runs, in the order they were made;
+    patience: how long a refinement may take [s]
     """
 
-    def __init__(self, scene: Scene, times: Array, limits: Mapping[str, str], progress: Progress) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        times: Array,
+        limits: Mapping[str, str],
+        progress: Progress,
+        patience: float = PATIENCE,
+    ) -> None:
         scene = scene.with_values({"solver.inertia_cap": False})
         self.scene, self.times, self.limits, self.progress = scene, times, limits, progress
+        self.patience = patience
         self.forecast = Forecast(scene, tuple(limits))
         self.rungs: list[Rung] = []
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
@@ -70,7 +83,10 @@ class Runs:
         key = tuple(levels.items()), fraction
         if key not in self._done:
             scene = flexible_scene(self.scene, levels, fraction)
-            work = self.forecast.work(levels) * min(1.0, STEP_MARGIN / fraction)
+            foreseen = self.forecast.work(levels) * STEP_MARGIN / fraction
+            if (seconds := foreseen / PACE) > TELL:
+                self.progress(f"run {words(levels)}, about {seconds:.0f} s")
+            work = min(foreseen, self.forecast.work(levels))
             rung = Rung(dict(levels), scene, run(scene, self.times), work, role=role)
             self.add(rung)
             self._done[key] = rung
@@ -83,7 +99,7 @@ class Runs:
     def add(self, rung: Rung) -> None:
         """Note a run."""
         self.rungs.append(rung)
-        self.progress(rung.name)
+        self.progress(f"ran {rung.name}")
 
 
 def climb(
@@ -124,10 +140,14 @@ def climb(
 
 def _refinement(runs: Runs, levels: Levels) -> Rung | str:
     """The run on these levels by half the stable step, or that it would take too much work."""
-    if (work := 2 * runs.forecast.work(levels)) <= WORK_LIMIT:
+    work = runs.forecast.work(levels) * STEP_MARGIN / HALF
+    if (seconds := work / PACE) <= runs.patience:
         return runs(levels, HALF, YARDSTICK)
     flexible = words({rod: level for rod, level in levels.items() if level.element != "rigid"})
-    return f"the next refinement ({flexible}) takes {work:.1g} element steps, more than {WORK_LIMIT:.1e}"
+    return (
+        f"the next refinement ({flexible}) takes {work:.1g} element steps, "
+        f"about {seconds:.2g} s, more than {runs.patience:.3g} s"
+    )
 
 
 def _next(
