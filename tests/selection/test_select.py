@@ -14,10 +14,10 @@ from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.selection import select
-from shoal.selection.climb import settled
+from shoal.selection.climb import climb, settled
 from shoal.selection.levels import LADDERS, RIGID, below, cable, quintic
 from shoal.selection.prior import estimate
-from shoal.selection.run import distance
+from shoal.selection.run import Rung, distance
 from shoal.selection.work import INTEGRATOR, Forecast
 from shoal_validation.problems import get_problem
 from shoal_validation.selection.machines import draw
@@ -90,10 +90,21 @@ def test_chaos_is_owned_up_to() -> None:
 
 
 def test_what_would_take_too_long_is_not_tried_and_not_met() -> None:
-    selection = select(_with_modulus(1e19), 1e-9)
+    selection = select(_with_modulus(1e19), 1e-9, patience=5.0)
     assert not selection.met
     assert all(level == RIGID for rung in selection.rungs for level in rung.levels.values())
-    assert "element steps, more than" in selection.trajectory.message
+    assert "element steps, about" in selection.trajectory.message
+
+
+def test_patience_is_stated_with_a_tolerance() -> None:
+    with pytest.raises(InputError, match="patience: needs a time above 0 s"):
+        select(HEADLINE, 1e-3, patience=0.0)
+    run = CliRunner().invoke(main, ["simulate", "flexible-double-pendulum", "--patience", "5"])
+    assert isinstance(run.exception, SystemExit | InputError)
+    assert run.exit_code != 0
+    hasty = select(HEADLINE, 1e-6, [0.1], patience=1e-3)
+    assert not hasty.met
+    assert "more than 0.001 s" in hasty.reason
 
 
 def test_rods_that_cannot_bend_say_why() -> None:
@@ -126,27 +137,64 @@ def test_command_line_prints_the_ladder() -> None:
     assert data["selection"]["levels"]["AB"]["element"] != "rigid"
 
 
+class At:
+    """A motion that is told by one number."""
+
+    ok = True
+
+    def __init__(self, x: float) -> None:
+        self.x = x
+
+    def distance(self, other: Any) -> float:
+        return abs(self.x - other.x)
+
+
 @pytest.mark.parametrize(
     ("places", "left"),
     [
         ([0.0, 0.8, 1.0, 1.04], 0.04 / 3),  # falls of 4 and 5: the smaller one counts
         ([0.0, 0.4, 0.7, 0.9], 0.6),  # slow falls promise little
         ([0.0, 0.1, 0.6, 0.7], 0.4),  # gaps that grew nothing
-        ([0.0, 0.3], 1.2),
+        ([0.0, 1.0, 1.01], 0.01 / 3),  # one fall alone may be chance
+        ([0.0, 0.3], 0.3),
     ],
 )
 def test_what_is_left_is_told_by_how_fast_the_distances_fell(places: list[float], left: float) -> None:
-    class At:
-        ok = True
-
-        def __init__(self, x: float) -> None:
-            self.x = x
-
-        def distance(self, other: Any) -> float:
-            return abs(self.x - other.x)
-
-    rungs: Any = [SimpleNamespace(trajectory=At(x)) for x in places]
+    rungs: Any = [SimpleNamespace(trajectory=At(x), levels={}) for x in places]
     assert settled(rungs)[0] == pytest.approx(left)
+
+
+class Meshes:
+    """Runs whose distance from the truth is a function of the levels."""
+
+    forecast, patience = SimpleNamespace(work=lambda _: 0.0), 1.0
+
+    def __init__(self, error: Any) -> None:
+        self.error = error
+
+    def refined(self, count: Any) -> Any:
+        return {rod: quintic(n) for rod, n in count.items()}
+
+    def __call__(self, levels: Any, *_: Any) -> Any:
+        elements = {rod: level.elements for rod, level in levels.items()}
+        return Rung(levels, HEADLINE, At(self.error(**elements)), 0.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("fall", [1.4, 1.9, 3.0, 8.0])
+def test_a_climb_tells_no_less_than_the_error_that_is_left(fall: float) -> None:
+    """Errors that fall slowly with every doubling: neighbours agree long before the error is small."""
+    meshes: Any = Meshes(lambda A: fall ** -np.log2(A))
+    found: Any = climb(meshes, ("A",), {}, 0.5)
+    assert found.rung.trajectory.x <= 1.001 * found.error
+    assert found.error <= 0.25
+
+
+def test_rods_that_are_left_behind_are_part_of_the_error() -> None:
+    """Rod B is refined no more after the second mesh, which is still 0.01 m off."""
+    meshes: Any = Meshes(lambda A, B: 0.9 * A**-2.0 + 0.02 / B)
+    found: Any = climb(meshes, ("A", "B"), {}, 0.2)
+    assert found.rung.levels["B"].elements == 2
+    assert found.rung.trajectory.x <= 1.001 * found.error
 
 
 @pytest.mark.slow

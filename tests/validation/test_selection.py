@@ -13,6 +13,7 @@ from shoal_validation.selection.chart import draw_chart
 from shoal_validation.selection.machines import draw
 from shoal_validation.selection.report import section
 from shoal_validation.selection.study import Case, study
+from shoal_validation.selection.told import told
 
 FEW, LONG = (1, 11, 14, 24), (9, 21)
 """Machines of one and two rods, stiff and soft."""
@@ -97,3 +98,16 @@ def test_two_hundred_machines() -> None:
     assert all(case.error <= 3 * case.tolerance for case in met)
     ratios = [case.work / case.least for case in met if np.isfinite(case.least) and case.least > 0]
     assert np.mean(np.array(ratios) <= 2) >= 0.9
+
+
+@pytest.mark.parametrize("seed", [9, 45])
+def test_told_errors_cover_the_true_ones(seed: int) -> None:
+    found = told(seed)
+    assert found is not None
+    assert found.met
+    for said, true in (found.answer, found.yardstick):
+        assert 0 < true <= said
+
+
+def test_machines_whose_truth_takes_too_much_are_passed_over() -> None:
+    assert told(9, most=1.0) is None

@@ -20,6 +20,12 @@ from shoal.errors import InputError, check_trusted
     metavar="METRES",
     help="Find the cheapest model whose error at the markers stays below; overrides elements, integrator and step.",
 )
+@click.option(
+    "--patience",
+    type=float,
+    metavar="SECONDS",
+    help="With --tolerance: longest run before the answer is that it is not met (default: 60).",
+)
 @options.verify
 @options.as_json
 @options.out(".html", ".gif", ".png", ".csv", ".parquet", ".nc", ".json")
@@ -29,6 +35,7 @@ def simulate(
     values: Values,
     times: Times,
     tolerance: float | None,
+    patience: float | None,
     verify: bool,
     as_json: bool,
     out: Out,
@@ -43,13 +50,22 @@ def simulate(
 
     wanted = load_scene(scene).with_values(values)
     stated, selection = wanted.name, None
+    if patience is not None and tolerance is None:
+        raise InputError("--patience: is that of a search; state --tolerance as well")
     if tolerance is not None:
         from shoal.selection import select
+        from shoal.selection.climb import PATIENCE
 
         if engine != "gauss":
             raise InputError(f"--tolerance: models are chosen for engine gauss only, found --engine {engine}")
         with screen.working(f"{stated}: looking for the cheapest model") as tell:
-            selection = select(wanted, tolerance, times, lambda model: tell(f"{stated}: ran {model}"))
+            selection = select(
+                wanted,
+                tolerance,
+                times,
+                lambda said: tell(f"{stated}: {said}"),
+                PATIENCE if patience is None else patience,
+            )
         trajectory, wanted = selection.trajectory, selection.chosen.scene
     else:
         chosen = get_engine(engine)

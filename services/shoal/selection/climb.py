@@ -15,8 +15,12 @@ from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
 
-WORK_LIMIT = 1.5e8
-"""Work of one run beyond which the climb gives up, in steps of one cable element: about ten seconds."""
+PATIENCE = 60.0
+"""Seconds that one run may take before the climb gives up, unless others are stated."""
+PACE = 3e7
+"""Steps of one cable element in a second, about: the answer must not depend on how busy the computer is."""
+TELL = 5.0
+"""A run of so many seconds is announced before it begins."""
 REJECTED = 3
 """So many refinements in a row whose run is rejected end the climb where another theory is left."""
 AGREE = 0.5
@@ -25,10 +29,14 @@ FINE, GAIN = 16, 3.0
 """From so many elements on a doubling that gains less than this factor is little."""
 HALF = 0.5 * STEP_MARGIN
 """A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
-SLOW, FAST = 1.25, 16.0
-"""No error of a climb that ended unsettled is taken to fall slower, or faster, from one refinement to the next."""
-UNKNOWN_FALL = 4.0
-"""By which factor an error is taken to fall from one refinement to the next before two falls were seen."""
+SLOW = 1.25
+"""No error is taken to fall slower from one refinement to the next."""
+BELIEVED = (2.0, 4.0, 16.0)
+"""Nor faster, after none, one and two falls were seen: one may be chance, and elements are of fourth order."""
+TWISTS = 4.0
+"""Nor errors of director rods, whose twist is of second order."""
+SET_BACK = 0.02
+"""A rod whose doubling moves the markers by less than this fraction of the tolerance is set back."""
 
 YARDSTICK = "yardstick"
 """Role of the refinements in the list of rungs."""
@@ -51,12 +59,21 @@ class Yardstick:
 class Runs:
     """Runs of one scene on different levels, each made once.
 
-    limits: the open rods with the element whose limit is their truth; rungs: all runs, in the order they were made
+    limits: the open rods with the element whose limit is their truth; rungs: all runs, in the order they were made;
+    patience: how long a refinement may take [s]
     """
 
-    def __init__(self, scene: Scene, times: Array, limits: Mapping[str, str], progress: Progress) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        times: Array,
+        limits: Mapping[str, str],
+        progress: Progress,
+        patience: float = PATIENCE,
+    ) -> None:
         scene = scene.with_values({"solver.inertia_cap": False})
         self.scene, self.times, self.limits, self.progress = scene, times, limits, progress
+        self.patience = patience
         self.forecast = Forecast(scene, tuple(limits))
         self.rungs: list[Rung] = []
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
@@ -66,7 +83,10 @@ class Runs:
         key = tuple(levels.items()), fraction
         if key not in self._done:
             scene = flexible_scene(self.scene, levels, fraction)
-            work = self.forecast.work(levels) * min(1.0, STEP_MARGIN / fraction)
+            foreseen = self.forecast.work(levels) * STEP_MARGIN / fraction
+            if (seconds := foreseen / PACE) > TELL:
+                self.progress(f"run {words(levels)}, about {seconds:.0f} s")
+            work = min(foreseen, self.forecast.work(levels))
             rung = Rung(dict(levels), scene, run(scene, self.times), work, role=role)
             self.add(rung)
             self._done[key] = rung
@@ -79,7 +99,7 @@ class Runs:
     def add(self, rung: Rung) -> None:
         """Note a run."""
         self.rungs.append(rung)
-        self.progress(rung.name)
+        self.progress(f"ran {rung.name}")
 
 
 def climb(
@@ -90,62 +110,87 @@ def climb(
     impatient: another theory is left; so also where runs are rejected, or a doubling of the elements gains little, as
     where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one.
     """
-    count = dict.fromkeys(rods, REFINEMENTS[0])
-    growing, gap, last_gap, rejected = rods, np.inf, np.nan, 0
-    levels = {**fixed, **runs.refined(count)}
-    if (work := 2 * runs.forecast.work(levels)) > WORK_LIMIT:
-        return _too_much(levels, work)
-    fine = runs(levels, HALF, YARDSTICK)
-    while True:
+    count, growing, rejected = dict.fromkeys(rods, REFINEMENTS[0]), rods, 0
+    gaps: list[float] = []
+    behind: dict[str, float] = {}
+    fine = _refinement(runs, {**fixed, **runs.refined(count)})
+    while isinstance(fine, Rung):
         coarse, base = fine, dict(count)
         if any(count[rod] == REFINEMENTS[-1] for rod in growing):
             return f"{REFINEMENTS[-1]} elements for {', '.join(growing)} do not settle it"
         count |= {rod: REFINEMENTS[REFINEMENTS.index(count[rod]) + 1] for rod in growing}
-        levels = {**fixed, **runs.refined(count)}
-        if (work := 2 * runs.forecast.work(levels)) > WORK_LIMIT:
-            return _too_much(levels, work)
-        fine = runs(levels, HALF, YARDSTICK)
+        fine = _refinement(runs, {**fixed, **runs.refined(count)})
+        if isinstance(fine, str):
+            break
         rejected = 0 if fine.ok else rejected + 1
         if impatient and rejected == REJECTED:
             return f"the runs are rejected: {fine.trajectory.message}"
-        last_gap, gap = gap, distance(coarse.trajectory, fine.trajectory)
-        coarse.error = gap
-        if gap <= AGREE * tolerance:
-            fall = np.clip(last_gap / gap, 2.0, FAST) if np.isfinite(last_gap) and gap > 0 else UNKNOWN_FALL
-            fine.error = gap / (fall - 1.0)
-            return Yardstick(fine, float(fine.error), {**fixed, **runs.refined(base)})
-        if impatient and max(count.values()) >= FINE and last_gap < GAIN * gap < np.inf:
-            return f"twice as many elements gain a factor of {last_gap / gap:.2g} only"
-        count, growing = _next(runs, fine, count, base, growing, tolerance)
+        gaps.append(distance(coarse.trajectory, fine.trajectory))
+        coarse.error = gaps[-1]
+        error = left(gaps, fine.levels)[0] + sum(behind.values())
+        if max(error, gaps[-1]) <= AGREE * tolerance:
+            fine.error = error
+            return Yardstick(fine, error, {**fixed, **runs.refined(base)})
+        if impatient and max(count.values()) >= FINE and len(gaps) > 1 and gaps[-2] < GAIN * gaps[-1] < np.inf:
+            return f"twice as many elements gain a factor of {gaps[-2] / gaps[-1]:.2g} only"
+        if len(growing) > 1 and fine.ok:
+            growing = _next(runs, fine, count, base, growing, behind, tolerance)
+    return fine
+
+
+def _refinement(runs: Runs, levels: Levels) -> Rung | str:
+    """The run on these levels by half the stable step, or that it would take too much work."""
+    work = runs.forecast.work(levels) * STEP_MARGIN / HALF
+    if (seconds := work / PACE) <= runs.patience:
+        return runs(levels, HALF, YARDSTICK)
+    flexible = words({rod: level for rod, level in levels.items() if level.element != "rigid"})
+    return (
+        f"the next refinement ({flexible}) takes {work:.1g} element steps, "
+        f"about {seconds:.2g} s, more than {runs.patience:.3g} s"
+    )
 
 
 def _next(
-    runs: Runs, fine: Rung, count: dict[str, int], base: dict[str, int], growing: tuple[str, ...], tolerance: float
-) -> tuple[dict[str, int], tuple[str, ...]]:
-    """Element counts to go on with, and the rods that the gap comes from: each set back alone shows its part."""
-    if len(growing) == 1 or not fine.ok:
-        return count, growing
+    runs: Runs,
+    fine: Rung,
+    count: dict[str, int],
+    base: dict[str, int],
+    growing: tuple[str, ...],
+    behind: dict[str, float],
+    tolerance: float,
+) -> tuple[str, ...]:
+    """The rods that the gap comes from: each set back alone shows its part.
+
+    The others stay behind, with what their finer elements would move the markers by [m]; those of the least parts are
+    set back in `count`.
+    """
     parts = {}
     for rod in growing:
         levels = fine.levels | runs.refined({rod: base[rod]})
         parts[rod] = distance(runs(levels, STEP_MARGIN, f"part of {rod}").trajectory, fine.trajectory)
-    guilty = tuple(rod for rod, part in parts.items() if part > AGREE * tolerance / (4 * len(growing)))
-    settled = {rod: base[rod] for rod, part in parts.items() if part < tolerance / 50}
-    return count | settled, guilty or growing
+    guilty = [rod for rod, part in parts.items() if part > AGREE * tolerance / (4 * len(growing))] or growing
+    for rod in set(growing) - set(guilty):
+        behind[rod] = parts[rod] / (BELIEVED[0] - 1.0)
+        if parts[rod] < SET_BACK * tolerance:
+            behind[rod] += parts[rod]
+            count[rod] = base[rod]
+    return tuple(guilty)
 
 
-def _too_much(levels: Levels, work: float) -> str:
-    flexible = words({rod: level for rod, level in levels.items() if level.element != "rigid"})
-    return f"the next refinement ({flexible}) takes {work:.1g} element steps, more than {WORK_LIMIT:.1e}"
+def left(gaps: Sequence[float], levels: Levels) -> tuple[float, float]:
+    """Estimated error of the last of some refinements [m], and the factor by which it falls from one to the next.
+
+    gaps: distances of neighbours, the finest last [m]; of the last two factors by which they fell the smaller one
+    counts. levels: of the last refinement
+    """
+    falls = [a / b if b > 0 else np.inf for a, b in pairwise(gaps[-3:]) if a < np.inf]
+    order = TWISTS if any(level.element == "director-rod" for level in levels.values()) else BELIEVED[-1]
+    fall = max(SLOW, min([*falls, BELIEVED[len(falls)], order]))
+    return float(gaps[-1] / (fall - 1.0)), float(fall)
 
 
 def settled(refined: Sequence[Rung]) -> tuple[float, str]:
-    """The estimated error of the last of some refinements [m], and why: what the last doublings moved the markers by.
-
-    Of two factors by which the distances fell the smaller one tells what is left; without them it is taken to be SLOW.
-    """
-    gaps = [distance(a.trajectory, b.trajectory) for a, b in pairwise(refined)][-3:]
-    falls = [a / b for a, b in pairwise(gaps) if 0 < b < np.inf and a < np.inf]
-    fall = min(falls) if len(falls) > 1 else SLOW
-    said = f"twice as many elements moved the markers by {gaps[-1]:.1g} m, each time {fall:.2g} times less at least"
-    return gaps[-1] / float(np.clip(fall, SLOW, FAST) - 1.0), said
+    """The estimated error of the last of some refinements [m], and what it follows from."""
+    gaps = [distance(a.trajectory, b.trajectory) for a, b in pairwise(refined)]
+    error, fall = left(gaps, refined[-1].levels)
+    return error, f"twice as many elements moved the markers by {gaps[-1]:.1g} m, each time {fall:.2g} times less"

@@ -14,7 +14,7 @@ from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import left_out
 from shoal.errors import InputError
 from shoal.scene import Rod, Scene
-from shoal.selection.climb import YARDSTICK, Progress, Runs, climb, settled
+from shoal.selection.climb import PATIENCE, YARDSTICK, Progress, Runs, climb, settled
 from shoal.selection.levels import SHEARS, SLENDER, Levels, open_rods, rigid
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
@@ -87,7 +87,11 @@ def _rung_json(rung: Rung, chosen: bool) -> dict[str, Any]:
 
 
 def select(
-    scene: Scene, tolerance: float, times: Sequence[float] | Array | None = None, progress: Progress = lambda _: None
+    scene: Scene,
+    tolerance: float,
+    times: Sequence[float] | Array | None = None,
+    progress: Progress = lambda _: None,
+    patience: float = PATIENCE,
 ) -> Selection:
     """The cheapest model of a scene whose estimated error at the markers is within `tolerance` [m].
 
@@ -95,16 +99,18 @@ def select(
     or in the plane Simo and Reissner's rod where what the former leaves out is worth more than half of the tolerance,
     or where the former does not settle. The elements ancf-full, simo-reissner and director-rod are theories of their
     own; a rigid rod in space is taken to twist as well as to bend; `solver.theory: slender` keeps the former.
-    Integrator, step, element and number of elements are chosen; progress is told every model that is run. Raises
-    InputError.
+    Integrator, step, element and number of elements are chosen; progress is told every model that is run.
+    patience: the answer is "not met" where a refinement would take longer [s]. Raises InputError.
     """
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
+    if not patience > 0:
+        raise InputError(f"patience: needs a time above 0 s, found {patience:g}")
     begin = time.perf_counter()
     asked = sampling_times(scene, times)
     scene = scene.with_values({"solver.duration": float(asked[-1])}) if asked[-1] > 0 else scene
     limits, closed = _open(scene)
-    task = _Task(scene, tolerance, asked, estimate(scene, tuple(limits)) if limits else {}, closed, progress)
+    task = _Task(scene, tolerance, asked, estimate(scene, tuple(limits)) if limits else {}, closed, progress, patience)
     may_shear = scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
     found = _of_theory(task, limits, impatient=may_shear)
     if may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
@@ -122,6 +128,7 @@ class _Task(NamedTuple):
     priors: dict[str, Prior]
     closed: dict[str, str]
     progress: Progress
+    patience: float
 
 
 def _of_both(slender: Selection, stout: Selection) -> Selection:
@@ -144,7 +151,7 @@ def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) 
     surely = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
     closed = task.closed | {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
     fixed = rigid(limits)
-    runs = Runs(task.scene, grid, limits, task.progress)
+    runs = Runs(task.scene, grid, limits, task.progress, task.patience)
     flexible = tuple(rod for rod in limits if rod not in surely)
     known = sum(priors[rod].error for rod in surely)
     if flexible:

@@ -18,9 +18,9 @@ INTEGRATOR = "leapfrog"
 WEIGHT = {
     "rigid": 0.0,
     "ancf-cable": 1.0,
-    "ancf-quintic": 2.5,
+    "ancf-quintic": 1.5,
     "ancf-full": 5.0,
-    "simo-reissner": 1.1,
+    "simo-reissner": 2.3,
     "director-rod": 30.0,
 }
 """Work of one element in one step, in terms of a cable's; measured on meshes of 16 elements. Directors are held by
