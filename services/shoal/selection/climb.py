@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.scene import Scene
-from shoal.selection.levels import REFINEMENTS, Level, Levels, words
+from shoal.selection.levels import REFINEMENTS, Level, Levels, coarsest, words
 from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
@@ -51,13 +51,15 @@ class Yardstick:
 class Runs:
     """Runs of one scene on different levels, each made once.
 
-    limits: the open rods with the element whose limit is their truth; rungs: all runs, in the order they were made
+    limits: the open rods with the element whose limit is their truth; coarsest: where their ladders begin; rungs: all
+    runs, in the order they were made
     """
 
     def __init__(self, scene: Scene, times: Array, limits: Mapping[str, str], progress: Progress) -> None:
         scene = scene.with_values({"solver.inertia_cap": False})
         self.scene, self.times, self.limits, self.progress = scene, times, limits, progress
-        self.forecast = Forecast(scene, tuple(limits))
+        self.coarsest = coarsest(scene, limits)
+        self.forecast = Forecast(scene, self.coarsest)
         self.rungs: list[Rung] = []
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
 
@@ -90,7 +92,7 @@ def climb(
     impatient: another theory is left; so also where runs are rejected, or a doubling of the elements gains little, as
     where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one.
     """
-    count = dict.fromkeys(rods, REFINEMENTS[0])
+    count = {rod: runs.coarsest[rod].elements for rod in rods}
     growing, gap, last_gap, rejected = rods, np.inf, np.nan, 0
     levels = {**fixed, **runs.refined(count)}
     if (work := 2 * runs.forecast.work(levels)) > WORK_LIMIT:
