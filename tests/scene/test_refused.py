@@ -220,3 +220,16 @@ def test_a_twist_that_elements_cannot_tell_is_refused() -> None:
     with pytest.raises(InputError, match=r"bodies.strip.*24 rad within an element.* use at least 8 elements"):
         strip.with_values({"bodies.strip.elements": 1})
     assert strip.with_values({"bodies.strip.elements": 8}).value("bodies.strip.elements") == 8
+
+
+@pytest.mark.parametrize("letter", ["x", "y", "z"])
+def test_a_letter_is_a_unit_axis(letter: str) -> None:
+    machine = load_scene("heavy-top").model_dump(mode="json", exclude_unset=True)
+    ends = {"first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": next(iter(machine["bodies"]))}}
+
+    def parsed(axis: object) -> Scene:
+        return Scene.parse(machine | {"joints": {"J": {"kind": "revolute", "axis": axis} | ends}})
+
+    assert parsed(letter).joints == parsed([float(letter == one) for one in "xyz"]).joints
+    with pytest.raises(InputError, match=r"joints.J.axis: an axis has three components, such as \[1, 0, 0\].* 'w'"):
+        parsed("w")

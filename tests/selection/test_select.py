@@ -219,7 +219,7 @@ def test_a_soft_rod_that_kinks_is_met_by_a_mesh_that_follows_it() -> None:
 def test_levels_below_are_coarser(limit: str) -> None:
     ladder = LADDERS[limit]
     for level in ladder:
-        assert all(ladder.index(coarser) < ladder.index(level) for coarser in below(level, limit))
+        assert all(ladder.index(coarser) < ladder.index(level) for coarser in below(level, limit, ladder[0]))
 
 
 THICK = HEADLINE.with_values(
@@ -276,7 +276,7 @@ def test_forecast_of_the_stable_step(levels: tuple[Any, Any]) -> None:
 
     chosen = dict(zip(("OA", "AB"), levels, strict=True))
     true = stable_step(apply(HEADLINE, chosen), INTEGRATOR)
-    assert 0.6 < Forecast(HEADLINE, ("OA", "AB")).step(chosen) / true < 1.6
+    assert 0.6 < Forecast(HEADLINE, {"OA": RIGID, "AB": RIGID}).step(chosen) / true < 1.6
 
 
 @pytest.mark.parametrize("modulus", [2e9, 2e10, 2e11, 2e12])

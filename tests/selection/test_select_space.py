@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shoal.errors import InputError
+from shoal.engines import get_engine
+from shoal.errors import ComputationError, InputError
 from shoal.scene import Scene, load_scene
 from shoal.selection import select
 from shoal.selection.levels import RIGID
+from shoal_validation.problems import get_problem
 
 PENDULUM = load_scene("flexible-spherical-double-pendulum")
 EXUDYN = {"A": [0.677293, -0.321390, -0.661664], "B": [1.920270, 0.149686, -2.134790]}
@@ -74,10 +76,45 @@ def test_a_rod_whose_bending_is_within_the_tolerance_comes_out_rigid() -> None:
     assert set(found.chosen.levels.values()) == {RIGID}
 
 
-@pytest.mark.parametrize("bent", [{"curvature": [0.5]}, {"twist": [0.5]}])
-def test_models_are_not_chosen_of_curved_rods_in_space(bent: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match=r"bodies.B.element: models are chosen of straight rods in space"):
-        select(clamped(**bent), 1e-3)
+HELIX = {"side_curvature": [12.0], "twist": [4.0], "youngs_modulus": 2e8, "elements": 2}
+BENT = {"curvature": [1.0], "side_curvature": [0.5], "twist": [1.0], "youngs_modulus": 2e8}
+
+
+@pytest.mark.parametrize(
+    ("shape", "tolerance", "mesh"),
+    [(BENT, 2e-4, 16), pytest.param(HELIX, 2e-4, 64, marks=pytest.mark.slow)],
+    ids=["bent", "helix"],
+)
+def test_a_curved_and_twisted_rod_keeps_its_word_against_exudyns_beams(
+    shape: dict[str, Any], tolerance: float, mesh: int
+) -> None:
+    pytest.importorskip("exudyn")
+    scene, times = clamped(**shape), np.linspace(0.02, 0.2, 10)
+    found = select(scene, tolerance, times)
+    assert found.met
+    assert 0 < found.shear < tolerance
+    settings = {"bodies.B.elements": mesh, "solver.step": 5e-4, "solver.newton_tolerance": 1e-6}
+    exudyn = get_engine("exudyn-ge").simulate(scene.with_values(settings), times).marker("e")
+    assert np.max(np.linalg.norm(exudyn - exudyn[0], axis=1)) > 9 * tolerance
+    assert np.max(np.linalg.norm(found.trajectory.marker("e") - exudyn, axis=1)) < tolerance
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_the_swinging_strip_comes_within_the_tolerance_of_exudyns_limit(tolerance: float) -> None:
+    problem = get_problem("swinging-strip")
+    assert problem.reference is not None
+    found = select(load_scene("swinging-strip"), tolerance, problem.times)
+    exudyn = np.array(problem.reference.points)
+    assert found.met
+    assert np.max(np.linalg.norm(found.trajectory.marker("E") - exudyn, axis=1)) < tolerance
+
+
+def test_a_curved_rod_that_is_too_stiff_or_too_wound_is_told_in_one_line() -> None:
+    with pytest.raises(ComputationError, match=r"takes .* element steps.*; state numbers of elements instead"):
+        select(clamped(curvature=[100.0], youngs_modulus=2e11), 1e-6)
+    with pytest.raises(InputError, match=r"B does by 1e\+03; state its number of elements"):
+        select(clamped(curvature=[1000.0]), 1e-3)
 
 
 def test_a_flat_rod_with_a_head_is_not_called_rigid() -> None:

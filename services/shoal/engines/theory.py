@@ -39,7 +39,7 @@ def rigid_runs(scene: Scene, engine: str = "gauss") -> list[Scene]:
     """The scene with rigid rods, without and with the rotary inertia of their section; none if it cannot be told."""
     rods, slender = _rods(scene, engine in WITH_SHEAR)
     # A place on a curved rod is told by its arc length where it is flexible, by its coordinates where it is rigid.
-    if not slender or any(rod.curvature for rod in rods.values() if rod.element != "rigid"):
+    if not slender or any(rod.curvature or rod.side_curvature for rod in rods.values() if rod.element != "rigid"):
         return []
     values: dict[str, object] = {f"bodies.{name}.element": "rigid" for name in rods}
     for name in rods:
@@ -60,6 +60,22 @@ def _rods(scene: Scene, shearing: bool) -> tuple[dict[str, Rod], dict[str, Rod]]
     full = [name for name, rod in rods.items() if rod.shears or (shearing and rod.element != "rigid")]
     slender = {name: rod for name, rod in rods.items() if name not in full and not rod.rotary_inertia}
     return rods, slender
+
+
+def softer(trajectory: Trajectory, scene: Scene, native: Engine) -> float | None:
+    """What shear and rotary inertia would move the markers by [m], where no rigid rod has the shape of a flexible one.
+
+    By order of magnitude it is the distance from the run of a scene whose rods are softer by that share; None if it
+    cannot be told.
+    """
+    _, slender = _rods(scene, trajectory.engine in WITH_SHEAR)
+    values = {
+        f"bodies.{name}.youngs_modulus": rod.youngs_modulus / (1.0 + slender_share(rod))
+        for name, rod in slender.items()
+        if rod.element != "rigid" and rod.youngs_modulus is not None
+    }
+    run = native.simulate(scene.with_values(values), trajectory.times)
+    return run.distance(trajectory) if run.ok else None
 
 
 def slender_share(rod: Rod) -> float:

@@ -198,6 +198,16 @@ class Rod(Record):
         return max(abs(after - before) for before, after in pairwise(turns))
 
     @property
+    def winding(self) -> float:
+        """Angle [rad] by which the unstrained section would turn along the rod, were it as fast as at the fastest."""
+        shapes = self.curvature, self.side_curvature, self.twist
+        rates = [
+            [sum(k * (x * self.length) ** power for power, k in enumerate(shape)) for shape in shapes]
+            for x, _ in (*_gauss(_POINTS), (0.0, 0), (1.0, 0))
+        ]
+        return self.length * max(math.hypot(*rate) for rate in rates)
+
+    @property
     def shears(self) -> bool:
         """Whether its element has shear and the rotary inertia of its sections."""
         return _SHEARS[self.element]

@@ -59,8 +59,9 @@ def check_dimensions(scene: Any) -> None:
                 f"bodies.{name}.width: {body.element} bends alike about both axes of its section; beyond the plane "
                 "z = 0 its width must be its height, or its element a director-rod"
             )
-        if body.kind == "rod" and body.curvature:
-            raise ValueError(f"bodies.{name}.curvature: in space a curved rod is a director-rod, not {body.element}")
+        for field in ("curvature", "side_curvature"):
+            if body.kind == "rod" and getattr(body, field):
+                raise ValueError(f"bodies.{name}.{field}: in space a curved rod is a director-rod, not {body.element}")
 
 
 def _check_plane(part: Any, path: str) -> None:

@@ -6,7 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from shoal.errors import InputError
 
@@ -34,14 +34,21 @@ else:
 Vector3 = tuple[float, float, float]
 
 
+def _letter(given: Any) -> Any:
+    units = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    if isinstance(given, str) and given not in units:
+        raise ValueError(f"an axis has three components, such as [1, 0, 0], or is x, y or z; found {given!r}")
+    return units[given] if isinstance(given, str) else given
+
+
 def _pointing(value: Vector3) -> Vector3:
     if not any(value):
         raise ValueError("an axis needs a direction, found [0, 0, 0]")
     return value
 
 
-Axis = Annotated[Vector3, AfterValidator(_pointing)]
-"""A direction in space, of any length."""
+Axis = Annotated[Vector3, BeforeValidator(_letter), AfterValidator(_pointing)]
+"""A direction in space, of any length; x, y and z stand for the unit vectors of the ground."""
 
 
 def kinds(annotation: Any) -> tuple[str, ...]:

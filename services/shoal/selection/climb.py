@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.scene import Scene
-from shoal.selection.levels import REFINEMENTS, Level, Levels, words
+from shoal.selection.levels import REFINEMENTS, Level, Levels, coarsest, words
 from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
@@ -59,8 +59,8 @@ class Yardstick:
 class Runs:
     """Runs of one scene on different levels, each made once.
 
-    limits: the open rods with the element whose limit is their truth; rungs: all runs, in the order they were made;
-    patience: how long a refinement may take [s]
+    limits: the open rods with the element whose limit is their truth; coarsest: where their ladders begin; rungs: all
+    runs, in the order they were made; patience: how long a refinement may take [s]
     """
 
     def __init__(
@@ -74,7 +74,8 @@ class Runs:
         scene = scene.with_values({"solver.inertia_cap": False})
         self.scene, self.times, self.limits, self.progress = scene, times, limits, progress
         self.patience = patience
-        self.forecast = Forecast(scene, tuple(limits))
+        self.coarsest = coarsest(scene, limits)
+        self.forecast = Forecast(scene, self.coarsest)
         self.rungs: list[Rung] = []
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
 
@@ -110,7 +111,7 @@ def climb(
     impatient: another theory is left; so also where runs are rejected, or a doubling of the elements gains little, as
     where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one.
     """
-    count, growing, rejected = dict.fromkeys(rods, REFINEMENTS[0]), rods, 0
+    count, growing, rejected = {rod: runs.coarsest[rod].elements for rod in rods}, rods, 0
     gaps: list[float] = []
     behind: dict[str, float] = {}
     fine = _refinement(runs, {**fixed, **runs.refined(count)})

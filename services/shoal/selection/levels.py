@@ -10,6 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from shoal.errors import InputError
 from shoal.scene import Rod, Scene
 from shoal.scene.dimensions import is_flat
 
@@ -80,10 +83,10 @@ REFINEMENTS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 """Numbers of these elements in the models by which errors are estimated."""
 
 
-def below(level: Level, limit: str) -> tuple[Level, ...]:
-    """Coarser levels, the finest first, of a rod whose truth is the limit of that element."""
+def below(level: Level, limit: str, coarsest: Level) -> tuple[Level, ...]:
+    """Coarser levels down to the coarsest, the finest first, of a rod whose truth is the limit of that element."""
     ladder = LADDERS[limit]
-    return tuple(reversed(ladder[: ladder.index(level)]))
+    return tuple(reversed(ladder[ladder.index(coarsest) : ladder.index(level)]))
 
 
 def open_rods(scene: Scene) -> dict[str, str]:
@@ -101,9 +104,25 @@ def open_rods(scene: Scene) -> dict[str, str]:
     }
 
 
-def rigid(limits: Mapping[str, str]) -> dict[str, Level]:
-    """All rods rigid, the coarsest of their ladders. limits: the element whose limit is the truth of each."""
-    return {rod: LADDERS[limit][0] for rod, limit in limits.items()}
+def coarsest(scene: Scene, limits: Mapping[str, str]) -> dict[str, Level]:
+    """Where the ladders of rods begin. limits: the element whose limit is the truth of each.
+
+    All are rigid, but for director rods that are curved or twisted: of those no element turns by more than a right
+    angle or so. Raises InputError where that takes too many of them.
+    """
+    return {rod: _coarsest(rod, scene.bodies[rod], limit) for rod, limit in limits.items()}
+
+
+def _coarsest(name: str, rod: Any, limit: str) -> Level:
+    if limit != "director-rod" or rod.straight:
+        return LADDERS[limit][0]
+    few = next((n for n in REFINEMENTS[:-1] if rod.winding <= n * np.pi / 2), None)
+    if few is None:
+        raise InputError(
+            f"bodies.{name}.element: models are chosen of rods that wind by {REFINEMENTS[-2] * np.pi / 2:.3g} rad at "
+            f"most, and {name} does by {rod.winding:.3g}; state its number of elements instead of a tolerance"
+        )
+    return Level(limit, few)
 
 
 def apply(scene: Scene, levels: Levels) -> Scene:

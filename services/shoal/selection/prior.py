@@ -56,11 +56,16 @@ class Prior:
 
 
 def estimate(scene: Scene, rods: tuple[str, ...]) -> dict[str, Prior]:
-    """The estimate for every rod whose model is open; nan where the rigid motion cannot be had."""
-    probed = _probed(apply(scene, dict.fromkeys(rods, RIGID)), rods)
-    times = np.linspace(0.0, scene.solver.duration, SAMPLES + 1)
-    motion = _run(probed, times)
-    growth = _growth(probed, times, motion) if motion is not None else np.nan
+    """The estimate for every rod whose model is open; nan where the rigid motion cannot be had.
+
+    So it is in space with a curved or twisted rod: no rigid one has its shape.
+    """
+    motion, growth = None, np.nan
+    if scene.dimensions == 2 or all(getattr(scene.bodies[name], "straight", True) for name in rods):
+        probed = _probed(apply(scene, dict.fromkeys(rods, RIGID)), rods)
+        times = np.linspace(0.0, scene.solver.duration, SAMPLES + 1)
+        motion = _run(probed, times)
+        growth = _growth(probed, times, motion) if motion is not None else np.nan
     found = {}
     for name in rods:
         rod = scene.bodies[name]

@@ -10,7 +10,7 @@ from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Scene
-from shoal.selection.levels import RIGID, Level, Levels, apply, open_rods, words
+from shoal.selection.levels import Level, Levels, apply, coarsest, open_rods, words
 from shoal.selection.work import INTEGRATOR
 from shoal.trajectory import Array, Trajectory
 
@@ -70,7 +70,8 @@ def distance(one: Trajectory, other: Trajectory) -> float:
 
 def can_be_flexible(scene: Scene, rod: str, limit: str) -> str | None:
     """None, or why this rod has to stay rigid. limit: the element it would be made of."""
-    levels = dict.fromkeys(open_rods(scene), RIGID) | {rod: Level(limit, 1)}
+    coarse = coarsest(scene, open_rods(scene) | {rod: limit})
+    levels = coarse | {rod: Level(limit, coarse[rod].elements)}
     try:
         stable_step(apply(scene, levels), INTEGRATOR)
     except InputError as error:

@@ -11,11 +11,11 @@ import numpy as np
 
 from shoal.engines.contract import sampling_times
 from shoal.engines.gauss import GaussEngine
-from shoal.engines.theory import left_out
-from shoal.errors import InputError
+from shoal.engines.theory import left_out, softer
+from shoal.errors import ComputationError, InputError
 from shoal.scene import Rod, Scene
 from shoal.selection.climb import PATIENCE, YARDSTICK, Progress, Runs, climb, settled
-from shoal.selection.levels import SHEARS, SLENDER, Levels, open_rods, rigid
+from shoal.selection.levels import SHEARS, SLENDER, Levels, open_rods
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
 from shoal.selection.trim import WITHIN, trim
@@ -100,7 +100,8 @@ def select(
     or where the former does not settle. The elements ancf-full, simo-reissner and director-rod are theories of their
     own; a rigid rod in space is taken to twist as well as to bend; `solver.theory: slender` keeps the former.
     Integrator, step, element and number of elements are chosen; progress is told every model that is run.
-    patience: the answer is "not met" where a refinement would take longer [s]. Raises InputError.
+    patience: the answer is "not met" where a refinement would take longer [s]. Raises InputError, and ComputationError
+    where a curved or twisted rod in space, which is never rigid, takes too long.
     """
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
@@ -150,8 +151,8 @@ def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) 
     tolerance, priors, grid = task.tolerance, task.priors, _grid(task.asked)
     surely = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
     closed = task.closed | {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
-    fixed = rigid(limits)
     runs = Runs(task.scene, grid, limits, task.progress, task.patience)
+    fixed = runs.coarsest
     flexible = tuple(rod for rod in limits if rod not in surely)
     known = sum(priors[rod].error for rod in surely)
     if flexible:
@@ -170,8 +171,15 @@ def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) 
         priors=priors,
         rigid=closed,
         limits=dict(limits),
-        shear=left_out(chosen.trajectory, chosen.scene, GaussEngine()) or 0.0,
+        shear=_shear(chosen),
     )
+
+
+def _shear(chosen: Rung) -> float:
+    """See `Selection`; 0 where it is not known."""
+    scene = chosen.scene
+    shaped = scene.dimensions == 3 and any(isinstance(rod, Rod) and not rod.straight for rod in scene.bodies.values())
+    return (softer if shaped else left_out)(chosen.trajectory, scene, GaussEngine()) or 0.0
 
 
 def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
@@ -188,11 +196,6 @@ def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
         if start.modes or start.mode_rates:
             field = "modes" if start.modes else "mode_rates"
             raise InputError(f"initial.{rod}.{field}: models are chosen of rods that start unstrained; leave it out")
-        if limit == "director-rod" and not body.straight:
-            raise InputError(
-                f"bodies.{rod}.element: models are chosen of straight rods in space, and {rod} is curved or twisted; "
-                "state its number of elements instead of a tolerance"
-            )
         if reason := can_be_flexible(scene, rod, limit):
             if body.element != "rigid":
                 raise InputError(f"bodies.{rod}.element: no other model can take the place of {body.element}: {reason}")
@@ -237,7 +240,9 @@ def _flexible(
     if isinstance(yardstick, str):
         refined = [rung for rung in runs.rungs if rung.role == YARDSTICK]
         if len(refined) < 2:
-            stiff, _ = _rigid(runs, rigid(runs.limits), tolerance, worst)
+            if any(level.element != "rigid" for level in runs.coarsest.values()):
+                raise ComputationError(f"{yardstick}; state numbers of elements instead of a tolerance")
+            stiff, _ = _rigid(runs, runs.coarsest, tolerance, worst)
             return stiff, yardstick
         left, why = settled(refined)
         refined[-1].error = left + known

@@ -88,7 +88,7 @@ def _down(runs: Runs, yardstick: Yardstick, context: Rung, rod: str, tolerance: 
     start = context.levels[rod]
     table = {start: 0.0}
     last, misses = runs.forecast.own(rod, start), 0
-    for level in below(start, runs.limits[rod]):
+    for level in below(start, runs.limits[rod], runs.coarsest[rod]):
         if (work := runs.forecast.own(rod, level)) > CHEAPER * last:
             continue
         last = work

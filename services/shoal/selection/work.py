@@ -1,8 +1,8 @@
 """What a model costs before it is run: its stable step, and its work in steps of one cable element.
 
-The highest frequency of a machine is about the highest of its rods, each taken with the others rigid. It is computed
-on two elements and carried over to n: an axial mode goes as c / l, a bending mode as c r / l^2 (c^2 = E / rho, r the
-radius of gyration of the section, l the element's length).
+The highest frequency of a machine is about the highest of its rods, each taken with the others as coarse as can be. It
+is computed on two elements and carried over to n: an axial mode goes as c / l, a bending mode as c r / l^2 (c^2 = E /
+rho, r the radius of gyration of the section, l the element's length).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Rod, Scene
-from shoal.selection.levels import RIGID, SHEARS, Level, Levels, apply
+from shoal.selection.levels import SHEARS, Level, Levels, apply
 
 INTEGRATOR = "leapfrog"
 """One force evaluation a step, and the longest stable step per evaluation of all explicit integrators."""
@@ -32,10 +32,10 @@ _BENDING = {"ancf-cable": 4.7, "ancf-quintic": 16.8, "director-rod": 4.6}
 
 
 class Forecast:
-    """Work of the models of one scene. open: its rods whose model is open."""
+    """Work of the models of one scene. coarse: of the rods whose model is open the coarsest levels."""
 
-    def __init__(self, scene: Scene, rods: tuple[str, ...]) -> None:
-        self.scene, self.rods = scene, rods
+    def __init__(self, scene: Scene, coarse: Levels) -> None:
+        self.scene, self.coarse = scene, coarse
         self._steps: dict[tuple[str, Level], float] = {}
 
     def step(self, levels: Levels) -> float:
@@ -50,11 +50,11 @@ class Forecast:
     def _rod_step(self, name: str, level: Level) -> float:
         if level.element == "rigid":
             return np.inf
-        probe = level if level.element == SHEARS else Level(level.element, 2)  # few elements shear, many stretch
+        few = max(2, self.coarse[name].elements)
+        probe = level if level.element == SHEARS else Level(level.element, few)  # few elements shear, many stretch
         key = (name, probe)
         if key not in self._steps:
-            alone = dict.fromkeys(self.rods, RIGID) | {name: probe}
-            self._steps[key] = stable_step(apply(self.scene, alone), INTEGRATOR)
+            self._steps[key] = stable_step(apply(self.scene, {**self.coarse, name: probe}), INTEGRATOR)
         rod = self.scene.bodies[name]
         assert isinstance(rod, Rod)
         if level.element not in _BENDING:  # the thickness mode does not know the length of its element
@@ -65,8 +65,8 @@ class Forecast:
         def growth(n: int) -> float:
             return float(n * max(1.0, n / turn))
 
-        return float(self._steps[key] * growth(2) / growth(level.elements))
+        return float(self._steps[key] * growth(few) / growth(level.elements))
 
     def own(self, name: str, level: Level) -> float:
-        """Work of one rod by itself, as if the others were rigid."""
+        """Work of one rod by itself, as if the others were as coarse as can be."""
         return float(WEIGHT[level.element] * level.elements / self._rod_step(name, level))

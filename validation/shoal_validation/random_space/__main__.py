@@ -10,8 +10,8 @@ bent        one or two flat director rods, curved and twisted at rest: Exudyn's 
 linkages    tops, Bennett's, Bricard's, Sarrus' and spherical linkages, RSSR, slider-cranks, platforms, generic loops:
             Newton's and Euler's equations of every body, written for this study alone
 
-With a tolerance, those with flexible rods are asked for `--tolerance METRES`, and Exudyn's cables, whose own error two
-meshes tell, judge whether it is met.
+With a tolerance, those with flexible rods are asked for `--tolerance METRES`, and Exudyn's cables, of bent rods its
+geometrically exact beams, whose own error two meshes tell, judge whether it is met.
 """
 
 from __future__ import annotations

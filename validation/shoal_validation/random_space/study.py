@@ -26,7 +26,7 @@ FINER = 4
 ATTEMPTS = (1.0, 1e-7), (1.0, 1e-6), (0.2, 1e-6)
 """Parts of these steps, and where its iterations stop: round-off of stiff cables may reach no further."""
 MESHES = 16, 32
-"""Cables of every rod of the judge of a tolerance, and of the run that says how well it knows."""
+"""Elements of every rod of the judge of a tolerance: of two runs, which say how well it knows."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def flexible(scene: Scene) -> dict[str, Rod]:
 
 
 def met(seed: int, tolerance: float, kind: str = "chains") -> Judged:
-    """Ask for the machine of a seed, which has flexible rods, within a tolerance [m], and judge by Exudyn's cables."""
+    """Ask for the machine of a seed, which has flexible rods, within a tolerance [m], and judge by Exudyn's rods."""
     _, scene = drawn(seed, kind)
     times = sampling_times(scene, None)
     try:
@@ -120,17 +120,15 @@ def met(seed: int, tolerance: float, kind: str = "chains") -> Judged:
         return Judged(seed, "not met", "", str(error))
     if not found.met:
         return Judged(seed, "refused" if not found.trajectory.ok else "not met", "", found.reason)
-    coarse, fine = (_exudyn(scene, dict.fromkeys(flexible(scene), count)) for count in MESHES)
-    for one in (coarse, fine):
-        if isinstance(one, str) or not one.ok:
-            return Judged(seed, "not judged", "exudyn", one if isinstance(one, str) else one.message)
-    assert isinstance(coarse, Trajectory)
-    assert isinstance(fine, Trajectory)
-    known, away = coarse.distance(fine), found.trajectory.distance(fine)
+    opinion = _by_beams(_divided(scene, MESHES[0])) if kind == "bent" else _by_cables(scene)
+    if opinion.silence:
+        return Judged(seed, "not judged", opinion.judge, opinion.silence)
+    known, away = opinion.known, opinion.away(found.trajectory)
     if known > tolerance / 2:
-        return Judged(seed, "not judged", "exudyn", f"its own meshes are {known:.2g} m apart")
-    verdict = "right" if away <= tolerance + known else "wrong and called right"
-    return Judged(seed, verdict, "exudyn", f"{found.chosen.name}: {away:.2g} m away, known to {known:.2g} m")
+        return Judged(seed, "not judged", opinion.judge, f"it knows the motion to {known:.2g} m only")
+    shear = found.shear if kind == "bent" else 0.0  # its beams have what ours leave out
+    verdict = "right" if away <= tolerance + known + shear else "wrong and called right"
+    return Judged(seed, verdict, opinion.judge, f"{found.chosen.name}: {away:.2g} m away, known to {known:.2g} m")
 
 
 def _by_newton_and_euler(seed: int) -> _Opinion:
@@ -150,6 +148,22 @@ def _by_engines(scene: Scene) -> _Opinion:
         return _Opinion("tree", get_engine("tree").simulate(scene))
     except InputError:
         return _Opinion("finer" if finer else "exudyn", _exudyn(scene, finer))
+
+
+def _divided(scene: Scene, count: int) -> Scene:
+    """The scene with so many elements of every flexible rod."""
+    return scene.with_values({f"bodies.{name}.elements": count for name in flexible(scene)})
+
+
+def _by_cables(scene: Scene) -> _Opinion:
+    """Exudyn's cables on the finer of two meshes."""
+    coarse, fine = (_exudyn(scene, dict.fromkeys(flexible(scene), count)) for count in MESHES)
+    for one in (coarse, fine):
+        if (opinion := _Opinion("exudyn", one)).silence:
+            return opinion
+    assert isinstance(coarse, Trajectory)
+    assert isinstance(fine, Trajectory)
+    return _Opinion("exudyn", fine, known=coarse.distance(fine))
 
 
 def _by_beams(scene: Scene) -> _Opinion:
