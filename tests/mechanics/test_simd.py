@@ -150,7 +150,7 @@ from shoal.scene import load_scene
 scene = load_scene("flexible-double-pendulum")
 one = simulate(scene, np.linspace(0, 0.3, 4))
 many = simulate(scene, np.linspace(0, 0.3, 4), {"initial.OA.angle": np.linspace(0.1, 0.2, 3)})
-assert (one.status, many.status) == ("ok", "ok")
+assert {*one.status, *many.status} == {"ok"}
 np.save("points.npy", np.concatenate([one.points.ravel(), many.points.ravel()]))
 """
 
