@@ -64,24 +64,26 @@ def test_operations_equal_those_of_numbers(lanes: tuple[int, ...]) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _roots(lanes, x, out, count):  # type: ignore[no-untyped-def]
+def _inverses(lanes, x, out, count):  # type: ignore[no-untyped-def]
     x, out = pointer(x), pointer(out)
     for at in range(0, count, len(lanes)):
         simd.store(out, at, simd.inverse_root(simd.load(lanes, x, at)))
         simd.store(out, count + at, simd.heaviside(simd.load(lanes, x, at)))
+        simd.store(out, 2 * count + at, simd.reciprocal(simd.load(lanes, x, at)))
 
 
 @LENGTHS
-def test_inverse_roots_have_all_their_digits(lanes: tuple[int, ...]) -> None:
+def test_inverses_have_all_their_digits(lanes: tuple[int, ...]) -> None:
     """Of numbers between which the processor's first guess differs most, and of all sizes but the smallest."""
     rng = np.random.default_rng(3)
     x = np.concatenate([np.linspace(1, 4, 8192), 10.0 ** rng.uniform(-300, 300, 8192)])
-    out = np.empty((2, x.size))
-    _roots(lanes, x, out, x.size)
+    out = np.empty((3, x.size))
+    _inverses(lanes, x, out, x.size)
     np.testing.assert_allclose(out[0], 1 / np.sqrt(x), rtol=5e-16, atol=0)
+    np.testing.assert_allclose(out[2], 1 / x, rtol=5e-16, atol=0)
     signs = np.resize([-1.0, 0.0, -0.0, 2.0, -np.inf, np.inf, np.nan, -5e-324], 16)
-    out = np.empty((2, signs.size))
-    _roots(lanes, signs, out, signs.size)
+    out = np.empty((3, signs.size))
+    _inverses(lanes, signs, out, signs.size)
     np.testing.assert_array_equal(out[1], signs >= 0)
 
 
@@ -148,7 +150,7 @@ from shoal.scene import load_scene
 scene = load_scene("flexible-double-pendulum")
 one = simulate(scene, np.linspace(0, 0.3, 4))
 many = simulate(scene, np.linspace(0, 0.3, 4), {"initial.OA.angle": np.linspace(0.1, 0.2, 3)})
-assert (one.status, many.status) == ("ok", "ok")
+assert {*one.status, *many.status} == {"ok"}
 np.save("points.npy", np.concatenate([one.points.ravel(), many.points.ravel()]))
 """
 

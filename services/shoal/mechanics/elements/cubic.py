@@ -26,7 +26,7 @@ from shoal.mechanics.elements.batch import VARIANT, add_rows, add_sum, coefficie
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.strain import bend, reference
 from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import EIGHT, inverse_root, spread
+from shoal.mechanics.numerics.simd import EIGHT, inverse_root, reciprocal, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section
@@ -209,11 +209,13 @@ def _force(
         at = 2 * (points + int(bending[g, 3]))
         straight = reference(tile, curved, family, number, lane, at, 1.0)
         angle = reference(tile, curved, family, number, lane, at + 1, 0.0)
-        moment, turn, more = bend(damped, 1.0 / here, k_here, rate, turning, straight, 0.25 * angle, stiff, eta)
+        moment, turn, more = bend(damped, reciprocal(here), k_here, rate, turning, straight, 0.25 * angle, stiff, eta)
         at = 2 * (points + int(bending[g, 2]))
         straight = reference(tile, curved, family, number, lane, at, 1.0)
         angle = reference(tile, curved, family, number, lane, at + 1, 0.0)
-        second, twist, most = bend(damped, 1.0 / there, k_there, other, twisting, straight, 0.25 * angle, stiff, eta)
+        second, twist, most = bend(
+            damped, reciprocal(there), k_there, other, twisting, straight, 0.25 * angle, stiff, eta
+        )
         lost = lost + (more + most)
         n = _collect(x, -2.0, moment * turn, second * twist, n)
         even, odd = moment + second, moment - second
@@ -232,30 +234,45 @@ def _force(
 
 
 @njit(error_model="numpy", forceinline=True)
-def _forces(tile, curved, damped, axial, bending, family, number, members, z, zdot, f, w, power):  # type: ignore[no-untyped-def]
-    """Of `members` elements of one variant: its constants are made ready once for all of them."""
-    count = members if len(tile) == 1 else 1
-    for first in range(number, number + members, count):
-        for lane in range(0, len(tile) - family.spare, len(EIGHT)):
-            _force(tile, curved, damped, axial, bending, family, first, count, lane, z, zdot, f, w, power)
+def _first_of(family: Family, one: int, other: int) -> int:
+    """The first element that is of one variant or another; beyond the last if there is none.
+
+    The compiler makes ready before a loop what it needs: after this search, only for variants that there are.
+    """
+    number = 0
+    while number < family.size and not _is_of(family, number, one, other):
+        number += of_one_variant(family, number)
+    return number
+
+
+@njit(error_model="numpy", forceinline=True)
+def _is_of(family: Family, number: int, one: int, other: int) -> bool:
+    """Whether an element is of one variant or another."""
+    return family.plan[PLAN * number + VARIANT] in (one, other)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _forces(tile, one, other, curved, damped, axial, bending, family, z, zdot, f, w, power):  # type: ignore[no-untyped-def]
+    """Of all elements of one variant or another."""
+    number = _first_of(family, one, other)
+    while number < family.size:
+        members = of_one_variant(family, number)
+        count = members if len(tile) == 1 else 1
+        for first in range(number, number + (members if _is_of(family, number, one, other) else 0), count):
+            for lane in range(0, len(tile) - family.spare, len(EIGHT)):
+                _force(tile, curved, damped, axial, bending, family, first, count, lane, z, zdot, f, w, power)
+        number += members
 
 
 @njit(cache=True, error_model="numpy")
 def force(tile: Tile, family: Family, z: Array, zdot: Array, f: Array, w: Array, power: Array, moving: bool) -> None:
     """See `families.add_force`."""
-    number = 0
-    while number < family.size:
-        members, variant = of_one_variant(family, number), family.plan[PLAN * number + VARIANT]
-        at = family, number, members, z, zdot, f, w, power
-        if variant == FULL:
-            _forces(tile, False, False, _FULL_AXIAL, _FULL_BENDING, *at)
-        elif variant == REDUCED:
-            _forces(tile, False, False, _REDUCED_AXIAL, _REDUCED_BENDING, *at)
-        elif variant == DAMPED and moving:
-            _forces(tile, True, True, _FULL_AXIAL, _FULL_BENDING, *at)
-        else:
-            _forces(tile, True, False, _FULL_AXIAL, _FULL_BENDING, *at)
-        number += members
+    at = family, z, zdot, f, w, power
+    _forces(tile, FULL, FULL, False, False, _FULL_AXIAL, _FULL_BENDING, *at)
+    _forces(tile, REDUCED, REDUCED, False, False, _REDUCED_AXIAL, _REDUCED_BENDING, *at)
+    _forces(tile, CURVED, CURVED if moving else DAMPED, True, False, _FULL_AXIAL, _FULL_BENDING, *at)
+    if moving:
+        _forces(tile, DAMPED, DAMPED, True, True, _FULL_AXIAL, _FULL_BENDING, *at)
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -150,7 +150,7 @@ def implement(
     viscosity: of a family that may be damped. mean: of one that is exact.
     """
     KERNELS[kind] = kernel
-    choose(add_force, kind, force)
+    choose(add_force, kind, force, forceinline=True)
     choose(add_energy, kind, potential)
     choose(tangent, kind, stiffness)
     choose(damping, kind, viscosity or (lambda tile, family, z, w, out, first: None))

@@ -159,6 +159,19 @@ def root(typing_context, x):  # type: ignore[no-untyped-def]
     return x(x), generate
 
 
+def _knows_digits(context: Any, count: int) -> bool:
+    """Whether the processor has AVX-512, for vectors of this length."""
+    return count == len(EIGHT) and "+avx512f" in context.codegen().magic_tuple()[2].split(",")
+
+
+def _near(builder: Any, name: str, value: Any) -> Any:
+    """The first 14 bits of an inverse, by AVX-512."""
+    kind = value.type
+    function = ir.FunctionType(kind, [kind, kind, ir.IntType(8)])
+    found = cgutils.get_or_insert_function(builder.module, function, f"llvm.x86.avx512.{name}.pd.512")
+    return builder.call(found, [value, ir.Constant(kind, [0.0] * kind.count), ir.IntType(8)(255)])
+
+
 @intrinsic
 def inverse_root(typing_context, x):  # type: ignore[no-untyped-def]
     """1/sqrt of a vector of positive numbers, to their last digit or two; zero and infinity may give no number.
@@ -171,13 +184,11 @@ def inverse_root(typing_context, x):  # type: ignore[no-untyped-def]
         (value,) = arguments
         kind = value.type
         one = ir.Constant(kind, [1.0] * x.count)
-        if x.count != len(EIGHT) or "+avx512f" not in context.codegen().magic_tuple()[2].split(","):
+        if not _knows_digits(context, x.count):
             function = ir.FunctionType(kind, [kind])
             found = cgutils.get_or_insert_function(builder.module, function, f"llvm.sqrt.v{x.count}f64")
             return builder.fdiv(one, builder.call(found, arguments), flags=_FLAGS)
-        function = ir.FunctionType(kind, [kind, kind, ir.IntType(8)])
-        found = cgutils.get_or_insert_function(builder.module, function, "llvm.x86.avx512.rsqrt14.pd.512")
-        near = builder.call(found, [value, ir.Constant(kind, [0.0] * x.count), ir.IntType(8)(255)])
+        near = _near(builder, "rsqrt14", value)
         off = builder.fsub(one, builder.fmul(value, builder.fmul(near, near, flags=_FLAGS), flags=_FLAGS), flags=_FLAGS)
         terms = ir.Constant(kind, [0.3125] * x.count)
         for factor in (0.375, 0.5):
@@ -185,6 +196,26 @@ def inverse_root(typing_context, x):  # type: ignore[no-untyped-def]
             terms = builder.fadd(above, ir.Constant(kind, [factor] * x.count), flags=_FLAGS)
         change = builder.fmul(builder.fmul(near, off, flags=_FLAGS), terms, flags=_FLAGS)
         return builder.fadd(near, change, flags=_FLAGS)
+
+    return x(x), generate
+
+
+@intrinsic
+def reciprocal(typing_context, x):  # type: ignore[no-untyped-def]
+    """1/x of a vector, to its last digit or two; zero and infinity may give no number. See `inverse_root`."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        (value,) = arguments
+        kind = value.type
+        one = ir.Constant(kind, [1.0] * x.count)
+        if not _knows_digits(context, x.count):
+            return builder.fdiv(one, value, flags=_FLAGS)
+        near = _near(builder, "rcp14", value)
+        off = builder.fsub(one, builder.fmul(value, near, flags=_FLAGS), flags=_FLAGS)
+        terms = off
+        for _ in range(2):
+            terms = builder.fadd(builder.fmul(terms, off, flags=_FLAGS), off, flags=_FLAGS)
+        return builder.fadd(builder.fmul(near, terms, flags=_FLAGS), near, flags=_FLAGS)
 
     return x(x), generate
 
