@@ -15,7 +15,7 @@ from rich.console import Console
 from shoal.mechanics.simulate import stable_step
 from shoal.selection import Selection, select
 from shoal.selection.climb import YARDSTICK
-from shoal.selection.levels import LADDERS, Level, Levels, apply
+from shoal.selection.levels import LADDERS, Level, Levels, apply, coarsest
 from shoal.selection.run import Rung, distance, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Trajectory
@@ -70,7 +70,7 @@ def _truth(found: Selection, finest: Rung, most: float) -> Trajectory | None:
     }
     modelled = apply(finest.scene, levels)
     steps = int(np.ceil(modelled.solver.duration / (FRACTION * stable_step(modelled, INTEGRATOR))))
-    forecast = Forecast(finest.scene, tuple(levels))
+    forecast = Forecast(finest.scene, coarsest(finest.scene, found.limits))
     leaps = modelled.solver.duration / forecast.step(levels)
     if EVALUATIONS * steps * forecast.work(levels) / leaps > most:
         return None
