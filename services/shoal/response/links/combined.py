@@ -67,4 +67,6 @@ def combined(inputs: Inputs, way: Array) -> Combined:
         spectrum *= np.fft.rfft(shared)
     density = np.fft.fftshift(np.fft.irfft(spectrum, NODES))
     there = density > NOWHERE
-    return Combined(grid[there], density[there] / density[there].sum())
+    weights = density[there] / density[there].sum()
+    # Sharing adds a little to the deviation, which is 1.
+    return Combined(grid[there] / np.sqrt(weights @ grid[there] ** 2), weights)
