@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
-from shoal.response.expansion import Expansion
 from shoal.response.statistics import SURE
 from shoal.response.study import Study
 from shoal.trajectory import Array
@@ -21,8 +21,32 @@ HALVES = 2.0
 """Times what a half tells apart from all."""
 
 
-def errors(study: Study, found: Expansion, fitted: Callable[[Study], Expansion]) -> tuple[Array, Array]:
-    """Within which mean and std lie with 95 % confidence, (columns,) each; fitted: the expansion of fewer runs."""
+class Moments(Protocol):
+    """What an expansion tells, (columns,) each."""
+
+    @property
+    def mean(self) -> Array:
+        """Over all parameters."""
+        ...
+
+    @property
+    def variance(self) -> Array:
+        """Over all parameters."""
+        ...
+
+    @property
+    def left_out(self) -> Array:
+        """Error at runs that are left out of the fit."""
+        ...
+
+    @property
+    def squares(self) -> Array | None:
+        """The same of squares."""
+        ...
+
+
+def errors(study: Study, found: Moments, fitted: Callable[[Study], Moments]) -> tuple[Array, Array]:
+    """Within which mean and std lie with 95 % confidence, (columns,) each; fitted: what fewer runs tell."""
     made, std, left_out = len(study.runs.germs), np.sqrt(found.variance), found.left_out
     squares = left_out if found.squares is None else np.maximum(found.squares, left_out)
     missing = np.divide(left_out**2, 2 * std, out=np.zeros_like(std), where=std > 0)

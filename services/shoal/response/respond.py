@@ -18,8 +18,9 @@ from shoal.response.kept import TimeIsUpError
 from shoal.response.methods import get_method
 from shoal.response.result import Bounds
 from shoal.response.runs import Model, Runs, TooManyRunsError
-from shoal.response.statistics import Statistics, either, masked, of_expansion, of_runs
-from shoal.response.study import Found, Study
+from shoal.response.statistics import DRAWN as PLACES
+from shoal.response.statistics import QUANTILES, Statistics, either, masked, of_expansion, of_runs
+from shoal.response.study import Found, Linked, Study
 from shoal.trajectory import Array
 
 MIXED = "auto", "nested"
@@ -111,6 +112,8 @@ def _statistics(study: Study, found: Found) -> Statistics:
     told = sampled = of_runs(runs.values, found.indices, len(study.inputs))
     if isinstance(found.surrogate, Expansion):
         told = of_expansion(found.surrogate, study.inputs, found.error, runs.evaluations, study.seed)
+        if found.linked is not None:
+            told = _over(told, found.linked, study)
         if found.errors is not None:
             told = replace(told, error=found.errors[0], std_error=found.errors[1])
         if found.indices is None:
@@ -119,3 +122,14 @@ def _statistics(study: Study, found: Found) -> Statistics:
     if found.quantiles is not None:
         told = replace(told, quantiles=found.quantiles)
     return masked(told, study.largest(np.nan_to_num(told.std), runs.values))
+
+
+def _over(told: Statistics, linked: Linked, study: Study) -> Statistics:
+    """With those of the columns that something else than the expansion tells."""
+    quantiles, first, total = told.quantiles.copy(), told.first.copy(), told.total.copy()
+    for columns, link in linked.links:
+        answers = link(study.inputs.sobol(PLACES, study.seed + 1))
+        quantiles[:, columns] = np.quantile(answers, QUANTILES, axis=0)
+        if not study.inputs.correlations:
+            first[:, columns], total[:, columns] = link.indices()
+    return replace(told, mean=linked.mean, std=np.sqrt(linked.variance), quantiles=quantiles, first=first, total=total)

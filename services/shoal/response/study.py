@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -100,6 +101,37 @@ class Study:
             raise InputError(f"vary: method {method} needs {wanted} for {name}, such as {form}")
 
 
+class Other(Protocol):
+    """What tells some columns better than an expansion."""
+
+    def __call__(self, germs: Array) -> Array:
+        """Answers at any germ without a run, (places, columns)."""
+        ...
+
+    def indices(self) -> Array:
+        """First and total ones of Sobol, (2, parameters, columns), of parameters that do not correlate."""
+        ...
+
+
+class Linked(Protocol):
+    """Moments of all columns, and what tells some of them better than an expansion."""
+
+    @property
+    def links(self) -> Sequence[tuple[IntArray, Other]]:
+        """These columns, (n,), and what tells them."""
+        ...
+
+    @property
+    def mean(self) -> Array:
+        """Of all columns, (columns,)."""
+        ...
+
+    @property
+    def variance(self) -> Array:
+        """Of all columns, (columns,)."""
+        ...
+
+
 @dataclass(frozen=True)
 class Found:
     """What a method leaves beside its runs.
@@ -108,7 +140,8 @@ class Found:
     it did, in words; indices: first and total Sobol indices by sampling, (2, parameters, columns);
     quantiles: that take the place of those of the runs, (levels, columns);
     errors: within which mean and deviation lie with 95 % confidence, (columns,) each;
-    coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,)
+    coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,);
+    linked: what tells some columns better than the surrogate
     """
 
     why: str
@@ -120,6 +153,7 @@ class Found:
     share: float = 0.0
     quantiles: Array | None = None
     errors: tuple[Array, Array] | None = None
+    linked: Linked | None = None
 
 
 Method = Callable[[Study], Found]

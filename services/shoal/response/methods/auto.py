@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from shoal.response.course import UnsuitableError, watch
-from shoal.response.expansion import Expansion
 from shoal.response.methods import chaos, long_time, sampling
 from shoal.response.methods.bounds import bounds
 from shoal.response.methods.nested import nested
@@ -36,8 +35,8 @@ def auto(study: Study) -> Found:
     if study.inputs.mixed:
         return nested(study)
     found = chaos.grown(study, study.count or chaos.RUNS)
-    assert isinstance(found.surrogate, Expansion)
-    off = chaos.shares(study, found.surrogate)
+    assert found.error is not None
+    off = chaos.shares(study, found.error)
     coarse = off > TOO_COARSE
     if not coarse.any():
         return found
@@ -46,7 +45,7 @@ def auto(study: Study) -> Found:
         return replace(found, why=f"{about}; where it is, these runs tell, and it tells the shares only", coarse=coarse)
     sampled = sampling.of_distributions(study, SAMPLED)
     why = f"{about}; where it is, {sampled.why} tell"
-    return Found(why, found.surrogate, found.error, sampled.indices, coarse)
+    return replace(found, why=why, indices=sampled.indices, coarse=coarse)
 
 
 def _intervals(study: Study) -> Found:

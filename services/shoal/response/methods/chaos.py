@@ -12,9 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from shoal.response import moments
+from shoal.response import links, moments
 from shoal.response.degrees import best
 from shoal.response.expansion import Expansion
+from shoal.response.inputs import BoolArray
+from shoal.response.links import Linked
 from shoal.response.outermost import hidden, outwards
 from shoal.response.polynomials import size
 from shoal.response.regularised import likeliest, regularised, trimmed
@@ -55,24 +57,38 @@ def grown(study: Study, fair: int) -> Found:
         count = max(min(count, most, made + runs.left), min(least, made + runs.left))
         runs(inputs.sobol(count - made, study.seed, made))
         made = count
-        found = best(study, SHARE, lambda one: _reaching(study, one))
-        if made >= min(fair, made + runs.left) and not study.degree:
-            found = _with_more_terms(study, found)
-        off = share(study, found)
+        told = _told(study, more=made >= min(fair, made + runs.left) and not study.degree)
+        off = share(study, told.left_out)
         most = MORE * fair if off > COARSE and made >= fair else fair
         if off < CONVERGED or made >= most or not runs.left:
             break
         count = 2 * made
+    found = told.plain
     degree = int(found.terms.sum(axis=1).max(initial=0))
     kind = "regularised " if len(found.terms) > len(runs.germs) / SHARE else ""
-    why = f"{kind}polynomial chaos of degree {degree} fitted to {runs.evaluations} runs"
-    return Found(why, found, found.left_out, errors=moments.errors(study, found, _fitted))
+    why = f"{kind}polynomial chaos of degree {degree} fitted to {runs.evaluations} runs{told.why}"
+    errors = moments.errors(study, told, lambda part: told.again(part, _fitted, _chosen))
+    return Found(why, found, told.left_out, errors=errors, linked=told if told.links else None)
+
+
+def _told(study: Study, *, more: bool) -> Linked:
+    """The expansion, with links where they are clearly better, and with more terms where it still misses something."""
+    found = _chosen(study)
+    wanted = shares(study, found.left_out) > CONVERGED
+    told = links.plainly(found) if study.degree else links.linked(study, found, wanted, _chosen)
+    if more:
+        told = links.beside(told, _with_more_terms(study, found, shares(study, told.left_out) <= CONVERGED))
+    return told
+
+
+def _chosen(study: Study) -> Expansion:
+    return best(study, SHARE, lambda one: _reaching(study, one))
 
 
 def _fitted(study: Study) -> Expansion:
     """To the runs of a part of a study."""
-    found = best(study, SHARE, lambda one: _reaching(study, one))
-    return found if study.degree else _with_more_terms(study, found)
+    found = _chosen(study)
+    return found if study.degree else _with_more_terms(study, found, shares(study, found.left_out) <= CONVERGED)
 
 
 def _reaching(study: Study, found: Expansion) -> Expansion:
@@ -86,15 +102,15 @@ def _with_hidden(found: Expansion) -> Expansion:
     return replace(found, left_out=np.maximum(found.left_out, beyond))
 
 
-def _with_more_terms(study: Study, found: Expansion) -> Expansion:
-    """In every column that one, or a regularised one that foretells better.
+def _with_more_terms(study: Study, found: Expansion, good: BoolArray) -> Expansion:
+    """In every column that one, or a regularised one that foretells better; good: columns that need none, (columns,).
 
     The column that is told worst tells how coefficients fall; what that is good for elsewhere is taken there as well.
     """
     runs, inputs = study.runs, study.inputs
-    tried = np.zeros(len(found.left_out), dtype=bool)
+    tried = good.copy()
     for _ in range(DECAYS):
-        open_shares = np.where(tried, 0.0, shares(study, found))
+        open_shares = np.where(tried, 0.0, shares(study, found.left_out))
         worst = int(open_shares.argmax())
         if open_shares[worst] <= CONVERGED:
             break
@@ -107,13 +123,13 @@ def _with_more_terms(study: Study, found: Expansion) -> Expansion:
     return found
 
 
-def share(study: Study, found: Expansion) -> float:
+def share(study: Study, left_out: Array) -> float:
     """The largest of `shares`."""
-    return float(shares(study, found).max())
+    return float(shares(study, left_out).max())
 
 
-def shares(study: Study, found: Expansion) -> Array:
-    """Error at runs that are left out, as a share of the standard deviation of the group, (columns,)."""
+def shares(study: Study, left_out: Array) -> Array:
+    """Error at runs that are left out, (columns,), as a share of the standard deviation of the group, (columns,)."""
     values = study.runs.values
     scale = study.largest(values.std(axis=0), values)
-    return np.divide(found.left_out, scale, out=np.zeros_like(scale), where=scale > 0)
+    return np.divide(left_out, scale, out=np.zeros_like(scale), where=scale > 0)
