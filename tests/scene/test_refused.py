@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": 
             id="element",
         ),
         pytest.param(("bodies.OA.elements", 0), "bodies.OA.elements", "greater than or equal to 1", id="no-elements"),
-        pytest.param(("bodies.OA.elements", 2.5), "bodies.OA.elements", "integer", id="half-an-element"),
+        pytest.param(("bodies.OA.elements", 2.5), "bodies.OA.elements", "whole number", id="half-an-element"),
         pytest.param(("bodies.OA.quadrature", "half"), "bodies.OA.quadrature", "'full' or 'reduced'", id="quadrature"),
         pytest.param(("bodies.OA.youngs_modulus", GONE), "bodies.OA", "youngs_modulus is missing", id="no-modulus"),
         pytest.param(("bodies.OA.poisson_ratio", 0.7), "bodies.OA.poisson_ratio", "0.5", id="poisson"),
@@ -66,7 +67,9 @@ GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": 
         pytest.param(("bodies.OA.law", "lame"), "bodies.OA", "is for ancf-full", id="law-of-another-element"),
         pytest.param(("bodies.OA.rotary_inertia", True), "bodies.OA", "has none", id="rotary-inertia-of-a-cable"),
         pytest.param(("bodies.OA.kind", "blob"), "bodies.OA", "'rod', 'rigid-body'", id="unknown-kind-of-body"),
-        pytest.param(("bodies.OA.kind", GONE), "bodies.OA", "discriminator 'kind'", id="no-kind-of-body"),
+        pytest.param(
+            ("bodies.OA.kind", GONE), "bodies.OA", "needs a kind, one of rod, rigid-body", id="no-kind-of-body"
+        ),
         pytest.param(("bodies.ground", ROD), "bodies.ground", "fixed frame", id="a-body-called-ground"),
         pytest.param(("bodies", {}), "bodies", "at least 1", id="no-bodies"),
         pytest.param(("bodies.2nd", ROD), "bodies.2nd.[key]", "pattern", id="bad-name"),
@@ -233,3 +236,39 @@ def test_a_letter_is_a_unit_axis(letter: str) -> None:
     assert parsed(letter).joints == parsed([float(letter == one) for one in "xyz"]).joints
     with pytest.raises(InputError, match=r"joints.J.axis: an axis has three components, such as \[1, 0, 0\].* 'w'"):
         parsed("w")
+
+
+@pytest.mark.parametrize(
+    ("change", "named", "why"),
+    [
+        pytest.param(("gravity", 9.81), "gravity", "needs a list, found 9.81", id="one-number"),
+        pytest.param(
+            ("initial.top.rotation", [1.0, 0.0, 0.0, 0.0]), "initial.top.rotation", "4 entries", id="quaternion"
+        ),
+        pytest.param(("initial.top.spin", [1.0, 0.0]), "initial.top.spin", "too few numbers", id="two-of-three"),
+        pytest.param(("joints.foot.axis", [1, 0]), "joints.foot.axis", "too few numbers", id="axis-in-the-plane"),
+        pytest.param(("bodies.top.inertia", [1.0, 2.0]), "bodies.top.inertia", "three principal moments", id="moments"),
+        pytest.param(("bodies.top.inertia", [[1.0], [2.0, 3.0]]), "bodies.top.inertia", "3 x 3 matrix", id="rows"),
+        pytest.param(("joints.foot.first.point", [0] * 4), "joints.foot.first.point", "a name, or a list", id="point"),
+        pytest.param(("joints.foot.kind", "ball"), "joints.foot", "no kind is called ball; there are", id="kind"),
+    ],
+)
+def test_slips_in_space_are_one_line(change: tuple[str, Any], named: str, why: str) -> None:
+    place = {"body": "ground", "point": [0.0, 0.0, 0.0]}
+    data: Any = {
+        "name": "top",
+        "dimensions": 3,
+        "bodies": {"top": {"kind": "rigid-body", "mass": 1.0, "inertia": [0.1, 0.1, 0.05]}},
+        "joints": {"foot": {"kind": "revolute", "first": place, "second": {"body": "top"}, "axis": "z"}},
+        "markers": {"top": {"body": "top"}},
+        "initial": {"top": {"rotation": [0.0, 0.0, 0.1], "spin": [0.0, 0.0, 1.0]}},
+        "solver": {"duration": 1.0},
+    }
+    Scene.parse(data)
+    *parents, leaf = change[0].split(".")
+    within = data
+    for name in parents:
+        within = within[name]
+    within[leaf] = change[1]
+    with pytest.raises(InputError, match=rf"^my\.yaml: {re.escape(named)}: .*{why}"):
+        Scene.parse(data, "my.yaml")

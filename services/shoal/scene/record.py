@@ -58,24 +58,60 @@ def kinds(annotation: Any) -> tuple[str, ...]:
     return tuple(kind for part in get_args(annotation) for kind in kinds(part))
 
 
-_MEMBER = re.compile(r"constrained-|tuple\[|float$|function-")
+_MEMBER = re.compile(r"constrained-|tuple\[|float$|str$|function-")
 """How pydantic names a member of a union in a path."""
+
+
+_WORDS = {
+    "tuple_type": "needs a list",
+    "too_long": "has {actual_length} entries, where at most {max_length} belong",
+    "union_tag_not_found": "needs a kind{of}",
+    "union_tag_invalid": "no kind is called {tag}; there are {expected_tags}",
+    "float_type": "needs a number",
+    "float_parsing": "needs a number",
+    "int_type": "needs a whole number",
+    "int_parsing": "needs a whole number",
+    "int_from_float": "needs a whole number",
+    "dict_type": "needs entries with names",
+    "model_type": "needs entries with names",
+    "model_attributes_type": "needs entries with names",
+}
+"""What pydantic's errors of a type are called."""
 
 
 def one_line(error: ValidationError, what: str, model: type[Record] | None = None) -> InputError:
     """Turn pydantic's report on a model into one line that names the field, the value and what is right."""
     first = error.errors()[0]
-    parts = [str(part) for part in first["loc"]]
+    path, message = _path(first, model), first["msg"].removeprefix("Value error, ")
+    found = (
+        "" if first["type"] in ("missing", "value_error", "union_tag_invalid") else f", found {_short(first['input'])}"
+    )
+    if _lacks(first):
+        message, found = "has too few numbers", f", found {_short(first['input'])}"
+    elif first["type"] in _WORDS:
+        field = model.model_fields.get(str(first["loc"][0])) if model else None
+        of = f", one of {', '.join(kinds(field.annotation))}" if field else ""
+        message = _WORDS[first["type"]].format(of=of, **first.get("ctx", {}))
+    if first["type"] == "string_type" and any("tuple[" in str(one["loc"]) for one in error.errors()):
+        message = "needs a name, or a list of two or three numbers"
+    others = len({_path(one, model) for one in error.errors()}) - 1
+    more = f" (and {others} more)" if others else ""
+    return InputError(f"{what}: {path + ': ' if path else ''}{message}{found}{more}")
+
+
+def _lacks(error: Any) -> bool:
+    """Whether a list is too short."""
+    return error["type"] == "missing" and isinstance(error["loc"][-1], int)
+
+
+def _path(error: Any, model: type[Record] | None) -> str:
+    """Where an error is, as a user writes it; of a list that is too short the list itself."""
+    parts = [str(part) for part in error["loc"][: -1 if _lacks(error) else None]]
     field = model.model_fields.get(parts[0]) if model and parts[2:] else None
     # Pydantic puts the kind that tells the members of a field apart into the path, after the member's name.
     if field and parts[2] in kinds(field.annotation):
         del parts[2]
-    path = ".".join(part for part in parts if part not in {"file", "engine"} and not _MEMBER.match(part))
-    message = first["msg"].removeprefix("Value error, ")
-    others = error.error_count() - 1
-    more = f" (and {others} more)" if others else ""
-    found = "" if first["type"] in ("missing", "value_error") else f", found {_short(first['input'])}"
-    return InputError(f"{what}: {path + ': ' if path else ''}{message}{found}{more}")
+    return ".".join(part for part in parts if part not in {"file", "engine"} and not _MEMBER.match(part))
 
 
 def _short(value: Any) -> str:

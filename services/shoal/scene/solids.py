@@ -5,16 +5,27 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from shoal.scene.record import NonNegative, Positive, Record, Vector, Vector3
+
+
+def _formed(given: Any) -> Any:
+    try:
+        shape: tuple[int, ...] | None = np.shape(given)
+    except ValueError:  # rows of different lengths
+        shape = None
+    if shape not in ((), (3,), (3, 3)):
+        raise ValueError(f"a number, three principal moments or a 3 x 3 matrix [kg m^2], found {given!r}")
+    return given
+
 
 Principal = tuple[NonNegative, NonNegative, NonNegative]
 Matrix = tuple[Vector3, Vector3, Vector3]
 if TYPE_CHECKING:
     Inertia = Any  # who computes in the plane has one number, or one a lane
 else:
-    Inertia = NonNegative | Principal | Matrix
+    Inertia = Annotated[NonNegative | Principal | Matrix, BeforeValidator(_formed)]
 
 
 class RigidBody(Record):
