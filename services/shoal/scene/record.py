@@ -89,7 +89,7 @@ def one_line(error: ValidationError, what: str, model: type[Record] | None = Non
     if _lacks(first):
         message, found = "has too few numbers", f", found {_short(first['input'])}"
     elif first["type"] in _WORDS:
-        field = model.model_fields.get(str(first["loc"][0])) if model else None
+        field = model.model_fields.get(str(first["loc"][0])) if model and first["loc"] else None
         of = f", one of {', '.join(kinds(field.annotation))}" if field else ""
         message = _WORDS[first["type"]].format(of=of, **first.get("ctx", {}))
     if first["type"] == "string_type" and any("tuple[" in str(one["loc"]) for one in error.errors()):
