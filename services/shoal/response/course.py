@@ -17,6 +17,8 @@ PER_TURN = 24, 48
 """Samples between two turning points: as few and as many as are kept."""
 DEGREE = 7
 """Of the splines between samples."""
+CYCLES = 3
+"""Turning points that are too few for cycles; six have to be seen."""
 EARLY = 0.25
 """Turning points before this share of the usual distance of two are not counted: a run from rest begins with one."""
 
@@ -103,8 +105,14 @@ def watch(study: Study, stretch: float) -> Watch:
 def _most_even(times: Array, course: Array) -> tuple[int, float, int]:
     """Signal, how uneven its cycles are, and its turning points."""
     found: list[tuple[float, int, int]] = []
-    for signal in range(course.shape[1]):
-        turns = turning_points(times, spline(times, course[:, signal]))
+    steps = np.diff(course, axis=0)
+    # Signals that hardly ever turn between their samples need no splines.
+    turning = np.flatnonzero((steps[:-1] * steps[1:] < 0).sum(axis=0) > CYCLES)
+    if not len(turning):
+        raise UnsuitableError("the motion has too few cycles")
+    every = spline(times, course[:, turning])
+    for k, signal in enumerate(turning.tolist()):
+        turns = turning_points(times, BSpline(every.t, every.c[:, k], every.k))
         if len(turns) >= 6:
             cycle = np.diff(turns[::2])
             found.append((float(np.median(np.abs(np.diff(cycle))) / cycle.mean()), signal, len(turns)))
@@ -115,7 +123,7 @@ def _most_even(times: Array, course: Array) -> tuple[int, float, int]:
 
 
 def spline(times: Array, values: Array) -> BSpline:
-    """Through all samples."""
+    """Through all samples, (samples,) or (samples, signals)."""
     return make_interp_spline(times, values, DEGREE)
 
 

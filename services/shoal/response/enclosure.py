@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from shoal.response.expansion import Expansion
-from shoal.response.extremes import Extremes, IntArray, Surrogate, places
+from shoal.response.extremes import Extremes, IntArray, Surrogate, in_parts, places
 from shoal.response.study import SAFETY, Study
 from shoal.trajectory import Array
 
@@ -93,16 +93,16 @@ def _widened(
     best, place = objective(own), own.copy()
     scanned = places(germs.shape[1], study.seed, rough=rough)
     share, run = away(scanned)
-    block = max(1, 4_000_000 // columns)
-    for k in range(0, len(scanned), block):
-        some = slice(k, k + block)
-        told = np.ascontiguousarray(surrogate(scanned[some]).T)
-        wide = margin[:, None] * share[some] + np.ascontiguousarray(misfit.T)[:, run[some]]
-        value = np.concatenate([told - wide, -told - wide])
-        least = value.argmin(axis=1)
-        value = value[np.arange(2 * columns), least]
-        better = value < best
-        best[better], place[better] = value[better], scanned[some][least][better]
+    for some, told in in_parts(surrogate, scanned, columns):
+        wide = share[some, None] * margin
+        wide += misfit[run[some]]
+        for side, of in enumerate((told - wide, told + wide)):
+            every_place = np.ascontiguousarray(of.T)
+            extreme = every_place.argmax(axis=1) if side else every_place.argmin(axis=1)
+            value = (-1 if side else 1) * every_place[every, extreme]
+            mine = slice(side * columns, (side + 1) * columns)
+            better = value < best[mine]
+            best[mine][better], place[mine][better] = value[better], scanned[some][extreme][better]
     starts = [place] if rough else [place, own]
     for at in starts:
         value = best.copy() if at is place else objective(at)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Protocol
@@ -23,6 +24,8 @@ ROUNDS, IDLE = 24, 4
 """Of searches, at most, and how many of them in a row have to find nothing new."""
 GRID = {1: 1001, 2: 41, 3: 15, 4: 7}
 """Places along each axis of the grid, by the number of parameters."""
+HELD, AT_HAND = 4_000_000, 2**17
+"""Numbers of a surrogate that are asked for and that are compared at once."""
 STEPS = 0.25, 0.1
 """Of the search along each axis from the best place that was scanned, before it goes downhill by slopes."""
 
@@ -99,18 +102,16 @@ def _round(surrogate: Surrogate, looked_at: Array, columns: int, starts: int) ->
     parameters = looked_at.shape[1]
     best = np.full((starts, 2, columns), np.inf)
     at = np.zeros((starts, 2, columns, parameters))
-    block = max(1, 4_000_000 // max(columns, 1))
     every = np.arange(columns)
     for start in range(starts):
         # Every n-th place of Sobol's sequence lies in a part of the box of its own, where n is a power of two.
         mine = looked_at[start::starts]
-        for k in range(0, len(mine), block):
-            some = mine[k : k + block]
-            found = np.ascontiguousarray(surrogate(some).T)
+        for some, told in in_parts(surrogate, mine, columns):
+            found = np.ascontiguousarray(told.T)
             for side, (sign, least) in enumerate(((1.0, found.argmin(axis=1)), (-1.0, found.argmax(axis=1)))):
                 value = sign * found[every, least]
                 better = value < best[start, side]
-                best[start, side, better], at[start, side, better] = value[better], some[least][better]
+                best[start, side, better], at[start, side, better] = value[better], mine[some][least][better]
     which = np.tile(every, 2 * starts)
     signs = np.tile(np.repeat([1.0, -1.0], columns), starts)
     value, place = best.reshape(-1), at.reshape(-1, parameters)
@@ -121,6 +122,15 @@ def _round(surrogate: Surrogate, looked_at: Array, columns: int, starts: int) ->
     best, at = value.reshape(starts, 2, columns), place.reshape(starts, 2, columns, parameters)
     first = best.argmin(axis=0)[None]
     return np.take_along_axis(best, first, 0)[0], np.take_along_axis(at, first[..., None], 0)[0]
+
+
+def in_parts(surrogate: Surrogate, looked_at: Array, columns: int) -> Iterator[tuple[slice, Array]]:
+    """What a surrogate says at some of the places, (places, columns): so many at once as a processor has at hand."""
+    whole, part = (max(1, numbers // max(columns, 1)) for numbers in (HELD, AT_HAND))
+    for k in range(0, len(looked_at), whole):
+        told = surrogate(looked_at[k : k + whole])
+        for j in range(0, len(told), part):
+            yield slice(k + j, k + min(j + part, len(told))), told[j : j + part]
 
 
 def _beside(surrogate: Surrogate, best: Array, at: Array) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 from scipy import special
@@ -217,12 +218,25 @@ class Inputs:
 
     def basis(self, germs: Array, terms: Terms) -> Array:
         """Every product of polynomials at every germ, (runs, terms)."""
-        found = np.ones((len(germs), len(terms)))
-        for k in range(len(self)):
-            degree = int(terms[:, k].max())
+        highest = terms.max(axis=0)
+        found = np.ones((len(terms), len(germs)))
+        # Parameters with the same polynomials are evaluated together, and terms are rows, which is faster.
+        for recurrence, which in self._alike:
+            degrees = highest[which]
+            degree = int(degrees.max())
             if degree:
-                found *= self.polynomials(k, germs[:, k], degree)[:, terms[:, k]]
-        return found
+                told = recurrence.rows(np.ascontiguousarray(germs[:, which].T), degree)
+                for row, k in enumerate(which):
+                    if degrees[row]:
+                        found *= told[terms[:, k], row]
+        return np.ascontiguousarray(found.T)
+
+    @cached_property
+    def _alike(self) -> list[tuple[Recurrence, list[int]]]:
+        """Parameters in a row that have the same polynomials."""
+        each = [self._recurrence(k) for k in range(len(self))]
+        groups = [list(group) for _, group in groupby(range(len(each)), lambda k: id(each[k]))]
+        return [(each[group[0]], group) for group in groups]
 
 
 def inside(x: Array) -> Array:

@@ -26,10 +26,16 @@ class Recurrence:
 
     def __call__(self, s: Array, degree: int) -> Array:
         """All polynomials up to a degree at the places s, (places, degree + 1)."""
-        found = np.ones((len(s), degree + 1))
+        return np.ascontiguousarray(np.moveaxis(self.rows(s, degree), 0, -1))
+
+    def rows(self, s: Array, degree: int) -> Array:
+        """The same at places of any shape, (degree + 1, ...)."""
+        found = np.ones((degree + 1, *np.shape(s)))
         for k in range(degree):
-            before = np.sqrt(self.b[k]) * found[:, k - 1] if k else 0.0
-            found[:, k + 1] = ((s - self.a[k]) * found[:, k] - before) / np.sqrt(self.b[k + 1])
+            now = (s - self.a[k]) * found[k]
+            if k:
+                now -= np.sqrt(self.b[k]) * found[k - 1]
+            np.divide(now, np.sqrt(self.b[k + 1]), out=found[k + 1])
         return found
 
 

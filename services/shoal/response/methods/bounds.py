@@ -166,23 +166,28 @@ def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
     most = max(2, plan.fair // ROUNDS)
     if runs.evaluations < plan.fair:
         most = min(most, plan.fair - runs.evaluations)
-    groups, varies = np.tile(study.groups, 2), width > 0
-    turns = dict.fromkeys(np.unique(groups).tolist(), 0)
-    chosen: list[Array] = []
+    names, varies = np.unique(study.groups), width > 0
+    member = np.tile(study.groups, 2) == names[:, None]
+    turns = dict.fromkeys(range(len(names)), 0)
+    known, chosen = runs.germs, list[Array]()
+    share: Array | None = None
     while len(chosen) < most:
-        gains = np.concatenate([low - found.lower, found.upper - high])
-        share = np.divide(gains, width, out=np.zeros_like(gains), where=varies)
-        share[share < least] = 0.0
-        best = {group: int(np.where(groups == group, share, 0.0).argmax()) for group in turns}
-        left = [group for group, k in best.items() if share[k] > 0]
+        if share is None:
+            gains = np.concatenate([low - found.lower, found.upper - high])
+            share = np.divide(gains, width, out=np.zeros_like(gains), where=varies)
+            share[share < least] = 0.0
+            mine = np.where(member, share, 0.0)
+        best = mine.argmax(axis=1).tolist()
+        left = [group for group, k in enumerate(best) if share[k] > 0]
         if not left:
             break
         # Of the groups that were served least the one that gains most.
-        group = min(left, key=lambda one: (turns[one], -share[best[one]]))
+        group = min(left, key=lambda one: (turns[one], -mine[one, best[one]]))
         k, turns[group] = best[group], turns[group] + 1
-        varies[k] = False
-        if np.min(np.max(np.abs(np.vstack([runs.germs, *chosen]) - places[k]), axis=1)) > APART:
+        varies[k], share[k], mine[:, k] = False, 0.0, 0.0
+        if np.min(np.max(np.abs(known - places[k]), axis=1)) > APART:
             chosen.append(places[k])
+            known, share = np.vstack([known, places[k]]), None
             low, high = np.minimum(low, told[k]), np.maximum(high, told[k])
     return np.array(chosen).reshape(-1, len(study.inputs))
 
