@@ -48,7 +48,7 @@ def _pointing(value: Vector3) -> Vector3:
 
 
 Axis = Annotated[Vector3, BeforeValidator(_letter), AfterValidator(_pointing)]
-"""A direction in space, of any length; x, y and z stand for the unit vectors of the ground."""
+"""A direction in space, of any length; x, y and z stand for the unit vectors."""
 
 
 def kinds(annotation: Any) -> tuple[str, ...]:
@@ -60,8 +60,6 @@ def kinds(annotation: Any) -> tuple[str, ...]:
 
 _MEMBER = re.compile(r"constrained-|tuple\[|float$|str$|function-")
 """How pydantic names a member of a union in a path."""
-
-
 _WORDS = {
     "tuple_type": "needs a list",
     "too_long": "has {actual_length} entries, where at most {max_length} belong",
@@ -77,17 +75,17 @@ _WORDS = {
     "model_attributes_type": "needs entries with names",
 }
 """What pydantic's errors of a type are called."""
+_TOLD = ("missing", "value_error", "union_tag_invalid")
+"""Errors whose message holds the value, or that have none."""
 
 
 def one_line(error: ValidationError, what: str, model: type[Record] | None = None) -> InputError:
     """Turn pydantic's report on a model into one line that names the field, the value and what is right."""
     first = error.errors()[0]
     path, message = _path(first, model), first["msg"].removeprefix("Value error, ")
-    found = (
-        "" if first["type"] in ("missing", "value_error", "union_tag_invalid") else f", found {_short(first['input'])}"
-    )
+    found = "" if first["type"] in _TOLD and not _lacks(first) else f", found {_short(first['input'])}"
     if _lacks(first):
-        message, found = "has too few numbers", f", found {_short(first['input'])}"
+        message = "has too few numbers"
     elif first["type"] in _WORDS:
         field = model.model_fields.get(str(first["loc"][0])) if model and first["loc"] else None
         of = f", one of {', '.join(kinds(field.annotation))}" if field else ""

@@ -107,11 +107,9 @@ class Exponential:
         for column in range(len(found)):
             germs = plain.copy()
             for k in range(len(of.inputs)):
-                own = self._alone & (of.terms[:, k] > 0)
-                if own.any():
+                if (own := self._own(k)).any():
                     at, weights = nodes(of.inputs, k, REACH)
-                    basis = of.inputs.polynomials(k, at, int(of.terms[own, k].max()))[:, of.terms[own, k]]
-                    weights = weights * np.exp(order * basis @ of.coefficients[own, column])
+                    weights = weights * np.exp(order * self._basis(k, at) @ of.coefficients[own, column])
                     # The middle of each step, so that places lie on either side of its node.
                     germs[:, k] = np.interp(x[:, k], (np.cumsum(weights) - 0.5 * weights) / weights.sum(), at)
             cross = of.inputs.basis(germs, of.terms[self._cross]) @ of.coefficients[self._cross, column]
@@ -120,16 +118,23 @@ class Exponential:
 
     def _parts(self, reach: float) -> Array:
         """Mean and mean square of the exponentials of the functions of one parameter, (2, parameters, columns)."""
-        inputs, terms, coefficients = self.logarithm.inputs, self.logarithm.terms, self.logarithm.coefficients
+        inputs = self.logarithm.inputs
         found = np.ones((2, len(inputs), len(self.signs)))
         for k in range(len(inputs)):
-            own = self._alone & (terms[:, k] > 0)
-            if own.any():
+            if (own := self._own(k)).any():
                 germs, weights = nodes(inputs, k, reach)
-                basis = inputs.polynomials(k, germs, int(terms[own, k].max()))[:, terms[own, k]]
-                part = np.exp(basis @ coefficients[own])
+                part = np.exp(self._basis(k, germs) @ self.logarithm.coefficients[own])
                 found[:, k] = weights @ part, weights @ part**2
         return found
+
+    def _own(self, k: int) -> BoolArray:
+        """Terms of parameter k alone."""
+        return np.asarray(self._alone & (self.logarithm.terms[:, k] > 0))
+
+    def _basis(self, k: int, germs: Array) -> Array:
+        """Polynomials of these terms at germs of parameter k, (germs, terms)."""
+        degrees = self.logarithm.terms[self._own(k), k]
+        return self.logarithm.inputs.polynomials(k, germs, int(degrees.max()))[:, degrees]
 
     def _split(self, places: Array) -> tuple[Array, Array]:
         """The exponential of the functions of one parameter, and of all but the constant, (places, columns) each."""
