@@ -94,6 +94,10 @@ def test_a_signal_does_not_lead_out_of_a_library(path: str, tmp_path: Path, monk
         ({"column": "angle", "colour": 1}, None, "joints.motor.angle: colour: Extra inputs"),
         ({"column": "angle"}, "t,angle\n0,0\n1,x\n", "row 3, column 'angle': 'x' is not a number"),
         ({"column": "angle"}, "t,angle\n0,0\n0,1\n", "joints.motor.angle.table: times must increase"),
+        ({"column": "angle"}, "t,angle\ns,mm\n0,0\n1,1\n", "row 2, column 'angle': 'mm' is no unit of an angle; state"),
+        ({"column": "angle"}, "t,angle\nmm,rad\n0,0\n1,1\n", "row 2, column 't': 'mm' is no unit of a time; state"),
+        ({"column": "angle"}, "t,angle\n1700000000,0\n1700000002,1\n", "begins at 0 s of a table that covers 17000"),
+        ({"column": "angle", "start": 3.0}, "t,angle\n0,0\n2,1\n", "begins at 3 s of a table that covers 0 s to 2 s"),
         ({"column": "angle", "path": "gone.csv"}, None, "joints.motor.angle: data: .*gone.csv cannot be read"),
     ],
 )

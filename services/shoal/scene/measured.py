@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import ValidationError
@@ -12,12 +12,18 @@ from pydantic import ValidationError
 from shoal.errors import InputError
 from shoal.scene.record import Positive, Record, one_line
 from shoal.shelf import LARGEST
-from shoal.table_units import SI, TIMES, Units
+from shoal.table_units import SI, TIMES, AngleUnit, ForceUnit, LengthUnit, TorqueUnit, Units
 
 PARTS = ("joints", "loads", "ground_points")
 """Parts of a scene whose members have functions of time: PART.NAME.FIELD."""
-_COHERENT = ("N", "Nm", "N m", "N*m", "N/m", "-")
-"""Units of forces and torques, which are SI's."""
+_LENGTHS = ("a length", {unit: SI[unit] for unit in get_args(LengthUnit) if unit != "px"})
+_MEASURES: Mapping[str, tuple[str, Mapping[str, float]]] = {
+    "angle": ("an angle", {unit: SI[unit] for unit in get_args(AngleUnit)}),
+    "torque": ("a torque", {unit: SI[unit] for unit in get_args(TorqueUnit)}),
+    "scale": ("a force", {unit: SI[unit] for unit in get_args(ForceUnit)} | {"N/m": 1.0}),
+    **dict.fromkeys(("length", "value", "x", "y", "z"), _LENGTHS),
+}
+"""What a field is, by its name, and the units that a line of units may state for it."""
 
 
 class Signal(Record):
@@ -36,24 +42,43 @@ class Signal(Record):
     start: float = 0.0
     smooth: bool = True
 
-    def table(self, folder: Path) -> dict[str, Any]:
-        """The function as a scene has it. Raises InputError."""
+    def table(self, folder: Path, field: str) -> dict[str, Any]:
+        """The function as a scene has it, for a field by its name. Raises InputError."""
         # Where no scene names a file, none of what reads tables is loaded.
         from shoal.table import load_table
 
         found = load_table(folder / self.path, largest=LARGEST)
         times, values = found.numbers(self.time), found.numbers(self.column)
         told = np.isfinite(times) & np.isfinite(values)
-        pace = self._factor("time_scale", self.time, found.units, TIMES)
-        factor = self._factor("scale", self.column, found.units, SI | dict.fromkeys(_COHERENT, 1.0))
+        pace = self._factor("time_scale", self.time, found.units, ("a time", TIMES))
+        factor = self._factor("scale", self.column, found.units, _MEASURES.get(field, ("a number", SI)))
         rows = np.column_stack([pace * times - self.start, factor * values])[told]
+        if field != "elastic":
+            self._check_start(rows[:, 0])
         return {"table": rows.tolist(), "smooth": self.smooth}
 
-    def _factor(self, field: str, column: str, units: Units | None, known: Mapping[str, float]) -> float:
-        """What is stated, or else what the table says of a column."""
+    def _check_start(self, times: np.ndarray) -> None:
+        """Refuse a motion of which the table tells nothing: times [s] of the motion.
+
+        It begins at the table's end, or more than the table's length before it and nobody said so.
+        """
+        if len(times) < 2 or np.any(np.diff(times) <= 0.0):  # refused by the table itself
+            return
+        first, last = times[0], times[-1]
+        if last <= 0.0 or (first > last - first and "start" not in self.model_fields_set):
+            raise InputError(
+                f"start: the motion begins at {self.start:g} s of a table that covers {first + self.start:.10g} s to "
+                f"{last + self.start:.10g} s; state `start`, a time of the table [s]"
+            )
+
+    def _factor(self, field: str, column: str, units: Units | None, measure: tuple[str, Mapping[str, float]]) -> float:
+        """What is stated, or else what the table says of a column; measure: what it is, and the units of that."""
+        what, known = measure
         unit = units.of.get(column, "") if units else ""
         if field in self.model_fields_set or units is None or not unit:
             return float(getattr(self, field))
+        if unit not in known and unit in (*SI, *TIMES):
+            raise InputError(f"row {units.row}, column {column!r}: {unit!r} is no unit of {what}; state `{field}`")
         if unit not in known:
             raise InputError(f"row {units.row}, column {column!r}: unit {unit!r} is not known here; state `{field}`")
         return known[unit]
@@ -63,7 +88,7 @@ def with_signals(data: Any, folder: Path, source: str) -> Any:
     """The fields of a scene with the signals that they name as tables. Raises InputError, one line with the field."""
     for path, field, stated in signals(data):
         try:
-            field[path[-1]] = Signal.model_validate(stated).table(folder)
+            field[path[-1]] = Signal.model_validate(stated).table(folder, path[-1])
         except ValidationError as error:
             raise one_line(error, f"{source}: {'.'.join(path)}") from None
         except InputError as error:
