@@ -75,6 +75,20 @@ def test_a_ring_stays_closed_and_moves_by_the_push_it_gets() -> None:
     assert centre == pytest.approx(force * end / (LINE * LENGTH) * (0.2 - end / 2), rel=2e-2)
 
 
+def test_a_ring_that_spins_turns_about_its_centre() -> None:
+    """It is wider by rho (rate R)^2 / E of its radius and turns so much more slowly, about which it then swings."""
+    rate, stop = 20.0, 0.1
+    start = {"ring": {"position": [0.0, 0.0], "velocity": [rate * RADIUS, 0.0], "rate": rate}}
+    solver = {"duration": stop, "step": 2e-5}
+    run = verified(get_engine("gauss"), ring("ancf-quintic", 12, initial=start, solver=solver))
+    assert run.ok, run.message
+    seam, top = run.marker("seam"), run.marker("top")
+    assert (seam + top) / 2 == pytest.approx(np.tile([0.0, RADIUS], (len(seam), 1)), abs=1e-6)
+    wider = DENSITY * (rate * RADIUS) ** 2 / YOUNG
+    turned = np.array([np.sin(rate * stop), -np.cos(rate * stop)])
+    assert (seam[-1] - [0.0, RADIUS]) / RADIUS == pytest.approx(turned, abs=5 * wider * rate * stop)
+
+
 def test_a_rigid_body_is_not_joined_to_itself() -> None:
     with pytest.raises(InputError, match="joins 'ring' to itself; a joint needs two bodies, or two places of a flex"):
         ring(bodies={"ring": {"kind": "rigid-body", "mass": 1.0, "inertia": 1.0, "named_points": {"a": [1, 0]}}},

@@ -16,6 +16,7 @@ from shoal.mechanics.plane import as_complex, phasor
 from shoal.mechanics.start.closure import Closure
 from shoal.mechanics.start.poses import ROUNDING, Assembly, Statement, stated
 from shoal.scene import PointMass, Scene
+from shoal.scene.joints import Tie
 from shoal.scene.record import Record
 
 SINGULAR = 1e-6
@@ -44,6 +45,9 @@ class Velocities:
         self.scene, self.lanes, self.poses = assembly.scene, assembly.lanes, poses
         self.closure = Closure(assembly.scene, poses)
         self.rows = self.closure.rows(poses)
+        # What closes a rod upon itself asks nothing of its rates; its rows are round-off.
+        joints = assembly.scene.joints.items()
+        self.rings = {name for name, j in joints if isinstance(j, Tie) and j.first.body == j.second.body}
         self.statements = stated(assembly.scene, assembly.lanes, ("rate", "velocity"))
         self.size, self.walk = assembly.size, assembly.walk
         self.guess = assembly.walk.poses(self.closure, poses[:, 2::3], assembly.rates)[1]
@@ -60,7 +64,7 @@ class Velocities:
         if without is None and not joint and self._easy():
             return Moving(self.guess, np.ones(self.lanes, dtype=bool), [])
         given = [one for one in self.statements if one is not without]
-        keep = [k for k, name in enumerate(self.rows.names) if name != joint]
+        keep = [k for k, name in enumerate(self.rows.names) if name != joint and name not in self.rings]
         lower = np.asarray(np.linalg.cholesky(_metric(self.scene, self.poses, self.size)), dtype=float)
         basis = _Basis(lower, self.guess)
         ok, broken = np.ones(self.lanes, dtype=bool), []
