@@ -46,6 +46,14 @@ def test_data_from_exudyns_fine_mesh_lie_within_the_intervals(name: str) -> None
         assert found.value + found.correction == pytest.approx(true, abs=1e-4)
 
 
+def test_where_nothing_can_be_simulated_the_reason_is_told() -> None:
+    problem, measurement = data("paper-case-1")
+    strict = problem.model_copy(update={"values": {**problem.values, "solver.energy_tolerance": 1e-12}})
+    estimate = identify(strict, method="least-squares", measurement=measurement)
+    assert estimate.verdict is Verdict.FAILED
+    assert "no parameter set could be simulated (energy is off by" in estimate.message
+
+
 def test_both_elbow_branches_are_looked_at() -> None:
     estimate = run("paper-case-1", "least-squares")
     assert len(estimate.minima) == 1

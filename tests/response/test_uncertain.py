@@ -100,6 +100,19 @@ def test_wrong_input_is_named(vary: list[str], names: str) -> None:
         uncertain("single-pendulum", vary)
 
 
+@pytest.mark.parametrize("head", ["", "# of 12 balls\nspeed\n"])
+def test_observations_are_a_column_with_or_without_its_name(head: str, tmp_path: Path) -> None:
+    """A ball goes as far in a second as its speed, drawn from the column, says: mean and deviation are of the data."""
+    data = np.linspace(0.8, 1.3, 12) ** 2
+    (tmp_path / "speed.csv").write_text(head + "\n".join(str(float(x)) for x in data))
+    ball = {"name": "ball", "bodies": {"b": {"kind": "point-mass", "mass": 1.0}}, "markers": {"b": {"body": "b"}},
+            "initial": {"b": {"position": [0, 0], "velocity": [1, 0]}}}  # fmt: skip
+    found = uncertain(Scene.parse(ball), [f"initial.b.velocity.0~empirical({tmp_path / 'speed.csv'})"], [1.0])
+    assert found.statistics is not None
+    assert found.column("b", "x", found.statistics.mean)[0] == pytest.approx(np.mean(data), rel=1e-9)
+    assert found.column("b", "x", found.statistics.std)[0] == pytest.approx(np.std(data), rel=1e-9)
+
+
 def test_the_command_prints_what_the_contract_says(tmp_path: Path) -> None:
     out = tmp_path / "bounds.csv"
     words = ["uncertain", "single-pendulum", "--vary", "initial.OA.angle=-0.1:0.1", "--at", "0.5,1", "--json"]

@@ -112,7 +112,8 @@ def conclude(
     if possible:
         judgement = judge(model, found, seen, at, tests, values, unknown)
     else:
-        message = "no parameter set could be simulated; look at the bounds and the scene"
+        why = f" ({model.failure})" if model.failure else ""
+        message = f"no parameter set could be simulated{why}; look at the bounds and the scene"
         judgement = Judgement(Verdict.FAILED, message)
     ended = outcome.ended and judgement.verdict is not Verdict.UNFINISHED
     better = judgement.better or (unless_late(lambda: _lower(model, outcome, profiled), None) if ended else None)

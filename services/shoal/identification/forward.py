@@ -70,6 +70,8 @@ class ForwardModel:
     """Simulated time over that of one run of all recordings: full-run equivalents."""
     refusal: str = field(init=False, default="")
     """Why a simulation was refused, if one was."""
+    failure: str = field(init=False, default="")
+    """Why a simulation failed, if one did."""
     reached: tuple[float, float, Array] = field(init=False, default=(0.0, np.inf, np.empty(0)))
     """Of the longest part of the recordings that was fitted: its end [s], the best fitness on it, and the point."""
 
@@ -209,6 +211,9 @@ class ForwardModel:
         seen = without_turns(seen, channels)[:, len(instants) - len(times) :]
         failed = np.array([status is not Status.OK for status in trajectory.status])
         seen[np.broadcast_to(failed, len(seen))] = np.nan
+        if np.any(failed):
+            asked = self.whole or self
+            self.failure = asked.failure = asked.failure or trajectory.message
         return seen
 
     def _run(

@@ -242,12 +242,22 @@ def _distribution(name: str, text: str) -> Marginal:
 
 def _empirical(name: str, file: str, text: str) -> Marginal:
     try:
-        data = np.loadtxt(Path(file), delimiter=",", comments="#", ndmin=1, dtype=float)
+        lines = [line for line in Path(file).read_text().splitlines() if line.strip() and not line.startswith("#")]
+        data = np.loadtxt(lines[_is_name(lines) :], delimiter=",", ndmin=1, dtype=float)
     except (OSError, ValueError) as error:
         raise InputError(f"vary: {name}~{text}: cannot read one column of numbers: {error}") from None
     if data.ndim != 1 or len(data) < EVERYTHING or not np.isfinite(data).all() or np.ptp(data) == 0:
         raise InputError(f"vary: {name}~{text}: needs one column of at least {EVERYTHING} different finite numbers")
     return Empirical(np.asarray(data, dtype=float), text)
+
+
+def _is_name(lines: list[str]) -> bool:
+    """Whether the first line of a column names it."""
+    try:
+        float(lines[0].split(",")[0]) if lines else None
+    except ValueError:
+        return True
+    return False
 
 
 def _positive(what: str, value: float) -> float:
