@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shoal
+from scipy.integrate import solve_ivp
 from shoal.errors import InputError
 from shoal.scene import Scene
 
@@ -65,6 +66,35 @@ def test_lanes_in_space_are_runs_of_their_own(path: str, values: list[float]) ->
     for lane, value in enumerate(values):
         alone = shoal.simulate(scene, times=[0.1], values={path: value}, verify=False)
         assert found.positions["load"][lane] == pytest.approx(alone.points[-1, 1, :, 0], abs=1e-12)
+
+
+def test_one_of_three_principal_moments_differs_from_lane_to_lane() -> None:
+    """Euler: a body that spins about its first axis, and a little about the others, by the moments of each lane."""
+    moments, spin, values = np.array([0.02, 0.024, 0.03]), [4.0, 0.2, 0.1], np.array([0.015, 0.022])
+    body = {"kind": "rigid-body", "mass": 1.0, "inertia": moments.tolist(), "named_points": {"tip": [0.0, 0.3, 0.0]}}
+    scene = Scene.parse(
+        {
+            "name": "tumbling",
+            "dimensions": 3,
+            "gravity": [0.0, 0.0, 0.0],
+            "bodies": {"body": body},
+            "markers": {"tip": {"body": "body", "point": "tip"}},
+            "initial": {"body": {"position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0], "spin": spin}},
+            "solver": {"duration": 1.0},
+        }
+    )
+    found = shoal.sweep(scene, {"bodies.body.inertia.0": values}, verify=False)
+    assert found.ok
+    for lane, value in enumerate(values):
+        own = np.array([value, *moments[1:]])
+
+        def slope(_: float, y: np.ndarray, own: np.ndarray = own) -> np.ndarray:
+            turn, rate = y[:9].reshape(3, 3), y[9:]
+            cross = np.array([[0.0, -rate[2], rate[1]], [rate[2], 0.0, -rate[0]], [-rate[1], rate[0], 0.0]])
+            return np.concatenate([(turn @ cross).ravel(), -np.cross(rate, own * rate) / own])
+
+        end = solve_ivp(slope, (0.0, 1.0), [*np.eye(3).ravel(), *spin], rtol=1e-12, atol=1e-13).y[:9, -1]
+        assert found.positions["tip"][lane] == pytest.approx(0.3 * end.reshape(3, 3)[:, 1], abs=1e-8)
 
 
 @pytest.mark.parametrize("path", ["bodies.rod.modal_stiffness.0.0", "bodies.rod.modes.0.translation.1"])

@@ -62,7 +62,10 @@ class RigidBody(Record):
         """Inertia about the centre of mass in the body's frame [kg m^2], (3, 3), or (3, 3, lanes)."""
         if not isinstance(self.inertia, tuple):
             return np.multiply.outer(np.eye(3), self.inertia)
-        return np.array(self.inertia) if isinstance(self.inertia[0], tuple) else np.diag(self.inertia)
+        if isinstance(self.inertia[0], tuple):
+            return np.array(self.inertia)
+        moments = np.stack(np.broadcast_arrays(*self.inertia))
+        return np.einsum("ij,i...->ij...", np.eye(3), moments)
 
     @property
     def points(self) -> dict[str, Vector]:

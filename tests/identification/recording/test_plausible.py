@@ -62,6 +62,14 @@ def test_what_may_be_is_let_through(tmp_path: Path, kind: str) -> None:
     measure(problem(recorded(tmp_path, kind, 1.4, 1.6), kind), SCENE)
 
 
+def test_single_outliers_are_no_sign_of_degrees(tmp_path: Path) -> None:
+    path = recorded(tmp_path, "angle")
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    table[4::9, 2] += 20.0
+    np.savetxt(path, table, delimiter=",", header="t,a,b", comments="")
+    measure(problem(path, "angle"), SCENE)
+
+
 @pytest.mark.parametrize("kind", ["angle", "position"])
 def test_a_channel_that_stands_still_is_named_before_any_search(tmp_path: Path, kind: str) -> None:
     with pytest.raises(InputError, match=r"column '[by]' is constant .* moves in the model"):

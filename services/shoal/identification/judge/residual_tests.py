@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.noise import noise_of
@@ -29,6 +30,8 @@ _HARDLY = 0.3
 _MOSTLY = 0.5
 """Of the signal: a residual above this may be noise, but nobody said so."""
 _OUTLIER = 5.0
+_FEW = 0.1
+"""Of the samples: so many outliers a robust loss may set aside."""
 _DIGITS = 1e-12
 """Of the data: no deviation below is held against a model, as a motion is computed to this tolerance by default."""
 _MAD = 1.4826
@@ -143,12 +146,16 @@ def residual_tests(
     """Test the residuals (rows,) of an answer; blocks, noise: as estimated with it.
 
     mesh: size of the model's own error; refined: residuals (rows,) that the answer of a better mesh and theory would
-    leave, whose whiteness is then what counts
+    leave, whose whiteness is then what counts. With a loss that lets outliers weigh less, they count as zero here.
     """
     measured = [(b, n) for b, n in zip(blocks, noise, strict=True) if not b.known]
     rows = np.concatenate([block.rows for block, _ in measured])
-    left = residual if refined is None else refined
-    size, smaller = (float(np.sqrt(np.mean(r[rows] ** 2))) for r in (residual, left))
+    outlying = [_outlying(residual[block.rows]) for block, _ in measured]
+    counted = np.ones(len(residual))
+    if model.problem.loss != "squares" and np.mean(np.concatenate(outlying)) <= _FEW:
+        counted[rows[np.concatenate(outlying)]] = 0.0
+    left = counted * (residual if refined is None else refined)
+    size, smaller = (float(np.sqrt(np.sum(r[rows] ** 2) / np.sum(counted[rows]))) for r in (counted * residual, left))
     seen = model.rows.noise if model.rows.noise is not None else _without_model(model)
     # Chi-square with as many samples as the residual's memory leaves independent for its variance (Bartlett 1935),
     # less the parameters.
@@ -157,7 +164,6 @@ def residual_tests(
     beyond = min(size, smaller) / max(float(np.hypot(seen, mesh)), 1e-300)
     whiteness = [ljung_box(left[block.rows]) for block, _ in measured]
     white = min(1.0, min(whiteness) * len(whiteness))
-    outlying = [_outlying(residual[block.rows]) for block, _ in measured]
     return ResidualTests(
         size=size,
         noise=seen,
@@ -167,7 +173,7 @@ def residual_tests(
         # A product overflows to infinity, which has chance zero; a power would raise OverflowError.
         chance_of_size=above_chi_square(freedom, freedom * beyond * beyond),
         chance_of_white=white,
-        outliers=sum(outlying),
+        outliers=int(sum(np.sum(part) for part in outlying)),
         rows=len(rows),
         unit=of_channels(model.measurement),
         excess=0.0 if white > _DOUBT else _excess([left[block.rows] for block, _ in measured], seen, mesh),
@@ -207,6 +213,6 @@ def _digits(number: float, digits: int) -> str:
     return f"{float(f'{number:.{digits}g}'):g}"
 
 
-def _outlying(residual: Array) -> int:
+def _outlying(residual: Array) -> npt.NDArray[np.bool_]:
     deviation = np.abs(residual - np.median(residual))
-    return int(np.sum(deviation > _OUTLIER * _MAD * max(float(np.median(deviation)), 1e-300)))
+    return np.asarray(deviation > _OUTLIER * _MAD * max(float(np.median(deviation)), 1e-300))

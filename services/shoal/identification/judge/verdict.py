@@ -124,7 +124,8 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
         best, *equals = (suspect.words for suspect in found if suspect.equals(found[0], tests.rows))
         reason += f" (as would {', '.join(equals)})" if equals else ""
         others = [suspect.words for suspect in found if suspect.words not in (best, *equals)][:_OTHERS]
-        advice.append(f"check the {' or the '.join([best, *equals])}, or seek it as a parameter")
+        seek = "" if found[0].kind == "data" else ", or seek it as a parameter"
+        advice.append(f"check the {' or the '.join([best, *equals])}{seek}")
         advice += [f"less likely: the {' or the '.join(others)}"] if others else []
     if (exchange := exchanged(model)) is not None:
         reason += f"; {exchange}"

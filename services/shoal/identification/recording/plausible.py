@@ -139,11 +139,15 @@ def _pace(times: Array, signal: Array) -> float | None:
 
 
 def _rate(times: Array, signal: Array, least: float) -> float:
-    """How fast a signal changes at most, but for a twentieth of the time, over steps of at least so many seconds."""
+    """How fast a signal changes at most, but for a twentieth of the time, over steps of at least so many seconds.
+
+    Of three samples in a row the middle one by size counts, so that single outliers do not.
+    """
     known = np.isfinite(signal)
     t, x = times[known], signal[known]
-    if len(t) < 3:
+    if len(t) < 4:
         return 0.0
+    t, x = t[1:-1], np.median(np.stack([x[:-2], x[1:-1], x[2:]]), axis=0)
     every = max(1, math.ceil(least / float(np.median(np.diff(t)))))
     t, x = t[::every], x[::every]
     return float(np.percentile(np.abs(np.diff(x) / np.diff(t)), 95)) if len(t) > 1 else 0.0

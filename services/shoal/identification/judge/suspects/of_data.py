@@ -1,15 +1,17 @@
-"""Other readings of the recorded numbers: units, mirrored and exchanged axes."""
+"""Other readings of the recorded numbers: units, mirrored and exchanged axes, turned signs and exchanged columns."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.size import size_of
 from shoal.identification.recording.measurement import Recording
+from shoal.identification.recording.source import Channel, units_of
 from shoal.trajectory import Array
 
 _UNITS = (1e3, 1e2, 25.4, float(np.degrees(1.0)))
@@ -21,6 +23,8 @@ _SWINGS = (0.3, 60.0)
 """Time is read in a unit in which a record lasts so many radians of a swing."""
 _TURNS = (0.02, 100.0)
 """Angles are read in a unit in which they go so far [rad]."""
+_PAIRS = 12
+"""Columns that are exchanged, at most."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,27 @@ def of_data(model: ForwardModel) -> Iterator[Reading]:
     if "angle" in kinds:
         mirrored = _read(model, _scaled({"angle", "rate"}, -1.0))
         yield Reading("sense of the angles", "mirrored, it", mirrored, -1.0)
+    yield from _of_columns(model, [*{c.name: c for run in runs for c in run.channels}.values()])
+
+
+def _of_columns(model: ForwardModel, channels: list[Channel]) -> Iterator[Reading]:
+    """Single channels beside others with the sign turned, and pairs of a kind whose columns are exchanged."""
+    others = [c for c in channels if not c.is_position]
+    turning = [c for c in others if c.quantity in ("angle", "rate")]
+    for channel in others if len(channels) > 1 else ():
+        if channel not in turning or len(turning) > 1:
+            turned = _read(model, _turned(channel.name))
+            yield Reading(f"sign of the {channel.name}", "turned, it", turned, -1.0)
+    pairs = [pair for pair in combinations(others, 2) if _of_a_kind(*pair)]
+    for one, other in pairs[:_PAIRS]:
+        swapped = _read(model, _swapped(one.name, other.name))
+        yield Reading(f"columns of {one.name} and {other.name}", "exchanged, they", swapped, -1.0)
+
+
+def _of_a_kind(one: Channel, other: Channel) -> bool:
+    """Whether columns may have been taken for each other: of one unit, and of one place or one quantity."""
+    alike = one.place == other.place or one.quantity == other.quantity
+    return alike and units_of(one.quantity) == units_of(other.quantity)
 
 
 def _largest(runs: Iterable[Recording], quantities: set[str]) -> float:
@@ -87,6 +112,23 @@ def _scaled(quantities: set[str], factor: float) -> Callable[[Recording], Record
     def change(run: Recording) -> Recording:
         factors = np.array([factor if channel.quantity in quantities else 1.0 for channel in run.channels])
         return replace(run, values=run.values * factors, noise=run.noise * np.abs(factors))
+
+    return change
+
+
+def _turned(name: str) -> Callable[[Recording], Recording]:
+    def change(run: Recording) -> Recording:
+        return replace(run, values=run.values * np.array([-1.0 if c.name == name else 1.0 for c in run.channels]))
+
+    return change
+
+
+def _swapped(one: str, other: str) -> Callable[[Recording], Recording]:
+    def change(run: Recording) -> Recording:
+        order, columns = {c.name: k for k, c in enumerate(run.channels)}, list(range(len(run.channels)))
+        if one in order and other in order:
+            columns[order[one]], columns[order[other]] = order[other], order[one]
+        return replace(run, values=run.values[:, columns], noise=run.noise[columns])
 
     return change
 
