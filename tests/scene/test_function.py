@@ -40,6 +40,12 @@ def test_values_and_round_trip(written: Any, expected: Any) -> None:
     assert motor.drive(np.float64(0.5)).shape == ()
 
 
+@pytest.mark.parametrize(("text", "value"), [("5", 5.0), (" -0.5 ", -0.5), ("1e-3", 1e-3), (".5", 0.5)])
+def test_the_text_of_a_number_is_that_number(text: str, value: float) -> None:
+    """`--set loads.motor.torque=5` gives text; what a number may do, such as be an input of a unit, it may too."""
+    assert Motor(drive=text).drive == Function(number=value)
+
+
 def test_expressions_keep_extended_precision() -> None:
     assert Function(expression="sin(t) + 1")(np.ones(2, dtype=np.longdouble)).dtype == np.longdouble
 

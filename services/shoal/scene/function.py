@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Self
@@ -16,6 +17,7 @@ from shoal.scene import formula
 from shoal.scene.record import Record
 
 Array = npt.NDArray[Any]
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _MOST_ROWS = 20_000
 
 
@@ -35,7 +37,8 @@ class Function(Record):
     @classmethod
     def _short_forms(cls, data: Any) -> Any:
         if isinstance(data, str):
-            return {"expression": data}
+            # What `--set` gives is text.
+            return {"number": float(data)} if _NUMBER.fullmatch(data.strip()) else {"expression": data}
         if isinstance(data, int | float) and not isinstance(data, bool):
             return {"number": data}
         if isinstance(data, dict) and "path" in data:
