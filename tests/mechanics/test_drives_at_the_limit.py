@@ -64,3 +64,25 @@ def test_a_wrong_angle_is_told_where_the_marker_rests() -> None:
     assert not run.ok
     assert "rad" in run.message
     assert run.model["verification"]["angle_error"] > 0.2
+
+
+def test_a_drive_that_asks_for_more_than_a_linkage_can_reach_is_named() -> None:
+    """A four-bar of 0.5, 0.6 and 0.4 m on 1 m: its crank stops where the other two rods lie in one line."""
+    lengths = {"a": 0.5, "b": 0.6, "c": 0.4}
+    bodies = {
+        name: {"kind": "rod", "length": length, "height": 0.02, "width": 0.02, "density": 7800.0}
+        for name, length in lengths.items()
+    }
+    ends = {name: {"body": name, "point": "end"} for name in lengths}
+    joints = {
+        "A": {"first": GROUND, "second": {"body": "a"}},
+        "B": {"first": ends["a"], "second": {"body": "b"}},
+        "C": {"first": ends["b"], "second": ends["c"]},
+        "D": {"first": {"body": "ground", "point": [1.0, 0.0]}, "second": {"body": "c"}},
+        "m": {"kind": "driven-angle", "first": GROUND, "second": {"body": "a"}, "angle": "1 + 2*t"},
+    }
+    start = {"a": {"angle": 1.0}, "c": {"angle": 1.9, "guess": ["angle"]}}
+    scene = {"name": "four-bar", "gravity": [0.0, 0.0], "bodies": bodies, "joints": joints, "initial": start}
+    run = get_engine("gauss").simulate(Scene.parse({**scene, "markers": {"B": ends["b"]}}))
+    assert not run.ok
+    assert run.message.endswith("or let the drives ask for no more than the joints can reach")

@@ -237,6 +237,22 @@ def test_rods_that_bend_far_are_not_believed() -> None:
     assert "use element: ancf-cable" in Verification(0.0, 0.0, 5.0 * error, bending_error=error).complaint
 
 
+def test_a_rod_that_turns_faster_than_it_vibrates_flies_apart_and_is_told_why() -> None:
+    """Kane, Ryan and Banerjee 1987: without the stiffness of tension; 3.516 sqrt(EI/m L^4) is the limit."""
+    first = 3.516 * np.sqrt(2e11 * 0.01**2 / 12 / 7800.0)
+    spin = {"kind": "driven-angle", "first": GROUND, "second": {"body": "hub"}, "angle": f"{2 * first}*ramp(t)*t"}
+    hub = {"hub": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.01}}
+    joints = {
+        "m": {"first": GROUND, "second": {"body": "hub"}},
+        "w": {"kind": "weld", "first": {"body": "hub"}, "second": {"body": "A"}},
+        "d": spin,
+    }
+    more = {"gravity": [0.0, 0.0], "solver": {"duration": 1.0, "samples": 4}}
+    found = get_engine("gauss").simulate(_rod(joints, bodies=hub | {"A": ROD}, **more))
+    assert not found.ok
+    assert found.message.endswith("; modal rods are right for small bending: use element: ancf-cable for more")
+
+
 BODY = load_scene("flexible-slider-crank").model_dump(mode="json")["bodies"]["rod"]
 
 

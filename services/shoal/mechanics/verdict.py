@@ -9,7 +9,8 @@ from shoal.mechanics.integrators import Choice, facts
 from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENERGY_SCALE, FARTHEST, REACHED, STEPS
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array, Flags
-from shoal.scene import Scene
+from shoal.scene import Function, Scene
+from shoal.scene.joints import Joint
 from shoal.trajectory import Status
 
 DRIFT_TOLERANCE = 1e-6
@@ -33,6 +34,10 @@ class Limits:
         """The machine's size [m]."""
         self.anchors = reaches.anchors(model.scene)
         """Where the ground holds the machine [m], (anchors, d, lanes) or (anchors, d, 1)."""
+        # Modal rods that turn faster than they vibrate fly apart, as they do not know that tension makes them stiff.
+        modal = any(body.element == "modal" for body in scene.bodies.values())
+        self._remark = "; modal rods are right for small bending: use element: ancf-cable for more" if modal else ""
+        self._driven = any(not _constant(joint) for joint in scene.joints.values()) or bool(scene.ground_points)
         self._weight = float(np.max(np.abs(model.weight), initial=0.0))
         stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
         self._still = self._weight * 1e-9 * self.span + 1e-12 * float(stiff)
@@ -63,7 +68,7 @@ class Limits:
         statuses, message = [Status.OK] * lanes, ""
         for lane in np.flatnonzero(~fine.all(axis=0) | failed):
             statuses[lane], reason = self._judged(choice, numbers[:, lane], float(reach[lane]), bool(failed[lane]))
-            message = message or reason
+            message = message or reason + self._remark
         return tuple(statuses), message
 
     def _judged(self, choice: Choice, numbers: Array, reach: float, failed: bool) -> tuple[Status, str]:
@@ -81,6 +86,8 @@ class Limits:
             )
         if not finite:
             advice = "no step is short enough for it" if adaptive else "use a smaller step"
+            if self._driven:
+                advice += ", or let the drives ask for no more than the joints can reach"
             return Status.DIVERGED, f"the motion is not finite; {advice}"
         if farthest > reach:
             return Status.OUT_OF_REACH, f"a marker is {farthest:.3g} m away, the reach is {reach:.3g} m"
@@ -89,3 +96,9 @@ class Limits:
         if not constraint_drift <= DRIFT_TOLERANCE:
             return Status.DRIFTED, f"constraints are violated by {constraint_drift:.2g} of the machine's size"
         return Status.OK, ""
+
+
+def _constant(joint: Joint) -> bool:
+    """Whether a joint has no part that a function of time moves."""
+    functions = (getattr(joint, field, None) for field in ("angle", "length", "value"))
+    return all(f.number is not None for f in functions if isinstance(f, Function))
