@@ -6,9 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shoal
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
 from shoal.engines import get_engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError
+from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.motion_state import states
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
@@ -62,6 +66,54 @@ def test_a_bent_blade_swings_as_its_modes_when_it_is_let_go() -> None:
     assert run.ok, run.message
     known = let_go(np.maximum(run.times - gone, 0.0))
     assert run.marker("tip")[:, 1] == pytest.approx(known, abs=5e-4 * FORCE * LENGTH**3 * 4 / (YOUNG * HEIGHT**4))
+
+
+def between_pins(apart: float, initial: Any = "statics", **fields: Any) -> Scene:
+    """A round wire of one metre between two pins that are so far apart."""
+    ends = {"a": ([0.0, 0.0], "start"), "b": ([apart, 0.0], "end")}
+    joints = {
+        name: {"first": {"body": "ground", "point": place}, "second": {"body": "wire", "point": end}}
+        for name, (place, end) in ends.items()
+    }
+    wire = {"kind": "rod", "section": "round", "length": 1.0, "height": 1e-3, "density": 7800.0,
+            "youngs_modulus": 2e11, "element": "ancf-cable", "elements": 16}  # fmt: skip
+    data = {"name": "wire", "gravity": [0.0, 0.0], "bodies": {"wire": wire}, "joints": joints}
+    data |= {"markers": {"middle": {"body": "wire", "point": [0.5, 0.0]}}, "initial": {"from": initial}}
+    return Scene.parse(data | {"solver": {"duration": 2e-3, "samples": 4}} | fields)
+
+
+def test_a_wire_that_two_pins_stretch_is_a_string() -> None:
+    """T = EA e, and the frequencies of a string that bends a little: n/2l sqrt(T/m) sqrt(1 + n^2 pi^2 EI/T l^2)."""
+    area, bending, apart = np.pi * 1e-6 / 4, 2e11 * np.pi * 1e-12 / 64, 1.002
+    tension, line = 2e11 * area * (apart - 1.0), 7800.0 * area / apart
+    scene = between_pins(apart)
+    assert statics(scene).reactions.joints["b"].force[0] == pytest.approx(tension, rel=1e-6)
+    n = np.arange(1, 4)
+    wanted = n / (2 * apart) * np.sqrt(tension / line * (1 + (n * np.pi / apart) ** 2 * bending / tension))
+    assert [mode.frequency for mode in modes(scene).modes[:3]] == pytest.approx(wanted, rel=1e-3)
+    run = verified(get_engine("gauss"), scene)
+    assert run.ok, run.message
+    assert run.marker("middle") == pytest.approx(np.tile([apart / 2, 0.0], (len(run.times), 1)), abs=1e-9)
+
+
+def test_a_wire_that_two_pins_press_is_an_elastica() -> None:
+    """With k = sin(a/2) of the angle a at its ends: chord 2 E/K - 1, height k/K of its length."""
+    chord = 0.98
+    k = brentq(lambda k: 2 * ellipe(k * k) / ellipk(k * k) - 1 - chord, 1e-3, 0.9)
+    assert abs(statics(between_pins(chord)).marker("middle")[1]) == pytest.approx(k / ellipk(k * k), rel=1e-3)
+
+
+def test_a_stretched_wire_goes_on_where_a_run_has_stretched_it() -> None:
+    """A pin that moves stretches it; the pin that stands where that one ended holds the same force."""
+    moving = {"x": "1 + 2e-3*ramp(t/0.02)"}
+    held = {"b": {"first": {"body": "ground", "point": "P"}, "second": {"body": "wire", "point": "end"}}}
+    scene = between_pins(1.0, None, ground_points={"P": moving}, solver={"duration": 0.05})
+    scene = scene.with_values({"joints": {**scene.model_dump(mode="json")["joints"], **held}})
+    end = dict(shoal.simulate(scene, verify=False).end)
+    later = scene.with_values({"ground_points.P.x": 1.002, "initial.from": end, "solver.duration": 1e-3})
+    run = get_engine("gauss").simulate(later)
+    assert run.ok, run.message
+    assert run.marker("middle")[:, 0] == pytest.approx(0.501, abs=1e-4)
 
 
 def test_a_mass_hangs_from_its_spring() -> None:

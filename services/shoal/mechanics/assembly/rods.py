@@ -22,7 +22,7 @@ def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: P
     inner: list[JointPoint] = []
     for point in mine:
         p = point.local(name)
-        if point.where is not None:
+        if point.where is not None and scene.initial_from is None:
             _check_fit(name, rod, pose.point(rod_axis(rod, p[0])), point, result)
         place = p[0] / rod.length * rod.elements
         node = int(np.rint(np.asarray(place).flat[0]))
