@@ -100,6 +100,20 @@ def test_wrong_input_is_named(vary: list[str], names: str) -> None:
         uncertain("single-pendulum", vary)
 
 
+def test_a_load_whose_scale_is_a_number_varies() -> None:
+    """x = F t^2 / 2m."""
+    ball = {"name": "ball", "gravity": [0, 0], "bodies": {"b": {"kind": "point-mass", "mass": 1.0}},
+            "markers": {"b": {"body": "b"}}, "initial": {"b": {"position": [0, 0]}},
+            "loads": {"f": {"kind": "force", "at": {"body": "b"}, "force": [2.0, 0.0], "scale": 1.0}}}  # fmt: skip
+    found = uncertain(Scene.parse(ball), ["loads.f.scale=-10%:20%"], [1.0])
+    assert found.bounds is not None
+    assert found.column("b", "x", found.bounds.lower)[0] == pytest.approx(0.9, abs=1e-9)
+    assert found.column("b", "x", found.bounds.upper)[0] == pytest.approx(1.2, abs=1e-9)
+    ball["loads"]["f"]["scale"] = "sin(t)"
+    with pytest.raises(InputError, match=r"loads.f.scale is 'a function of time', which is no number"):
+        uncertain(Scene.parse(ball), ["loads.f.scale=1:2"], [1.0])
+
+
 @pytest.mark.parametrize("head", ["", "# of 12 balls\nspeed\n"])
 def test_observations_are_a_column_with_or_without_its_name(head: str, tmp_path: Path) -> None:
     """A ball goes as far in a second as its speed, drawn from the column, says: mean and deviation are of the data."""

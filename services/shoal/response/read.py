@@ -16,7 +16,7 @@ from shoal.response.inputs import Correlations, Parameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
 from shoal.response.posterior import from_posterior, is_source
 from shoal.response.salib import from_salib, is_problem
-from shoal.scene import Scene
+from shoal.scene import Function, Scene
 from shoal.trajectory import Array
 
 FORM = "PATH=LOW:HIGH or PATH~normal(MEAN,SD) or the FILE.json of an estimate"
@@ -159,6 +159,8 @@ def _nominal(path: str, scene: Scene) -> float:
     value = scene.value(path)
     if value is None and path.startswith("initial."):
         return 0.0
+    if isinstance(value, Function):
+        value = value.number if value.number is not None else "a function of time"
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"vary: {path} is {value!r}, which is no number")
     if isinstance(value, int) and path.split(".")[-1] in ("elements", "samples", "max_steps"):
