@@ -153,10 +153,11 @@ def reactions_table(found: list[Reactions]) -> None:
             both = np.hstack([forces, torques])
             _exerted(f"joint forces {when}", ["fx [N]", "fy [N]", "torque [N m]"], reactions, both)
         if reactions.redundancy:
-            screen.say(
-                f"{reactions.redundancy} more than needed: least forces are shown; "
-                f"redundant: {', '.join(reactions.constraints) or 'none away from this position'}"
-            )
+            # Constraints of bodies, such as the unit length of a director, are no joints to a user.
+            among = ", ".join(dict.fromkeys(name for name in reactions.constraints if name in joints))
+            told = f"; among {among}" if among else ""
+            told = told if reactions.constraints else "; none away from this position"
+            screen.say(f"{reactions.redundancy} more than needed: least forces are shown{told}")
 
 
 def _exerted(title: str, headings: list[str], reactions: Reactions, values: Array) -> None:
