@@ -232,6 +232,35 @@ def heaviside(typing_context, x):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
+def inverse_below(typing_context, x, limit):  # type: ignore[no-untyped-def]
+    """1/x where a vector is below a limit, elsewhere 0."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        value, limit = arguments
+        one, zero = (ir.Constant(value.type, [number] * x.count) for number in (1.0, 0.0))
+        below = builder.fcmp_ordered("<", value, limit)
+        return builder.select(below, builder.fdiv(one, value, flags=_FLAGS), zero)
+
+    return x(x, limit), generate
+
+
+@intrinsic
+def zeros(typing_context, x):  # type: ignore[no-untyped-def]
+    """How many numbers of a vector are 0."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        (value,) = arguments
+        same = builder.fcmp_ordered("==", value, ir.Constant(value.type, [0.0] * x.count))
+        wide = ir.VectorType(ir.IntType(64), x.count)
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(ir.IntType(64), [wide]), f"llvm.vector.reduce.add.v{x.count}i64"
+        )
+        return builder.call(function, [builder.zext(same, wide)])
+
+    return types.int64(x), generate
+
+
+@intrinsic
 def _negative(typing_context, x):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         return builder.fneg(arguments[0])
