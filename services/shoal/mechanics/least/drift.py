@@ -11,10 +11,11 @@ from numba import njit
 
 from shoal.mechanics import constraints, saddle
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import many, projection
+from shoal.mechanics.least import many, projection, together
 from shoal.mechanics.least.work import GaussWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.mechanics.numerics.vector import clear
 
@@ -118,10 +119,17 @@ def _correct(tile: Tile, m: Arrays, w: GaussWork, x: Array, tolerance: float) ->
 
 @njit(cache=True, error_model="numpy")
 def _move(tile: Tile, m: Arrays, w: GaussWork, tolerance: float) -> None:
-    """The change into w.extra, as D^1/2 L' d, lane by lane."""
-    width = len(tile)
-    s = lane_work(m, w)
+    """The change into w.extra, as D^1/2 L' d."""
+    width, count, n = len(tile), m.constraints.size, m.unknowns
+    s, alone = lane_work(m, w), 0
     for lane in range(width):
+        if width % len(EIGHT) == 0 and lane % len(EIGHT) == 0:
+            rank = together.orthonormalise(w.group, count, n, width, lane, w.response, SETTLING * tolerance)
+            if rank != together.ALONE:
+                together.move(w.group, rank, count, n, width, lane, w.gap, w.extra)
+                alone = lane + len(EIGHT)
+        if lane < alone:
+            continue
         load_lane(width, lane, m, w, s, w.extra)
         for k in range(m.constraints.size):
             s.weights[k] = -w.gap[k * width + lane]

@@ -261,6 +261,36 @@ def zeros(typing_context, x):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
+def least(typing_context, x):  # type: ignore[no-untyped-def]
+    """The least number of a vector, of those that are numbers."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        (value,) = arguments
+        kind = ir.FunctionType(ir.DoubleType(), [value.type])
+        function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fmin.v{x.count}f64")
+        return builder.call(function, [value])
+
+    return types.float64(x), generate
+
+
+@intrinsic
+def larger(typing_context, x, y):  # type: ignore[no-untyped-def]
+    """The larger of the sizes |x| and |y|."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        kind = arguments[0].type
+        size, most = (
+            cgutils.get_or_insert_function(
+                builder.module, ir.FunctionType(kind, [kind] * count), f"llvm.{name}.v{x.count}f64"
+            )
+            for name, count in (("fabs", 1), ("maxnum", 2))
+        )
+        return builder.call(most, [builder.call(size, [value]) for value in arguments])
+
+    return x(x, y), generate
+
+
+@intrinsic
 def _negative(typing_context, x):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         return builder.fneg(arguments[0])
