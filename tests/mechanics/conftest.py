@@ -61,7 +61,7 @@ def force(tile, arrays, room):
 def project(tile, arrays, room, tolerance):
     """Make the state in `room` consistent."""
     w = raw(room)
-    drift.project(tile, raw(arrays), w.gauss, 0.0, w.z, w.zdot, tolerance, 3)
+    drift.project(tile, raw(arrays), w.gauss, 0.0, w.z, w.zdot, tolerance, 3, False)
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ import pytest
 from llvmlite import binding
 from numba import cfunc, njit, types
 from shoal.mechanics.numerics import simd
+from shoal.mechanics.numerics.arc import arctangent, turn
 from shoal.mechanics.numerics.pointers import pointer
 from shoal.mechanics.numerics.simd import EIGHT
 
@@ -85,6 +86,42 @@ def test_inverses_have_all_their_digits(lanes: tuple[int, ...]) -> None:
     out = np.empty((3, signs.size))
     _inverses(lanes, signs, out, signs.size)
     np.testing.assert_array_equal(out[1], signs >= 0)
+
+
+@njit(cache=True, error_model="numpy")
+def _chosen(lanes, x, limit, out, zeros, count):  # type: ignore[no-untyped-def]
+    x, limit, out = pointer(x), pointer(limit), pointer(out)
+    for at in range(0, count, len(lanes)):
+        simd.store(out, at, simd.inverse_below(simd.load(lanes, x, at), simd.load(lanes, limit, at)))
+        zeros[0] += simd.zeros(simd.load(lanes, x, at))
+
+
+@LENGTHS
+def test_inverses_below_a_limit_and_zeros(lanes: tuple[int, ...]) -> None:
+    x, limit = _pairs()
+    out, zeros = np.full(x.size, 7.0), np.zeros(1, dtype=np.int64)
+    _chosen(lanes, x, limit, out, zeros, x.size)
+    with np.errstate(divide="ignore", over="ignore", under="ignore"):
+        np.testing.assert_array_equal(out, np.where(x < limit, 1.0 / x, 0.0))
+    assert zeros[0] == np.sum(x == 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _arcs(lanes, x, out, count):  # type: ignore[no-untyped-def]
+    x, out = pointer(x), pointer(out)
+    for at in range(0, count, len(lanes)):
+        sine, cosine = turn(simd.load(lanes, x, at))
+        simd.store(out, at, sine)
+        simd.store(out, count + at, cosine)
+        simd.store(out, 2 * count + at, arctangent(simd.load(lanes, x, at)))
+
+
+@LENGTHS
+def test_arcs_sines_and_cosines_are_those_of_numpy(lanes: tuple[int, ...]) -> None:
+    x = np.concatenate([np.linspace(-np.pi / 2, np.pi / 2, 1022), [0.0, 1e-200]])
+    out = np.empty((3, x.size))
+    _arcs(lanes, x, out, x.size)
+    np.testing.assert_allclose(out, [np.sin(x), np.cos(x), np.arctan(x)], rtol=1e-15, atol=2e-16)
 
 
 @njit(cache=True)

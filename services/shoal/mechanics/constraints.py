@@ -19,6 +19,7 @@ from numba import njit
 
 from shoal.mechanics import functions
 from shoal.mechanics.functions import Functions
+from shoal.mechanics.numerics import simd
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
 POWERS = 3
@@ -61,15 +62,12 @@ def residual(tile: Tile, constraints: Constraints, drives: Functions, t: float, 
     width = len(tile)
     for k in range(constraints.size):
         drive = functions.evaluate(drives, constraints.drive[k], t, 0)
-        for lane in range(width):
-            value[k * width + lane] = constraints.constant[k * width + lane] + drive
+        total = simd.load(tile, constraints.constant, k * width) + drive
         for p in range(constraints.start[k], constraints.start[k + 1]):
-            left, right = constraints.left[p], constraints.right[p]
-            for lane in range(width):
-                product = constraints.factor[p * width + lane] * z[right * width + lane]
-                if left >= 0:
-                    product *= z[left * width + lane]
-                value[k * width + lane] += product
+            left, right = constraints.left[p] * width, constraints.right[p] * width
+            product = simd.load(tile, constraints.factor, p * width) * simd.load(tile, z, right)
+            total = total + (product * simd.load(tile, z, left) if left >= 0 else product)
+        simd.store(value, k * width, total)
         if constraints.turned[k] < constraints.turned[k + 1]:
             _add_angles(width, constraints, k, z, value)
 
@@ -93,8 +91,7 @@ def rates(tile: Tile, constraints: Constraints, drives: Functions, t: float, out
     width = len(tile)
     for k in range(constraints.size):
         drive = functions.evaluate(drives, constraints.drive[k], t, 1)
-        for lane in range(width):
-            out[k * width + lane] = drive
+        simd.store(out, k * width, simd.spread(tile, drive))
 
 
 @njit(cache=True, error_model="numpy")
@@ -105,12 +102,11 @@ def jacobian(tile: Tile, constraints: Constraints, z: Array, linear: float, out:
         out[i] = 0.0
     for r in range(constraints.parts):
         target, source = constraints.target[r] * width, constraints.source[r] * width
+        coefficient = simd.load(tile, constraints.coefficient, r * width)
         if source < 0:
-            for lane in range(width):
-                out[target + lane] += linear * constraints.coefficient[r * width + lane]
+            simd.add_to(out, target, linear * coefficient)
         else:
-            for lane in range(width):
-                out[target + lane] += constraints.coefficient[r * width + lane] * z[source + lane]
+            simd.add_to(out, target, coefficient * simd.load(tile, z, source))
 
 
 @njit(cache=True, error_model="numpy")
@@ -137,19 +133,13 @@ def bias(tile: Tile, constraints: Constraints, drives: Functions, t: float, zdot
     """eta = C_qq v v + C_tt, so that C_q a = -eta; out: (constraints, lanes). Derived rows of zdot must be filled."""
     width = len(tile)
     for k in range(constraints.size):
-        drive = functions.evaluate(drives, constraints.drive[k], t, 2)
-        for lane in range(width):
-            out[k * width + lane] = drive
+        total = simd.spread(tile, functions.evaluate(drives, constraints.drive[k], t, 2))
         for p in range(constraints.start[k], constraints.start[k + 1]):
-            left, right = constraints.left[p], constraints.right[p]
+            left, right = constraints.left[p] * width, constraints.right[p] * width
             if left >= 0:
-                for lane in range(width):
-                    out[k * width + lane] += (
-                        2.0
-                        * constraints.factor[p * width + lane]
-                        * zdot[left * width + lane]
-                        * zdot[right * width + lane]
-                    )
+                doubled = 2.0 * simd.load(tile, constraints.factor, p * width)
+                total = total + doubled * simd.load(tile, zdot, left) * simd.load(tile, zdot, right)
+        simd.store(out, k * width, total)
 
 
 @njit(cache=True, error_model="numpy")
@@ -170,9 +160,10 @@ def add_product(tile: Tile, constraints: Constraints, matrix: Array, x: Array, o
     """out += C_q x for the entries of a Jacobian; out: (constraints, lanes)."""
     width = len(tile)
     for k in range(constraints.size):
+        total = simd.load(tile, out, k * width)
         for e in range(constraints.entry[k], constraints.entry[k + 1]):
-            for lane in range(width):
-                out[k * width + lane] += matrix[e * width + lane] * x[constraints.column[e] * width + lane]
+            total = total + simd.load(tile, matrix, e * width) * simd.load(tile, x, constraints.column[e] * width)
+        simd.store(out, k * width, total)
 
 
 @njit(cache=True, error_model="numpy")
@@ -180,9 +171,9 @@ def subtract_transposed(tile: Tile, constraints: Constraints, matrix: Array, mul
     """out -= C_q' multiplier; out: (unknowns, lanes)."""
     width = len(tile)
     for k in range(constraints.size):
+        force = simd.load(tile, multiplier, k * width)
         for e in range(constraints.entry[k], constraints.entry[k + 1]):
-            for lane in range(width):
-                out[constraints.column[e] * width + lane] -= matrix[e * width + lane] * multiplier[k * width + lane]
+            simd.add_to(out, constraints.column[e] * width, -force * simd.load(tile, matrix, e * width))
 
 
 @njit(cache=True, error_model="numpy")

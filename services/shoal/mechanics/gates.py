@@ -19,6 +19,7 @@ from shoal.mechanics import compilation, dynamics
 from shoal.mechanics.dynamics import ACCELERATION, ALL, ELASTIC, SIMPLE, Work, instant
 from shoal.mechanics.elements import families
 from shoal.mechanics.least import drift
+from shoal.mechanics.least.principle import PROJECTION
 from shoal.mechanics.model import Arrays, Gates
 from shoal.mechanics.numerics import gate
 from shoal.mechanics.numerics.pointers import raw_type
@@ -75,23 +76,30 @@ def _motion(tile, pm, pw, t, z, zdot, tolerance, a, part):  # type: ignore[no-un
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def settle(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, iterations: int = 3) -> None:
-    """Remove the drift of a constrained model (nothing to do where sharing expressed every joint)."""
+def settle(
+    tile: Tile, m: Arrays, w: Work, t: float, tolerance: float, iterations: int = 3, found: bool = False
+) -> None:
+    """Remove the drift of a constrained model (nothing to do where sharing expressed every joint).
+
+    found: whether the accelerations of this very state are the last that were found
+    """
     if m.constraints.size > 0 and m.projects:
         t = instant(w, t)
-        gate.call(m.gates.settle, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, tolerance, iterations))
+        ready = found and m.gates.sought == 0 and m.method == PROJECTION
+        arguments = (gate.typed(m.home, m), gate.typed(w.home, w), t, tolerance, iterations, ready)
+        gate.call(m.gates.settle, (tile, *arguments))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def meet(tile: Tile, m: Arrays, w: Work, t: float, tolerance: float) -> None:
     """Let driven constraints take up their new rates at once: a plastic impact, the least change in the mass metric."""
-    gate.call(m.gates.settle, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, tolerance, 3))
+    gate.call(m.gates.settle, (tile, gate.typed(m.home, m), gate.typed(w.home, w), t, tolerance, 3, False))
 
 
 @njit(cache=True, error_model="numpy")
-def _settle(tile, pm, pw, t, tolerance, iterations):  # type: ignore[no-untyped-def]
+def _settle(tile, pm, pw, t, tolerance, iterations, ready):  # type: ignore[no-untyped-def]
     m, w = gate.load(pm), gate.load(pw)
-    drift.project(tile, m, w.gauss, t, w.z, w.zdot, tolerance, iterations)
+    drift.project(tile, m, w.gauss, t, w.z, w.zdot, tolerance, iterations, ready)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -135,7 +143,7 @@ _STATE_GATES: dict[str, Kernel] = {
     "motion": (_motion, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS, _COUNT)),
     "energies": (_energies, ()),
     "constrain": (_constrain, (_NUMBER, _ROWS, _ROWS, _NUMBER, _ROWS)),
-    "settle": (_settle, (_NUMBER, _NUMBER, _COUNT)),
+    "settle": (_settle, (_NUMBER, _NUMBER, _COUNT, _FLAG)),
 }
 """Gates of a whole state, and the types of their arguments after the tile and the two structures."""
 _FAMILY_GATES: dict[str, Kernel] = {

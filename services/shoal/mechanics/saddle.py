@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Collection, Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -50,10 +50,11 @@ class Saddle(NamedTuple):
 
 
 class SaddleWork(NamedTuple):
-    """Work space: the factor (slots, lanes) and a right-hand side (size, lanes)."""
+    """Work space: the factor (slots, lanes), a right-hand side (size, lanes) and a number: see `factor`."""
 
     values: Array
     x: Array
+    weak: Array
 
 
 def order(unknowns: int, entries: Iterable[tuple[int, int]], rows: list[list[int]]) -> list[int]:
@@ -123,39 +124,49 @@ def analyse(
 def factor(tile: Tile, s: Saddle, entries: int, jacobian: Array, w: SaddleWork, tolerance: float) -> int:
     """Factor the problem for a Jacobian (entries, lanes); returns how many rows were left out in some lane.
 
-    The factors are solved with by `sparse.solve`, the right-hand side ordered by place.
+    The factors are solved with by `sparse.solve`, the right-hand side ordered by place. They serve for the removal of
+    drift as well, unless some row is left out, now or by its tolerance: w.weak[0] is how many are.
     """
     simd.assign(w.values, s.base, s.slots * len(tile))
     for e in range(entries):
         copy(tile, w.values, s.slot[e], jacobian, e)
-    dropped: int = eliminate(tile, s.pattern, s.multiplier, w.values, tolerance)
-    return dropped
+    dropped, weak = eliminate(tile, s.pattern, s.multiplier, w.values, tolerance)
+    w.weak[0] = weak
+    return dropped  # type: ignore[no-any-return]
 
 
 @njit(cache=True, error_model="numpy")
-def eliminate(tile: Tile, p: sparse.Pattern, multiplier: Index, values: Array, tolerance: float) -> int:
-    """Replace a matrix with multipliers (slots, lanes) by its factors; returns how many rows were left out. Pointers.
+def eliminate(tile: Tile, p: sparse.Pattern, multiplier: Index, values: Array, tolerance: float) -> tuple[int, int]:
+    """Replace a matrix with multipliers (slots, lanes) by its factors. Pointers.
 
-    The pivot of a multiplier is compared with what it is when only its coordinates are taken out.
+    The pivot of a multiplier is compared with what it is when only its coordinates are taken out. Returns how many rows
+    were left out, and how many would be by the tolerance SETTLED.
     """
-    width, dropped = len(tile), 0
+    width, dropped, weak = len(tile), 0, 0
     for k in range(p.size):
-        for lane in range(width if multiplier[k] else 0):
-            first, pivot = 0.0, values[k * width + lane]
-            for e in range(p.across[k], p.across[k + 1]):
-                taken = values[p.slot[e] * width + lane] ** 2 * values[p.other[e] * width + lane]
-                pivot -= taken
-                first += 0.0 if multiplier[p.other[e]] else taken
-            kept = pivot < -tolerance * first
-            dropped += 0 if kept else 1
-            values[k * width + lane] = 1.0 / pivot if kept else 0.0
-        pivots = sparse.finish_row(tile, p, values, k)
-        if not multiplier[k]:
-            simd.store(values, k * width, 1.0 / pivots)
+        first = _by_coordinates(tile, p, multiplier, values, k)
+        pivot = sparse.finish_row(tile, p, values, k)
+        if multiplier[k]:
+            simd.store(values, k * width, simd.inverse_below(pivot, -tolerance * first))
+            dropped += simd.zeros(simd.load(tile, values, k * width))
+            weak += simd.zeros(simd.inverse_below(pivot, -SETTLED * first))
+        else:
+            simd.store(values, k * width, 1.0 / pivot)
         sparse.start_column(tile, p, values, k)
-    return dropped
+    return dropped, weak
+
+
+@njit(error_model="numpy", forceinline=True)
+def _by_coordinates(tile: Tile, p: sparse.Pattern, multiplier: Index, values: Array, k: int) -> Any:
+    """What its coordinates take off the pivot of a multiplier; its row is not finished yet."""
+    taken = simd.spread(tile, 0.0)
+    for e in range(p.across[k], p.across[k + 1] if multiplier[k] else p.across[k]):
+        if not multiplier[p.other[e]]:
+            entry = simd.load(tile, values, p.slot[e] * len(tile))
+            taken = taken + entry * entry * simd.load(tile, values, p.other[e] * len(tile))
+    return taken
 
 
 def room(size: int, slots: int, width: int) -> SaddleWork:
     """Work space as arrays."""
-    return SaddleWork(np.zeros(slots * width), np.zeros(size * width))
+    return SaddleWork(np.zeros(slots * width), np.zeros(size * width), np.zeros(1))

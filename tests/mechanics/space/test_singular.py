@@ -40,16 +40,18 @@ def test_started_at_any_distance_from_the_singular_position(name: str, offset: f
 def test_an_integrator_keeps_its_order_when_started_at_the_singular_position(
     name: str, integrator: str, order: int
 ) -> None:
-    """A linkage that only its geometry lets move needs short steps: within one it leaves its conditions."""
+    """A linkage that only its geometry lets move needs short steps: within one it leaves its conditions.
+
+    From halving to halving the order differs where errors are small: what counts is the whole of two of them.
+    """
     machine, reference = MACHINES[name]
-    longest = 0.02 if name != "bennett" else 6e-4 if integrator == "leapfrog" else 4e-3
+    longest = 0.01 if name != "bennett" else 3e-4 if integrator == "leapfrog" else 2e-3
     exact = reference(0.0)(np.array([0.4]))
     errors = [
         np.abs(ends(machine(0.0), "A", [0.4], integrator=integrator, step=step, energy_tolerance=0.1) - exact).max()
-        for step in (longest, longest / 2, longest / 4)
+        for step in (longest, longest / 4)
     ]
-    slopes = np.diff(np.log(errors)) / np.log(0.5)
-    assert slopes[-1] > order - 0.35, f"errors {errors}"
+    assert np.log(errors[0] / errors[1]) / np.log(4.0) > order - 0.35, f"errors {errors}"
 
 
 @pytest.mark.parametrize("step", [0.02, 0.005, 0.00125])

@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics.elements.hermite import collect, curve
-from shoal.mechanics.numerics.arc import arctangent
-from shoal.mechanics.numerics.simd import root
+from shoal.mechanics.numerics.arc import arctangent, turn
+from shoal.mechanics.numerics.simd import inverse_root, reciprocal
 from shoal.mechanics.numerics.triples import across, cross
 from shoal.mechanics.numerics.tuples import dot, plus, times
 
@@ -23,19 +23,9 @@ BENDING = np.array([[0.5 - 0.5 / np.sqrt(3), 0.5], [0.5 + 0.5 / np.sqrt(3), 0.5]
 
 
 @njit(error_model="numpy", forceinline=True)
-def _turn(a):  # type: ignore[no-untyped-def]
-    """Sine and cosine of an angle up to a right one or so, by their series."""
-    s, c, d = a * a, 0.0 * a + 1.0, 0.0 * a + 1.0
-    for n in range(11, 0, -1):
-        c = 1.0 - s * c / ((2.0 * n) * (2.0 * n - 1.0))
-        d = 1.0 - s * d / ((2.0 * n) * (2.0 * n + 1.0))
-    return a * d, c
-
-
-@njit(error_model="numpy", forceinline=True)
 def _carry(d, t, tm):  # type: ignore[no-untyped-def]
     """A director carried from t to tm by the smallest rotation, and two factors for the way back."""
-    j = 1.0 / (1.0 + dot(t, tm))
+    j = reciprocal(1.0 + dot(t, tm))
     v = dot(d, tm) * j
     return plus(plus(d, -v, t), -v, tm), v, j
 
@@ -49,9 +39,10 @@ def _carry_back(m, d, t, tm, v, j):  # type: ignore[no-untyped-def]
 
 @njit(error_model="numpy", forceinline=True)
 def _slope(s):  # type: ignore[no-untyped-def]
-    """One over the length of a slope, and its direction."""
-    inverse = 1.0 / root(dot(s, s))
-    return inverse, times(inverse, s)
+    """One over the length of a slope, its direction, and its length."""
+    square = dot(s, s)
+    inverse = inverse_root(square)
+    return inverse, times(inverse, s), square * inverse
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -60,18 +51,18 @@ def _between(m1, m2, tm):  # type: ignore[no-untyped-def]
     m12 = cross(m1, m2)
     s, c = dot(tm, m12), 1.0 + dot(m1, m2)
     b = plus(m1, 1.0, m2)
-    ib = 1.0 / root(dot(b, b))
+    ib = inverse_root(dot(b, b))
     e = times(ib, b)
-    return 2.0 * arctangent(s / c), e, cross(tm, e), m12, s, c, ib
+    return 2.0 * arctangent(s * reciprocal(c)), e, cross(tm, e), m12, s, c, ib
 
 
 @njit(error_model="numpy", forceinline=True)
 def _bent(p, curl, tm):  # type: ignore[no-untyped-def]
     """At a point: 1/|r'|, t, t . L r'', h, 1/(1 + t . t_m), u, t x h, its part of the torsion, h - u t."""
-    ip, t = _slope(p)
+    ip, t, _ = _slope(p)
     tc = dot(t, curl)
     h = times(ip, plus(curl, -tc, t))
-    i = 1.0 / (1.0 + dot(tm, t))
+    i = reciprocal(1.0 + dot(tm, t))
     u = dot(h, tm) * i
     th = cross(t, h)
     return ip, t, tc, h, i, u, th, dot(tm, th) * i, plus(h, -u, t)
@@ -80,7 +71,7 @@ def _bent(p, curl, tm):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy", forceinline=True)
 def _section(phi, x, e0, f0):  # type: ignore[no-untyped-def]
     """The section at x, and sine and cosine of its turn from the one halfway."""
-    sa, ca = _turn(phi * (x - 0.5))
+    sa, ca = turn(phi * (x - 0.5))
     return plus(times(ca, e0), sa, f0), plus(times(ca, f0), -sa, e0), sa, ca
 
 
@@ -90,9 +81,9 @@ def strains(z, inverse):  # type: ignore[no-untyped-def]
     s1, d1, s2, d2 = z[3:6], z[6:9], z[12:15], z[15:18]
     chord = times(inverse, plus(z[9:12], -1.0, z[0:3]))
     pm, _ = curve(0.5, chord, s1, s2)
-    _, tm = _slope(pm)
-    _, t1 = _slope(s1)
-    _, t2 = _slope(s2)
+    _, tm, nm = _slope(pm)
+    _, t1, n1 = _slope(s1)
+    _, t2, n2 = _slope(s2)
     m1, _, _ = _carry(d1, t1, tm)
     m2, _, _ = _carry(d2, t2, tm)
     phi, e0, f0, _, _, _, _ = _between(m1, m2, tm)
@@ -104,7 +95,7 @@ def strains(z, inverse):  # type: ignore[no-untyped-def]
     q, kk = _bent(p, curl, tm)[7:9]
     e, f, _, _ = _section(phi, BENDING[1, 0], e0, f0)
     second = phi - q, dot(kk, e), dot(kk, f)
-    return (*first, *second, root(dot(s1, s1)) - 1.0, root(dot(pm, pm)) - 1.0, root(dot(s2, s2)) - 1.0)
+    return (*first, *second, n1 - 1.0, nm - 1.0, n2 - 1.0)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -114,19 +105,14 @@ def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
     r1, s1, d1, r2, s2, d2 = z[0:3], z[3:6], z[6:9], z[9:12], z[12:15], z[15:18]
     zero = times(0.0, r1)
     chord = times(inverse, plus(r2, -1.0, r1))
-    g, g1, g2 = zero, zero, zero
-    energy = 0.0 * inverse
-    for k in range(len(AXIAL)):
-        x, w = AXIAL[k, 0], AXIAL[k, 1]
-        p, _ = curve(x, chord, s1, s2)
-        n = root(dot(p, p))
-        strain = n - 1.0 - free[6 + k]
-        energy = energy + 0.5 * w * ea * strain * strain
-        g, g1, g2 = collect(x, times(w * ea * strain / n, p), zero, g, g1, g2)
     pm, _ = curve(0.5, chord, s1, s2)
-    im, tm = _slope(pm)
-    i1, t1 = _slope(s1)
-    i2, t2 = _slope(s2)
+    im, tm, nm = _slope(pm)
+    i1, t1, n1 = _slope(s1)
+    i2, t2, n2 = _slope(s2)
+    first, middle, last = n1 - 1.0 - free[6], nm - 1.0 - free[7], n2 - 1.0 - free[8]
+    outer, inner = AXIAL[0, 1] * ea, AXIAL[1, 1] * ea
+    energy = 0.5 * (outer * (first * first + last * last) + inner * (middle * middle))
+    g, g1, g2 = collect(0.5, times(inner * middle, tm), zero, zero, times(outer * first, t1), times(outer * last, t2))
     m1, v1, j1 = _carry(d1, t1, tm)
     m2, v2, j2 = _carry(d2, t2, tm)
     phi, e0, f0, m12, s, c, ib = _between(m1, m2, tm)
@@ -156,16 +142,16 @@ def gradient(z, stiff, free):  # type: ignore[no-untyped-def]
     by_e = plus(by_e, 1.0, cross(by_f, tm))
     by_tm = plus(by_tm, 1.0, cross(e0, by_f))
     by_b = across(by_e, e0, ib)
-    part = 2.0 * by_phi / (c * c + s * s)
+    part = 2.0 * by_phi * reciprocal(c * c + s * s)
     y, xx = part * c, -part * s
     by_tm = plus(by_tm, y, m12)
     by_m1 = plus(plus(by_b, y, cross(m2, tm)), xx, m2)
     by_m2 = plus(plus(by_b, y, cross(tm, m1)), xx, m1)
-    n1, a1, c1 = _carry_back(by_m1, d1, t1, tm, v1, j1)
-    n2, a2, c2 = _carry_back(by_m2, d2, t2, tm, v2, j2)
+    h1, a1, c1 = _carry_back(by_m1, d1, t1, tm, v1, j1)
+    h2, a2, c2 = _carry_back(by_m2, d2, t2, tm, v2, j2)
     by_tm = plus(plus(by_tm, 1.0, c1), 1.0, c2)
     g, g1, g2 = collect(0.5, across(by_tm, tm, im), zero, g, g1, g2)
     g1 = plus(g1, 1.0, across(a1, t1, i1))
     g2 = plus(g2, 1.0, across(a2, t2, i2))
     ends = times(inverse, g)
-    return energy, (-ends[0], -ends[1], -ends[2], *g1, *n1, *ends, *g2, *n2)
+    return energy, (-ends[0], -ends[1], -ends[2], *g1, *h1, *ends, *g2, *h2)

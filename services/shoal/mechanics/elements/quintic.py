@@ -25,7 +25,7 @@ from shoal.mechanics.elements.batch import (
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.strain import bend, reference, stretch
 from shoal.mechanics.numerics.pointers import shift
-from shoal.mechanics.numerics.simd import EIGHT, inverse_root, root, spread
+from shoal.mechanics.numerics.simd import EIGHT, inverse_root, reciprocal, root, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section
@@ -151,7 +151,7 @@ def _force(
     inverse = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 0)
     ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
     ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
-    length, none = 1.0 / inverse, spread(EIGHT, 0.0)
+    length, none = reciprocal(inverse), spread(EIGHT, 0.0)
     eta, lost, still = none, none, (none, none, none, none, none)
     x = component(tile, family, number, lane, ROWS, inverse, length, 0, z)
     y = component(tile, family, number, lane, ROWS, inverse, length, 1, z)

@@ -19,7 +19,7 @@ from numba import njit
 from shoal.mechanics.elements.hermite import collect, curve
 from shoal.mechanics.numerics.arc import arctangent
 from shoal.mechanics.numerics.pairs import cross, quarter
-from shoal.mechanics.numerics.simd import root
+from shoal.mechanics.numerics.simd import heaviside, inverse_root, reciprocal
 from shoal.mechanics.numerics.tuples import dot, plus, times
 
 STRAINS = 8
@@ -34,13 +34,13 @@ TURNED = 4.0 * (1.0 - 2.0 * BENDING[0, 0])
 @njit(error_model="numpy", forceinline=True)
 def _unit(d):  # type: ignore[no-untyped-def]
     """d/|d|."""
-    return times(1.0 / root(dot(d, d)), d)
+    return times(inverse_root(dot(d, d)), d)
 
 
 @njit(error_model="numpy", forceinline=True)
 def _by_angle(d):  # type: ignore[no-untyped-def]
     """The derivative of the angle of d."""
-    return times(1.0 / dot(d, d), quarter(d))
+    return times(reciprocal(dot(d, d)), quarter(d))
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -53,14 +53,14 @@ def _middle(z, inverse):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy", forceinline=True)
 def _between(e1, e2):  # type: ignore[no-untyped-def]
     """The angle from e1 to e2, below two right ones."""
-    return 2.0 * arctangent(cross(e1, e2) / (1.0 + dot(e1, e2)))
+    return 2.0 * arctangent(cross(e1, e2) * reciprocal(1.0 + dot(e1, e2)))
 
 
 @njit(error_model="numpy", forceinline=True)
 def _short(a, t):  # type: ignore[no-untyped-def]
     """1 - |r'|^2 where that is above 0, else 0."""
     g = 1.0 - a * a - t * t
-    return 0.5 * (g + root(g * g))
+    return g * heaviside(g)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -69,9 +69,9 @@ def _bent(p, m, tau):  # type: ignore[no-untyped-def]
     a, t = dot(m, p), cross(m, p)
     g = _short(a, t)
     x, y = a + g * g * g, t - tau
-    size = 1.0 / root(x * x + y * y)
+    size = inverse_root(x * x + y * y)
     cosine, sine = x * size, y * size
-    return a, t, cosine, sine, 2.0 * arctangent(sine / (1.0 + cosine)), size
+    return a, t, cosine, sine, 2.0 * arctangent(sine * reciprocal(1.0 + cosine)), size
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -137,9 +137,10 @@ def _back(p, e, along, across):  # type: ignore[no-untyped-def]
 @njit(error_model="numpy", forceinline=True)
 def _held(d, stiffness):  # type: ignore[no-untyped-def]
     """The energy of a director that is not of unit length, and its derivative."""
-    size = root(dot(d, d))
-    longer = stiffness * (size - 1.0)
-    return 0.5 * longer * (size - 1.0), times(longer / size, d)
+    square = dot(d, d)
+    inverse = inverse_root(square)
+    longer = square * inverse - 1.0
+    return 0.5 * stiffness * longer * longer, times(stiffness * longer * inverse, d)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -236,17 +237,17 @@ def _back_change(p, u, e, w, along, across, dalong, dacross):  # type: ignore[no
 @njit(error_model="numpy", forceinline=True)
 def _angle_change(s, u):  # type: ignore[no-untyped-def]
     """The change of `_by_angle` with that of s."""
-    square = 1.0 / dot(s, s)
+    square = reciprocal(dot(s, s))
     return plus(times(square, quarter(u)), -2.0 * dot(s, u) * square, _by_angle(s))
 
 
 @njit(error_model="numpy", forceinline=True)
 def _held_change(d, u, stiffness):  # type: ignore[no-untyped-def]
     """The change of what `_held` derives."""
-    size = root(dot(d, d))
-    t = times(1.0 / size, d)
+    inverse = inverse_root(dot(d, d))
+    t = times(inverse, d)
     grown = dot(t, u)
-    return plus(times(stiffness * grown, t), stiffness * (size - 1.0) / size, plus(u, -grown, t))
+    return plus(times(stiffness * grown, t), stiffness * (1.0 - inverse), plus(u, -grown, t))
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -18,7 +18,7 @@ from shoal.mechanics.elements.cubic import FULL_RULE, REDUCED_RULE
 from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, implement
 from shoal.mechanics.elements.spatial import bend
 from shoal.mechanics.elements.strain import stretch
-from shoal.mechanics.numerics.simd import EIGHT, inverse_root, spread
+from shoal.mechanics.numerics.simd import EIGHT, inverse_root, reciprocal, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section
@@ -140,9 +140,9 @@ def _force(
         rate, other = _at_both(xi, p0, p1, p2, p3, p4)
         turning, twisting = _at_both(xi, 2.0 * p1, 4.0 * p2, 6.0 * p3, 8.0 * p4, none)
         change, changing = _at_both(xi, l0, l1, l2, none, none)
-        by_a, by_b, by_c, more = bend(damped, 1.0 / here, b, c, rate, turning, change, ei * bending[g, 1], eta)
+        by_a, by_b, by_c, more = bend(damped, reciprocal(here), b, c, rate, turning, change, ei * bending[g, 1], eta)
         of_a, of_b, of_c, most = bend(
-            damped, 1.0 / there, b_there, c_there, other, twisting, changing, ei * bending[g, 1], eta
+            damped, reciprocal(there), b_there, c_there, other, twisting, changing, ei * bending[g, 1], eta
         )
         lost = lost + (more + most)
         even, odd, up, down = by_a + of_a, xi * (by_a - of_a), 2.0 * (by_b + of_b), (4.0 * xi) * (by_b - of_b)

@@ -11,7 +11,7 @@ from shoal.mechanics.elements.families import PLAN, Entry, Family, Kernel, imple
 from shoal.mechanics.elements.quintic import at_both, collect, component, nodal, recommended
 from shoal.mechanics.elements.spatial import bend
 from shoal.mechanics.elements.strain import stretch
-from shoal.mechanics.numerics.simd import EIGHT, inverse_root, spread
+from shoal.mechanics.numerics.simd import EIGHT, inverse_root, reciprocal, spread
 from shoal.mechanics.numerics.tile import Array, Number, Tile
 from shoal.scene import Rod
 from shoal.scene.sections import Section
@@ -39,7 +39,8 @@ def _dot(u, v):  # type: ignore[no-untyped-def]
 def _point(damped, p, c, u, v, axial, bending, eta):  # type: ignore[no-untyped-def]
     """Derivatives of the energy by p and by c at a point, and the power lost; u, v: rates of p and c."""
     square, rate = _dot(p, p), _dot(p, u)
-    flat, shrink = 1.0 / square, inverse_root(square)
+    shrink = inverse_root(square)
+    flat = shrink * shrink
     n, lost = stretch(damped, shrink, rate, spread(EIGHT, 1.0), axial, eta)
     turning, change = _dot(p, v) + _dot(c, u), _dot(c, v)
     by_a, m, by_c, more = bend(damped, flat, _dot(p, c), _dot(c, c), rate, turning, change, bending, eta)
@@ -68,7 +69,7 @@ def _force(
     inverse = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 0)
     ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
     ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
-    length, none = 1.0 / inverse, spread(EIGHT, 0.0)
+    length, none = reciprocal(inverse), spread(EIGHT, 0.0)
     eta, lost, still = none, none, (none, none, none, none, none)
     x = component(tile, family, number, lane, ROWS, inverse, length, 0, z)
     y = component(tile, family, number, lane, ROWS, inverse, length, 1, z)

@@ -67,7 +67,7 @@ def step(tile: Tile, scheme: Leapfrog, m: Arrays, w: Work, t: float, h: float) -
         gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         assign(w.zdot, w.stage, end)
         add_scaled(w.zdot, 0.5 * h, w.a, end)
-        gates.settle(tile, m, w, t + h, scheme.rank_tolerance)
+        gates.settle(tile, m, w, t + h, scheme.rank_tolerance, found=True)
     else:
         gates.acceleration(tile, m, w, t + h, w.z, w.zdot, scheme.rank_tolerance, w.a)
         add_scaled(w.zdot, 0.5 * h, w.a, end)

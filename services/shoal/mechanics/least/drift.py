@@ -1,68 +1,135 @@
-"""The removal of drift: the smallest change in the metric of the mass matrix that closes the constraints again."""
+"""The removal of drift: the smallest change in the metric of the mass matrix that closes the constraints again.
+
+Drift is small, and so is the way back. Where there are many constraints, the factors of its beginning serve for all of
+it, places and rates, and are renewed only where a change has left more than a hundredth of a gap.
+"""
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from shoal.mechanics import constraints, saddle
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import many, projection
+from shoal.mechanics.least import many, projection, together
 from shoal.mechanics.least.work import GaussWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
 from shoal.mechanics.numerics.vector import clear
 
 SETTLING = 100.0
 """Drift is removed along fewer directions than accelerations are held: those this much farther from singular."""
+CLOSED = 1e-15
+"""A gap of round-off."""
+SLOW, SMALL = 1e-2, 1e-10
+"""What is left of a gap after a change along directions that still serve; a gap that is near round-off."""
+LITTLE = 1e-13
+"""A gap of rates that the next step may remove."""
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def project(
-    tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, tolerance: float, iterations: int
+    tile: Tile,
+    m: Arrays,
+    w: GaussWork,
+    t: float,
+    q: Array,
+    v: Array,
+    tolerance: float,
+    iterations: int,
+    ready: bool,
 ) -> None:
-    """Move q and v back onto C = 0 and C_q v = -C_t by the smallest change in the mass metric."""
+    """Move q and v back onto C = 0 and C_q v = -C_t by the smallest change in the mass metric.
+
+    ready: whether the accelerations at q have just been found by the projection, whose directions are at hand.
+    """
+    ready, before = ready and m.saddle.size > 0 and w.saddle.weak[0] == 0.0, np.inf
     for _ in range(iterations):
         derive(tile, m.derived, q, m.unknowns, m.held_rows, False)
         constraints.residual(tile, m.constraints, m.functions, t, q, w.gap)
-        largest = 0.0
-        for k in range(m.constraints.size * len(tile)):
-            largest = max(largest, abs(w.gap[k]))
-        if largest < 1e-15:
+        now = _largest(tile, m, w)
+        if now < CLOSED:
             break
-        constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
+        if not (ready and (now < SLOW * before or now < SMALL)):
+            constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
+            _prepare(tile, m, w)
         _correct(tile, m, w, q, tolerance)
-    project_rates(tile, m, w, t, q, v, tolerance)
+        ready, before = m.saddle.size > 0, now
+    _project_rates(tile, m, w, t, q, v, tolerance, ready)
 
 
 @njit(cache=True, error_model="numpy")
 def project_rates(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, tolerance: float) -> None:
     """Move v back onto C_q v = -C_t by the smallest change in the mass metric."""
+    _project_rates(tile, m, w, t, q, v, tolerance, False)
+
+
+@njit(cache=True, error_model="numpy")
+def _project_rates(
+    tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, tolerance: float, ready: bool
+) -> None:
+    """The same; ready: whether directions are prepared near q. Twice with those, as a change leaves a little then."""
     derive(tile, m.derived, q, m.unknowns, m.held_rows, False)
     constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
-    constraints.rates(tile, m.constraints, m.functions, t, w.gap)
-    constraints.add_product(tile, m.constraints, w.jacobian, v, w.gap)
-    _correct(tile, m, w, v, tolerance)
+    if not ready:
+        _prepare(tile, m, w)
+    for again in range(2 if ready else 1):
+        constraints.rates(tile, m.constraints, m.functions, t, w.gap)
+        constraints.add_product(tile, m.constraints, w.jacobian, v, w.gap)
+        if again and _largest(tile, m, w) < LITTLE:
+            break
+        _correct(tile, m, w, v, tolerance)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _largest(tile: Tile, m: Arrays, w: GaussWork) -> float:
+    """The largest gap of all lanes; of those that are numbers."""
+    largest = 0.0
+    for k in range(m.constraints.size * len(tile)):
+        largest = max(largest, abs(w.gap[k]))
+    return largest
+
+
+@njit(cache=True, error_model="numpy")
+def _prepare(tile: Tile, m: Arrays, w: GaussWork) -> None:
+    """Take the directions of `_correct` from C_q in w.jacobian."""
+    if m.saddle.size > 0:
+        c = m.constraints
+        saddle.factor(tile, m.saddle, c.entry[c.size], w.jacobian, w.saddle, saddle.SETTLED)
+    else:
+        rows(tile, m, w)
 
 
 @njit(cache=True, error_model="numpy")
 def _correct(tile: Tile, m: Arrays, w: GaussWork, x: Array, tolerance: float) -> None:
-    """Change x by the smallest d in the mass metric with C_q d = -gap; C_q is in w.jacobian."""
+    """Change x by the smallest d in the mass metric with C_q d = -gap, along prepared directions."""
     width = len(tile)
+    for row in range(m.unknowns):
+        clear(tile, w.extra, row)
     if m.saddle.size > 0:
-        c = m.constraints
-        saddle.factor(tile, m.saddle, c.entry[c.size], w.jacobian, w.saddle, saddle.SETTLED)
-        for row in range(m.unknowns):
-            clear(tile, w.extra, row)
         many.solve(tile, m, w, w.extra, w.gap, w.extra, w.multiplier)
-        for i in range(m.unknowns * width):
-            x[i] += w.extra[i]
-        return
-    s = lane_work(m, w)
-    rows(tile, m, w)
+    else:
+        _move(tile, m, w, tolerance)
+        sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+    for i in range(m.unknowns * width):
+        x[i] += w.extra[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _move(tile: Tile, m: Arrays, w: GaussWork, tolerance: float) -> None:
+    """The change into w.extra, as D^1/2 L' d."""
+    width, count, n = len(tile), m.constraints.size, m.unknowns
+    s, alone = lane_work(m, w), 0
     for lane in range(width):
-        for i in range(m.unknowns):
-            w.extra[i * width + lane] = 0.0
+        if width % len(EIGHT) == 0 and lane % len(EIGHT) == 0:
+            rank = together.orthonormalise(w.group, count, n, width, lane, w.response, SETTLING * tolerance)
+            if rank != together.ALONE:
+                together.move(w.group, rank, count, n, width, lane, w.gap, w.extra)
+                alone = lane + len(EIGHT)
+        if lane < alone:
+            continue
         load_lane(width, lane, m, w, s, w.extra)
         for k in range(m.constraints.size):
             s.weights[k] = -w.gap[k * width + lane]
@@ -71,6 +138,3 @@ def _correct(tile: Tile, m: Arrays, w: GaussWork, x: Array, tolerance: float) ->
         projection.move(rank, s.rows, s.wanted, s.y)
         for i in range(m.unknowns):
             w.extra[i * width + lane] = s.y[i]
-    sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
-    for i in range(m.unknowns * width):
-        x[i] += w.extra[i]

@@ -11,10 +11,11 @@ from numba import njit
 from shoal.errors import InputError
 from shoal.mechanics import constraints, functions
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import alternatives, many, projection
+from shoal.mechanics.least import alternatives, many, projection, together
 from shoal.mechanics.least.work import GaussWork, LaneWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.simd import EIGHT
 from shoal.mechanics.numerics.tile import Array, Tile
 
 PROJECTION, BAUMGARTE = 0, 4
@@ -63,16 +64,30 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
     sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, a, 0)
     if m.method == BAUMGARTE:
         _stabilise(tile, m, w, t, q, v)
+    count, n, alone = m.constraints.size, m.unknowns, 0
+    orthogonal = m.method == PROJECTION or m.method == BAUMGARTE
+    turned = False
     for lane in range(width):
+        if width % len(EIGHT) == 0 and lane % len(EIGHT) == 0 and orthogonal:
+            rank = together.orthonormalise(w.group, count, n, width, lane, w.response, tolerance)
+            if 0 <= rank < count:
+                turned = turned or _turn(tile, m, w, v)
+                rank = rank if _are_redundant(tile, m, w, v, lane, rank) else together.ALONE
+            if rank != together.ALONE:
+                together.move(w.group, rank, count, n, width, lane, w.gap, a)
+                together.multipliers(w.group, rank, count, width, lane, w.multiplier)
+                alone = lane + len(EIGHT)
+        if lane < alone:
+            continue
         load_lane(width, lane, m, w, s, a)
-        count = m.constraints.size
         for k in range(count):
             s.weights[k] = -w.gap[k * width + lane]
-        if m.method == PROJECTION or m.method == BAUMGARTE:
+        if orthogonal:
             rank = projection.orthonormalise(s.rows, s.triangle, s.norms, s.order, tolerance)
             first = rank
             projection.components(rank, s.triangle, s.norms, s.order, s.weights, s.wanted)
             if rank < count:
+                turned = turned or _turn(tile, m, w, v)
                 rank = _add_third_derivatives(tile, m, w, s, t, v, lane, rank)
             projection.move(rank, s.rows, s.wanted, s.y)
             projection.multipliers(first, s.triangle, s.norms, s.order, s.wanted, s.weights)
@@ -88,15 +103,33 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
 
 
 @njit(cache=True, error_model="numpy")
+def _turn(tile: Tile, m: Arrays, w: GaussWork, v: Array) -> bool:
+    """dC_q/dt into w.turning."""
+    constraints.jacobian(tile, m.constraints, v, 0.0, w.turning)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _are_redundant(tile: Tile, m: Arrays, w: GaussWork, v: Array, lane: int, rank: int) -> bool:
+    """Whether the rows of a group beyond a rank add nothing by third derivatives; dC_q/dt is in w."""
+    c, n, width = m.constraints, m.unknowns, len(tile)
+    for number in range(rank, c.size):
+        if not together.third_derivative(c, w.group, rank, number, n, width, lane, v, w.turning, many.STILL, w.extra):
+            sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
+            if not together.depends(w.group, rank, n, width, lane, w.extra, projection.NEW):
+                return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
 def _add_third_derivatives(
     tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, t: float, v: Array, lane: int, rank: int
 ) -> int:
-    """Rows u' d3C/dt3 = 0 for the dependent combinations u of one lane; returns the new rank."""
+    """Rows u' d3C/dt3 = 0 for the dependent combinations u of one lane; returns the new rank. dC_q/dt is in w."""
     width = len(tile)
     count, n = m.constraints.size, m.unknowns
     c = m.constraints
     first = rank
-    constraints.jacobian(tile, c, v, 0.0, w.turning)
     for number in range(first, count):
         projection.dependence(number, first, s.triangle, s.norms, s.order, s.weights)
         target = 0.0
@@ -114,7 +147,7 @@ def _add_third_derivatives(
         sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.extra, 0)
         for i in range(n):
             s.row[i] = w.extra[i * width + lane]
-        rank = projection.extend(rank, s.rows, s.wanted, s.row, target, 1e-6)
+        rank = projection.extend(rank, s.rows, s.wanted, s.row, target, projection.NEW)
     return rank
 
 

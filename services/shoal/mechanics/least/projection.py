@@ -17,6 +17,9 @@ from numba import njit
 
 from shoal.mechanics.numerics.tile import Array, Index
 
+NEW = 1e-6
+"""What must be left of a row by third derivatives, as a part of its length, to add to the others."""
+
 
 @njit(error_model="numpy", forceinline=True)
 def dot(x: Array, y: Array) -> float:

@@ -8,6 +8,8 @@ import numpy as np
 from numba import carray, njit
 
 from shoal.mechanics import saddle
+from shoal.mechanics.least import together
+from shoal.mechanics.least.together import GroupWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.tile import Array, Index, Tile
@@ -46,6 +48,7 @@ class GaussWork(NamedTuple):
     gap: Array
     extra: Array
     lane: LaneWork
+    group: GroupWork
     saddle: SaddleWork
 
 
@@ -57,8 +60,8 @@ def work_space(width: int, m: Arrays) -> GaussWork:
     order = np.zeros(count, dtype=np.int64)
     first = np.zeros((count, n)), np.zeros((count, count)), np.zeros(count), order, np.zeros(count), np.zeros(count)
     lane = LaneWork(*first, np.zeros(n), np.zeros(n))
-    room = saddle.room(m.saddle.size, m.saddle.slots, width)
-    return GaussWork(jacobian, turning, response, gram, multiplier, gap, extra, lane, room)
+    group, room = together.room(width, count, n), saddle.room(m.saddle.size, m.saddle.slots, width)
+    return GaussWork(jacobian, turning, response, gram, multiplier, gap, extra, lane, group, room)
 
 
 @njit(cache=True, error_model="numpy")

@@ -232,6 +232,65 @@ def heaviside(typing_context, x):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
+def inverse_below(typing_context, x, limit):  # type: ignore[no-untyped-def]
+    """1/x where a vector is below a limit, elsewhere 0."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        value, limit = arguments
+        one, zero = (ir.Constant(value.type, [number] * x.count) for number in (1.0, 0.0))
+        below = builder.fcmp_ordered("<", value, limit)
+        return builder.select(below, builder.fdiv(one, value, flags=_FLAGS), zero)
+
+    return x(x, limit), generate
+
+
+@intrinsic
+def zeros(typing_context, x):  # type: ignore[no-untyped-def]
+    """How many numbers of a vector are 0."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        (value,) = arguments
+        same = builder.fcmp_ordered("==", value, ir.Constant(value.type, [0.0] * x.count))
+        wide = ir.VectorType(ir.IntType(64), x.count)
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(ir.IntType(64), [wide]), f"llvm.vector.reduce.add.v{x.count}i64"
+        )
+        return builder.call(function, [builder.zext(same, wide)])
+
+    return types.int64(x), generate
+
+
+@intrinsic
+def least(typing_context, x):  # type: ignore[no-untyped-def]
+    """The least number of a vector, of those that are numbers."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        (value,) = arguments
+        kind = ir.FunctionType(ir.DoubleType(), [value.type])
+        function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fmin.v{x.count}f64")
+        return builder.call(function, [value])
+
+    return types.float64(x), generate
+
+
+@intrinsic
+def larger(typing_context, x, y):  # type: ignore[no-untyped-def]
+    """The larger of the sizes |x| and |y|."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        kind = arguments[0].type
+        size, most = (
+            cgutils.get_or_insert_function(
+                builder.module, ir.FunctionType(kind, [kind] * count), f"llvm.{name}.v{x.count}f64"
+            )
+            for name, count in (("fabs", 1), ("maxnum", 2))
+        )
+        return builder.call(most, [builder.call(size, [value]) for value in arguments])
+
+    return x(x, y), generate
+
+
+@intrinsic
 def _negative(typing_context, x):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         return builder.fneg(arguments[0])
