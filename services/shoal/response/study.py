@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from shoal.response.inputs import BoolArray, Inputs
 from shoal.response.polynomials import size
 from shoal.response.runs import Model, Runs
 from shoal.trajectory import Array
+
+if TYPE_CHECKING:
+    from shoal.response.enclosure import Looked
 
 FINE_GAP = 1e-6
 """The gap that is aimed at where none is asked for: a share of the width."""
@@ -141,7 +144,7 @@ class Found:
     quantiles: that take the place of those of the runs, (levels, columns);
     errors: within which mean and deviation lie with 95 % confidence, (columns,) each;
     coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,);
-    linked: what tells some columns better than the surrogate
+    linked: what tells some columns better than the surrogate; looked: its bounds, where the method knows them
     """
 
     why: str
@@ -154,6 +157,7 @@ class Found:
     quantiles: Array | None = None
     errors: tuple[Array, Array] | None = None
     linked: Linked | None = None
+    looked: Looked | None = None
 
 
 Method = Callable[[Study], Found]
