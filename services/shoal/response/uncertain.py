@@ -49,6 +49,8 @@ from shoal.versions import versions
 
 CHECKED = 6
 """Extremal runs, or drawn ones, that are looked at by more careful runs."""
+LEFT = 0.25
+"""Share of a mesh error that twice as many elements leave, where it falls with the square of their size or faster."""
 UNRESOLVED = 1e-8
 """Runs that differ by less than this share of a limit's quantity differ by the errors of their steps."""
 NAMED = 3
@@ -228,11 +230,16 @@ def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, 
             machine.scene.with_values(given), lambda scene: verified(machine.engine, scene, machine.times)
         )
         if not careful.ok:
-            return mesh, step, f"a more careful run does not bear one out: {careful.message}"
+            return _whole(mesh), step, f"a more careful run does not bear one out: {careful.message}"
         estimated = careful.model.get("verification", {})
         mesh = larger(mesh, estimated.get("mesh_error"))
         step = larger(step, estimated.get("time_error"))
-    return mesh, step, ""
+    return _whole(mesh), step, ""
+
+
+def _whole(apart: float | None) -> float | None:
+    """The mesh error of runs that are so far from those on a mesh twice as fine [m], which has a share of it itself."""
+    return None if apart is None else apart / (1 - LEFT)
 
 
 def _keep(scene: Scene, times: Array, engine: str, checkpoint: Path | str | None, end: float | None) -> Keep:
