@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from shoal.response.enclosure import Enclosure, enclosure, foretold
+from shoal.response.enclosure import enclosure, foretold
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.result import Bounds
-from shoal.response.study import Found, Study
+from shoal.response.study import Enclosure, Found, Study
 from shoal.trajectory import Array
 
 DRAWN = 93

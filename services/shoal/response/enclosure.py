@@ -9,7 +9,6 @@ that, the attained bound is the bound.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -17,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from shoal.response.expansion import Expansion
 from shoal.response.extremes import Extremes, IntArray, Surrogate, extremes, in_parts, places
-from shoal.response.study import SAFETY, Study
+from shoal.response.study import SAFETY, Enclosure, Looked, Study
 from shoal.trajectory import Array
 
 Look = Literal["there", "scanned", "everywhere"]
@@ -25,17 +24,6 @@ ARMS = 1.0, 0.3, 0.1
 """Of the search for widened extremes, in lengths over which the margin grows to its full size."""
 ROUGH = 50
 """Change of the error of a surrogate that is no polynomial, in margins for every radian."""
-
-
-@dataclass(frozen=True)
-class Enclosure:
-    """Attained and outer bounds, (columns,); gap: their distance as a share of the width of the group, (columns,)."""
-
-    lower: Array
-    upper: Array
-    lower_outer: Array
-    upper_outer: Array
-    gap: Array
 
 
 def enclosure(
@@ -53,14 +41,6 @@ def enclosure(
     beyond = np.maximum(lower - low, high - upper)
     gap = np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0)
     return Enclosure(lower, upper, low, high, gap)
-
-
-@dataclass(frozen=True)
-class Looked:
-    """Bounds by so many runs."""
-
-    runs: int
-    told: Enclosure
 
 
 def looked_at(study: Study, surrogate: Surrogate, error: Array) -> Looked:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from shoal.response.inputs import BoolArray, Inputs
 from shoal.response.polynomials import size
 from shoal.response.runs import Model, Runs
 from shoal.trajectory import Array
-
-if TYPE_CHECKING:
-    from shoal.response.enclosure import Looked
 
 FINE_GAP = 1e-6
 """The gap that is aimed at where none is asked for: a share of the width."""
@@ -133,6 +130,25 @@ class Linked(Protocol):
     def variance(self) -> Array:
         """Of all columns, (columns,)."""
         ...
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """Attained and outer bounds, (columns,); gap: their distance as a share of the width of the group, (columns,)."""
+
+    lower: Array
+    upper: Array
+    lower_outer: Array
+    upper_outer: Array
+    gap: Array
+
+
+@dataclass(frozen=True)
+class Looked:
+    """Bounds by so many runs."""
+
+    runs: int
+    told: Enclosure
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.response.design import box_design
-from shoal.response.enclosure import Looked, enclosure, looked_at
+from shoal.response.enclosure import enclosure, looked_at
 from shoal.response.expansion import Expansion, fit
 from shoal.response.extremes import Extremes, extremes
 from shoal.response.polynomials import HIGHEST
 from shoal.response.runs import TooManyRunsError
 from shoal.response.screening import Screened, screened
-from shoal.response.study import FINE_GAP, Found, Study
+from shoal.response.study import FINE_GAP, Found, Looked, Study
 from shoal.trajectory import Array
 
 SHARE = 1.25
