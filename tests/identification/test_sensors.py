@@ -19,7 +19,7 @@ from shoal.engines import get_engine
 from shoal.engines.poses import initial_poses
 from shoal.errors import InputError
 from shoal.identification import Problem, identify, measure
-from shoal.identification.recording.felt import equipped, from_start
+from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.observation import Camera, observe
 from shoal.identification.recording.source import Channel
 from shoal.mechanics.start.start import complete
@@ -102,6 +102,28 @@ def test_an_imu_shows_acceleration_less_gravity_in_its_own_axes_and_the_rate(eng
     found = seen(pendulum(), (*IMU, GYRO), engine)
     np.testing.assert_allclose(found[:, :2], specific_force(*swing(), TILT), atol=accuracy)
     np.testing.assert_allclose(found[:, 2], swing()[1], atol=accuracy)
+
+
+@pytest.mark.parametrize("flexible", [False, True])
+def test_lanes_that_differ_in_a_table_feel_what_each_feels_alone(flexible: bool) -> None:
+    table = {"table": [[0.0, 1.0], [2.0, 1.0]], "smooth": False}
+    push = {"kind": "torque", "at": {"body": "rod"}, "torque": table}
+    scene, times = pendulum(loads={"push": push}), np.array([0.1, 0.2])
+    if flexible:
+        cable = {"bodies.rod.element": "ancf-cable", "bodies.rod.youngs_modulus": 1e9, "solver.step": 1e-5}
+        scene = scene.with_values({"markers.imu.point.1": 0.0, **cable})
+    channels = (IMU[0], Channel(joint="O", quantity="fx"))
+    values = {"loads.push.torque.table.1.1": np.array([1.0, 2.0])}
+    instants, here = from_start(times, channels), equipped(scene, channels)
+    options = asking(get_engine("gauss"), scene, channels)
+    motion = get_engine("gauss").simulate_many(here, values, instants, **options)
+    assert motion.ok, motion.message
+    found = observe(motion, channels, Camera(), scene, values)[:, 1:]
+    for lane, height in enumerate(values["loads.push.torque.table.1.1"].tolist()):
+        one = scene.with_values({"loads.push.torque.table.1.1": height})
+        alone = get_engine("gauss").simulate(equipped(one, channels), instants, **options)
+        np.testing.assert_allclose(found[lane], observe(alone, channels, Camera(), one)[0, 1:], rtol=1e-12)
+    assert np.max(np.abs(found[0] - found[1])) > 1e-3
 
 
 def test_mounting_turns_an_imu_further_and_biases_are_added() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.response import uncertain
 from shoal.response.allocation import cheapest, with_factors
+from shoal.response.allocation_of_both import Cut
+from shoal.response.allocation_of_both import cheapest as within
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.marginals import Frozen, Interval, Normal, Scaled, Uniform
 from shoal.response.worst import worst
@@ -98,6 +101,80 @@ def test_deviations_of_distributions() -> None:
         tight = np.ones(2)
         tight[k] = 0.99
         assert allocation.effects[k] == pytest.approx(1 - passed(tight) / passed(np.ones(2)), rel=0.15)
+
+
+@pytest.mark.parametrize("target", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
+def test_an_interval_and_a_deviation_together(target: float) -> None:
+    """h + v / 2 - 1.25 at 0.5 s, v normal(5, 0.3 s), h in 0.025 -+ 0.075 w: P(> 1.9) = Phi(-(0.625 - 0.075 w) / 0.15 s)
+    at the upper end, which is the target where 0.15 beta s + 0.075 w = 0.625: costs decide the shares.
+    """
+    found = uncertain(
+        *(Scene.parse(THROWN), {UP: "normal(5,0.3)", HEIGHT: (-0.05, 0.1), ALONG: (1.9, 2.1)}, [0.5]),
+        **dict[str, Any](limits=["P.y > 1.9"], limit_runs=2000, verify=False),
+        **dict[str, Any](allocate=True, target=target, costs={HEIGHT: 1.5}),
+    )
+    assert found.ok, found.message
+    allocation, room = found.allocation, 0.625
+    assert allocation is not None
+    weights, costs = np.array([-0.15 * stats.norm.ppf(target), 0.075]), np.array([1.0, 1.5])
+    best = room * np.sqrt(costs / weights) / np.sqrt(costs * weights).sum()
+    assert np.all(best < 3.0)
+    # A tenth of the probability is a hundredth of the index; what is not in the limit is as wide as it may be.
+    assert allocation.factors == pytest.approx([*best, 3.0], rel=2e-2)
+    assert target * 0.8 < allocation.confirmed <= target
+
+    def passed(deviation: float, width: float) -> float:
+        return float(stats.norm.sf((room - 0.075 * width) / (0.15 * deviation)))
+
+    assert allocation.stated == pytest.approx(passed(1, 1), rel=0.1)
+    effects = [1 - passed(0.99, 1) / passed(1, 1), 1 - passed(1, 0.99) / passed(1, 1), 0.0]
+    assert allocation.effects == pytest.approx(effects, rel=0.1, abs=1e-9)
+    told = allocation.to_json()
+    assert told["tighten_first"] == UP
+    assert told["probability_allocated"] == allocation.confirmed
+
+
+def test_the_cheapest_factors_within_cones() -> None:
+    """Sum(c / s) under pull @ s + beta |spread s| <= room for two corners, by a general optimiser from many starts."""
+    cuts = [
+        Cut(np.array([0.5, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.3, 0.0]), 3.0),
+        Cut(np.array([1.5, 0.0, 0.0, 0.0]), np.array([0.0, 0.2, 0.6, 0.0]), 3.5),
+    ]
+    costs, most, beta = np.array([1.0, 2.0, 1.0, 1.0]), np.full(4, 3.0), 3.0
+    found = within(cuts, costs, beta, most)
+    random = np.random.default_rng(1)
+    others = [
+        optimize.minimize(
+            lambda s: float(costs @ (1 / s)),
+            random.uniform(0.1, 0.6, 4),
+            bounds=[(1e-3, 3.0)] * 4,
+            method="trust-constr",
+            constraints=[
+                optimize.NonlinearConstraint(lambda s, one=one: one.used(s, beta), -np.inf, one.room) for one in cuts
+            ],
+            options={"xtol": 1e-10, "gtol": 1e-8, "maxiter": 3000},
+        )
+        for _ in range(2)
+    ]
+    assert float(costs @ (1 / found)) == pytest.approx(min(other.fun for other in others), rel=1e-4)
+    assert max(one.used(found, beta) - one.room for one in cuts) < 1e-6
+
+
+def test_an_interval_that_reaches_beyond_the_limit() -> None:
+    """The stated upper end passes it half of the times and more; narrower ones keep it."""
+    found = uncertain(
+        *(Scene.parse(THROWN), {UP: "normal(5,0.2)", HEIGHT: (-0.5, 0.5)}, [0.5]),
+        **dict[str, Any](limits=["P.y > 1.7"], limit_runs=600, verify=False, allocate=True, target=1e-2),
+    )
+    assert found.ok, found.message
+    assert found.allocation is not None
+    deviation, width = found.allocation.factors
+    assert -stats.norm.ppf(1e-2) * 0.1 * deviation + 0.5 * width == pytest.approx(0.45, rel=1e-2)
+    with pytest.raises(ComputationError, match="passed by the middle values"):
+        uncertain(
+            *(Scene.parse(THROWN), {UP: "normal(5,0.2)", HEIGHT: (-0.5, 0.5)}, [0.5]),
+            **dict[str, Any](limits=["P.y > 1.2"], limit_runs=600, verify=False, allocate=True, target=1e-2),
+        )
 
 
 def test_what_cannot_be_allocated_is_refused() -> None:

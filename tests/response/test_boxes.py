@@ -243,8 +243,6 @@ def test_what_cannot_be_asked_is_refused() -> None:
         uncertain(scene, vary, method="monte-carlo")
     with pytest.raises(InputError, match="needs an interval and a distribution"):
         uncertain(scene, {HEIGHT: (-0.05, 0.1)}, method="nested")
-    with pytest.raises(InputError, match="allocate: needs intervals or distributions"):
-        uncertain(scene, vary, limits=["P.y > 1.7"], allocate=True)
 
 
 def test_the_command_and_its_files(tmp_path: Path) -> None:

@@ -140,6 +140,25 @@ def test_energies_of_a_torsion_spring_that_is_wound_up() -> None:
     assert found.limits[1].margin == pytest.approx(100 - most, abs=1e-5)
 
 
+def test_a_parameter_that_is_a_number_in_a_table() -> None:
+    """A push of s along the guide and 2 s across, s the height of a table of one step, in [1, 2].
+
+    It draws the spring by s / k, about which the body swings.
+    """
+    data, times = oscillator(turned=False), np.array([0.1, 0.2, 0.3])
+    table = {"table": [[0.0, 1.5], [1.0, 1.5]], "smooth": False}
+    own = {"body": "P", "point": [0.0, 0.0]}
+    data["loads"]["push"] = {"kind": "force", "at": own, "force": [1.0, 2.0], "scale": table}
+    ends = {"loads.push.scale.table.0.1,loads.push.scale.table.1.1": (1.0, 2.0)}
+    limits = ["abs(guide.fy) > 5", "kinetic > 2", "P.x > 1"]
+    found = uncertain(Scene.parse(data), ends, times, limits=limits, verify=False)
+    assert found.ok, found.message
+    rate, swing = math.sqrt(20.0), 0.3 - np.array([[1.0], [2.0]]) / 40
+    assert found.limits[0].margin == pytest.approx(5 - 4, abs=1e-8)
+    assert found.limits[1].margin == pytest.approx(2 - np.max((rate * swing * np.sin(rate * times)) ** 2), abs=1e-6)
+    assert found.limits[2].margin == pytest.approx(1 - np.max(0.3 - swing + swing * np.cos(rate * times)), abs=1e-6)
+
+
 def oscillator(turned: bool) -> dict[str, Any]:
     """A body on a spring along x, drawn by 0.3 m, or on a torsion spring, wound up by 5 pi / 2."""
     ground, own = {"body": "ground", "point": [0.0, 0.0]}, {"body": "P", "point": [0.0, 0.0]}

@@ -4,128 +4,54 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from scipy import integrate, stats
+from scipy import stats
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal.response import uncertain
 from shoal.response.inputs import Inputs, Parameter
-from shoal.response.limits.choice import WAYS, Passing, probability
+from shoal.response.limits.choice import WAYS, probability
 from shoal.response.limits.estimate import weighted
 from shoal.response.limits.form import design_points
 from shoal.response.limits.limit import limit
 from shoal.response.limits.margins import Margins
-from shoal.response.marginals import Frozen, Normal, Uniform
+from shoal.response.marginals import Frozen, Uniform
 from shoal.response.read import parameters
 from shoal.response.runs import Answers
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
+from shoal_validation.uncertain.limits import MOST, STATES, margins, plane, repeated
 from thrown import ALONG, THROWN, UP
-
-Function = Callable[[Array], Array]
-MOST = 5000
-
-
-def margins(function: Function, count: int) -> Margins:
-    """function: standard normal places, (runs, parameters), to margins, (runs,) or (runs, instants)."""
-    names = [f"x{k}" for k in range(count)]
-
-    def model(values: dict[str, Array]) -> Answers:
-        found = function(np.stack([values[name] for name in names], axis=1))
-        found = found if found.ndim == 2 else found[:, None]
-        return Answers(found, np.ones(len(found), dtype=bool))
-
-    return Margins(model, Inputs(tuple(Parameter(name, Normal(0.0, 1.0), {name: 1.0}) for name in names)), MOST)  # type: ignore[arg-type]
-
-
-def plane(beta: float, count: int) -> tuple[Function, float]:
-    return lambda x: beta - x.sum(axis=1) / math.sqrt(count), float(stats.norm.sf(beta))
-
-
-def paraboloid(beta: float, curved: float, count: int) -> tuple[Function, float]:
-    """P = E Phi(-(beta + curved r^2)), r^2 of chi-squared distribution."""
-
-    def chance(r: float) -> float:
-        return float(stats.chi2.pdf(r, count - 1) * stats.norm.sf(beta + curved * r))
-
-    edges = [1.0, 5.0, 20.0, abs(beta / curved)]
-    exact = integrate.quad(chance, 0, 200, limit=800, points=edges)[0]
-    return lambda x: beta - x[:, 0] + curved * (x[:, 1:] ** 2).sum(axis=1), exact
-
-
-def branches(c: float) -> tuple[Function, float]:
-    """Waarts' series system of four branches, with four design points, each as an instant of its own."""
-
-    def four(x: Array) -> Array:
-        s, t = (x[:, 0] - x[:, 1]) / math.sqrt(2), (x[:, 0] + x[:, 1]) / math.sqrt(2)
-        return np.stack([c + 0.2 * s**2 - t, c + 0.2 * s**2 + t, s + (c + 4) / 2, (c + 4) / 2 - s], axis=1)
-
-    def kept(s: float) -> float:
-        return float(stats.norm.pdf(s) * 2 * stats.norm.sf(c + 0.2 * s * s))
-
-    inside = integrate.quad(kept, -(c + 4) / 2, (c + 4) / 2, epsabs=1e-16)[0]
-    return four, inside + 2 * float(stats.norm.sf((c + 4) / 2))
-
-
-def two(one: float, other: float, count: int) -> tuple[Function, float]:
-    exact = 1 - stats.norm.cdf(one) * stats.norm.cdf(other)
-    return lambda x: np.minimum(one - x[:, 0], other + x[:, 1]), float(exact)
-
-
-STATES: dict[str, tuple[tuple[Function, float], int]] = {
-    "a plane, 1e-3": (plane(3.09, 2), 2),
-    "a plane, 1e-5, eight parameters": (plane(4.26, 8), 8),
-    "a plane, 1e-7": (plane(5.2, 2), 2),
-    "curved away": (paraboloid(4.5, 0.3, 4), 4),
-    "curved towards": (paraboloid(4.0, -0.1, 3), 3),
-    "two sides": ((lambda x: 4 - np.abs(x[:, 0]), 2 * float(stats.norm.sf(4))), 2),
-    "two unequal design points": (two(3.5, 4.0, 4), 4),
-    "four branches": (branches(3.0), 2),
-    "four branches, 7e-6": (branches(5.0), 2),
-}
-
-
-def repeated(state: str, way: str, times: int) -> tuple[float, Array]:
-    """Share of the repetitions whose interval holds the exact probability, and estimates over it."""
-    (function, exact), count = STATES[state]
-    found: list[Passing] = []
-    for seed in range(times):
-        run = margins(function, count)
-        found.append(probability(run, way, seed))
-        assert run.evaluations <= MOST
-    intervals = [one.estimate.interval for one in found]
-    held = np.mean([lower[-1] <= exact <= upper[-1] for lower, upper in intervals])
-    return float(held), np.array([one.estimate.probability for one in found]) / exact
 
 
 @pytest.mark.parametrize("state", ["a plane, 1e-7", "curved away", "two unequal design points", "four branches"])
 def test_probabilities_of_closed_forms(state: str) -> None:
-    held, ratio = repeated(state, "auto", 40)
-    assert held >= 0.9
-    assert ratio.mean() == pytest.approx(1.0, abs=0.02)
-    assert np.mean(np.abs(ratio - 1) < 0.1) >= 0.9
+    told = repeated(state, "auto", 40)
+    assert told.held >= 0.9
+    assert told.ratios.mean() == pytest.approx(1.0, abs=0.02)
+    assert told.within >= 0.9
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("state", STATES)
 def test_intervals_hold_as_often_as_they_say(state: str) -> None:
     """95 % of 200 repetitions, within what 200 of them can tell."""
-    held, ratio = repeated(state, "auto", 200)
-    assert 0.92 <= held <= 0.98
-    assert ratio.mean() == pytest.approx(1.0, abs=0.02)
-    assert np.mean(np.abs(ratio - 1) < 0.1) >= (0.85 if state == "curved towards" else 0.95)
+    told = repeated(state, "auto", 200)
+    assert 0.92 <= told.held <= 0.98
+    assert told.runs <= MOST
+    assert told.ratios.mean() == pytest.approx(1.0, abs=0.02)
+    assert told.within >= (0.85 if state == "curved towards" else 0.95)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("state", STATES)
 def test_subset_simulation_holds_as_often_as_it_says(state: str) -> None:
-    held, ratio = repeated(state, "subset", 100)
-    assert held >= 0.92
-    assert ratio.mean() == pytest.approx(1.0, abs=0.2)
+    told = repeated(state, "subset", 100)
+    assert told.held >= 0.92
+    assert told.ratios.mean() == pytest.approx(1.0, abs=0.2)
 
 
 def test_a_plain_half_space_by_every_way() -> None:

@@ -63,6 +63,20 @@ def test_a_cantilever_under_its_weight() -> None:
         assert margin == pytest.approx(exact, abs=off * size), text
 
 
+def test_a_section_where_the_load_is_a_number_in_a_table() -> None:
+    """A force at the tip, which a table states: at rest half of the rod bears it with F L / 2."""
+    stated: dict[str, Any] = cantilever().model_dump(mode="json", exclude_unset=True)
+    table = {"table": [[0.0, 2.0], [0.5, 2.0]], "smooth": False}
+    tip = {"body": "rod", "point": "end"}
+    stated |= {"gravity": [0.0, 0.0]}
+    stated["loads"] = {"push": {"kind": "force", "at": tip, "force": [0.0, -1.0], "scale": table}}
+    path = "loads.push.scale.table.0.1,loads.push.scale.table.1.1"
+    moment, strain = margins(Scene.parse(stated), ["middle.moment < -20", "root.strain_above > 0.01"], path, (2.0, 3.0))
+    assert moment == pytest.approx(20 - 3.0 * LENGTH / 2, abs=1e-3)
+    curvature = 3.0 * LENGTH / (STIFF * BENDING)
+    assert strain == pytest.approx(0.01 - curvature * THICK / 2, abs=5e-3 * curvature * THICK / 2)
+
+
 def test_sections_of_rods_in_space_are_those_of_cables_in_the_plane() -> None:
     """A soft rod swings in a plane: director rods share no element with cables, whose sections closed forms hold."""
     rod = {"kind": "rod", "length": LENGTH, "height": 0.02, "width": 0.02, "density": 1000.0, "youngs_modulus": 1e7}

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from shoal_validation.uncertain import machines, studies
-from shoal_validation.uncertain.__main__ import methods_table, studies_text
+from shoal_validation.uncertain.__main__ import methods_table, reached_table, studies_text
 from shoal_validation.uncertain.measure import measured
 from shoal_validation.uncertain.problems import PROBLEMS
+from shoal_validation.uncertain.reached import motions
 
 
 @pytest.mark.parametrize("problem", [PROBLEMS[0], PROBLEMS[-1]], ids=lambda problem: problem.name)
@@ -78,3 +79,10 @@ def test_random_studies_keep_their_word(seed: int, runs: int) -> None:
     found = studies.judged(studies.drawn(seed), runs)
     assert found.kept
     assert "1 random studies" in studies_text([found], runs)
+
+
+def test_what_is_asked_of_long_motions_is_reached() -> None:
+    """The rows of pendulum, two frequencies and rod, and their table."""
+    found = list(motions())
+    assert all(one.met for one in found), found
+    assert reached_table(found).count("| yes |") == len(found)

@@ -61,6 +61,6 @@ class GaussEngine:
         from shoal.engines.prepared import prepared
 
         lanes = {path: np.ravel(np.asarray(numbers, dtype=float)) for path, numbers in values.items()}
-        if not whole and scene.alone(lanes) is not None:
-            return one_by_one(self, scene, lanes, times)
+        if scene.alone(lanes) is not None:
+            return one_by_one(self, scene, lanes, times, whole=whole)
         return prepared(scene, self.threads)(lanes, times, whole=whole)

@@ -16,9 +16,16 @@ from shoal.trajectory import Array, Status, Trajectory
 
 
 def one_by_one(
-    engine: Engine, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
+    engine: Engine,
+    scene: Scene,
+    values: Mapping[str, Array],
+    times: Sequence[float] | Array | None = None,
+    **options: bool,
 ) -> Trajectory:
-    """One scene per lane, one after the other; a lane that failed is not a number and has its status."""
+    """One scene per lane, one after the other; a lane that failed is not a number and has its status.
+
+    options: of the engine's `simulate`; states that it tells come with the model of the first lane that has them
+    """
     started = time.perf_counter()
     require(engine, scene)
     lanes = check_lanes(scene, values)
@@ -27,7 +34,7 @@ def one_by_one(
     for lane in range(lanes):
         numbers = {path: float(np.ravel(column)[lane]) for path, column in values.items()}
         try:
-            runs.append(engine.simulate(scene.with_values(numbers), wanted))
+            runs.append(engine.simulate(scene.with_values(numbers), wanted, **options))
         except InputError as error:
             runs.append(_refused(engine, scene, wanted, str(error)))
     return _side_by_side(runs, time.perf_counter() - started)
@@ -61,6 +68,11 @@ def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
         one = next((part for part in parts if part is not None), None)
         return None if one is None else together([np.nan * one if part is None else part for part in parts])
 
+    states = [run.states for run in runs]
+    first = next((one for one in states if one is not None), None)
+    if first is not None:
+        coordinates, rates = (known([getattr(one, name, None) for one in states]) for name in "qv")
+        first = first._replace(q=coordinates, v=rates)
     return replace(
         runs[0],
         points=together([run.points for run in runs]),
@@ -74,4 +86,5 @@ def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
         wall_s=wall_s,
         message=next((f"lane {lane}: {run.message}" for lane, run in enumerate(runs) if not run.ok), ""),
         model=next((run.model for run in runs if run.model), {}),
+        states=first,
     )

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from shoal.pictures.style import GREY, LINES, ORANGE, VERMILION, canvas, headline, log_ticks, styled
 from shoal.response import Response
+from shoal.response.boxes import Ends
+from shoal.response.result import Bounds
+from shoal.trajectory import Array
 
 LEAST = 1e-12
 """[m] Below this, nothing is drawn."""
@@ -14,17 +19,20 @@ LEAST = 1e-12
 
 @styled
 def gaps(found: Response, marker: str) -> Figure:
-    """Width of the attained bounds and distance of the outer ones [m], of one marker; found: of intervals."""
-    assert found.bounds is not None
-    bounds = found.bounds
+    """Width of the attained bounds and distance of the outer ones [m], of one marker; found: of intervals.
+
+    Beside distributions, the scatter and the distance of the outer bounds of the mean.
+    """
+    what, width, beyond = _known(found)
     figure, panel = canvas()
-    beyond = np.maximum(bounds.lower - bounds.lower_outer, bounds.upper_outer - bounds.upper)
     within = found.times <= found.horizon
+    largest = list[float]()
     for look, quantity in zip(LINES, found.axes, strict=False):
-        width = found.column(marker, quantity, bounds.upper - bounds.lower)
-        gap = found.column(marker, quantity, beyond)
-        panel.plot(found.times, np.maximum(width, LEAST), label=f"width of {quantity}", **look)
+        wide, gap = (found.column(marker, quantity, of) for of in (width, beyond))
+        panel.plot(found.times, np.maximum(wide, LEAST), label=f"{what} of {quantity}", **look)
         panel.plot(found.times[within], np.maximum(gap[within], LEAST), alpha=0.5, label=f"gap of {quantity}", **look)
+        if within.any():
+            largest.append(float(gap[within].max()) / max(float(wide.max()), LEAST))
     for error, name, colour in ((found.mesh_error, "mesh error", VERMILION), (found.step_error, "step error", ORANGE)):
         if error:
             panel.axhline(error, color=colour, linestyle=":", label=name)
@@ -35,7 +43,21 @@ def gaps(found: Response, marker: str) -> Figure:
     panel.set_xlabel("time [s]")
     panel.set_ylabel(f"at {marker} [m]")
     panel.legend(fontsize=10, ncols=2)
-    off = float(np.max([found.gap(marker, quantity) for quantity in found.axes]))
-    known = "are not known to be complete" if np.isnan(off) else f"are known to {off:.1e} of the width"
-    headline(figure, f"{found.scene}: bounds of {marker} {known}")
+    off = float(np.max(largest)) if largest else math.nan
+    known = "are not known to be complete" if np.isnan(off) else f"are known to {off:.1e} of the {what}"
+    told = "bounds" if found.boxes is None else "bounds of the mean"
+    headline(figure, f"{found.scene}: {told} of {marker} {known}")
     return figure
+
+
+def _known(found: Response) -> tuple[str, Array, Array]:
+    """What the gap is a share of, that, and the distance of the outer bounds, (columns,) each."""
+    bounds: Bounds | Ends
+    if found.boxes is None:
+        assert found.bounds is not None
+        what, bounds = "width", found.bounds
+        size = bounds.upper - bounds.lower
+    else:
+        what, bounds = "scatter", found.boxes.mean
+        size = bounds.upper - bounds.lower + found.boxes.std.upper
+    return what, size, np.maximum(bounds.lower - bounds.lower_outer, bounds.upper_outer - bounds.upper)

@@ -55,7 +55,7 @@ def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
         low, high = (found.column(marker, quantity, of) for of in (levels[1].lower, levels[-2].upper))
         panel.fill_between(t, low, high, color=BLUE, alpha=0.25, linewidth=0, label="5 % and 95 % at their farthest")
         low, high = (found.column(marker, quantity, of) for of in (mean.lower, mean.upper))
-        panel.fill_between(t, low, high, color=ORANGE, alpha=0.5, linewidth=0, label="means over the intervals")
+        panel.fill_between(t, low, high, color=ORANGE, alpha=0.5, linewidth=1.5, label="means over the intervals")
         if found.horizon < t[-1]:
             panel.axvline(found.horizon, color=GREY, linestyle=":", label="horizon")
         widest = float(np.max(found.column(marker, quantity, found.boxes.std.upper)))

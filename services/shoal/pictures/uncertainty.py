@@ -20,6 +20,7 @@ from shoal.pictures.response import response
 from shoal.response import Response
 from shoal.response.limits import Judged
 from shoal.response.worst import Worst, worst
+from shoal.trajectory import Array
 
 MARKERS, CASES = 4, 3
 """So many markers and worst cases are shown."""
@@ -40,6 +41,7 @@ def uncertainty(found: Response) -> str:
         pictures=[one.embedded() for one in _pictures(found)],
         passages=[_passage(one).embedded() for one in found.limits if one.estimates],
         allocation=_allocation(found),
+        allocated=_allocated(found),
         remarks=_remarks(found),
         provenance=_provenance(found),
     )
@@ -50,19 +52,20 @@ def _lead(found: Response) -> str:
         return f"Not to be believed as it stands ({found.status}): {found.message}."
     told = found.bounds.upper - found.bounds.lower if found.bounds is not None else None
     if told is not None:
-        widest = max(
-            (float(found.column(marker, axis, told).max()), marker) for marker in found.markers for axis in ("x", "y")
-        )
-        return f"Places of {widest[1]} differ by up to {length(widest[0])}; runs attain the bounds."
+        widest, marker = _largest(found, told)
+        return f"Places of {marker} differ by up to {length(widest)}; runs attain the bounds."
     if found.boxes is not None:
         deviation, among = found.boxes.std.upper, "Over all interval values, "
     else:
         assert found.statistics is not None
         deviation, among = found.statistics.std, ""
-    spread = max(
-        (float(found.column(marker, axis, deviation).max()), marker) for marker in found.markers for axis in ("x", "y")
-    )
-    return f"{among}{spread[1]} scatters with a standard deviation of up to {length(spread[0])}."
+    spread, marker = _largest(found, deviation)
+    return f"{among}{marker} scatters with a standard deviation of up to {length(spread)}."
+
+
+def _largest(found: Response, of: Array) -> tuple[float, str]:
+    """Of all coordinates [m], and its marker."""
+    return max((float(found.column(marker, axis, of).max()), marker) for marker in found.markers for axis in found.axes)
 
 
 def _parameters(found: Response) -> list[list[str]]:
@@ -125,13 +128,18 @@ def _pictures(found: Response) -> list[Drawn]:
         alt = f"{what} of {marker} over time."
         drawn.append(Drawn(f"response-{marker}", response(found, marker), alt, f"{what} of {marker}."))
     last = found.markers[-1]
-    if found.bounds is not None:
-        words = (
-            "Outer bounds lie a gap beyond what runs attain; mesh and step errors are those of the runs that decide."
-        )
-        drawn.append(Drawn("gaps", gaps(found, last), f"Widths, gaps and errors of {last} over time.", words))
-    if found.statistics is not None and not np.isnan(found.statistics.total).all():
-        words = "The share of the variance that goes with a parameter, alone and with others."
+    if found.statistics is None:
+        lie = "Outer bounds lie a gap beyond what runs attain"
+        if found.boxes is not None:
+            lie = "Outer bounds of the mean lie a gap beyond those told; the scatter is its spread and a deviation"
+        words = f"{lie}; mesh and step errors are those of the runs that decide."
+        alt = f"{'Widths' if found.boxes is None else 'Scatter'}, gaps and errors of {last} over time."
+        drawn.append(Drawn("gaps", gaps(found, last), alt, words))
+    shares = found.statistics.total if found.statistics is not None else None
+    shares = found.boxes.shares if found.boxes is not None else shares
+    if shares is not None and not np.isnan(shares).all():
+        words = "The share of the variance that goes with a parameter, alone and with others"
+        words += "." if found.boxes is None else ": from the least to the largest over all interval values."
         drawn.append(Drawn("indices", indices(found, last), f"Total Sobol indices of {last} over time.", words))
     return drawn
 
@@ -149,6 +157,18 @@ def _allocation(found: Response) -> list[list[str]]:
     return [[name, *(f"{one[key]:.3g}" for key in keys)] for name, one in told.items()]
 
 
+def _allocated(found: Response) -> list[str]:
+    """What tolerances do, in words."""
+    told = found.allocation
+    if told is None:
+        return []
+    return [
+        f"The {told.what} is {told.stated:.3g} with the stated tolerances and {told.confirmed:.3g} with those found, "
+        f"which cost {told.cost:.3g} times as much.",
+        f"To tighten first: {told.first or 'none'}.",
+    ]
+
+
 def _remarks(found: Response) -> list[str]:
     remarks = [f"{one.limit.text}: {one.passing.why}." for one in found.limits if one.passing is not None]
     for one in found.limits:
@@ -159,7 +179,8 @@ def _remarks(found: Response) -> list[str]:
     if found.repeated or found.failed:
         remarks.append(f"{found.repeated} runs were repeated with smaller steps; {found.failed} failed all the same.")
     if (found.bounds or found.boxes) is not None and found.horizon < found.times[-1]:
-        remarks.append(f"Bounds hold until {found.horizon:.4g} s.")
+        what = "Bounds hold" if found.boxes is None else "Statistics are known"
+        remarks.append(f"{what} until {found.horizon:.4g} s.")
     return remarks
 
 

@@ -21,6 +21,7 @@ from shoal.response.inputs import Inputs, Parameter
 from shoal.response.limits.choice import probability
 from shoal.response.limits.form import design_points
 from shoal.response.limits.margins import Margins
+from shoal.response.limits.margins import least as least_of
 from shoal.response.marginals import scaled
 from shoal.response.runs import Model, Runs
 from shoal.scene import Scene
@@ -56,7 +57,8 @@ class Allocation:
 
     factors: on those that are stated, (parameters,); effects: of tightening each by one per cent: by how much the least
     margin grows, or by which share the probability falls, (parameters,); confirmed: the least margin, or the
-    probability, with the new ones; target: what it had to be; cost: of the new ones over that of the stated ones
+    probability (the largest over intervals), with the new ones; target: what it had to be; cost: of the new ones over
+    that of the stated ones
     """
 
     limit: str
@@ -80,9 +82,20 @@ class Allocation:
         """The parameters with the new tolerances."""
         return with_factors(self.inputs, self.factors)
 
+    @property
+    def what(self) -> str:
+        """What is confirmed, in words."""
+        random = self.inputs.random
+        return "least margin" if not random.any() else "probability" if random.all() else "largest probability"
+
+    @property
+    def first(self) -> str | None:
+        """Which parameter's tolerance to tighten first, None where none has an effect."""
+        return None if not np.any(self.effects) else self.inputs.names[int(np.argmax(self.effects))]
+
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        random = bool(self.inputs.random.all())
+        random = bool(self.inputs.random.any())
         told = "probability" if random else "margin"
         return dict(
             plain(
@@ -95,7 +108,7 @@ class Allocation:
                     "target": self.target,
                     "cost": self.cost,
                     "evaluations": self.evaluations,
-                    "tighten_first": self.inputs.names[int(np.argmax(self.effects))],
+                    "tighten_first": self.first,
                     "parameters": {
                         one.name: {
                             "factor": float(factor),
@@ -174,7 +187,7 @@ def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: A
         cuts[tuple(np.sign(np.round(reached.germ, 3)))] = pull, room
         fresh = _within(list(cuts.values()), costs, most)
         if room <= 0:
-            raise ComputationError(f"allocate: limit {text} is passed by the middle values, whatever the tolerances")
+            raise passed(text)
         settled = np.max(np.abs(fresh / factors - 1)) < SETTLED
         factors = fresh
         if settled:
@@ -247,6 +260,8 @@ def of_distributions(
     wanted = -float(special.ndtri(target))
     aim = wanted
     found = math.nan
+    if least_of(Margins(model, inputs, 1)(np.zeros((1, len(inputs)))))[0] <= 0:
+        raise passed(text)
     for round_ in range(ROUNDS):
         margins = Margins(model, with_factors(inputs, factors), MANY)
         points = design_points(margins, np.zeros((1, len(inputs))))
@@ -259,7 +274,7 @@ def of_distributions(
             continue
         point = points[0]
         if point.beta <= 0:
-            raise ComputationError(f"allocate: limit {text} is passed by the middle values, whatever the tolerances")
+            raise passed(text)
         weights = np.abs(point.normal) / (point.beta * factors)
         if round_ == 0:
             # d ln P / d ln s = beta alpha^2 phi(beta) / Phi(-beta)
@@ -286,6 +301,11 @@ def of_distributions(
     message = "" if found <= target else f"the probability is {found:.2e} with the tolerances that were found"
     cost = float(costs @ (1 / factors) / costs.sum())
     return Allocation(text, inputs, factors, effects, stated, found, target, cost, spent, message)
+
+
+def passed(text: str) -> ComputationError:
+    """What to say of a limit that no tolerances keep."""
+    return ComputationError(f"allocate: limit {text} is passed by the middle values, whatever the tolerances")
 
 
 def _chance(model: Model, inputs: Inputs, seed: int) -> tuple[float, int]:

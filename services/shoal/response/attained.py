@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from shoal.response.enclosure import Enclosure, enclosure, foretold
+from shoal.response.enclosure import enclosure, foretold
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.result import Bounds
-from shoal.response.study import Found, Study
+from shoal.response.study import Enclosure, Found, Study
 from shoal.trajectory import Array
 
 DRAWN = 93
@@ -27,7 +27,8 @@ def bounds_of(study: Study, found: Found) -> Bounds:
     """Attained bounds of all runs, after the extremal points of the surrogate are run, and outer ones by its error."""
     runs, error, surrogate = study.runs, found.error, found.surrogate
     named = None
-    if surrogate is not None:
+    known = found.looked is not None and found.looked.runs == runs.evaluations
+    if surrogate is not None and not known:
         # Over many cycles there are many extremes.
         how = (STARTS, error) if found.foretold else (1, None)
         named = extremes(surrogate, len(study.inputs), runs.values.shape[1], study.seed, *how)
@@ -40,7 +41,9 @@ def bounds_of(study: Study, found: Found) -> Bounds:
     lower, upper = values.min(axis=0), values.max(axis=0)
     unknown = np.full(len(lower), np.nan)
     told = Enclosure(lower, upper, unknown, unknown, unknown)
-    if surrogate is not None and named is not None and error is not None:
+    if known and found.looked is not None:
+        told = found.looked.told
+    elif surrogate is not None and named is not None and error is not None:
         told = (foretold if found.foretold else enclosure)(study, surrogate, named, error)
         at_lower = np.where((told.lower < lower)[:, None], named.at_lower, at_lower)
         at_upper = np.where((told.upper > upper)[:, None], named.at_upper, at_upper)

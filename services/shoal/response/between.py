@@ -23,7 +23,7 @@ from shoal.response.limits.judged import Between
 from shoal.response.limits.margins import FAR, Margins
 from shoal.response.machine import Machine
 from shoal.response.methods.nested import best
-from shoal.response.respond import respond
+from shoal.response.respond import Answer, respond
 from shoal.response.runs import Answers, Runs
 from shoal.response.study import Study
 from shoal.trajectory import Array
@@ -32,6 +32,8 @@ SHARE, LEAST = 5, 500
 """One in so many of the runs that a probability takes, but this number at least, tells the index while it is sought."""
 PLACES, MORE = 12, 6
 """Interval values that are looked at, and more for each interval, at most."""
+SHARED = 2
+"""Times as many indices as a plane through them has terms, at least, if some are left out of a fit."""
 GAP = 0.05
 """Share of the spread of the index that is good enough."""
 
@@ -49,23 +51,8 @@ def between(
 ) -> Judged:
     """The least and the largest probability, with the interval values there. Raises InputError, ComputationError."""
     given, random = inputs.some(~inputs.random), inputs.some(inputs.random)
-    few, made, failed = min(most, max(LEAST, most // SHARE)), 0, 0
-
-    def index(values: Mapping[str, Array]) -> Answers:
-        """Of every place."""
-        nonlocal made, failed
-        found = np.full((len(next(iter(values.values()))), 1), np.nan)
-        why = ""
-        for k in range(len(found)):
-            here = machine.at({path: float(at[k]) for path, at in values.items()})
-            margins = Margins(watched(here, limit), random, few, _on(progress, made))
-            passing = probability(margins, way, seed)
-            found[k] = np.clip(-special.ndtri(passing.estimate.probability), -FAR, FAR)
-            made, failed = made + margins.evaluations, failed + margins.failed
-            why = why or (passing.why if np.isnan(found[k, 0]) else "")
-        return Answers(found, np.isfinite(found[:, 0]), 0, why)
-
-    answer = respond(index, given, 1, gap=GAP, seed=seed, most=PLACES + MORE * len(given))
+    few = min(most, max(LEAST, most // SHARE))
+    answer, made, failed = searched(limit, machine, inputs, way=way, few=few, seed=seed, progress=progress)
     bounds = answer.bounds
     assert bounds is not None
     ends = []
@@ -85,16 +72,54 @@ def between(
     )
 
 
+def searched(
+    limit: Limit,
+    machine: Machine,
+    inputs: Inputs,
+    *,
+    way: str,
+    few: int,
+    seed: int,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[Answer, int, int]:
+    """Bounds of the reliability index over the intervals, runs made, and how many failed.
+
+    few: runs at each interval value, at most. Raises InputError, ComputationError.
+    """
+    given, random, made, failed = inputs.some(~inputs.random), inputs.some(inputs.random), 0, 0
+
+    def index(values: Mapping[str, Array]) -> Answers:
+        """Of every place."""
+        nonlocal made, failed
+        found = np.full((len(next(iter(values.values()))), 1), np.nan)
+        why = ""
+        for k in range(len(found)):
+            here = machine.at({path: float(at[k]) for path, at in values.items()})
+            margins = Margins(watched(here, limit), random, few, _on(progress, made))
+            passing = probability(margins, way, seed)
+            found[k] = np.clip(-special.ndtri(passing.estimate.probability), -FAR, FAR)
+            made, failed = made + margins.evaluations, failed + margins.failed
+            why = why or (passing.why if np.isnan(found[k, 0]) else "")
+        return Answers(found, np.isfinite(found[:, 0]), 0, why)
+
+    answer = respond(index, given, 1, gap=GAP, seed=seed, most=PLACES + MORE * len(given))
+    return answer, made, failed
+
+
 def _beyond(runs: Runs, seed: int) -> tuple[float, float]:
     """By how much the index may be above the largest one that is known, and below the least.
 
-    Indices are known to the scatter of few runs: of all polynomials the one that foretells left-out ones best tells.
+    Indices are known to the scatter of few runs: of all polynomials the one that foretells left-out ones best tells. Of
+    those that are FAR nothing else is known, and beyond them lies no probability to tell: they stay out of the fit.
     """
+    near = runs.values[:, 0] < FAR
+    some = not near.all() and near.sum() > SHARED * (len(runs.inputs) + 1)
+    runs = runs.part(near) if some else runs
     study = Study(runs, np.zeros(1, dtype=np.int64), np.zeros(1), seed)
     surrogate = best(study)
     found = extremes(surrogate, len(runs.inputs), 1, seed)
     told = enclosure(study, surrogate, found, surrogate.left_out)
-    return float(told.upper_outer[0] - told.upper[0]), float(told.lower[0] - told.lower_outer[0])
+    return 0.0 if some else float(told.upper_outer[0] - told.upper[0]), float(told.lower[0] - told.lower_outer[0])
 
 
 def _on(progress: Callable[[int], None] | None, made: int) -> Callable[[int], None] | None:

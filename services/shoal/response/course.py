@@ -107,10 +107,14 @@ def _most_even(times: Array, course: Array) -> tuple[int, float, int]:
     found: list[tuple[float, int, int]] = []
     steps = np.diff(course, axis=0)
     # Signals that hardly ever turn between their samples need no splines.
-    turning = np.flatnonzero((steps[:-1] * steps[1:] < 0).sum(axis=0) > CYCLES)
+    seen = (steps[:-1] * steps[1:] < 0).sum(axis=0)
+    turning = np.flatnonzero(seen > CYCLES)
     if not len(turning):
         raise UnsuitableError("the motion has too few cycles")
-    every = spline(times, course[:, turning])
+    # As many samples as are kept of the one that turns most often tell the cycles of all.
+    apart = max(1, len(times) // (PER_TURN[1] * int(seen.max())))
+    times = times[::apart]
+    every = spline(times, course[::apart, turning])
     for k, signal in enumerate(turning.tolist()):
         turns = turning_points(times, BSpline(every.t, every.c[:, k], every.k))
         if len(turns) >= 6:

@@ -9,46 +9,44 @@ that, the attained bound is the bound.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from shoal.response.expansion import Expansion
-from shoal.response.extremes import Extremes, IntArray, Surrogate, in_parts, places
-from shoal.response.study import SAFETY, Study
+from shoal.response.extremes import Extremes, IntArray, Surrogate, extremes, in_parts, places
+from shoal.response.study import SAFETY, Enclosure, Looked, Study
 from shoal.trajectory import Array
 
+Look = Literal["there", "scanned", "everywhere"]
 ARMS = 1.0, 0.3, 0.1
 """Of the search for widened extremes, in lengths over which the margin grows to its full size."""
 ROUGH = 50
 """Change of the error of a surrogate that is no polynomial, in margins for every radian."""
 
 
-@dataclass(frozen=True)
-class Enclosure:
-    """Attained and outer bounds, (columns,); gap: their distance as a share of the width of the group, (columns,)."""
-
-    lower: Array
-    upper: Array
-    lower_outer: Array
-    upper_outer: Array
-    gap: Array
-
-
-def enclosure(study: Study, surrogate: Surrogate, found: Extremes, error: Array, *, rough: bool = False) -> Enclosure:
-    """error: of the surrogate at runs that it had not seen, (columns,); found: its extremes; rough: the margin is
-    looked at there and where the surrogate is scanned only; in between it may reach farther
+def enclosure(
+    study: Study, surrogate: Surrogate, found: Extremes, error: Array, *, look: Look = "everywhere"
+) -> Enclosure:
+    """error: of the surrogate at runs that it had not seen, (columns,); found: its extremes; look: where the margin is
+    looked at: there only, where the surrogate is scanned as well, or in between too: each may reach farther
     """
     values = study.runs.values
     lower, upper = values.min(axis=0), values.max(axis=0)
     slope = 1 + int(surrogate.terms.sum(axis=1).max()) if isinstance(surrogate, Expansion) else ROUGH
-    low, high = _widened(study, surrogate, found, SAFETY * error, slope, rough)
+    low, high = _widened(study, surrogate, found, SAFETY * error, slope, look)
     low, high = np.minimum(lower, low), np.maximum(upper, high)
     width = study.widths(values)
     beyond = np.maximum(lower - low, high - upper)
     gap = np.divide(beyond, width, out=np.zeros_like(beyond), where=width > 0)
     return Enclosure(lower, upper, low, high, gap)
+
+
+def looked_at(study: Study, surrogate: Surrogate, error: Array) -> Looked:
+    """Bounds by all runs there are; error: see `enclosure`."""
+    named = extremes(surrogate, len(study.inputs), len(error), study.seed)
+    return Looked(study.runs.evaluations, enclosure(study, surrogate, named, error))
 
 
 def foretold(study: Study, _: Surrogate, found: Extremes, error: Array) -> Enclosure:
@@ -68,7 +66,7 @@ def foretold(study: Study, _: Surrogate, found: Extremes, error: Array) -> Enclo
 
 
 def _widened(
-    study: Study, surrogate: Surrogate, found: Extremes, margin: Array, slope: int, rough: bool
+    study: Study, surrogate: Surrogate, found: Extremes, margin: Array, slope: int, look: Look
 ) -> tuple[Array, Array]:
     """Where the surrogate is least and largest if it is off by its margin at the most, (columns,) each.
 
@@ -91,6 +89,9 @@ def _widened(
 
     own = np.concatenate([found.at_lower, found.at_upper])
     best, place = objective(own), own.copy()
+    if look == "there":
+        return best[:columns], -best[columns:]
+    rough = look == "scanned"
     scanned = places(germs.shape[1], study.seed, rough=rough)
     share, run = away(scanned)
     for some, told in in_parts(surrogate, scanned, columns):

@@ -97,6 +97,11 @@ class Response:
         """Those of the quantities that are coordinates [m]."""
         return tuple(name for name in self.quantities if name in "xyz")
 
+    @property
+    def random(self) -> list[str]:
+        """Names of the random parameters."""
+        return [one.name for one in self.inputs.parameters if one.marginal.random]
+
     def column(self, marker: str, quantity: str, of: Array) -> Array:
         """What belongs to one marker and quantity over time; of: (..., columns) -> (..., instants)."""
         shape = len(self.times), len(self.markers), len(self.quantities)
@@ -163,7 +168,8 @@ class Response:
 
         lower, upper over bound (attained, outer); argument_lower, argument_upper over parameter; mean, std, quantiles
         over quantile; first and total Sobol indices over parameter. With intervals and distributions: mean_lower,
-        mean_upper, std_..., quantiles_... over bound (inner, outer), and their arguments over interval.
+        mean_upper, std_..., quantiles_... over bound (inner, outer), and their arguments over interval; first_lower to
+        total_upper over random (parameters).
         """
         try:
             import xarray as xr
@@ -208,6 +214,11 @@ class Response:
                 put(f"quantiles_{side}", np.array(both), "quantile", "bound")
                 at = np.array([getattr(of, f"at_{side}").T for of in self.boxes.quantiles])
                 put(f"argument_quantiles_{side}", at, "quantile", "interval")
+            if self.boxes.shares is not None:
+                coordinates["random"] = self.random
+                for index, sides in zip(("first", "total"), self.boxes.shares, strict=True):
+                    put(f"{index}_lower", sides[0], "random")
+                    put(f"{index}_upper", sides[1], "random")
         about = {"scene": self.scene, "status": self.status, "method": self.method, "why": self.why}
         numbers = {"horizon": self.horizon, "evaluations": self.evaluations, "seed": self.seed}
         return xr.Dataset(variables, coordinates, {**about, **numbers})
@@ -296,14 +307,13 @@ class Response:
                 for q, of in zip(levels, found.quantiles, strict=True)
             }
         if found.shares is not None:
-            random = [name for name in self.inputs.names if name not in found.names]
             told["sobol"] = {
                 name: {
                     f"{index}_{side}": at(found.shares[i, j, k])
                     for i, index in enumerate(("first", "total"))
                     for j, side in enumerate(("lower", "upper"))
                 }
-                for k, name in enumerate(random)
+                for k, name in enumerate(self.random)
             }
         return told
 

@@ -133,6 +133,25 @@ class Linked(Protocol):
 
 
 @dataclass(frozen=True)
+class Enclosure:
+    """Attained and outer bounds, (columns,); gap: their distance as a share of the width of the group, (columns,)."""
+
+    lower: Array
+    upper: Array
+    lower_outer: Array
+    upper_outer: Array
+    gap: Array
+
+
+@dataclass(frozen=True)
+class Looked:
+    """Bounds by so many runs."""
+
+    runs: int
+    told: Enclosure
+
+
+@dataclass(frozen=True)
 class Found:
     """What a method leaves beside its runs.
 
@@ -141,7 +160,7 @@ class Found:
     quantiles: that take the place of those of the runs, (levels, columns);
     errors: within which mean and deviation lie with 95 % confidence, (columns,) each;
     coarse: columns whose statistics are those of the runs, because the surrogate is not good enough there, (columns,);
-    linked: what tells some columns better than the surrogate
+    linked: what tells some columns better than the surrogate; looked: its bounds, where the method knows them
     """
 
     why: str
@@ -154,6 +173,7 @@ class Found:
     quantiles: Array | None = None
     errors: tuple[Array, Array] | None = None
     linked: Linked | None = None
+    looked: Looked | None = None
 
 
 Method = Callable[[Study], Found]

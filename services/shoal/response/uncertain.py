@@ -29,13 +29,14 @@ from shoal.response.allocation import (
     of_distributions,
     of_intervals,
 )
+from shoal.response.allocation_of_both import of_both
 from shoal.response.attained import DRAWN
 from shoal.response.between import between
 from shoal.response.finer import repeated
 from shoal.response.inputs import Correlations, Inputs, Parameter
 from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
-from shoal.response.limits import Judged, Limit, judge, limit
+from shoal.response.limits import Judged, judge, limit
 from shoal.response.limits.judge import Reach, require, watched
 from shoal.response.machine import Machine, stable
 from shoal.response.read import parameters
@@ -48,6 +49,8 @@ from shoal.versions import versions
 
 CHECKED = 6
 """Extremal runs, or drawn ones, that are looked at by more careful runs."""
+LEFT = 0.25
+"""Share of a mesh error that twice as many elements leave, where it falls with the square of their size or faster."""
 UNRESOLVED = 1e-8
 """Runs that differ by less than this share of a limit's quantity differ by the errors of their steps."""
 NAMED = 3
@@ -99,8 +102,6 @@ def uncertain(
     wanted = load_scene(scene) if isinstance(scene, str) else scene
     wanted = wanted.with_values(values) if values else wanted
     inputs = Inputs(parameters(vary, wanted), correlations)
-    if allocate and inputs.mixed:
-        raise InputError("allocate: needs intervals or distributions, found both among the parameters")
     if allocate and len(limits) != 1:
         raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")
     when, asked = sampling_times(wanted, times), [limit(text, wanted) for text in limits]
@@ -137,14 +138,14 @@ def uncertain(
     try:
         if tolerance is not None and bounds is not None and verify and not keep.over:
             finer = repeated(machine, answer.runs)
+        how = dict[str, Any](way=limit_method, most=limit_runs, seed=seed, verify=verify, progress=progress)
         for passed in asked:
-            how = dict[str, Any](way=limit_method, most=limit_runs, seed=seed, verify=verify, progress=progress)
             if inputs.mixed:
                 judged.append(between(passed, machine, inputs, **how))
             else:
                 judged.append(judge(passed, machine, inputs, _reach(inputs, when, gap, seed, most), **how))
         if allocate:
-            allocation = _allocated(asked[0], machine, inputs, costs or {}, target, seed, most)
+            allocation = _allocated(judged[0], machine, costs or {}, target, most, how)
     except TimeIsUpError:
         pass
     finally:
@@ -229,11 +230,16 @@ def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, 
             machine.scene.with_values(given), lambda scene: verified(machine.engine, scene, machine.times)
         )
         if not careful.ok:
-            return mesh, step, f"a more careful run does not bear one out: {careful.message}"
+            return _whole(mesh), step, f"a more careful run does not bear one out: {careful.message}"
         estimated = careful.model.get("verification", {})
         mesh = larger(mesh, estimated.get("mesh_error"))
         step = larger(step, estimated.get("time_error"))
-    return mesh, step, ""
+    return _whole(mesh), step, ""
+
+
+def _whole(apart: float | None) -> float | None:
+    """The mesh error of runs that are so far from those on a mesh twice as fine [m], which has a share of it itself."""
+    return None if apart is None else apart / (1 - LEFT)
 
 
 def _keep(scene: Scene, times: Array, engine: str, checkpoint: Path | str | None, end: float | None) -> Keep:
@@ -265,11 +271,14 @@ def _reach(inputs: Inputs, when: Array, gap: float | None, seed: int, most: int)
 
 
 def _allocated(
-    wanted: Limit, machine: Machine, inputs: Inputs, costs: Mapping[str, float], target: float, seed: int, most: int
+    stated: Judged, machine: Machine, costs: Mapping[str, float], target: float, most: int, how: Mapping[str, Any]
 ) -> Allocation:
-    """The cheapest tolerances that keep a limit."""
+    """The cheapest tolerances that keep a limit. stated: what is known of it with those that are stated."""
+    wanted, inputs, seed = stated.limit, stated.inputs, how["seed"]
     told, when = watched(machine, wanted), machine.times
     prices, widest = costs_of(costs, inputs), accepted(machine.scene, inputs)
+    if stated.between is not None:
+        return of_both(wanted, machine, inputs, stated.between, target, prices, widest, **how)
     if inputs.random.all():
         return of_distributions(wanted.text, told, inputs, target, prices, widest, seed)
 

@@ -2,9 +2,9 @@
 
 Prints accuracy by number of runs of every method for intervals on every problem (`methods`), N random studies of
 machines in closed form by `auto`, whose bounds 100 000 random runs try to leave (`studies`), and ten scenes of other
-shapes whose bounds a fiftieth of these runs try (`scenes`), and draws how far ahead every method tells bounds (`map`);
-writes all into FILE (docs/uncertain.md). An hour; quick: 20 studies of at most three parameters, the problems of one,
-and a map of up to two.
+shapes whose bounds a fiftieth of these runs try (`scenes`), what must be reached and is (`reached`), and draws how far
+ahead every method tells bounds (`map`); writes all into FILE (docs/uncertain.md). Two hours; quick: 20 studies of at
+most three parameters, the problems of one, demands of few seconds, and a map of up to two.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from shoal.response.methods import METHODS
 
 from shoal_validation.document import publish, table
-from shoal_validation.uncertain import chart, maps, scenes
+from shoal_validation.uncertain import chart, maps, reached, scenes
 from shoal_validation.uncertain.measure import Line, measured
 from shoal_validation.uncertain.problems import PROBLEMS
 from shoal_validation.uncertain.studies import RUNS, Judged, drawn, judged
@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> bool:
     parser.add_argument("--studies", type=int, default=200)
     parser.add_argument("--first", type=int, default=0, help="seed of the first study")
     parser.add_argument("--runs", type=int, default=RUNS, help="random runs against every study")
-    parser.add_argument("--only", choices=["methods", "studies", "scenes", "map"])
+    parser.add_argument("--only", choices=["methods", "studies", "scenes", "reached", "map"])
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--chart", type=Path, default=Path("docs/charts/uncertain-map.png"))
     parser.add_argument("--page", type=Path, default=Path("docs/uncertain.md"))
@@ -59,6 +59,8 @@ def main(arguments: list[str]) -> bool:
         made = [scenes.tried(asked, max(chosen.runs // SHARE, scenes.BLOCK)) for asked in scenes.STUDIES]
         told["uncertain-scenes"] = scenes_table(made)
         good = good and all(one.kept for one in made)
+    if chosen.only in (None, "reached"):
+        told["uncertain-reached"] = reached_table(list(reached.all_of_them(quick=chosen.quick)))
     if chosen.only in (None, "map"):
         cells = maps.surveyed([name for name in METHODS if name not in NOT_FOR_INTERVALS], quick=chosen.quick)
         told["uncertain-map"] = chart.findings(cells)
@@ -111,6 +113,12 @@ def scenes_table(made: Sequence[scenes.Tried]) -> str:
         )
     titles = ["machine", "status", "runs", "gap", "horizon [s]", "a run beyond attained bounds", "beyond outer ones"]
     return table(titles, rows)
+
+
+def reached_table(found: Sequence[reached.Reached]) -> str:
+    """A row for each demand."""
+    rows = [[one.name, one.asked, one.found, "yes" if one.met else "no"] for one in found]
+    return table(["what", "asked", "found", "met"], rows)
 
 
 def methods_table(lines: Sequence[Line]) -> str:

@@ -105,7 +105,8 @@ def felt(
     found |= {k: np.full(shape, np.nan) for k in dynamic}
     joints = tuple(dict.fromkeys(c.joint for k in dynamic if (c := channels[k]).joint is not None))
     told = _by_states if needs_states(scene, channels) else _by_course
-    for lane, one in told(trajectory, scene, values, channels[dynamic[0]], bool(joints)):
+    alone = bool(joints) or scene.alone(values) is not None
+    for lane, one in told(trajectory, scene, values, channels[dynamic[0]], alone):
         views = slice(None) if trajectory.lanes == 1 else slice(lane, lane + 1)
         for k, signal in _of_lane(one, scene, channels, dynamic, joints, turned[views]).items():
             found[k][:, views] = signal

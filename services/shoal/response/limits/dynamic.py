@@ -72,6 +72,7 @@ def along(motion: Trajectory, scene: Scene, values: Mapping[str, Array], quantit
     told = _by_states if needs_states(quantity, scene) else _by_course
     # A model of all lanes tells places and accelerations in each, and forces of parts in the first only.
     alone = quantity not in STRAINS and not (told is _by_course and quantity in ENERGIES)
+    alone = alone or scene.alone(values) is not None
     for lane, one in told(motion, scene, values, quantity, alone):
         found[:, lane] = _of_lane(one, quantity, place)
     return found

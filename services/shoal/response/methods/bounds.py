@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.response.design import box_design
-from shoal.response.enclosure import enclosure
+from shoal.response.enclosure import enclosure, looked_at
 from shoal.response.expansion import Expansion, fit
 from shoal.response.extremes import Extremes, extremes
 from shoal.response.polynomials import HIGHEST
 from shoal.response.runs import TooManyRunsError
 from shoal.response.screening import Screened, screened
-from shoal.response.study import FINE_GAP, Found, Study
+from shoal.response.study import FINE_GAP, Found, Looked, Study
 from shoal.trajectory import Array
 
 SHARE = 1.25
@@ -46,13 +46,15 @@ class Round:
     """Where a study stands.
 
     surrogate: fitted to all runs; error: of the last one at runs that it had not seen, (columns,); gap: by which outer
-    bounds lie beyond attained ones, as a share of the width, (columns,); found: extremal points that were run
+    bounds lie at least beyond attained ones, as a share of the width, (columns,); found: extremal points that were run;
+    looked: the bounds, where they may end the study
     """
 
     surrogate: Expansion
     error: Array
     gap: Array
     found: int
+    looked: Looked | None = None
 
 
 def bounds(study: Study) -> Found:
@@ -73,7 +75,7 @@ def bounds(study: Study) -> Found:
         pass
     top = int(here.surrogate.terms.sum(axis=1).max())
     why = f"polynomials of total degree {top}; their extremal points are run and entered into the fit{plan.why}"
-    return Found(why, here.surrogate, here.error)
+    return Found(why, here.surrogate, here.error, looked=here.looked)
 
 
 def _next(plan: Screened, degree: int) -> int:
@@ -145,11 +147,16 @@ def _round(plan: Screened, degree: int) -> Round:
     if _carried(plan, degree):
         # What the new runs tell makes the polynomial better; its error is what it was without them.
         surrogate = _foretold(plan, degree)
-    gap = enclosure(study, surrogate, found, error, rough=True).gap
+    # What shows at once that a study is not done saves the rest, unless the horizon is looked for.
+    looked = None
+    gap = enclosure(study, surrogate, found, error, look="there").gap
+    if gap.max() <= _enough(plan) or _late(plan):
+        gap = enclosure(study, surrogate, found, error, look="scanned").gap
     if gap.max() <= _enough(plan):
-        found = extremes(surrogate, parameters, columns, study.seed + degree)
-        gap = enclosure(study, surrogate, found, error).gap
-    return Round(surrogate, error, gap, len(new))
+        # If this ends the study it is the answer.
+        looked = looked_at(study, surrogate, error)
+        gap = looked.told.gap
+    return Round(surrogate, error, gap, len(new), looked)
 
 
 def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
@@ -200,11 +207,16 @@ def _enough(plan: Screened) -> float:
     return FINE_GAP if study.runs.evaluations < plan.fair else HOPELESS
 
 
+def _late(plan: Screened) -> bool:
+    """Whether enough runs are made to look for the horizon."""
+    return plan.study.runs.evaluations >= ENOUGH * plan.fair
+
+
 def _done(plan: Screened, here: Round) -> bool:
     study, wanted = plan.study, _enough(plan)
     if here.gap.max() <= wanted:
         return True
-    if study.runs.evaluations < ENOUGH * plan.fair:
+    if not _late(plan):
         return False
     # Beyond the horizon no number of runs helps.
     return bool(np.all((here.gap <= wanted) | (study.instants >= horizon(study, here.gap))))

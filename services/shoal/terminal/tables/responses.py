@@ -129,10 +129,9 @@ def _allocation(found: Allocation) -> None:
         numbers = one["tolerance_stated"], one["tolerance"], one["factor"], one["effect_of_one_per_cent"]
         table.add_row(escape(name), *(f"{x:.3g}" for x in numbers))
     screen.out.print(table)
-    what = "probability" if found.inputs.random.all() else "least margin"
     screen.say(
-        f"{what} {found.stated:.3g} with the stated tolerances, {found.confirmed:.3g} with those found, which cost "
-        f"{found.cost:.3g} times as much; to tighten first: {told['tighten_first']}; {found.evaluations} runs"
+        f"{found.what} {found.stated:.3g} with the stated tolerances, {found.confirmed:.3g} with those found, which "
+        f"cost {found.cost:.3g} times as much; to tighten first: {found.first or 'none'}; {found.evaluations} runs"
     )
 
 
@@ -141,8 +140,7 @@ def _shares_between(response: Response, found: Boxes) -> None:
     assert found.shares is not None
     marker, axes = response.markers[-1], response.axes
     table = screen.table(f"share of the variance of {marker} (total Sobol index), from and to", "", *axes)
-    random = [name for name in response.inputs.names if name not in found.names]
-    for k, name in enumerate(random):
+    for k, name in enumerate(response.random):
         ends = [[response.column(marker, axis, found.shares[1, side, k])[-1] for side in (0, 1)] for axis in axes]
         table.add_row(escape(name), *("-" if np.isnan(low) else f"{low:.3f} to {high:.3f}" for low, high in ends))
     screen.out.print(table)

@@ -1,0 +1,114 @@
+"""Limits of standard normal variables whose probabilities are known, and how often an interval holds these."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import integrate, stats
+from shoal.response.inputs import Inputs, Parameter
+from shoal.response.limits.choice import probability
+from shoal.response.limits.margins import Margins
+from shoal.response.marginals import Normal
+from shoal.response.runs import Answers
+from shoal.trajectory import Array
+
+Function = Callable[[Array], Array]
+"""Places, (runs, parameters), to margins, (runs,) or (runs, instants)."""
+MOST = 5000
+"""Runs for one probability."""
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """One limit many times, each with a seed of its own.
+
+    held: share of the intervals that hold the exact probability; ratios: of what was told to that, (repetitions,);
+    runs: the most that one took
+    """
+
+    held: float
+    ratios: Array
+    runs: int
+
+    @property
+    def within(self) -> float:
+        """Share of the repetitions that tell the probability within ten per cent."""
+        return float(np.mean(np.abs(self.ratios - 1) < 0.1))
+
+
+def margins(function: Function, count: int) -> Margins:
+    """Of so many parameters."""
+    names = [f"x{k}" for k in range(count)]
+
+    def model(values: Mapping[str, Array]) -> Answers:
+        found = function(np.stack([values[name] for name in names], axis=1))
+        found = found if found.ndim == 2 else found[:, None]
+        return Answers(found, np.ones(len(found), dtype=bool))
+
+    return Margins(model, Inputs(tuple(Parameter(name, Normal(0.0, 1.0), {name: 1.0}) for name in names)), MOST)
+
+
+def plane(beta: float, count: int) -> tuple[Function, float]:
+    """At this distance from the origin."""
+    return lambda x: beta - x.sum(axis=1) / math.sqrt(count), float(stats.norm.sf(beta))
+
+
+def paraboloid(beta: float, curved: float, count: int) -> tuple[Function, float]:
+    """P = E Phi(-(beta + curved r^2)), r^2 of chi-squared distribution."""
+
+    def chance(r: float) -> float:
+        return float(stats.chi2.pdf(r, count - 1) * stats.norm.sf(beta + curved * r))
+
+    edges = [1.0, 5.0, 20.0, abs(beta / curved)]
+    exact = integrate.quad(chance, 0, 200, limit=800, points=edges)[0]
+    return lambda x: beta - x[:, 0] + curved * (x[:, 1:] ** 2).sum(axis=1), exact
+
+
+def branches(c: float) -> tuple[Function, float]:
+    """Waarts' series system of four branches, with four design points, each as an instant of its own."""
+
+    def four(x: Array) -> Array:
+        s, t = (x[:, 0] - x[:, 1]) / math.sqrt(2), (x[:, 0] + x[:, 1]) / math.sqrt(2)
+        return np.stack([c + 0.2 * s**2 - t, c + 0.2 * s**2 + t, s + (c + 4) / 2, (c + 4) / 2 - s], axis=1)
+
+    def kept(s: float) -> float:
+        return float(stats.norm.pdf(s) * 2 * stats.norm.sf(c + 0.2 * s * s))
+
+    inside = integrate.quad(kept, -(c + 4) / 2, (c + 4) / 2, epsabs=1e-16)[0]
+    return four, inside + 2 * float(stats.norm.sf((c + 4) / 2))
+
+
+def two(one: float, other: float) -> tuple[Function, float]:
+    """Two planes in different directions."""
+    exact = 1 - stats.norm.cdf(one) * stats.norm.cdf(other)
+    return lambda x: np.minimum(one - x[:, 0], other + x[:, 1]), float(exact)
+
+
+STATES: dict[str, tuple[tuple[Function, float], int]] = {
+    "a plane, 1e-3": (plane(3.09, 2), 2),
+    "a plane, 1e-5, eight parameters": (plane(4.26, 8), 8),
+    "a plane, 1e-7": (plane(5.2, 2), 2),
+    "curved away": (paraboloid(4.5, 0.3, 4), 4),
+    "curved towards": (paraboloid(4.0, -0.1, 3), 3),
+    "two sides": ((lambda x: 4 - np.abs(x[:, 0]), 2 * float(stats.norm.sf(4))), 2),
+    "two unequal design points": (two(3.5, 4.0), 4),
+    "four branches": (branches(3.0), 2),
+    "four branches, 7e-6": (branches(5.0), 2),
+}
+"""Name -> margins and the exact probability, and the number of parameters."""
+
+
+def repeated(state: str, way: str, times: int) -> Repeated:
+    """One of `STATES`."""
+    (function, exact), count = STATES[state]
+    held, ratios, most = 0, [], 0
+    for seed in range(times):
+        run = margins(function, count)
+        estimate = probability(run, way, seed).estimate
+        lower, upper = estimate.interval
+        held, most = held + int(lower[-1] <= exact <= upper[-1]), max(most, run.evaluations)
+        ratios.append(estimate.probability / exact)
+    return Repeated(held / times, np.array(ratios), most)
