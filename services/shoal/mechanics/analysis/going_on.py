@@ -118,8 +118,8 @@ def _coordinates(model: Model, state: End, vectors: list[tuple[str, Affine]], la
 
 def _turn_axes(model: Model, q: Array, v: Array, lane: int) -> None:
     """Turn the further axes of sections, which no body has, as slopes and directors tell."""
-    for frame in model.frames.values():
-        for (node, number), vector in frame.axes.items() if isinstance(frame, BeamFrame) else ():
+    for frame in (one for one in model.frames.values() if isinstance(one, BeamFrame)):
+        for (node, number), vector in frame.axes.items():
             place = (node * frame.element_length, 0.0, 0.0)
             axes, rates = triads.along(frame, place, q[None], v[None], lane)
             own = list(vector.own or ())
