@@ -270,3 +270,23 @@ def test_a_weld_between_the_nodes_of_a_rod_is_refused() -> None:
     message = "joints.C: holds the section of the director-rod A at 0.3 m, where it has no node; use a point at a mult"
     with pytest.raises(InputError, match=message):
         simulate(Scene.parse(data), FEW)
+
+
+@pytest.mark.parametrize("kind", ["parallel", "perpendicular"])
+def test_directions_of_two_cables_are_held_in_space_as_in_the_plane(kind: str) -> None:
+    def ends(dimensions: int) -> Array:
+        bars = {name: rod(3, element="ancf-cable") | SOFT | {"width": 0.03, "length": 1.0 + 0.5 * k}
+                for k, name in enumerate("AB")}  # fmt: skip
+        hinges = {name: {"kind": "revolute", "first": {"body": "ground", "point": [0.7 * k, 0]},
+                         "second": {"body": name}} for k, name in enumerate("AB")}  # fmt: skip
+        found = simulate(Scene.parse({
+            "name": "two", "dimensions": dimensions, "bodies": bars,
+            "joints": hinges | {"C": {"kind": kind, "first": {"body": "A"}, "second": {"body": "B"}}},
+            "markers": {name: {"body": name, "point": "end"} for name in "AB"},
+            "initial": {"A": {"angle": 0.3}, "B": {"angle": 0.3 - (kind == "perpendicular") * math.pi / 2}},
+            "solver": {"integrator": "leapfrog", "step": 2e-5},
+        }), np.array([0.3]))  # fmt: skip
+        assert found.ok
+        return np.array([found.marker(name)[-1, :2] for name in "AB"])
+
+    assert ends(3) == pytest.approx(ends(2), abs=1e-9)
