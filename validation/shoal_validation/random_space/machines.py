@@ -89,9 +89,12 @@ def frame(seed: int) -> Scene:
             turn = Rotation.from_rotvec(np.pi / 2 * np.eye(3)[int(rng.integers(3))])
         bodies[name], _ = _strip(rng)
         if rng.random() < 0.5:
-            bodies[name] |= {"curvature": 0.0, "side_curvature": 0.0, "twist": 0.0}
+            bodies[name] |= {"curvature": [], "side_curvature": [], "twist": []}
         kind = str(rng.choice(("weld", "weld", "revolute"))) if k else "weld"
-        joints[f"J{k}"] = _joint(rng, kind, before, {"body": name})
+        joint = _joint(rng, kind, before, {"body": name})
+        joints[f"J{k}"] = {
+            field: value for field, value in joint.items() if field in ("kind", "first", "second", "axis")
+        }
         initial[name] = {"rotation": turn.as_rotvec().tolist()}
         before = {"body": name, "point": "end"}
     return _scene(seed, bodies, joints, initial, _loads(rng, list(bodies), before))
