@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -105,13 +105,15 @@ class ModalFrame(RigidFrame):
 class BeamFrame:
     """A flexible rod: the nodal vectors of its equally spaced nodes, and the element that interpolates them.
 
-    nodes: one tuple of vectors per node (position first), as the element's file orders them.
+    nodes: one tuple of vectors per node (position first), as the element's file orders them. axes: of sections in
+    space, by node and axis, those further ones that joints hold as vectors; slope and director of the node tell them.
     """
 
     name: str
     element: Element
     length: Number
     nodes: tuple[tuple[Affine, ...], ...]
+    axes: dict[tuple[int, int], Affine] = field(default_factory=dict)
 
     @property
     def element_length(self) -> Number:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, Literal, NamedTuple
 
 from pydantic import ValidationError
@@ -65,7 +65,7 @@ def check_start(origin: Any, paths: Iterable[str]) -> None:
 def end_of(stated: Any) -> End:
     """The end of a run. Raises ValueError."""
     try:
-        return End.model_validate(stated)
+        return End.model_validate(dict(stated) if isinstance(stated, Mapping) else stated)
     except ValidationError as error:
         raise ValueError(str(one_line(error, "initial.from"))) from None
 

@@ -78,7 +78,7 @@ class Scene(Record):
         origin = initial.pop(FROM, data.get("initial_from"))
         if origin is None:
             return {**data, INITIAL: initial}
-        if isinstance(origin, End | dict):
+        if isinstance(origin, End | Mapping):
             # What is stated beside fits the drives as they were then.
             beside = {name: guessed(start, (*POSES, *RATES)) for name, start in initial.items()}
             return {**data, INITIAL: beside, "initial_from": end_of(origin)}

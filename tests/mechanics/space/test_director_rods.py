@@ -206,12 +206,6 @@ def test_a_rod_on_a_turning_hub_and_with_a_welded_head_turns_as_a_whole() -> Non
     ("change", "message"),
     [
         ({"dimensions": 2, "gravity": [0, -9.81]}, "director-rod is for scenes in space"),
-        ({"joints": {"O": {"kind": "revolute", "first": GROUND, "second": {"body": "OA"}, "axis": [1, 0, 1]},
-                     "A": {"kind": "spherical", "first": {"body": "OA", "point": "end"}, "second": {"body": "AB"}}}},
-         "neither along the rod OA nor at a right angle"),
-        ({"joints": {"O": {"kind": "spherical", "first": GROUND, "second": {"body": "OA"}},
-                     "A": {"kind": "weld", "first": {"body": "OA", "point": "end"}, "second": {"body": "AB"}}},
-          "initial": {}}, "put a rigid body between"),
         ({"loads": {"T": {"kind": "torque", "at": {"body": "OA", "point": [0.1, 0, 0]}, "torque": 1.0}}},
          "nodes of director rods"),
         ({"bodies": {"OA": rod(2, element="ancf-cable", twist=[1.0], width=H), "AB": rod(2)}}, "twist: ancf-cable has"),

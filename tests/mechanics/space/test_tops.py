@@ -49,17 +49,49 @@ def test_a_top_precesses_steadily_at_both_of_its_rates(fast: bool) -> None:
     assert tip(top(tilt, spin), t)[0] == pytest.approx(turned, abs=1e-8)
 
 
-@pytest.mark.parametrize("s", [5.0, 40.0, 300.0])
-def test_a_top_that_is_let_go_nods_as_its_elliptic_function_says(s: float) -> None:
+TILT = 0.8
+
+
+def let_go(s: float) -> dict[str, Any]:
+    """A top that spins about its axis alone."""
+    return top(TILT, s * np.array([0.0, -math.sin(TILT), math.cos(TILT)]))
+
+
+def nodding(s: float, times: Any) -> Any:
     """u = cos(tilt): u'^2 = b (u0 - u)(u - u1)(u2 - u), b = 2 m g h/A (Whittaker, Analytical Dynamics, 71)."""
-    tilt, times = 0.8, np.array([0.05, 0.4, 1.0])
-    u0, a, b = math.cos(tilt), ALONG * s / PIVOT, 2 * PULL / PIVOT
+    u0, a, b = math.cos(TILT), ALONG * s / PIVOT, 2 * PULL / PIVOT
     root = math.sqrt(a**4 - 4 * b * (a**2 * u0 - b))
     u1, u2 = (a**2 - root) / (2 * b), (a**2 + root) / (2 * b)
     k2 = (u0 - u1) / (u2 - u1)
     sn = ellipj(0.5 * math.sqrt(b * (u2 - u1)) * times + ellipk(k2), k2)[0]
-    found = tip(top(tilt, s * np.array([0.0, -math.sin(tilt), math.cos(tilt)])), *times)
-    assert found[:, 2] == pytest.approx(u1 + (u0 - u1) * sn**2, abs=1e-8)
+    return u1 + (u0 - u1) * sn**2
+
+
+@pytest.mark.parametrize("s", [5.0, 40.0, 300.0])
+def test_a_top_that_is_let_go_nods_as_its_elliptic_function_says(s: float) -> None:
+    times = np.array([0.05, 0.4, 1.0])
+    assert tip(let_go(s), *times)[:, 2] == pytest.approx(nodding(s, times), abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "off", "order"),
+    [("rk4", 1e-7, 4), ("leapfrog", 2e-3, 2), ("energy-momentum", 1.5e-4, 2), ("generalized-alpha", 3e-4, 2)],
+)
+def test_it_nods_at_steps_of_a_millisecond_and_what_is_too_long_is_told(
+    integrator: str, off: float, order: int
+) -> None:
+    """Some 150 steps a turn; fifty times longer ones are no motion any more."""
+    times = np.linspace(0.1, 1.0, 10)
+    half, whole, long = (
+        simulate(Scene.parse(let_go(40.0) | {"solver": {"integrator": integrator, "step": step}}), times)
+        for step in (5e-4, 1e-3, 5e-2)
+    )
+    fine, coarse = (np.abs(one.marker("tip")[:, 2] - nodding(40.0, times)).max() for one in (half, whole))
+    assert half.ok and whole.ok  # noqa: PT018
+    assert coarse < off
+    assert coarse / fine > 0.9 * 2**order
+    assert not long.ok
+    assert long.message
 
 
 def test_a_sleeping_top_wakes_below_its_critical_spin_only() -> None:

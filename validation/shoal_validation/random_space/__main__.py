@@ -7,6 +7,7 @@ chains      one to four rigid and flexible bodies, open or closed: `tree` where 
             else Exudyn on cables four times as fine
 directors   the same with director rods
 bent        one or two flat director rods, curved and twisted at rest: Exudyn's geometrically exact beams
+frames      two or three such rods and straight ones, welded or hinged to each other: the same
 linkages    tops, Bennett's, Bricard's, Sarrus' and spherical linkages, RSSR, slider-cranks, platforms, generic loops:
             Newton's and Euler's equations of every body, written for this study alone
 
@@ -20,7 +21,7 @@ import argparse
 import sys
 from collections import Counter
 
-from shoal_validation.random_space.study import KINDS, drawn, flexible, judged, met
+from shoal_validation.random_space.study import BEAMS, KINDS, drawn, flexible, judged, met
 
 
 def main(arguments: list[str]) -> None:
@@ -36,7 +37,7 @@ def main(arguments: list[str]) -> None:
     first, last = map(int, asked.seeds.split(":"))
     counts: Counter[str] = Counter()
     for seed in range(first, last):
-        if (asked.kind in ("directors", "bent") or asked.tolerance) and not flexible(drawn(seed, asked.kind)[1]):
+        if (asked.kind in ("directors", *BEAMS) or asked.tolerance) and not flexible(drawn(seed, asked.kind)[1]):
             continue
         found = met(seed, asked.tolerance, asked.kind) if asked.tolerance else judged(seed, asked.kind)
         counts[found.verdict] += 1

@@ -76,6 +76,30 @@ def bent(seed: int) -> Scene:
     return _scene(seed, bodies, joints, initial, _loads(rng, list(bodies), before))
 
 
+def frame(seed: int) -> Scene:
+    """Two or three director rods, straight or bent and twisted at rest, that are welded or hinged to each other."""
+    rng = np.random.default_rng(seed)
+    bodies: dict[str, Any] = {}
+    joints: dict[str, Any] = {}
+    initial: dict[str, Any] = {}
+    before = GROUND
+    for k in range(int(rng.integers(2, 4))):
+        name, turn = f"B{k}", Rotation.random(random_state=int(rng.integers(2**31)))
+        if rng.random() < 0.4:  # a right angle, as most frames have
+            turn = Rotation.from_rotvec(np.pi / 2 * np.eye(3)[int(rng.integers(3))])
+        bodies[name], _ = _strip(rng)
+        if rng.random() < 0.5:
+            bodies[name] |= {"curvature": [], "side_curvature": [], "twist": []}
+        kind = str(rng.choice(("weld", "weld", "revolute"))) if k else "weld"
+        joint = _joint(rng, kind, before, {"body": name})
+        joints[f"J{k}"] = {
+            field: value for field, value in joint.items() if field in ("kind", "first", "second", "axis")
+        }
+        initial[name] = {"rotation": turn.as_rotvec().tolist()}
+        before = {"body": name, "point": "end"}
+    return _scene(seed, bodies, joints, initial, _loads(rng, list(bodies), before))
+
+
 def _strip(rng: Random) -> tuple[dict[str, Any], Any]:
     """A flat director rod, curved about both axes by up to a radian and twisted by up to two."""
     rod, end = _rod(rng)

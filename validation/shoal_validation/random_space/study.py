@@ -16,10 +16,12 @@ from shoal.selection import select
 from shoal.trajectory import Trajectory
 
 from shoal_validation.random_space import linkages
-from shoal_validation.random_space.machines import bent, machine, with_directors
+from shoal_validation.random_space.machines import bent, frame, machine, with_directors
 from shoal_validation.random_space.newton_euler import NewtonEuler
 
-KINDS = ("chains", "linkages", "directors", "bent")
+KINDS = ("chains", "linkages", "directors", "bent", "frames")
+BEAMS = ("bent", "frames")
+"""Kinds that geometrically exact beams judge."""
 RIGID_STEP, CABLE_STEP, BEAM_STEP = 5e-4, 1e-4, 5e-4
 """Of Exudyn as a judge [s]."""
 FINER = 4
@@ -80,7 +82,7 @@ def judged(seed: int, kind: str = "chains") -> Judged:
     if not run.ok:
         return Judged(seed, "refused", "", f"{name}{run.status[0]}: {run.message}")
     opinion = (
-        _by_newton_and_euler(seed) if kind == "linkages" else _by_beams(scene) if kind == "bent" else _by_engines(scene)
+        _by_newton_and_euler(seed) if kind == "linkages" else _by_beams(scene) if kind in BEAMS else _by_engines(scene)
     )
     if opinion.silence:
         return Judged(seed, "not judged", opinion.judge, name + opinion.silence)
@@ -101,7 +103,7 @@ def drawn(seed: int, kind: str) -> tuple[str, Scene]:
     if kind == "linkages":
         name, data = linkages.drawn(seed)
         return f"{name}: ", Scene.parse(data)
-    scene = bent(seed) if kind == "bent" else machine(seed)
+    scene = {"bent": bent, "frames": frame}.get(kind, machine)(seed)
     return "", with_directors(scene) if kind == "directors" else scene
 
 
@@ -120,13 +122,13 @@ def met(seed: int, tolerance: float, kind: str = "chains") -> Judged:
         return Judged(seed, "not met", "", str(error))
     if not found.met:
         return Judged(seed, "refused" if not found.trajectory.ok else "not met", "", found.reason)
-    opinion = _by_beams(_divided(scene, MESHES[0])) if kind == "bent" else _by_cables(scene)
+    opinion = _by_beams(_divided(scene, MESHES[0])) if kind in BEAMS else _by_cables(scene)
     if opinion.silence:
         return Judged(seed, "not judged", opinion.judge, opinion.silence)
     known, away = opinion.known, opinion.away(found.trajectory)
     if known > tolerance / 2:
         return Judged(seed, "not judged", opinion.judge, f"it knows the motion to {known:.2g} m only")
-    shear = found.shear if kind == "bent" else 0.0  # its beams have what ours leave out
+    shear = found.shear if kind in BEAMS else 0.0  # its beams have what ours leave out
     verdict = "right" if away <= tolerance + known + shear else "wrong and called right"
     return Judged(seed, verdict, opinion.judge, f"{found.chosen.name}: {away:.2g} m away, known to {known:.2g} m")
 

@@ -12,8 +12,10 @@ from scipy.interpolate import BPoly
 
 from shoal.errors import InputError
 from shoal.mechanics.affine import Affine
+from shoal.mechanics.analysis import triads
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.ended import counting
+from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -110,7 +112,18 @@ def _coordinates(model: Model, state: End, vectors: list[tuple[str, Affine]], la
                 f"initial.from: the joints hold {name} {abs(off[worst]):.3g} {unit} away from where the run left it; "
                 "joints and lengths have to be those of the run"
             )
+    _turn_axes(model, q, v, lane)
     return q, v
+
+
+def _turn_axes(model: Model, q: Array, v: Array, lane: int) -> None:
+    """Turn the further axes of sections, which no body has, as slopes and directors tell."""
+    for frame in (one for one in model.frames.values() if isinstance(one, BeamFrame)):
+        for (node, number), vector in frame.axes.items():
+            place = (node * frame.element_length, 0.0, 0.0)
+            axes, rates = triads.along(frame, place, q[None], v[None], lane)
+            own = list(vector.own or ())
+            q[own], v[own] = axes[0, number], rates[0, number]
 
 
 def _entries(vectors: list[tuple[str, Affine]], d: int, lane: int) -> Iterator[tuple[int, int, float]]:

@@ -47,4 +47,5 @@ def _directors(placement: Placement) -> Iterator[tuple[str, list[int]]]:
     """Rods and the unknowns of their directors, where those are of their own."""
     for name, frame in placement.frames.items():
         if isinstance(frame, BeamFrame) and frame.element.director is not None:
-            yield name, sorted({unknown for node in frame.nodes for unknown in node[2].terms})
+            vectors = [*(node[2] for node in frame.nodes), *frame.axes.values()]
+            yield name, sorted({unknown for vector in vectors for unknown in vector.terms})

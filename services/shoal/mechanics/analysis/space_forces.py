@@ -31,7 +31,7 @@ def components(bodies: FreeBodies, name: str, condition: Any, at: Array) -> list
     if isinstance(condition, Aligned):
         axis = _axis(bodies, condition.first, condition.second, condition.axis, at)
         both = all(_is_cable(bodies, side.body) for side in (condition.first, condition.second))
-        return [] if both else _torques(bodies, name, condition, _across(axis), at)
+        return [] if both and condition.axis is not None else _torques(bodies, name, condition, _across(axis), at)
     if isinstance(condition, Hinged):
         axis = _axis(bodies, condition.first, condition.second, condition.axis, at)
         return _torques(bodies, name, condition, axis[None], at)
@@ -41,8 +41,8 @@ def components(bodies: FreeBodies, name: str, condition: Any, at: Array) -> list
         turning = np.array(condition.factors) @ np.array(turns_of)
         return [Component(name, "torque", turning, _NONE, condition.factors[0] * axes[0])]
     if isinstance(condition, Square):
-        one = _held(bodies, condition.first.body, condition.axis, at)
-        other = _held(bodies, condition.second.body, condition.second_axis, at)
+        one = _pointing(bodies, condition.first, condition.axis, at)
+        other = _pointing(bodies, condition.second, condition.second_axis, at)
         return _torques(bodies, name, condition, turns.unit(np.cross(one, other))[None], at)
     if isinstance(condition, Along):
         line = moving(bodies, line_of(_placement(bodies), condition.first.body, condition.direction), at).value
@@ -150,13 +150,22 @@ def _by(vector: Moving) -> Array:
 
 def _axis(bodies: FreeBodies, first: Attachment, second: Attachment, axis: Any, at: Array) -> Array:
     """A common axis of two bodies, as one that is rigid has it, or a section."""
-    for side in (first, second):
-        if side.body == GROUND or not isinstance(bodies.placement.frames[side.body], BeamFrame):
-            return _held(bodies, side.body, axis, at)
-    for side in (first, second):
-        if not _is_cable(bodies, side.body):
-            return _of_section(bodies, side, axis, at)
-    return np.array([0.0, 0.0, 1.0])
+    sides = sorted((first, second), key=lambda side: (_is_rod(bodies, side.body), _is_cable(bodies, side.body)))
+    return _pointing(bodies, sides[0], axis, at)
+
+
+def _pointing(bodies: FreeBodies, side: Attachment, axis: Any, at: Array) -> Array:
+    """The unit vector of a body, or of a section, that pointed along an axis at the start; None: its x axis.
+
+    A cable has its slope only; any other axis is that of the start.
+    """
+    if not _is_rod(bodies, side.body):
+        return _held(bodies, side.body, axis, at)
+    if _is_cable(bodies, side.body):
+        if axis is not None:
+            return turns.unit(np.array(axis, dtype=float))
+        return turns.unit(moving(bodies, bodies.placement.direction(bodies.scene, side), at).value)
+    return _of_section(bodies, side, axis, at)
 
 
 def _held(bodies: FreeBodies, body: str, axis: Any, at: Array) -> Array:
@@ -176,6 +185,10 @@ def _of_section(bodies: FreeBodies, side: Attachment, axis: Any, at: Array) -> A
     other = np.cross(along, director)
     y, z = (director, other) if frame.element.director == 1 else (-other, director)
     return np.asarray(here @ np.array([along, y, z]))
+
+
+def _is_rod(bodies: FreeBodies, body: str) -> bool:
+    return body != GROUND and isinstance(bodies.placement.frames[body], BeamFrame)
 
 
 def _is_cable(bodies: FreeBodies, body: str) -> bool:

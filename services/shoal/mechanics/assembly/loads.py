@@ -230,6 +230,12 @@ class Loads:
         for side in (first, second):
             self._require_angle(name, side)
         if isinstance(self.placement, SpatialPlacement):
+            if isinstance(self.placement.frames.get(first.body), BeamFrame):
+                where = f"joints.{name}.friction" if name in self.scene.joints else f"loads.{name}.first.body"
+                raise InputError(
+                    f"{where}: turns about an axis of the flexible rod {first.body}; in space `first` is a rigid body "
+                    "there, such as a small one that is welded to the rod"
+                )
             directions = list(hinge(self.scene, self.placement, first, second, axis))
             a, b, ahead = (self.placement.start_of(one)[0] for one in directions)
             turn: Number = np.arctan2(sum(ahead * b), sum(a * b))

@@ -19,6 +19,12 @@ from shoal.mechanics.numerics.tile import Number
 from shoal.scene import Body, RigidBody, Rod, Scene
 from shoal.scene.dimensions import padded
 
+LENT = np.array([1e-8, 1e-5])
+"""Of the inertia of slope and director, which a further axis of a section has so that the mass matrix is positive.
+
+The first is for threads, whose constraints would seem dependent. Where an element is a thousand times as long as thick
+it is the larger one, and changes a frequency of torsion by less than 1e-3.
+"""
 Entries = dict[tuple[int, int], Number]
 
 
@@ -95,6 +101,11 @@ class Masses:
                 s = rod.length * node / rod.elements
                 axis = plane.vector(*rod_axis(rod, s)) if self.scene.dimensions == 2 else unstrained(rod, s)[0]
                 nodal += [axis, *element.nodal_vectors(rod, s)]
+            for (node, _), vector in frame.axes.items():
+                if node in (number, number + 1):
+                    masses = element.mass(rod.density, section, length)
+                    lent = sum(share * masses[k][k] for share, k in zip(LENT, (-2, -1), strict=True))
+                    _add(self.mass, [vector], [[lent]])
             part = element.part(rod, section, length, nodal)
             self.families[element.family].add(name, self.rows.of_all(vectors), part)
 

@@ -10,6 +10,7 @@ from shoal.errors import InputError
 from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
+from shoal.mechanics.assembly.groups import is_stiff
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.joints import Aligned, Along, Apart, Geared, Hinged, InPlane, Meet, Square, Sum, Turned
@@ -79,6 +80,8 @@ def _keep(scene: Scene, name: str, condition: Any, result: SpatialPlacement) -> 
         gap = result.point(scene, condition.second) - result.point(scene, condition.first)
         terms.dot(name, direction(result, condition.first.body, condition.axis), gap, 1)
     elif isinstance(condition, Square):
+        if not all(is_stiff(scene, side.body) for side in (condition.first, condition.second)):
+            return  # see `rod_joints`
         one = direction(result, condition.first.body, condition.axis)
         terms.dot(name, one, direction(result, condition.second.body, condition.second_axis), 0)
     elif isinstance(condition, Hinged):

@@ -24,10 +24,11 @@ from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.holding import hold, rests
-from shoal.mechanics.assembly.space.rods import hold_rod, place_rod
+from shoal.mechanics.assembly.space.rod_joints import hold_rod
+from shoal.mechanics.assembly.space.rods import place_rod
 from shoal.mechanics.assembly.space.sections import material
 from shoal.mechanics.frames import Place, PointFrame, RigidFrame
-from shoal.mechanics.joints import Aligned, Along, InPlane, Meet, Turned
+from shoal.mechanics.joints import Aligned, Along, InPlane, Meet, Square, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.plane import vector
 from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
@@ -62,7 +63,7 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
                 result.terms.dot(joint, fixed(normal), point.where - fixed(base), 1)
     hold(scene, result)
     for joint, condition in joints.of_scene(scene):
-        sides_of_rods = isinstance(condition, Aligned | Turned) and not all(
+        sides_of_rods = isinstance(condition, Aligned | Turned | Square) and not all(
             is_stiff(scene, side.body) for side in (condition.first, condition.second)
         )
         if sides_of_rods and joint not in result.held:

@@ -14,8 +14,9 @@ from shoal.mechanics.elements import SPATIAL
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.frames import Place
-from shoal.mechanics.joints import Aligned
+from shoal.mechanics.joints import Aligned, Turned
 from shoal.mechanics.numerics.tile import Array, Number
+from shoal.mechanics.plane import vector
 from shoal.scene import GROUND, Attachment, Rod, Scene
 
 ALIGNED = 1e-9
@@ -44,31 +45,45 @@ def node_of(rod: Rod, place: Place) -> int | None:
 
 
 def image(scene: Scene, attitudes: Attitudes, side: Attachment, axis: Any) -> Array:
-    """The unit vector of an axis, as it points at the start, in the frame of a body or of the section at a place."""
+    """The unit vector of an axis, as it points at the start, in the frame of a body or of the section at a place.
+
+    None: its x axis.
+    """
+    if axis is None:
+        return vector(1.0, 0.0, 0.0)
     return turns.back(section(scene, side), attitudes.image(side.body, axis))
 
 
 def chosen_elements(scene: Scene, attitudes: Attitudes) -> dict[str, Element]:
     """The element of every flexible rod; the director is the axis of the section that a joint can share with it.
 
-    Joints between two flexible rods come first, since these have no other way to hold an axis.
+    Hinges between two flexible rods come first, then welds between them, of which the one at a right angle to both axes
+    lets most be held by products.
     """
-    wishes: dict[str, list[tuple[bool, int]]] = {}
+    wishes: dict[str, list[tuple[int, int]]] = {}
     for _, condition in joints.of_scene(scene):
-        if isinstance(condition, Aligned):
-            sides = condition.first, condition.second
-            both = all(flexible(scene, side.body) is not None for side in sides)
-            for side in sides:
-                if flexible(scene, side.body) is not None:
-                    cosines = np.abs(image(scene, attitudes, side, condition.axis)[:, 0])
-                    along = [k for k in (1, 2) if cosines[k] > 1.0 - ALIGNED]
-                    wishes.setdefault(side.body, []).extend((both, k) for k in along)
+        if not isinstance(condition, Aligned | Turned):
+            continue
+        sides = condition.first, condition.second
+        both = all(flexible(scene, side.body) is not None for side in sides)
+        for side in sides:
+            if flexible(scene, side.body) is None or (isinstance(condition, Turned) and not both):
+                continue
+            if isinstance(condition, Turned):
+                one, other = (turn_of(attitudes, scene, end)[:, 0, 0] for end in sides)
+                here = turn_of(attitudes, scene, side)[..., 0].T @ np.cross(one, other)
+                here = here / max(float(np.linalg.norm(here)), ALIGNED)
+            else:
+                here = image(scene, attitudes, side, condition.axis)[:, 0]
+            rank = both + isinstance(condition, Aligned) * both
+            along = [k for k in (1, 2) if abs(here[k]) > 1.0 - ALIGNED]
+            wishes.setdefault(side.body, []).extend((rank, k) for k in along)
     found = {}
     for name, body in scene.bodies.items():
         if not isinstance(body, Rod) or body.element == "rigid":
             continue
         element = SPATIAL[body.element]
-        wish = max(wishes.get(name, []), key=lambda one: one[0], default=(False, element.director))[1]
+        wish = max(wishes.get(name, []), key=lambda one: one[0], default=(0, element.director))[1]
         if body.director is not None:
             wish = "xyz".index(body.director)
         found[name] = element.other if element.other is not None and wish != element.director else element
