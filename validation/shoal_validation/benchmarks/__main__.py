@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from shoal.home import home, processor
 
-from shoal_validation.benchmarks import forward, in_space
+from shoal_validation.benchmarks import forward, in_space, linkages
 
 
 def main() -> None:
@@ -19,8 +19,9 @@ def main() -> None:
     argparse.ArgumentParser(description=__doc__).parse_args()
     console = Console(highlight=False)
     rows = [row for quadrature in ("full", "reduced") for row in forward.measure(forward.scene(quadrature), quadrature)]
-    spatial = in_space.rows()
-    for title, part in (("case 1, 2/4 cables, 1000 steps", rows), ("machines in space", spatial)):
+    spatial, closed = in_space.rows(), linkages.rows()
+    parts = (("case 1, 2/4 cables, 1000 steps", rows), ("machines in space", spatial), ("closed linkages", closed))
+    for title, part in parts:
         table = Table(title, "ms each", "times faster", box=box.SIMPLE_HEAD)
         for row in part:
             table.add_row(row.name, f"{row.seconds * 1e3:.4f}", f"{row.ratio:.1f}")
@@ -28,7 +29,8 @@ def main() -> None:
 
     out = home() / "benchmarks.json"
     machine = {"processor": processor(), "cores": os.cpu_count()}
-    data = {"machine": machine, "forward": [vars(row) for row in rows], "space": [vars(row) for row in spatial]}
+    named = {"forward": rows, "space": spatial, "linkages": closed}
+    data = {"machine": machine, **{name: [vars(row) for row in part] for name, part in named.items()}}
     out.write_text(json.dumps(data, indent=1), encoding="utf-8")
     console.print(f"written to {out}")
 

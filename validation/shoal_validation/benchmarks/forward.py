@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ from shoal.engines.exudyn.build import library
 from shoal.engines.exudyn.record import choose_steps
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import Choice, halting
-from shoal.mechanics.numerics.tile import tiles
+from shoal.mechanics.numerics.tile import Array, tiles
 from shoal.mechanics.workspace import Workspace
 from shoal.scene import Scene, load_scene
 
@@ -45,8 +46,8 @@ def measure(what: Scene, quadrature: str, repeats: int = 15) -> list[Row]:
     many = {"initial.OA.angle": np.linspace(0.7, 0.8, LANES)}
     one_core, exudyn = get_engine("gauss"), ExudynEngine(modified_newton=True)
     loop = statistics.median(exudyn_loop(exudyn, what) for _ in range(repeats))
-    single = median_time(prepare(what, 1), repeats)
-    wide = median_time(prepare(what, LANES), repeats) / LANES
+    single = median_time(prepare(what, {}), repeats)
+    wide = median_time(prepare(what, many), repeats) / LANES
     call = median_time(lambda: exudyn.simulate(what), repeats)
     own_call = median_time(lambda: one_core.simulate(what), repeats)
     own_many = median_time(lambda: one_core.simulate_many(what, many), repeats) / LANES
@@ -71,9 +72,9 @@ def exudyn_loop(engine: ExudynEngine, what: Scene) -> float:
     return time.perf_counter() - begin
 
 
-def prepare(what: Scene, lanes: int) -> Any:
-    """A call that marches all lanes on one core from prepared arrays."""
-    values = {"initial.OA.angle": np.linspace(0.7, 0.8, lanes)} if lanes > 1 else {}
+def prepare(what: Scene, values: Mapping[str, Array]) -> Any:
+    """A call that marches all lanes, one number each of some values, on one core from prepared arrays."""
+    lanes = max((len(numbers) for numbers in values.values()), default=1)
     model = build(what.with_lanes(values), lanes)
     tile, parts = tiles(lanes)
     times = np.linspace(0.0, what.solver.duration, 51)[1:]

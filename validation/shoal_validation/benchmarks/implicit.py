@@ -85,7 +85,7 @@ def stiff(repeats: int = REPEATS) -> Iterator[StiffRow]:
         name = "/".join(map(str, mesh))
         scene = stiff_scene(mesh, step)
         run = ours.simulate(scene, times)
-        loop = median_time(prepare(scene, 1), repeats)
+        loop = median_time(prepare(scene, {}), repeats)
         call = median_time(partial(ours.simulate, scene, times), repeats)
         yield StiffRow("ours", name, step, error(run.points), loop, call)
         if step > times[0]:
@@ -118,7 +118,7 @@ def growth(sizes: tuple[int, ...] = ELEMENTS, repeats: int = 7) -> Iterator[Grow
         for elements in sizes:
             steps = max(20, round(work / elements))
             scene = cable(elements, integrator, step, steps)
-            march, taken = prepare(scene, 1), []
+            march, taken = prepare(scene, {}), []
             march()
             for _ in range(repeats):
                 begin = time.process_time()
