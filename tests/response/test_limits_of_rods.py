@@ -147,13 +147,6 @@ def test_sections_between_loads_are_refused_before_the_study() -> None:
     assert not runs
 
 
-def test_numbers_in_functions_of_time_are_refused_before_the_study() -> None:
-    push = {"kind": "force", "at": {"body": "rod", "point": "end"}, "force": [0.0, -1.0], "scale": 1.0}
-    scene = cantilever().with_values({"loads": {"push": push}})
-    with pytest.raises(InputError, match=r"moment of this machine is not told while loads.push.scale varies.*force"):
-        uncertain(scene, {"loads.push.scale": (0.9, 1.1)}, [0.5], limits=["middle.moment < -1"])
-
-
 def test_another_engine_tells_no_section_forces() -> None:
     scene = load_scene("flexible-double-pendulum")
     with pytest.raises(InputError, match="told by the engine gauss alone; found exudyn"):

@@ -9,10 +9,8 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.engines.verification import verified
-from shoal.errors import InputError
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import get_way, probability
-from shoal.response.limits.dynamic import Telling
 from shoal.response.limits.judged import Judged, Shown
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.margins import Margins
@@ -56,12 +54,6 @@ def require(machine: Machine, limit: Limit, inputs: Inputs) -> None:
     """Whether the machine tells a limit, by a run in the middle, as a balance of forces does. Raises InputError."""
     if limit.is_dynamic:
         middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
-        alone = machine.scene.alone(middle)
-        if alone and isinstance(limit.engine(machine.engine, machine.scene), Telling):
-            raise InputError(
-                f"limit: {limit.quantity} of this machine is not told while {alone} varies, a number in a function of "
-                "time or in a matrix; vary another, such as a component of the load's force"
-            )
         watched(replace(machine, keep=None), limit)(middle)
 
 
