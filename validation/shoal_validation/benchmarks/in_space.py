@@ -7,6 +7,7 @@ at our errors follows from its step nearest to them by its order, two: it grows 
 
 from __future__ import annotations
 
+import argparse
 import statistics
 import sys
 import time
@@ -74,6 +75,7 @@ def _exudyn(step: float) -> tuple[float, float]:
 
 def main() -> None:
     """Measure and print."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     shown = [(row.name, f"{row.seconds * 1e3:.4g}", f"{row.ratio:.3g}") for row in rows()]
     sys.stdout.write(table(("machine", "ms each", "times faster"), shown) + "\n")
 

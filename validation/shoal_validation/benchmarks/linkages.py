@@ -6,6 +6,7 @@ Exudyn's solver goes by its modified Newton at the same steps, of order two. `ma
 
 from __future__ import annotations
 
+import argparse
 import statistics
 import sys
 
@@ -42,6 +43,7 @@ def rows(repeats: int = 15) -> list[Row]:
 
 def main() -> None:
     """Measure and print."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     shown = [(row.name, f"{row.seconds * 1e3:.4g}", f"{row.ratio:.3g}") for row in rows()]
     sys.stdout.write(table(("machine", "ms each", "times faster"), shown) + "\n")
 
