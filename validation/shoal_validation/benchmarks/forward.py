@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import statistics
+import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,7 @@ from shoal.mechanics.workspace import Workspace
 from shoal.scene import Scene, load_scene
 
 from shoal_validation.benchmarks.timing import median_time
+from shoal_validation.document import table
 
 STEPS = 1000
 LANES = 64
@@ -32,6 +34,12 @@ class Row:
     name: str
     seconds: float
     ratio: float
+
+
+def show(rows: Iterable[Row]) -> None:
+    """Print lines of benchmarks as a table."""
+    shown = [(row.name, f"{row.seconds * 1e3:.4g}", f"{row.ratio:.3g}") for row in rows]
+    sys.stdout.write(table(("machine", "ms each", "times faster"), shown) + "\n")
 
 
 def scene(quadrature: str) -> Scene:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import statistics
-import sys
 import time
 
 import numpy as np
@@ -19,8 +18,7 @@ from shoal.engines.exudyn.record import choose_steps
 from shoal.engines.prepared import Prepared
 from shoal.scene import load_scene
 
-from shoal_validation.benchmarks.forward import Row, measure
-from shoal_validation.document import table
+from shoal_validation.benchmarks.forward import Row, measure, show
 from shoal_validation.spatial.machines import PUBLISHED, bricard
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
@@ -76,8 +74,7 @@ def _exudyn(step: float) -> tuple[float, float]:
 def main() -> None:
     """Measure and print."""
     argparse.ArgumentParser(description=__doc__).parse_args()
-    shown = [(row.name, f"{row.seconds * 1e3:.4g}", f"{row.ratio:.3g}") for row in rows()]
-    sys.stdout.write(table(("machine", "ms each", "times faster"), shown) + "\n")
+    show(rows())
 
 
 if __name__ == "__main__":

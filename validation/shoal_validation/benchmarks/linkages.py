@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import argparse
 import statistics
-import sys
 
 import numpy as np
 from shoal.engines.exudyn import ExudynEngine
 from shoal.scene import load_scene
 
-from shoal_validation.benchmarks.forward import LANES, Row, exudyn_loop, prepare
+from shoal_validation.benchmarks.forward import LANES, Row, exudyn_loop, prepare, show
 from shoal_validation.benchmarks.timing import median_time
-from shoal_validation.document import table
 
 STEPS = {"equal-slider-crank": 1e-3, "andrews-squeezer": 2e-5, "bricard": 1e-3}
 """Steps [s] by scene; a thousand each."""
@@ -44,8 +42,7 @@ def rows(repeats: int = 15) -> list[Row]:
 def main() -> None:
     """Measure and print."""
     argparse.ArgumentParser(description=__doc__).parse_args()
-    shown = [(row.name, f"{row.seconds * 1e3:.4g}", f"{row.ratio:.3g}") for row in rows()]
-    sys.stdout.write(table(("machine", "ms each", "times faster"), shown) + "\n")
+    show(rows())
 
 
 if __name__ == "__main__":
