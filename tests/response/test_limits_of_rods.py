@@ -152,3 +152,13 @@ def test_another_engine_tells_no_section_forces() -> None:
     with pytest.raises(InputError, match="told by the engine gauss alone; found exudyn"):
         uncertain(scene, {"initial.OA.angle": (0.75, 0.8)}, [0.1], limits=["O.force > 3"], engine="exudyn")
     assert limit("B.normal > 3", scene).unit == "N"
+
+
+def test_a_model_that_is_chosen_for_a_limit_tells_it() -> None:
+    """The tolerance would let the rod be rigid, whose sections tell no moment: rho g A L^2 / 2 at the root."""
+    densities = (900.0, 1100.0)
+    moment = densities[1] * G * AREA * LENGTH**2 / 2
+    asked = [f"root.moment < {-moment * share}" for share in (0.97, 1.03)]
+    settled = cantilever().with_values({"initial_from": "statics", "solver.duration": 0.005})
+    told = uncertain(settled, {"bodies.rod.density": densities}, limits=asked, tolerance=0.1)
+    assert [one.kept for one in told.limits] == [False, True]

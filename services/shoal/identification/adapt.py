@@ -12,7 +12,9 @@ from shoal.identification.methods import Method, Outcome
 from shoal.identification.methods.auto import explained
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.methods.starts import starting_points
+from shoal.identification.recording.source import STRAIN
 from shoal.selection import Selection, select
+from shoal.selection.levels import fields
 from shoal.trajectory import Array
 
 COARSER = 30.0
@@ -79,16 +81,19 @@ def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[Forwar
     clock = model.parameters.measurement_values(point[None], name, recording.stated)
     times = recording.times / clock["clock"][0] + clock["delay"][0]
     deadline = model.deadline
+    channels = (channel for recording in model.measurement.recordings.values() for channel in recording.channels)
     selection = select(
-        model.scene_at(point, name), tolerance, times, lambda _: None if deadline is None else deadline.check()
+        model.scene_at(point, name),
+        tolerance,
+        times,
+        lambda _: None if deadline is None else deadline.check(),
+        meshed=tuple(model.scene.markers[one.marker].body for one in channels if one.quantity == STRAIN),
     )
-    fields = {
-        path: value for rod, level in selection.chosen.levels.items() for path, value in level.fields(rod).items()
-    }
+    values = fields(model.scene, selection.chosen.levels)
     solver = selection.chosen.scene.solver.model_dump(mode="json")
     for name in ("integrator", "step", "inertia_cap", "relative_tolerance", "absolute_tolerance"):
-        fields[f"solver.{name}"] = solver[name]
-    return replace(model, scene=model.scene.with_values(fields)), selection
+        values[f"solver.{name}"] = solver[name]
+    return replace(model, scene=model.scene.with_values(values)), selection
 
 
 def _stage(selection: Selection, evaluations: int) -> Stage:

@@ -182,15 +182,15 @@ class Model:
 
     @cached_property
     def _saddle(self) -> Saddle:
-        """The sparse saddle point problem, where there are enough constraints to need it."""
-        none = np.zeros(0, dtype=np.int64)
-        if self.constraints.size <= saddle.SMALL or (self.constraints.size <= saddle.FEW and self._redundant):
-            return Saddle(0, 0, _EMPTY, none, np.zeros((0, 1)), none, none)
+        """The sparse saddle point problem."""
+        none, count = np.zeros(0, dtype=np.int64), self.constraints.size
+        if count == 0 or (count <= saddle.FEW and self._redundant):
+            return Saddle(0, 0, False, _EMPTY, none, np.zeros((0, 1)), none, none)
         pattern, slots, place, entries = saddle.analyse(self.unknowns, self.mass_entries, self.constraints)
         multiplier = np.zeros(len(place), dtype=np.int64)
         multiplier[place[self.unknowns :]] = 1
         base = scatter(pattern, slots, self.mass_entries)
-        return Saddle(len(place), pattern.slots, pattern, place, base, entries, multiplier)
+        return Saddle(len(place), pattern.slots, count > saddle.SMALL, pattern, place, base, entries, multiplier)
 
     @property
     def _redundant(self) -> bool:

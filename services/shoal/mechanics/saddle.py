@@ -1,10 +1,11 @@
-"""Least constraint as one sparse saddle point problem, for machines with many constraints: linear cost.
+"""Least constraint as one sparse saddle point problem: linear cost, and the least where no position is singular.
 
 [M C_q'; C_q 0] [a; lambda] = [Q; -eta] is factored as L D L' in an order of least fill in which every multiplier
 comes after its coordinates. The pivot of a multiplier is then minus the square of what is left of its row, in the
 mass metric, when the rows before it are taken out; one that vanishes against its first value marks a row that
-depends on the others, and is left out. Its distance from singular enters squared, so the position counts as
-singular earlier than with the orthogonal projection. Implicit steps solve [H C_q'; C_q 0] in the same way, with the
+depends on the others. Its distance from singular enters squared. So machines with few constraints take the orthogonal
+projection near singular positions; with many, the row is left out, and a position counts as singular earlier than
+with the projection. Implicit steps solve [H C_q'; C_q 0] in the same way, with the
 tangent H of the step and any number of constraints.
 """
 
@@ -23,10 +24,12 @@ from shoal.mechanics.numerics.tile import Array, Index, Tile
 from shoal.mechanics.numerics.vector import copy
 
 SMALL = 16
-"""Up to so many constraints the orthogonal projection is used, which is more accurate and about as fast."""
+"""Up to so many constraints the orthogonal projection is used near singular positions, where it is more accurate."""
 FEW = 64
-"""Up to so many where some depend on others: without a choice of pivots the row that is left out stays the same one,
-and where the motion brings its part in the dependence near zero, those that are kept look singular."""
+"""Up to so many it is used everywhere if some depend on others: without a choice of pivots the row that is left out
+stays the same one, and where the motion brings its part in the dependence near zero, those kept look singular."""
+REGULAR = 1e-4
+"""Pivot against its first value above which a position is far from singular ones, and few digits are lost."""
 SINGULAR = 1e-10
 """Pivot against its first value below which a row counts as dependent in an acceleration: 1e-5 from singular."""
 SETTLED = 1e-6
@@ -34,14 +37,16 @@ SETTLED = 1e-6
 
 
 class Saddle(NamedTuple):
-    """Pattern of the factor and where its numbers come from; empty (size 0) for machines with few constraints.
+    """Pattern of the factor and where its numbers come from; empty (size 0) where rows depend on others at the start.
 
-    place: position of every coordinate, then of every multiplier. base: the mass matrix in the pattern, (slots, lanes);
-    slot: of every entry of the Jacobian. multiplier: whether a position is that of a multiplier.
+    many: whether there are too many constraints for the projection, even near singular positions. place: position of
+    every coordinate, then of every multiplier. base: the mass matrix in the pattern, (slots, lanes); slot: of every
+    entry of the Jacobian. multiplier: whether a position is that of a multiplier.
     """
 
     size: int
     slots: int
+    many: bool
     pattern: sparse.Pattern
     place: Index
     base: Array
@@ -131,7 +136,7 @@ def factor(tile: Tile, s: Saddle, entries: int, jacobian: Array, w: SaddleWork, 
     for e in range(entries):
         copy(tile, w.values, s.slot[e], jacobian, e)
     dropped, weak = eliminate(tile, s.pattern, s.multiplier, w.values, tolerance)
-    w.weak[0] = weak
+    w.weak[0] = max(dropped, weak)
     return dropped  # type: ignore[no-any-return]
 
 

@@ -14,6 +14,8 @@ from shoal.scene.joints import Joint
 from shoal.trajectory import Status
 
 DRIFT_TOLERANCE = 1e-6
+ROUND_OFF = 1e-12
+"""Of a place, as a part of the machine's size."""
 SINKING = 3000.0
 """A weight that nothing holds yet falls for as long as the error of its rate is below the absolute tolerance; by then
 it is 14 times as fast as that. Twice as much is no error by the default tolerance of energies, a hundredth."""
@@ -42,9 +44,13 @@ class Limits:
         stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
         self._still = self._weight * 1e-9 * self.span + 1e-12 * float(stiff)
         # So far away a marker may be whatever the energy of the run.
-        near = np.minimum(reaches.MARGIN * reaches.reach(model.scene, np.zeros(1)), np.finfo(float).max)
+        near = np.minimum(self._reach(np.zeros(1)), np.finfo(float).max)
         tolerances = np.array([[scene.solver.energy_tolerance], [DRIFT_TOLERANCE]])
         self._fine = np.concatenate([near[None], np.broadcast_to(tolerances, (2, len(near)))])
+
+    def _reach(self, energy: Array) -> Array:
+        """How far a marker may be away [m]; a wheel's centre, which moves nowhere, as far as round-off goes."""
+        return reaches.MARGIN * reaches.reach(self._model.scene, energy) + ROUND_OFF * self.span
 
     def energy_floor(self, end: float) -> float:
         """The energy [J] that the energy error of a run up to `end` [s] is compared with at least.
@@ -63,8 +69,8 @@ class Limits:
         if fine.all() and not failed.any():
             return (Status.OK,) * lanes, ""
         # Lanes may be machines of different lengths.
-        reach = reaches.MARGIN * reaches.reach(self._model.scene, numbers[ENERGY_SCALE])
-        reach, failed = np.broadcast_to(reach, lanes), np.broadcast_to(failed, lanes)
+        reach = np.broadcast_to(self._reach(numbers[ENERGY_SCALE]), lanes)
+        failed = np.broadcast_to(failed, lanes)
         statuses, message = [Status.OK] * lanes, ""
         for lane in np.flatnonzero(~fine.all(axis=0) | failed):
             statuses[lane], reason = self._judged(choice, numbers[:, lane], float(reach[lane]), bool(failed[lane]))

@@ -50,7 +50,7 @@ def lean(arrays: Arrays, room: Work) -> Work:
 
     The accelerations of machines with many constraints and the removal of drift are sparse saddle point problems.
     """
-    if arrays.saddle.size == 0 or arrays.method != PROJECTION:
+    if not arrays.saddle.many or arrays.method != PROJECTION:
         return room
     none, gauss = np.zeros(0), room.gauss
     lane = gauss.lane._replace(rows=np.zeros((0, 0)), triangle=np.zeros((0, 0)))

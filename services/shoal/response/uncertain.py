@@ -38,6 +38,8 @@ from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
 from shoal.response.limits import Judged, judge, limit
 from shoal.response.limits.judge import Reach, require, watched
+from shoal.response.limits.limit import Limit
+from shoal.response.limits.quantities import of_section
 from shoal.response.machine import Machine, stable
 from shoal.response.read import parameters
 from shoal.response.respond import MOST, Answer, respond
@@ -106,7 +108,7 @@ def uncertain(
         raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")
     when, asked = sampling_times(wanted, times), [limit(text, wanted) for text in limits]
     if tolerance is not None:
-        wanted = _modelled(wanted, inputs, tolerance, when, engine)
+        wanted = _modelled(wanted, inputs, tolerance, when, engine, asked)
     keep = _keep(wanted, when, engine, checkpoint, end)
     machine = Machine(wanted, when, get_engine(engine), keep=keep)
     for one in asked:
@@ -321,14 +323,18 @@ def _status(answer: Answer, gap: float | None, rejected: str, judged: Sequence[J
     return "ok", ""
 
 
-def _modelled(scene: Scene, inputs: Inputs, tolerance: float, times: Array, engine: str) -> Scene:
-    """The cheapest model for the machine in the middle."""
+def _modelled(
+    scene: Scene, inputs: Inputs, tolerance: float, times: Array, engine: str, asked: Sequence[Limit]
+) -> Scene:
+    """The cheapest model for the machine in the middle that tells what is asked."""
     from shoal.selection import select
 
     if engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
     middle = inputs.values(inputs.germs(np.full((1, len(inputs)), 0.5)))
-    selection = select(scene.with_values({path: float(at[0]) for path, at in middle.items()}), tolerance, times)
+    sections = (scene.markers[one.place].body for one in asked if of_section(one.quantity, scene))
+    middling = scene.with_values({path: float(at[0]) for path, at in middle.items()})
+    selection = select(middling, tolerance, times, meshed=tuple(sections))
     if not selection.met:
         raise ComputationError(f"tolerance: no model within {tolerance:g} m: {selection.reason}")
     stated = {path: scene.value(path) for path in middle}

@@ -219,7 +219,7 @@ class Rod(Record):
             return {"modes": self.modes, "axial_modes": self.axial_modes}
         return {} if self.element == "rigid" else {"elements": self.elements}
 
-    def by_elements(self, element: Element, count: int) -> dict[str, Any]:
+    def by_elements(self, element: str, count: int) -> dict[str, Any]:
         """The fields that make a rod of so many elements of it, whatever it was before."""
         fields: dict[str, Any] = {"element": element, "elements": count}
         if self.element == "modal":

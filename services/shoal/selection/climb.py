@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,7 +11,7 @@ import numpy as np
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.scene import Scene
 from shoal.selection.levels import REFINEMENTS, Level, Levels, coarsest, words
-from shoal.selection.run import Rung, distance, flexible_scene, run
+from shoal.selection.run import Rung, cannot_be, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
 
@@ -60,7 +60,7 @@ class Runs:
     """Runs of one scene on different levels, each made once.
 
     limits: the open rods with the element whose limit is their truth; coarsest: where their ladders begin; rungs: all
-    runs, in the order they were made; patience: how long a refinement may take [s]
+    runs, in the order they were made; patience: how long a refinement may take [s]; meshed: see `select`
     """
 
     def __init__(
@@ -70,11 +70,12 @@ class Runs:
         limits: Mapping[str, str],
         progress: Progress,
         patience: float = PATIENCE,
+        meshed: Collection[str] = (),
     ) -> None:
         scene = scene.with_values({"solver.inertia_cap": False})
         self.scene, self.times, self.limits, self.progress = scene, times, limits, progress
         self.patience = patience
-        self.coarsest = coarsest(scene, limits)
+        self.coarsest = coarsest(scene, limits, meshed)
         self.forecast = Forecast(scene, self.coarsest)
         self.rungs: list[Rung] = []
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
@@ -92,6 +93,10 @@ class Runs:
             self.add(rung)
             self._done[key] = rung
         return self._done[key]
+
+    def knows(self, rod: str, level: Level) -> bool:
+        """Whether a rod can be modelled so: not every one can bend by modes."""
+        return level.element != "modal" or cannot_be(self.scene, {**self.coarsest, rod: level}) is None
 
     def refined(self, count: Mapping[str, int]) -> dict[str, Level]:
         """Rods of so many elements of the kind whose limit is their truth."""

@@ -1,12 +1,13 @@
 """How richly one rod may be modelled: a ladder from rigid to ever more elements.
 
 The accuracy of n quintic elements needs about 2 n cubic cables of reduced quadrature, whose work is about the same for
-small n and more beyond. So cables are the coarse end of the ladder and quintic elements the fine one.
+small n and more beyond. So cables are the coarse end of the elements and quintic ones the fine end. A few modes in a
+floating frame, below them, leave out stretching and large bending; their steps are as much longer as a rod is slender.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,24 +18,33 @@ from shoal.scene import Rod, Scene
 from shoal.scene.dimensions import is_flat
 
 _SHORT = {"ancf-cable": "cable", "ancf-quintic": "quintic", "ancf-full": "full", "simo-reissner": "reissner"}
+"""Elements in the names of models."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """One rung for one rod: its element and how many of them. rotary: whether a rigid rod's sections have inertia."""
+    """One rung for one rod: its element and how many of them, or of modes where it bends by modes.
+
+    rotary: whether the sections of a rigid or modal rod have rotary inertia
+    """
 
     element: str
     elements: int = 1
     rotary: bool = False
+    modes: int = 0
 
-    def fields(self, rod: str) -> dict[str, Any]:
-        """The fields of the scene that say so."""
-        values: dict[str, Any] = {f"bodies.{rod}.element": self.element}
+    def fields(self, rod: Rod) -> dict[str, Any]:
+        """The fields that make a rod so, whatever it was before."""
+        values: dict[str, Any] = {"element": self.element}
+        if self.element != "rigid" or rod.element == "modal":
+            values |= rod.by_elements(self.element, self.elements)
         if self.element != "rigid":
-            values[f"bodies.{rod}.elements"] = self.elements
-            values[f"bodies.{rod}.quadrature"] = "reduced" if self.element == "ancf-cable" else "full"
+            light = self.element == "ancf-cable" and not (rod.retardation or rod.curvature)
+            values["quadrature"] = "reduced" if light else "full"
         if self.rotary or self.element != "rigid":
-            values[f"bodies.{rod}.rotary_inertia"] = self.rotary
+            values["rotary_inertia"] = self.rotary
+        if self.modes:
+            values |= {"modes": self.modes, "axial_modes": 0, "ends": None}
         return values
 
 
@@ -46,7 +56,7 @@ def words(levels: Levels) -> str:
     """Such as `upper 1, lower 2 quintic, third rigid`: rods of one element together."""
     rods: dict[str, list[str]] = {}
     for rod, level in levels.items():
-        counted = rod if level.element == "rigid" else f"{rod} {level.elements}"
+        counted = rod if level.element == "rigid" else f"{rod} {level.modes or level.elements}"
         rods.setdefault(level.element, []).append(counted)
     return ", ".join(f"{', '.join(named)} {_SHORT.get(element, element)}" for element, named in rods.items())
 
@@ -65,19 +75,29 @@ def quintic(n: int) -> Level:
     return Level("ancf-quintic", n)
 
 
+def modal(n: int, rotary: bool = False) -> Level:
+    """n modes of bending in a floating frame."""
+    return Level("modal", rotary=rotary, modes=n)
+
+
+MODES = 1, 2, 4
 COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
 SLENDER, SHEARS = "ancf-quintic", "simo-reissner"
 """The elements whose limits are the truth of slender rods, and in the plane of those with shear and rotary inertia."""
 LADDERS = {
     SLENDER: (
-        *(RIGID, cable(1), cable(2), quintic(1), cable(3), cable(4)),
+        *(RIGID, *(modal(n) for n in MODES)),
+        *(cable(1), cable(2), quintic(1), cable(3), cable(4)),
         *(quintic(n) for n in COUNTS if n > 1),
     ),
     "ancf-full": (RIGID, *(Level("ancf-full", n) for n in COUNTS)),
-    SHEARS: (STOUT, *(Level(SHEARS, n) for n in COUNTS)),
+    SHEARS: (STOUT, *(modal(n, rotary=True) for n in MODES), *(Level(SHEARS, n) for n in COUNTS)),
     "director-rod": (RIGID, *(Level("director-rod", n) for n in COUNTS)),
 }
 """From coarse to fine, by the element whose limit is the truth."""
+
+FRAMED = ("rigid", "modal")
+"""Levels of a rod that moves with a frame: no element limits their step, and no section has a strain."""
 
 REFINEMENTS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 """Numbers of these elements in the models by which errors are estimated."""
@@ -104,18 +124,18 @@ def open_rods(scene: Scene) -> dict[str, str]:
     }
 
 
-def coarsest(scene: Scene, limits: Mapping[str, str]) -> dict[str, Level]:
-    """Where the ladders of rods begin. limits: the element whose limit is the truth of each.
+def coarsest(scene: Scene, limits: Mapping[str, str], meshed: Collection[str] = ()) -> dict[str, Level]:
+    """Where the ladders of rods begin. limits: the element whose limit is the truth of each; meshed: see `select`.
 
-    All are rigid, but for director rods that are curved or twisted: of those no element turns by more than a right
-    angle or so. Raises InputError where that takes too many of them.
+    The others are rigid, but for director rods that are curved or twisted: of those no element turns by more than a
+    right angle or so. Raises InputError where that takes too many of them.
     """
-    return {rod: _coarsest(rod, scene.bodies[rod], limit) for rod, limit in limits.items()}
+    return {rod: _coarsest(rod, scene.bodies[rod], limit, rod in meshed) for rod, limit in limits.items()}
 
 
-def _coarsest(name: str, rod: Any, limit: str) -> Level:
+def _coarsest(name: str, rod: Any, limit: str, meshed: bool) -> Level:
     if limit != "director-rod" or rod.straight:
-        return LADDERS[limit][0]
+        return next(level for level in LADDERS[limit] if not meshed or level.element not in FRAMED)
     few = next((n for n in REFINEMENTS[:-1] if rod.winding <= n * np.pi / 2), None)
     if few is None:
         raise InputError(
@@ -127,11 +147,15 @@ def _coarsest(name: str, rod: Any, limit: str) -> Level:
 
 def apply(scene: Scene, levels: Levels) -> Scene:
     """The scene with its rods modelled so. Raises InputError where a joint does not suit a flexible rod."""
-    values: dict[str, Any] = {}
-    for rod, level in levels.items():
-        body = scene.bodies[rod]
-        if isinstance(body, Rod) and body.element == "modal":
-            fields = body.by_elements("ancf-cable", level.elements)
-            values |= {f"bodies.{rod}.{field}": value for field, value in fields.items()}
-        values |= level.fields(rod)
-    return scene.with_values(values)
+    return scene.with_values(fields(scene, levels))
+
+
+def fields(scene: Scene, levels: Levels) -> dict[str, Any]:
+    """The values of a scene by which its rods are modelled so."""
+    rods = {name: scene.bodies[name] for name in levels}
+    return {
+        f"bodies.{name}.{field}": value
+        for name, rod in rods.items()
+        if isinstance(rod, Rod)
+        for field, value in levels[name].fields(rod).items()
+    }

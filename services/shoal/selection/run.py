@@ -14,6 +14,9 @@ from shoal.selection.levels import Level, Levels, apply, coarsest, open_rods, wo
 from shoal.selection.work import INTEGRATOR
 from shoal.trajectory import Array, Trajectory
 
+CLOSE = 1e-8
+"""The integrator's tolerance for rigid machines beside flexible ones."""
+
 
 @dataclass
 class Rung:
@@ -42,8 +45,10 @@ class Rung:
 def flexible_scene(scene: Scene, levels: Levels, fraction: float) -> Scene:
     """The scene on these levels, by leapfrog with a fraction of its longest stable step, or with more than that step.
 
-    Beyond it, the inertia of axial modes is raised. Raises InputError.
+    Beyond it, the inertia of axial modes is raised. Where all are rigid, see `rigid_scene`. Raises InputError.
     """
+    if all(level.element == "rigid" for level in levels.values()):
+        return rigid_scene(scene, levels, CLOSE)
     duration, modelled = scene.solver.duration, apply(scene, levels)
     steps = max(int(np.ceil(duration / (fraction * stable_step(modelled, INTEGRATOR)))), scene.solver.samples)
     pace = {"integrator": INTEGRATOR, "step": duration / steps, "inertia_cap": fraction > 1}
@@ -71,7 +76,11 @@ def distance(one: Trajectory, other: Trajectory) -> float:
 def can_be_flexible(scene: Scene, rod: str, limit: str) -> str | None:
     """None, or why this rod has to stay rigid. limit: the element it would be made of."""
     coarse = coarsest(scene, open_rods(scene) | {rod: limit})
-    levels = coarse | {rod: Level(limit, coarse[rod].elements)}
+    return cannot_be(scene, coarse | {rod: Level(limit, coarse[rod].elements)})
+
+
+def cannot_be(scene: Scene, levels: Levels) -> str | None:
+    """None, or why the rods of a scene cannot be modelled so."""
     try:
         stable_step(apply(scene, levels), INTEGRATOR)
     except InputError as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -92,6 +92,7 @@ def select(
     times: Sequence[float] | Array | None = None,
     progress: Progress = lambda _: None,
     patience: float = PATIENCE,
+    meshed: Collection[str] = (),
 ) -> Selection:
     """The cheapest model of a scene whose estimated error at the markers is within `tolerance` [m].
 
@@ -100,7 +101,8 @@ def select(
     or where the former does not settle. The elements ancf-full, simo-reissner and director-rod are theories of their
     own; a rigid rod in space is taken to twist as well as to bend; `solver.theory: slender` keeps the former.
     Integrator, step, element and number of elements are chosen; progress is told every model that is run.
-    patience: the answer is "not met" where a refinement would take longer [s]. Raises InputError, and ComputationError
+    patience: the answer is "not met" where a refinement would take longer [s]; meshed: rods that have to be made of
+    elements, as the strains of their sections are asked for. Raises InputError, and ComputationError
     where a curved or twisted rod in space, which is never rigid, takes too long.
     """
     if not (np.isfinite(tolerance) and tolerance > 0):
@@ -111,7 +113,8 @@ def select(
     asked = sampling_times(scene, times)
     scene = scene.with_values({"solver.duration": float(asked[-1])}) if asked[-1] > 0 else scene
     limits, closed = _open(scene)
-    task = _Task(scene, tolerance, asked, estimate(scene, tuple(limits)) if limits else {}, closed, progress, patience)
+    priors = estimate(scene, tuple(limits)) if limits else {}
+    task = _Task(scene, tolerance, asked, priors, closed, progress, patience, meshed)
     may_shear = scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
     found = _of_theory(task, limits, impatient=may_shear)
     if may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
@@ -130,6 +133,7 @@ class _Task(NamedTuple):
     closed: dict[str, str]
     progress: Progress
     patience: float
+    meshed: Collection[str]
 
 
 def _of_both(slender: Selection, stout: Selection) -> Selection:
@@ -149,9 +153,10 @@ def _of_both(slender: Selection, stout: Selection) -> Selection:
 def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) -> Selection:
     """The cheapest model where the truth of each rod is the limit of that element. impatient: see `climb`."""
     tolerance, priors, grid = task.tolerance, task.priors, _grid(task.asked)
-    surely = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
+    unmoved = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
+    surely = [rod for rod in unmoved if rod not in task.meshed]
     closed = task.closed | {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
-    runs = Runs(task.scene, grid, limits, task.progress, task.patience)
+    runs = Runs(task.scene, grid, limits, task.progress, task.patience, task.meshed)
     fixed = runs.coarsest
     flexible = tuple(rod for rod in limits if rod not in surely)
     known = sum(priors[rod].error for rod in surely)

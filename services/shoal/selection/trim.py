@@ -10,7 +10,7 @@ from shoal.errors import InputError
 from shoal.mechanics.numerics.alike import FEW
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.selection.climb import Runs, Yardstick
-from shoal.selection.levels import Level, Levels, below
+from shoal.selection.levels import FRAMED, Level, Levels, below
 from shoal.selection.run import Rung, distance
 
 WITHIN = 0.9
@@ -20,7 +20,9 @@ CHEAPER = 0.95
 HARMLESS = 0.1
 """While one rod goes down, those before it stay at the cheapest level that costs this part of the tolerance at most."""
 MISSES = 2
-"""So many levels in a row beyond twice the tolerance end the way down."""
+"""So many levels in a row beyond twice the tolerance end the way down the elements."""
+GAINS = 2.0
+"""Twice as many modes that gain less end the way up."""
 HOPEFUL = 1.6
 """Errors of rods may cancel: combinations are tried up to this multiple of the tolerance."""
 TRIES = 10
@@ -41,10 +43,14 @@ def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: flo
     tables: dict[str, dict[Level, float]] = {}
     context = base
     for rod in sorted(rods, key=lambda rod: -runs.forecast.own(rod, yardstick.base[rod])):
-        tables[rod] = table = _down(runs, yardstick, context, rod, tolerance)
+        tables[rod] = table = _alone(runs, yardstick, context, rod, tolerance)
         harmless = [level for level, part in table.items() if part <= HARMLESS * tolerance]
         cheapest = min(harmless, key=lambda level: runs.forecast.own(rod, level))
         context = judged(runs, yardstick, {**context.levels, rod: cheapest})
+    for rod, table in tables.items():
+        if not np.all(np.isfinite(list(table.values()))):  # other rods, as fine as they were, may have diverged
+            again = _alone(runs, yardstick, context, rod, tolerance)
+            table |= {level: part for level, part in again.items() if part < table.get(level, np.inf)}
     combinations = _combinations(runs, yardstick, base, tables, tolerance)
     for levels in combinations[:TRIES]:
         rung = judged(runs, yardstick, levels)
@@ -58,7 +64,7 @@ def _strided(runs: Runs, yardstick: Yardstick, combinations: list[Levels], toler
 
     Models whose mass matrix is not inverted as a whole lose more by the capped one than longer steps gain.
     """
-    few = [levels for levels in combinations if _few(levels)]
+    few = [levels for levels in combinations if _few(levels) and runs.forecast.work(levels) > 0]
     longer = [(runs.forecast.work(levels) / stride, stride, levels) for levels in few for stride in STRIDES]
     cheaper = [one for one in longer if one[0] < CHEAPER * found.work]
     for _, stride, levels in sorted(cheaper, key=lambda one: one[0])[:TRIES]:
@@ -83,18 +89,31 @@ def judged(runs: Runs, yardstick: Yardstick, levels: Levels, fraction: float = S
     return rung
 
 
-def _down(runs: Runs, yardstick: Yardstick, context: Rung, rod: str, tolerance: float) -> dict[Level, float]:
+def _alone(runs: Runs, yardstick: Yardstick, context: Rung, rod: str, tolerance: float) -> dict[Level, float]:
     """Distance from the context [m] of the models in which one rod alone is coarser."""
     start = context.levels[rod]
     table = {start: 0.0}
-    last, misses = runs.forecast.own(rod, start), 0
-    for level in below(start, runs.limits[rod], runs.coarsest[rod]):
-        if (work := runs.forecast.own(rod, level)) > CHEAPER * last:
-            continue
-        last = work
+
+    def miss(level: Level) -> float:
         rung = judged(runs, yardstick, {**context.levels, rod: level})
         table[level] = distance(rung.trajectory, context.trajectory)
-        misses = misses + 1 if rung.error > 2 * tolerance else 0
+        return rung.error
+
+    lower = [level for level in below(start, runs.limits[rod], runs.coarsest[rod]) if runs.knows(rod, level)]
+    framed = [level for level in reversed(lower) if level.element in FRAMED]
+    before = np.inf
+    for level in framed:
+        miss(level)
+        if table[level] <= HARMLESS * tolerance or GAINS * table[level] > before:
+            break
+        before = table[level] if level.modes else np.inf
+    last, misses = runs.forecast.own(rod, start), 0
+    for level in lower:
+        work = runs.forecast.own(rod, level)
+        if level.element in FRAMED or work > CHEAPER * last:
+            continue
+        last = work
+        misses = misses + 1 if miss(level) > 2 * tolerance else 0
         if misses == MISSES:
             break
     return table

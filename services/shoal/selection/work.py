@@ -20,6 +20,7 @@ WEIGHT = {
     "ancf-cable": 1.0,
     "ancf-quintic": 1.5,
     "ancf-full": 5.0,
+    "modal": 0.0,
     "simo-reissner": 2.3,
     "director-rod": 30.0,
 }
@@ -27,6 +28,8 @@ WEIGHT = {
 constraints, which each step solves."""
 STEP_WORK = 3.0
 """Work of a step beside its elements."""
+CONSTRAINED, CONSTRAINT = 12.0, 5.0
+"""More of it where there are constraints, and for each of them."""
 _BENDING = {"ancf-cable": 4.7, "ancf-quintic": 16.8, "director-rod": 4.6}
 """A bending mode is the fastest one of an element whose length is below so many radii of gyration."""
 
@@ -44,14 +47,17 @@ class Forecast:
 
     def work(self, levels: Levels) -> float:
         """Work of a run with leapfrog at its longest step, in steps of one cable element; 0 for rigid rods."""
-        elements = sum(WEIGHT[level.element] * level.elements for level in levels.values())
-        return float(self.scene.solver.duration / self.step(levels) * (elements + STEP_WORK)) if elements else 0.0
+        rows = sum(_rows(level) for level in levels.values())
+        each = sum(WEIGHT[level.element] * level.elements for level in levels.values())
+        each += STEP_WORK + (CONSTRAINED + CONSTRAINT * rows if rows else 0.0)
+        return float(self.scene.solver.duration / self.step(levels) * each)
 
     def _rod_step(self, name: str, level: Level) -> float:
         if level.element == "rigid":
             return np.inf
         few = max(2, self.coarse[name].elements)
-        probe = level if level.element == SHEARS else Level(level.element, few)  # few elements shear, many stretch
+        # few elements shear, many stretch
+        probe = level if level.element in (SHEARS, "modal") else Level(level.element, few)
         key = (name, probe)
         if key not in self._steps:
             self._steps[key] = stable_step(apply(self.scene, {**self.coarse, name: probe}), INTEGRATOR)
@@ -69,4 +75,13 @@ class Forecast:
 
     def own(self, name: str, level: Level) -> float:
         """Work of one rod by itself, as if the others were as coarse as can be."""
-        return float(WEIGHT[level.element] * level.elements / self._rod_step(name, level))
+        each = WEIGHT[level.element] * level.elements + CONSTRAINT * _rows(level)
+        return float(each / self._rod_step(name, level))
+
+
+def _rows(level: Level) -> int:
+    """Constraints of a rod: that its direction has unit length, and for each mode that its vector is along it.
+
+    Those of directors are part of WEIGHT.
+    """
+    return 1 + level.modes if level.element in ("rigid", "modal") else 0

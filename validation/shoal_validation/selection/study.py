@@ -102,7 +102,8 @@ def _cheapest(machine: Draw, chosen: Selection, yardstick: Rung) -> tuple[float,
     rods, least = tuple(chosen.chosen.levels), _uncapped(chosen)
     runs = Runs(chosen.chosen.scene, yardstick.trajectory.times, chosen.limits, lambda _: None)
     cheaper: list[tuple[float, dict[str, Level]]] = []
-    for levels in product(*(LADDERS[chosen.limits[rod]] for rod in rods)):
+    ladders = ([level for level in LADDERS[chosen.limits[rod]] if runs.knows(rod, level)] for rod in rods)
+    for levels in product(*ladders):
         combination = dict(zip(rods, levels, strict=True))
         work = runs.forecast.work(combination)
         if 0 < work < least and any(level.element != "rigid" for level in levels):

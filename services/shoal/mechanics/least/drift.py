@@ -1,6 +1,6 @@
 """The removal of drift: the smallest change in the metric of the mass matrix that closes the constraints again.
 
-Drift is small, and so is the way back. Where there are many constraints, the factors of its beginning serve for all of
+Drift is small, and so is the way back. By the sparse saddle point problem the factors of its beginning serve for all of
 it, places and rates, and are renewed only where a change has left more than a hundredth of a gap.
 """
 
@@ -45,19 +45,19 @@ def project(
 
     ready: whether the accelerations at q have just been found by the projection, whose directions are at hand.
     """
-    ready, before = ready and m.saddle.size > 0 and w.saddle.weak[0] == 0.0, np.inf
+    factored, before = ready and m.saddle.size > 0 and w.saddle.weak[0] == 0.0, np.inf
     for _ in range(iterations):
         derive(tile, m.derived, q, m.unknowns, m.held_rows, False)
         constraints.residual(tile, m.constraints, m.functions, t, q, w.gap)
         now = _largest(tile, m, w)
         if now < CLOSED:
             break
-        if not (ready and (now < SLOW * before or now < SMALL)):
+        if not (factored and (now < SLOW * before or now < SMALL)):
             constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
-            _prepare(tile, m, w)
-        _correct(tile, m, w, q, tolerance)
-        ready, before = m.saddle.size > 0, now
-    _project_rates(tile, m, w, t, q, v, tolerance, ready)
+            factored = _prepare(tile, m, w)
+        _correct(tile, m, w, q, tolerance, factored)
+        before = now
+    _project_rates(tile, m, w, t, q, v, tolerance, factored)
 
 
 @njit(cache=True, error_model="numpy")
@@ -70,17 +70,16 @@ def project_rates(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Ar
 def _project_rates(
     tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array, tolerance: float, ready: bool
 ) -> None:
-    """The same; ready: whether directions are prepared near q. Twice with those, as a change leaves a little then."""
+    """The same; ready: whether there are factors of a place near q. Again with those, as a change leaves a little."""
     derive(tile, m.derived, q, m.unknowns, m.held_rows, False)
     constraints.jacobian(tile, m.constraints, q, 1.0, w.jacobian)
-    if not ready:
-        _prepare(tile, m, w)
-    for again in range(2 if ready else 1):
+    factored = ready or _prepare(tile, m, w)
+    for again in range(3 if ready else 1):
         constraints.rates(tile, m.constraints, m.functions, t, w.gap)
         constraints.add_product(tile, m.constraints, w.jacobian, v, w.gap)
         if again and _largest(tile, m, w) < LITTLE:
             break
-        _correct(tile, m, w, v, tolerance)
+        _correct(tile, m, w, v, tolerance, factored)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -93,22 +92,24 @@ def _largest(tile: Tile, m: Arrays, w: GaussWork) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _prepare(tile: Tile, m: Arrays, w: GaussWork) -> None:
-    """Take the directions of `_correct` from C_q in w.jacobian."""
+def _prepare(tile: Tile, m: Arrays, w: GaussWork) -> bool:
+    """Take the directions of `_correct` from C_q in w.jacobian; whether they are factors of `saddle`."""
     if m.saddle.size > 0:
         c = m.constraints
-        saddle.factor(tile, m.saddle, c.entry[c.size], w.jacobian, w.saddle, saddle.SETTLED)
-    else:
-        rows(tile, m, w)
+        tolerance = saddle.SETTLED if m.saddle.many else saddle.REGULAR
+        if saddle.factor(tile, m.saddle, c.entry[c.size], w.jacobian, w.saddle, tolerance) == 0 or m.saddle.many:
+            return True
+    rows(tile, m, w)
+    return False
 
 
 @njit(cache=True, error_model="numpy")
-def _correct(tile: Tile, m: Arrays, w: GaussWork, x: Array, tolerance: float) -> None:
+def _correct(tile: Tile, m: Arrays, w: GaussWork, x: Array, tolerance: float, factored: bool) -> None:
     """Change x by the smallest d in the mass metric with C_q d = -gap, along prepared directions."""
     width = len(tile)
     for row in range(m.unknowns):
         clear(tile, w.extra, row)
-    if m.saddle.size > 0:
+    if factored:
         many.solve(tile, m, w, w.extra, w.gap, w.extra, w.multiplier)
     else:
         _move(tile, m, w, tolerance)

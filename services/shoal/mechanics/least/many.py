@@ -1,4 +1,4 @@
-"""Least constraint with many constraints, by the sparse saddle point problem (`saddle`)."""
+"""Least constraint by the sparse saddle point problem (`saddle`)."""
 
 from __future__ import annotations
 
@@ -36,14 +36,18 @@ def solve(tile: Tile, m: Arrays, w: GaussWork, load: Array, gap: Array, out: Arr
 
 
 @njit(cache=True, error_model="numpy")
-def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array) -> None:
-    """See `principle.constrain`; C_q and eta are in w."""
+def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array) -> bool:
+    """See `principle.constrain`; C_q and eta are in w. Whether it is done: not for few constraints near singular."""
     c = m.constraints
     entries = c.entry[c.size]
-    dropped = saddle.factor(tile, m.saddle, entries, w.jacobian, w.saddle, saddle.SINGULAR)
+    tolerance = saddle.SINGULAR if m.saddle.many else saddle.REGULAR
+    dropped = saddle.factor(tile, m.saddle, entries, w.jacobian, w.saddle, tolerance)
+    if dropped > 0 and not m.saddle.many:
+        return False
     solve(tile, m, w, a, w.gap, a, w.multiplier)
     if dropped > 0:
         _add_third_derivatives(tile, m, w, t, v, a)
+    return True
 
 
 @njit(cache=True, error_model="numpy")

@@ -55,8 +55,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
     best tolerance is about the cube root of eps.
     """
     state(tile, m, w, t, q, v)
-    if m.saddle.size > 0 and m.method == PROJECTION:
-        many.constrain(tile, m, w, t, v, a)
+    if m.saddle.size > 0 and m.method == PROJECTION and many.constrain(tile, m, w, t, v, a):
         return
     width = len(tile)
     s = lane_work(m, w)

@@ -38,9 +38,14 @@ _BENT = ("curvature", "side_curvature", "twist")
 """Fields that make the unstrained rod curved."""
 
 
+def of_section(quantity: str, scene: Scene) -> bool:
+    """Whether a section of a flexible rod tells it."""
+    return quantity in STRAINS or quantity in SECTIONS[scene.dimensions]
+
+
 def needs_states(quantity: str, scene: Scene) -> bool:
     """Whether more tells it than the motion of the bodies of a rigid machine in the plane."""
-    if quantity in STRAINS or quantity in SECTIONS[scene.dimensions]:
+    if of_section(quantity, scene):
         return True
     dynamic = quantity in ENERGIES or quantity in REACTIONS[scene.dimensions]
     return dynamic and (scene.dimensions == 3 or any(body.element != "rigid" for body in scene.bodies.values()))
@@ -70,7 +75,7 @@ def check(place: str, quantity: str, scene: Scene) -> None:
         other = "marker" if kind == "joint" else "joint"
         also = f" ({place} is a {other}, and {quantity} is that of a {kind})" if place in others else ""
         raise InputError(f"no {kind} {place!r}{also}; {there}")
-    if quantity in STRAINS or quantity in SECTIONS[d]:
+    if of_section(quantity, scene):
         _check_rod(scene, place, quantity)
     elif kind == "joint" and quantity == "torque" and d == 3 and not isinstance(scene.joints[place], DrivenAngle):
         raise InputError(
