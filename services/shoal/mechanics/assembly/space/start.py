@@ -7,6 +7,7 @@ in the coordinates themselves: poses by Gauss and Newton's method, rates of leas
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +35,10 @@ ITERATIONS = 60
 ATTEMPTS = 16
 DEPENDENT = 1e-9
 """Singular values below this, relative to the largest, are of rows that depend on others."""
+FREE = 1e-6
+"""Part of a guess that the joints and what is kept leave free, below which they tell it."""
+GUESSED = 20
+"""Iterations in which a guess is met, if it can be."""
 
 
 def place_started(scene: Scene) -> SpatialPlacement:
@@ -65,6 +70,21 @@ def _dense(stated: list[_Stated], unknowns: int) -> Array:
         for unknown, factor in one.parts:
             row[unknown] += factor
     return rows
+
+
+def _guesses(stated: list[_Stated]) -> Iterator[list[_Stated]]:
+    """The components of every guess, one after the other."""
+    for _, parts in groupby(stated, key=lambda one: (one.body, one.quantity)):
+        if not (guess := list(parts))[0].firm:
+            yield guess
+
+
+def _leaves_free(held: Array, asked: Array) -> bool:
+    """Whether some row of those asked for changes while those that are held do not."""
+    _, sizes, rows = np.linalg.svd(held, full_matrices=False)
+    told = rows[: int(np.sum(sizes > DEPENDENT * sizes[:1]))]
+    left = asked - (asked @ told.T) @ told
+    return bool(np.any(np.linalg.norm(left, axis=1) > FREE * np.linalg.norm(asked, axis=1)))
 
 
 class _Rates(NamedTuple):
@@ -141,8 +161,8 @@ class _Closing:
             shaken = 0.05 * 1.3**attempt * rng.normal(size=len(begin)) if attempt else 0.0
             found = self._newton(begin + shaken, lane, stated)
             if found is not None and not self._flipped(found, lane):
-                self._check_strain(begin, found, lane)
-                self.q[:, lane] = found
+                self.q[:, lane] = self._with_guesses(found, lane, stated)
+                self._check_strain(begin, self.q[:, lane], lane)
                 return True
         if self.lanes > 1:
             return False
@@ -152,6 +172,20 @@ class _Closing:
             worst = self.terms[int(np.argmax(off))].name
             raise InputError(f"joints.{worst}: cannot be assembled; no poses near the stated ones close it")
         return self._corrected(found, stated)
+
+    def _with_guesses(self, q: Array, lane: int, kept: list[_Stated]) -> Array:
+        """Poses that keep the guesses too, one after the other, where the joints and those before let them."""
+        for guess in _guesses(self._rows(_POSES, lane)):
+            if max(abs(one.off(q)) for one in guess) > CLOSED * max(self.size, 1.0):
+                held = np.vstack([self.jacobian(q, lane, self.terms) / self.scale[:, None], _dense(kept, len(q))])
+                if not _leaves_free(held, _dense(guess, len(q))):
+                    continue
+                found = self._newton(q, lane, [*kept, *guess], GUESSED)
+                if found is None or self._flipped(found, lane):
+                    continue
+                q = found
+            kept = [*kept, *guess]
+        return q
 
     def _corrected(self, q: Array, stated: list[_Stated]) -> bool:
         """Whether the stated poses miss by rounding only. Raises InputError if they do not."""
@@ -181,11 +215,11 @@ class _Closing:
     def _unit(self, quantity: Quantity) -> float:
         return self.size if quantity == "position" else 1.0
 
-    def _newton(self, q: Array, lane: int, stated: list[_Stated]) -> Array | None:
+    def _newton(self, q: Array, lane: int, stated: list[_Stated], most: int = ITERATIONS) -> Array | None:
         held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
         small = CLOSED * self.scale
-        for _ in range(ITERATIONS):
+        for _ in range(most):
             gap = np.array([value_of(term, q, lane) for term in self.terms])
             away = held @ q - wanted
             if np.all(np.abs(gap) <= small) and np.all(np.abs(away) <= CLOSED * max(self.size, 1.0)):
@@ -244,7 +278,7 @@ class _Closing:
         terms: list[Term | Mesh] = [*self.terms, *self.meshes]
         scale = np.append(self.scale, np.ones(len(self.meshes)))
         driven = np.array([_drive_rate(term) for term in terms]) / scale
-        stated = [one for one in self._rows(("velocity", "spin", "rate"), lane) if one.firm]
+        stated = [one for one in self._rows(_RATES, lane) if one.firm]
         return _Rates(terms, scale, driven, stated, max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0))))
 
     def _moves(self, lane: int, wanted: _Rates) -> bool:
@@ -267,6 +301,12 @@ class _Closing:
         root = np.linalg.cholesky(self._mass(lane))
         move = np.linalg.lstsq(np.linalg.solve(root, rows.T).T, right - rows @ v, DEPENDENT)[0]
         v = v + np.linalg.solve(root.T, move)
+        for guess in _guesses(self._rows(_RATES, lane)):
+            more, right_of_more = np.vstack([rows, _dense(guess, len(q))]), [*right, *(one.value for one in guess)]
+            move = np.linalg.lstsq(np.linalg.solve(root, more.T).T, right_of_more - more @ v, DEPENDENT)[0]
+            moved = v + np.linalg.solve(root.T, move)
+            if np.all(np.abs(more @ moved - right_of_more) <= 1e-9 * pace):
+                v, rows, right = moved, more, np.array(right_of_more)
         left = rows @ v - right
         worst = int(np.argmax(np.abs(left))) if left.size else 0
         if left.size and abs(left[worst]) > ROUNDING * pace:
@@ -274,7 +314,7 @@ class _Closing:
                 return False
             if worst < len(terms) and not stated:
                 raise InputError(f"joints.{terms[worst].name}: cannot begin to move as it is driven")
-            off = np.abs(left[len(terms) :])
+            off = np.abs(left[len(terms) : len(terms) + len(stated)])
             guilty = stated[int(np.argmax(off))]
             raise InputError(
                 f"initial.{guilty.body}.{guilty.quantity}: contradicts the joints and the other rates, by "
@@ -298,6 +338,7 @@ class _Closing:
 
 
 _POSES: tuple[Quantity, ...] = ("position", "rotation", "angle")
+_RATES: tuple[Quantity, ...] = ("velocity", "spin", "rate")
 
 
 def _lane(rows: Array, lane: int) -> Array:

@@ -1,0 +1,86 @@
+"""Which values of a start in space give way when a length changes, against the same machine in the plane."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.mechanics.simulate import simulate
+from shoal.scene import Scene
+
+CRANK, ROD, ANGLE, RATE = 0.3, 1.0, 0.6, 7.0
+
+
+def slider_crank(dimensions: int) -> Scene:
+    """Its crank is stated first, so that the rod follows."""
+    turned = -math.asin(CRANK * math.sin(ANGLE) / ROD)
+    ground = {"body": "ground", "point": [0.0] * dimensions}
+    bar: dict[str, Any] = {"kind": "rod", "height": 0.02, "width": 0.02, "density": 7800.0}
+    space = dimensions == 3
+    return Scene.parse({
+        "name": "slider-crank", "dimensions": dimensions, "gravity": [0.0, -9.81],
+        "bodies": {"crank": {**bar, "length": CRANK}, "rod": {**bar, "length": ROD}},
+        "joints": {
+            "O": {"first": ground, "second": {"body": "crank"}},
+            "P": {"kind": "spherical" if space else "revolute", "first": {"body": "crank", "point": "end"},
+                  "second": {"body": "rod"}},
+            "S": {"kind": "slider", "first": ground, "second": {"body": "rod", "point": "end"},
+                  **({"axis": "x"} if space else {})},
+        },
+        "markers": {"P": {"body": "crank", "point": "end"}, "S": {"body": "rod", "point": "end"}},
+        "initial": {
+            "crank": {"rotation": [0, 0, ANGLE], "spin": [0, 0, RATE]} if space else {"angle": ANGLE, "rate": RATE},
+            "rod": {"rotation": [0, 0, turned]} if space else {"angle": turned},
+        },
+        "solver": {"integrator": "dop853"},
+    })  # fmt: skip
+
+
+def test_after_a_length_changes_a_loop_keeps_its_first_values_as_in_the_plane() -> None:
+    lengths = np.array([0.25, 0.3, 0.33])
+    times = np.linspace(0.0, 0.5, 6)
+    plane, space = (simulate(slider_crank(d), times, {"bodies.crank.length": lengths}) for d in (2, 3))
+    assert plane.ok
+    assert space.ok
+    for lane, length in enumerate(lengths):
+        assert space.marker("P", lane)[0, :2] == pytest.approx(length * np.array([math.cos(ANGLE), math.sin(ANGLE)]))
+        for name in ("P", "S"):
+            assert space.marker(name, lane)[:, :2] == pytest.approx(plane.marker(name, lane), abs=1e-9)
+    alone = simulate(slider_crank(3).with_values({"bodies.crank.length": 0.33}), times)
+    assert alone.marker("S") == pytest.approx(space.marker("S", 2), abs=1e-12)
+
+
+LINK = {"kind": "rigid-body", "mass": 1.5, "inertia": [0.2, 0.25, 0.3], "named_points": {"end": [0.8, 0.1, 0.0]}}
+GEARS = Scene.parse({
+    "name": "gears", "dimensions": 3, "gravity": [0.0, 0.0, -9.81],
+    "bodies": {"A": LINK, "B": LINK, "C": LINK},
+    "joints": {
+        "a": {"first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "A"}},
+        "b": {"first": {"body": "ground", "point": [1, 0, 0]}, "second": {"body": "B"}, "axis": "x"},
+        "gear": {"kind": "gear", "first": {"body": "A"}, "second": {"body": "B"}, "ratio": "-1/2", "second_axis": "x"},
+        "c": {"kind": "universal", "first": {"body": "B", "point": "end"}, "second": {"body": "C"}, "axis": [1, 0, 0],
+              "second_axis": [0, 1, 0]},
+    },
+    "markers": {"C": {"body": "C", "point": "end"}},
+    "initial": {"B": {"position": [1, 0, 0]}},
+    "solver": {"integrator": "dop853"},
+})  # fmt: skip
+
+
+@pytest.mark.parametrize(("path", "values"), [
+    ("joints.gear.axis.2", [1.0, 1.1]),
+    ("joints.c.second.point", None),
+    ("bodies.B.named_points.end.1", [0.1, 0.15]),
+    ("bodies.C.centre_of_mass.0", [0.0, 0.2]),
+])  # fmt: skip
+def test_what_is_varied_moves_as_a_machine_that_states_it(path: str, values: Any) -> None:
+    scene, times = GEARS, np.array([0.3, 1.0])
+    if values is None:
+        scene, path, values = GEARS.with_values({path: [0.1, 0.2, 0.0]}), f"{path}.0", [0.1, 0.3]
+    varied = simulate(scene, times, {path: np.array(values)})
+    for lane, value in enumerate(values):
+        assert varied.marker("C", lane) == pytest.approx(
+            simulate(scene.with_values({path: value}), times).marker("C"), abs=1e-9
+        )
