@@ -84,3 +84,20 @@ def test_what_is_varied_moves_as_a_machine_that_states_it(path: str, values: Any
         assert varied.marker("C", lane) == pytest.approx(
             simulate(scene.with_values({path: value}), times).marker("C"), abs=1e-9
         )
+
+
+@pytest.mark.parametrize("path", ["joints.S.friction", "joints.S.coulomb_speed", "bodies.B.named_points.end.0"])
+def test_what_slides_keeps_its_speed_when_its_joint_changes(path: str) -> None:
+    """Down an incline at 0.6 rad, faster than friction holds."""
+    along = np.array([math.cos(0.6), 0.0, -math.sin(0.6)])
+    slope = along.tolist()
+    scene = Scene.parse({
+        "name": "slide", "dimensions": 3, "gravity": [0.0, 0.0, -9.81], "bodies": {"B": LINK},
+        "joints": {"S": {"kind": "slider", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "B"},
+                         "axis": slope, "rotation": "locked", "coulomb": 1.0, "friction": 1e-9}},
+        "markers": {"B": {"body": "B"}}, "initial": {"B": {"velocity": slope}}, "solver": {"integrator": "dop853"},
+    })  # fmt: skip
+    changed = scene.with_values({path: {"joints.S.friction": 2e-9}.get(path, 0.005)})
+    pull = 9.81 * math.sin(0.6) - 1.0 / 1.5
+    for one in (scene, changed):
+        assert simulate(one, np.array([1.0])).marker("B")[0] @ along == pytest.approx(1.0 + 0.5 * pull, abs=1e-7)

@@ -282,9 +282,9 @@ class _Closing:
         return _Rates(terms, scale, driven, stated, max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0))))
 
     def _moves(self, lane: int, wanted: _Rates) -> bool:
-        """Whether the rates meet the constraints and what is stated."""
-        (terms, scale, driven, stated, pace), v = wanted, self.v[:, lane]
-        kept = all(abs(one.off(v)) <= CLOSED * pace for one in stated)
+        """Whether the rates meet the constraints and what is stated, guesses among it."""
+        (terms, scale, driven, _, pace), v = wanted, self.v[:, lane]
+        kept = all(abs(one.off(v)) <= CLOSED * pace for one in self._rows(_RATES, lane))
         moving = np.array([sum(x * v[k] for k, x in slopes(term, self.q, lane)) for term in terms]) / scale
         return bool(kept and np.all(np.abs(moving + driven) <= CLOSED * pace))
 
