@@ -101,3 +101,32 @@ def test_what_slides_keeps_its_speed_when_its_joint_changes(path: str) -> None:
     pull = 9.81 * math.sin(0.6) - 1.0 / 1.5
     for one in (scene, changed):
         assert simulate(one, np.array([1.0])).marker("B")[0] @ along == pytest.approx(1.0 + 0.5 * pull, abs=1e-7)
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_a_rod_on_a_turning_hub_starts_as_a_rigid_body_as_in_the_plane(driven: bool) -> None:
+    """And stretches by rho w^2 L^3 / 3 E once its vibration along the axis is damped out."""
+    rate, times = 30.0, np.linspace(0.0, 0.04, 5)
+    rod = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 1000.0, "youngs_modulus": 2e9,
+           "element": "ancf-cable", "elements": 4, "retardation": 2e-3}  # fmt: skip
+    tips = []
+    for dimensions in (2, 3):
+        ground = {"body": "ground", "point": [0.0] * dimensions}
+        hub = {
+            "joints": {"D": {"kind": "driven-angle", "first": ground, "second": {"body": "H"}, "angle": f"{rate}*t"}}
+        }
+        spin = {"H": {"rate": rate} if dimensions == 2 else {"spin": [0, 0, rate]}}
+        scene = Scene.parse({
+            "name": "hub", "dimensions": dimensions, "gravity": [0.0] * dimensions,
+            "bodies": {"H": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.1}, "R": rod},
+            "joints": {"O": {"first": ground, "second": {"body": "H"}},
+                       "W": {"kind": "weld", "first": {"body": "H"}, "second": {"body": "R"}},
+                       **(hub["joints"] if driven else {})},
+            "markers": {"E": {"body": "R", "point": "end"}}, "initial": {} if driven else spin,
+            "solver": {"integrator": "generalized-alpha", "step": 1e-4},
+        })  # fmt: skip
+        found = simulate(scene, times)
+        assert found.ok, found.message
+        tips.append(found.marker("E")[:, :2])
+    assert tips[1] == pytest.approx(tips[0], abs=1e-6)
+    assert np.linalg.norm(tips[1][-1]) - 1.0 == pytest.approx(1000.0 * rate**2 / (3 * 2e9), rel=0.05)

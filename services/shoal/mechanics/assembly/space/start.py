@@ -18,6 +18,7 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.placement import place_in_space
+from shoal.mechanics.assembly.space.values import at, drive_rate, everywhere, of_lane, slopes, value_of, values_of
 from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
@@ -131,12 +132,12 @@ class _Closing:
             failed[moving] |= not self._move(int(moving))
         self.placement.positions, self.placement.velocities = list(self.q), list(self.v)
         held = self.placement.terms.held  # teeth mesh as the bodies start
-        held[:] = [one.begin(lambda u: _all(u, self.q)) if isinstance(one, Mesh) else one for one in held]
+        held[:] = [one.begin(lambda u: everywhere(u, self.q)) if isinstance(one, Mesh) else one for one in held]
         self.placement.failed = failed
 
     def residual(self, q: Array) -> Array:
         """The constraints at time zero, (constraints, lanes)."""
-        found = [_value(term, q) for term in self.terms]
+        found = [values_of(term, q) for term in self.terms]
         lanes = max((len(one) for one in found), default=1)
         return np.stack([np.broadcast_to(one, lanes) for one in found]) if found else np.zeros((0, lanes))
 
@@ -205,7 +206,7 @@ class _Closing:
         """Raises InputError where closing the joints would bend or stretch a rod, which starts unstrained."""
         for name, frame in self.placement.frames.items():
             if isinstance(frame, BeamFrame):
-                moved = (np.max(np.abs(_at(one, before, lane) - _at(one, after, lane))) for one in frame.vectors)
+                moved = (np.max(np.abs(at(one, before, lane) - at(one, after, lane))) for one in frame.vectors)
                 if max(moved) > STRAIN * max(self.size, 1.0):
                     raise InputError(
                         f"initial.{name}: the joints hold {name} where the unstrained rod would not start; state a "
@@ -236,7 +237,7 @@ class _Closing:
         """Whether a body has become its own mirror image."""
         for frame in self.placement.frames.values():
             if isinstance(frame, RigidFrame):
-                directors = np.array([_at(one, q, lane) for one in frame.directors])
+                directors = np.array([at(one, q, lane) for one in frame.directors])
                 if np.linalg.det(directors) < 0:
                     return True
         return False
@@ -251,8 +252,8 @@ class _Closing:
                     continue
                 for vector, target in self._targets(body, frame, quantity, value, lane):
                     for k in range(3):
-                        parts = [(unknown, float(_lane(one, lane)[k])) for unknown, one in vector.terms.items()]
-                        wanted = target[k] - _lane(vector.constant, lane)[k] * (quantity in _POSES)
+                        parts = [(unknown, float(of_lane(one, lane)[k])) for unknown, one in vector.terms.items()]
+                        wanted = target[k] - of_lane(vector.constant, lane)[k] * (quantity in _POSES)
                         found.append(_Stated(parts, float(wanted), quantity, body, quantity not in start.guess))
         return found
 
@@ -268,16 +269,16 @@ class _Closing:
         if quantity in ("angle", "rotation"):
             rotation = self.placement.attitudes.stated(body)
             assert rotation is not None
-            return [(one, _lane(rotation[:, k], lane)) for k, one in enumerate(frame.directors)]
+            return [(one, of_lane(rotation[:, k], lane)) for k, one in enumerate(frame.directors)]
         turning = self.placement.attitudes.stated_spin(body)
         assert turning is not None
-        spin = _lane(turning, lane)
-        return [(one, np.cross(spin, _at(one, self.q, lane))) for one in frame.directors]
+        spin = of_lane(turning, lane)
+        return [(one, np.cross(spin, at(one, self.q, lane))) for one in frame.directors]
 
     def _rates(self, lane: int) -> _Rates:
         terms: list[Term | Mesh] = [*self.terms, *self.meshes]
         scale = np.append(self.scale, np.ones(len(self.meshes)))
-        driven = np.array([_drive_rate(term) for term in terms]) / scale
+        driven = np.array([drive_rate(term) for term in terms]) / scale
         stated = [one for one in self._rows(_RATES, lane) if one.firm]
         return _Rates(terms, scale, driven, stated, max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0))))
 
@@ -285,8 +286,28 @@ class _Closing:
         """Whether the rates meet the constraints and what is stated, guesses among it."""
         (terms, scale, driven, _, pace), v = wanted, self.v[:, lane]
         kept = all(abs(one.off(v)) <= CLOSED * pace for one in self._rows(_RATES, lane))
+        kept = kept and all(np.all(np.abs(rows @ v) <= CLOSED * pace) for rows in self._straining(lane))
         moving = np.array([sum(x * v[k] for k, x in slopes(term, self.q, lane)) for term in terms]) / scale
         return bool(kept and np.all(np.abs(moving + driven) <= CLOSED * pace))
+
+    def _straining(self, lane: int) -> Iterator[Array]:
+        """Of every flexible rod, the part of its vectors' rates that is no rigid motion, as rows of the rates.
+
+        A rod starts as a rigid body moves, unless the joints forbid it.
+        """
+        q = self.q[:, lane]
+        for frame in self.placement.frames.values():
+            if isinstance(frame, BeamFrame):
+                rates = np.zeros((len(frame.vectors), 3, len(q)))
+                for one, row in zip(frame.vectors, rates, strict=True):
+                    for unknown, coefficient in one.terms.items():
+                        row[:, unknown] = of_lane(coefficient, lane)
+                turning = [-turns.skew(at(one, q, lane)) for one in frame.vectors]
+                moving = [np.eye(3) * (k % len(frame.nodes[0]) == 0) for k in range(len(turning))]
+                motions = np.linalg.svd(np.hstack([np.vstack(turning), np.vstack(moving)]), full_matrices=False)
+                rigid = motions.U[:, DEPENDENT * motions.S[0] < motions.S]
+                flat = rates.reshape(-1, len(q))
+                yield flat - rigid @ (rigid.T @ flat)
 
     def _move(self, lane: int) -> bool:
         """Rates that meet the constraints and what is stated; false if there are none."""
@@ -301,12 +322,15 @@ class _Closing:
         root = np.linalg.cholesky(self._mass(lane))
         move = np.linalg.lstsq(np.linalg.solve(root, rows.T).T, right - rows @ v, DEPENDENT)[0]
         v = v + np.linalg.solve(root.T, move)
-        for guess in _guesses(self._rows(_RATES, lane)):
-            more, right_of_more = np.vstack([rows, _dense(guess, len(q))]), [*right, *(one.value for one in guess)]
+        wishes = [(unstrained, np.zeros(len(unstrained))) for unstrained in self._straining(lane)]
+        guesses = _guesses(self._rows(_RATES, lane))
+        wishes += [(_dense(guess, len(q)), np.array([one.value for one in guess])) for guess in guesses]
+        for wish, value in wishes:
+            more, right_of_more = np.vstack([rows, wish]), np.concatenate([right, value])
             move = np.linalg.lstsq(np.linalg.solve(root, more.T).T, right_of_more - more @ v, DEPENDENT)[0]
             moved = v + np.linalg.solve(root.T, move)
             if np.all(np.abs(more @ moved - right_of_more) <= 1e-9 * pace):
-                v, rows, right = moved, more, np.array(right_of_more)
+                v, rows, right = moved, more, right_of_more
         left = rows @ v - right
         worst = int(np.argmax(np.abs(left))) if left.size else 0
         if left.size and abs(left[worst]) > ROUNDING * pace:
@@ -333,73 +357,12 @@ class _Closing:
         count = len(self.q)
         matrix = np.zeros((count, count))
         for (i, j), value in Masses(self.scene, self.placement, Rows(count)).mass.items():
-            matrix[i, j] = matrix[j, i] = _lane(np.atleast_1d(value)[None], lane)[0]
+            matrix[i, j] = matrix[j, i] = of_lane(np.atleast_1d(value)[None], lane)[0]
         return matrix
 
 
 _POSES: tuple[Quantity, ...] = ("position", "rotation", "angle")
 _RATES: tuple[Quantity, ...] = ("velocity", "spin", "rate")
-
-
-def _lane(rows: Array, lane: int) -> Array:
-    """A column of (rows, lanes) or (rows, 1)."""
-    return np.asarray(rows[:, lane if rows.shape[1] > 1 else 0])
-
-
-def _at(vector: Affine, q: Array, lane: int) -> Array:
-    """A vector at the coordinates (unknowns,) or (unknowns, lanes) of a lane, (3,)."""
-    column = q if q.ndim == 1 else _lane(q, lane)
-    total = _lane(vector.constant, lane)
-    for unknown, coefficient in vector.terms.items():
-        total = total + _lane(coefficient, lane) * column[unknown]
-    return total
-
-
-def _all(vector: Affine, q: Array) -> Array:
-    """A vector in all lanes, (3, lanes)."""
-    total = vector.constant
-    for unknown, coefficient in vector.terms.items():
-        total = total + coefficient * q[unknown]
-    return total
-
-
-def slopes(term: Term | Mesh, q: Array, lane: int) -> Iterator[tuple[int, float]]:
-    """Unknowns and derivatives of a constraint at the coordinates of a lane; those of an unknown add up."""
-    if isinstance(term, Mesh):
-        for factor, vector in term.parts:
-            x, y, _ = _at(vector, q, lane)
-            for unknown, coefficient in vector.terms.items():
-                along, across, _ = _lane(coefficient, lane)
-                yield unknown, factor * float(x * across - y * along) / float(x * x + y * y)
-        return
-    u, w = (_at(vector, q, lane) for vector in (term.u, term.w))
-    for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
-        for unknown, coefficient in vector.terms.items():
-            yield unknown, float(_lane(coefficient, lane) @ other)
-
-
-def _value(term: Term, q: Array) -> Array:
-    """A constraint at time zero in all lanes, (lanes,)."""
-    u, w = _all(term.u, q), _all(term.w, q)
-    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
-    return np.atleast_1d(np.sum(u * (term.form @ w), axis=0) + term.constant + drive)
-
-
-def value_of(term: Term, q: Array, lane: int) -> float:
-    """A constraint at time zero at the coordinates (unknowns,) of a lane."""
-    constant = np.atleast_1d(term.constant)
-    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
-    u, w = _at(term.u, q, lane), _at(term.w, q, lane)
-    return float(u @ term.form @ w + constant[min(lane, constant.size - 1)] + drive)
-
-
-def _drive_rate(term: Term | Mesh) -> float:
-    """The rate of a constraint's function of time at time zero."""
-    if term.drive is None:
-        return 0.0
-    h = 1e-5
-    before, now, after = (float(x) for x in term.drive(np.array([0.0, h, 2 * h])))
-    return (4 * now - 3 * before - after) / (2 * h)
 
 
 def begun(frames: dict[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
