@@ -38,7 +38,7 @@ DEPENDENT = 1e-9
 """Singular values below this, relative to the largest, are of rows that depend on others."""
 FREE = 1e-6
 """Part of a guess that the joints and what is kept leave free, below which they tell it."""
-GUESSED = 20
+GUESSED = 10
 """Iterations in which a guess is met, if it can be."""
 
 
