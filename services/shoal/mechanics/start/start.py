@@ -20,6 +20,7 @@ from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.start.closure import Rows
 from shoal.mechanics.start.poses import Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
+from shoal.mechanics.start.strained import gives_way
 from shoal.scene import GROUND, InitialState, Scene
 from shoal.scene.ended import End
 from shoal.scene.initial import POSES, RATES, Quantity
@@ -60,7 +61,7 @@ def complete(scene: Scene) -> Start:
     lanes = max(count, 1)
     assembly = Assembly(scene, lanes)
     placed = assembly.run()
-    if not np.all(placed.ok) and _gives_way(scene):
+    if not np.all(placed.ok) and gives_way(scene) and not gives_numbers(scene):
         placed = placed._replace(ok=np.ones_like(placed.ok))
     if not count and not placed.ok[0]:
         raise _pose_refused(assembly)
@@ -93,12 +94,6 @@ def complete(scene: Scene) -> Start:
             guess=(),
         )
     return Start(scene.model_copy(update={"initial": initial}), ~(placed.ok & moving.ok))
-
-
-def _gives_way(scene: Scene) -> bool:
-    """Whether a machine starts with elastic rods strained, so that rigid ones in their place need not close."""
-    elastic = any(body.element not in ("rigid", "modal") for body in scene.bodies.values())
-    return scene.initial_from is not None and elastic and not gives_numbers(scene)
 
 
 def gives_numbers(scene: Scene) -> bool:

@@ -15,7 +15,8 @@ from shoal.mechanics.affine import Affine, combined
 from shoal.mechanics.assembly.groups import is_stiff
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.holding import of_image
-from shoal.mechanics.assembly.space.sections import ALIGNED, turn_of
+from shoal.mechanics.assembly.space.sections import ALIGNED
+from shoal.mechanics.assembly.space.strained import section_at
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, Scene
@@ -76,7 +77,7 @@ def _axis(
     node = frame.node(scene.location(side))
     assert node is not None
     if (node, number) not in frame.axes:
-        value = turn_of(result.attitudes, scene, side)[:, number]
+        value = section_at(scene, result, side)[:, number]
         made = result.new_vector(value, turns.cross(result.attitudes.spin(side.body), value))
         result.terms.dot(name, made, made, 0, -1.0)
         for other in others:
