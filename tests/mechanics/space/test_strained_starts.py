@@ -86,6 +86,22 @@ def test_a_round_wire_that_may_bulge_anywhere_is_refused_as_a_start() -> None:
         shoal.simulate(between(0.98, "ancf-quintic", "weld", section="round", height=1e-3), verify=False)
 
 
+@pytest.mark.parametrize(
+    ("load", "instead"),
+    [({"kind": "spring", "stiffness": 1.0}, "length"),
+     ({"kind": "torsion-spring", "stiffness": 1.0, "axis": [0.0, 0.0, 1.0]}, "angle")],
+)  # fmt: skip
+def test_a_spring_that_takes_its_rest_from_a_start_that_does_not_fit_is_refused(load: Any, instead: str) -> None:
+    sides = {"first": {"body": "ground", "point": [0.0, 0.0, 0.0]}, "second": {"body": "rod", "point": "end"}}
+    scene = between(1.002, "director-rod", "weld", section="round", height=1e-3)
+    data = scene.model_dump(mode="json", exclude_unset=True) | {"initial": {"rod": {"rotation": list(WAY)}}}
+    data |= {"loads": {"K": load | sides}, "initial_from": "statics"}
+    with pytest.raises(
+        InputError, match=rf"loads\.K: takes a number from the start.*fit their joints; state its `{instead}`"
+    ):
+        statics(Scene.parse(data))
+
+
 def welded(turn: Any, place: Any, elements: int) -> Scene:
     """A strip from the ground to a block that the ground holds, turned and displaced."""
     strip = {"kind": "rod", "length": 1.0, "height": H, "width": W, "density": 7800.0, "youngs_modulus": E,

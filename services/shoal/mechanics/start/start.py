@@ -15,12 +15,12 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.frames import Frame, ModalFrame
-from shoal.mechanics.joints import Apart, Geared, Meet, Turned, of_scene
+from shoal.mechanics.joints import Meet, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.start.closure import Rows
 from shoal.mechanics.start.poses import Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
-from shoal.mechanics.start.strained import gives_way
+from shoal.mechanics.start.strained import gives_way, numbers_of_start, require_numbers
 from shoal.scene import GROUND, InitialState, Scene
 from shoal.scene.ended import End
 from shoal.scene.initial import POSES, RATES, Quantity
@@ -61,8 +61,11 @@ def complete(scene: Scene) -> Start:
     lanes = max(count, 1)
     assembly = Assembly(scene, lanes)
     placed = assembly.run()
-    if not np.all(placed.ok) and gives_way(scene) and not gives_numbers(scene):
-        placed = placed._replace(ok=np.ones_like(placed.ok))
+    if not np.all(placed.ok) and gives_way(scene):
+        if not count:
+            require_numbers(scene)
+        if not gives_numbers(scene):
+            placed = placed._replace(ok=np.ones_like(placed.ok))
     if not count and not placed.ok[0]:
         raise _pose_refused(assembly)
     velocities = Velocities(assembly, placed.poses)
@@ -101,18 +104,7 @@ def gives_numbers(scene: Scene) -> bool:
 
     In space they take their axes from it.
     """
-    if scene.dimensions == 3:
-        return True
-    kept = any(
-        (isinstance(one, Turned) and one.angle is None)
-        or (isinstance(one, Apart) and one.length is None)
-        or isinstance(one, Geared)
-        for _, one in of_scene(scene)
-    )
-    return kept or any(
-        (load.kind == "spring" and load.length is None) or (load.kind == "torsion-spring" and load.angle is None)
-        for load in scene.loads.values()
-    )
+    return scene.dimensions == 3 or next(numbers_of_start(scene), None) is not None
 
 
 def is_direct(scene: Scene) -> bool:

@@ -16,8 +16,11 @@ from shoal.mechanics.assembly.space.strained import guessed, section_at
 from shoal.mechanics.frames import BeamFrame, is_on_axis
 from shoal.mechanics.joints import Turned
 from shoal.mechanics.numerics.tile import Array
-from shoal.mechanics.start.strained import gives_way
+from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.scene import GROUND, Rod, Scene
+
+FIT = 1e-6
+"""Distance from its unstrained start, relative to its length, from which a rod does not fit its joints."""
 
 
 def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: Pose, result: SpatialPlacement) -> None:
@@ -43,6 +46,8 @@ def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: P
         joint = shared.get(node)
         r, v = pose.point(at), pose.point_velocity(at)
         if strained:
+            if np.max(np.abs(guess[node].place - r)) > FIT * np.max(rod.length):
+                require_numbers(scene)
             r = guess[node].place
         elif joint is not None and joint.where is not None:
             _check_fit(name, rod, r, joint, result)
@@ -124,7 +129,7 @@ def _check_fit(name: str, rod: Rod, planned: Array, point: JointPoint, result: S
     assert point.where is not None
     apart = np.sqrt(np.sum((result.start_of(point.where)[0] - planned) ** 2, axis=0))
     away = np.max(apart)
-    if np.any(apart > 1e-6 * rod.length):
+    if np.any(apart > FIT * rod.length):
         raise InputError(
             f"initial.{name}: joint {point.name} holds {name} {away:.3g} m away from where the unstrained rod would "
             "start"

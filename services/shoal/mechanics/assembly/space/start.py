@@ -20,7 +20,7 @@ from shoal.mechanics.assembly.space.placement import place_in_space
 from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
-from shoal.mechanics.start.strained import gives_way
+from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.scene import InitialState, Scene
 from shoal.scene.initial import Quantity
 from shoal.scene.paths import lanes_of
@@ -150,6 +150,7 @@ class _Closing:
             return False
         found = self._newton(begin, lane, [])
         if self.gives_way:
+            require_numbers(self.scene)
             self.q[:, lane] = begin if found is None else found
             return True
         if found is None:
@@ -173,13 +174,17 @@ class _Closing:
         return True
 
     def _check_strain(self, before: Array, after: Array, lane: int) -> None:
-        """Raises InputError where closing the joints would bend or stretch a rod that starts unstrained."""
-        if self.gives_way:
-            return
+        """Raises InputError where closing the joints would bend or stretch a rod that starts unstrained.
+
+        One that may start strained must not tell numbers of joints and loads then.
+        """
         for name, frame in self.placement.frames.items():
             if isinstance(frame, BeamFrame):
                 moved = (np.max(np.abs(_at(one, before, lane) - _at(one, after, lane))) for one in frame.vectors)
                 if max(moved) > STRAIN * max(self.size, 1.0):
+                    if self.gives_way:
+                        require_numbers(self.scene)
+                        return
                     raise InputError(
                         f"initial.{name}: the joints hold {name} where the unstrained rod would not start; state a "
                         "start that agrees with them"
