@@ -23,6 +23,7 @@ from shoal.mechanics.assembly.groups import JointPoint, is_stiff, moving, rotate
 from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
+from shoal.mechanics.assembly.space.hinges import make_axes
 from shoal.mechanics.assembly.space.holding import hold, rests
 from shoal.mechanics.assembly.space.rod_joints import hold_rod
 from shoal.mechanics.assembly.space.rods import place_rod
@@ -68,6 +69,7 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
         )
         if sides_of_rods and joint not in result.held:
             hold_rod(scene, joint, condition, result)
+    make_axes(scene, result)
     result.terms.settle(reach.span(scene))
     return result
 

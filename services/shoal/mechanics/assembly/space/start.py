@@ -22,6 +22,7 @@ from shoal.mechanics.assembly.space.values import at, drive_rate, everywhere, of
 from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
+from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.scene import InitialState, Scene
 from shoal.scene.initial import Quantity
 from shoal.scene.paths import lanes_of
@@ -107,6 +108,7 @@ class _Closing:
         self.meshes = [one for one in placement.terms.held if isinstance(one, Mesh)]
         self.q, self.v = stacked(placement.positions), stacked(placement.velocities)
         self.size = float(reach.span(scene))
+        self.gives_way = gives_way(scene)
         self.scale = np.array([self.size**term.lengths for term in self.terms])
         lanes = max(self.q.shape[1], self.v.shape[1], *(len(np.atleast_1d(one)) for one in self.residual(self.q)), 1)
         self.lanes = 0
@@ -168,6 +170,10 @@ class _Closing:
         if self.lanes > 1:
             return False
         found = self._newton(begin, lane, [])
+        if self.gives_way:
+            require_numbers(self.scene)
+            self.q[:, lane] = begin if found is None else found
+            return True
         if found is None:
             off = np.abs(self.residual(begin[:, None])[:, 0]) / self.scale
             worst = self.terms[int(np.argmax(off))].name
@@ -203,11 +209,17 @@ class _Closing:
         return True
 
     def _check_strain(self, before: Array, after: Array, lane: int) -> None:
-        """Raises InputError where closing the joints would bend or stretch a rod, which starts unstrained."""
+        """Raises InputError where closing the joints would bend or stretch a rod that starts unstrained.
+
+        One that may start strained must not tell numbers of joints and loads then.
+        """
         for name, frame in self.placement.frames.items():
             if isinstance(frame, BeamFrame):
                 moved = (np.max(np.abs(at(one, before, lane) - at(one, after, lane))) for one in frame.vectors)
                 if max(moved) > STRAIN * max(self.size, 1.0):
+                    if self.gives_way:
+                        require_numbers(self.scene)
+                        return
                     raise InputError(
                         f"initial.{name}: the joints hold {name} where the unstrained rod would not start; state a "
                         "start that agrees with them"
