@@ -103,6 +103,20 @@ def test_a_wire_that_two_pins_press_is_an_elastica() -> None:
     assert abs(statics(between_pins(chord)).marker("middle")[1]) == pytest.approx(k / ellipk(k * k), rel=1e-3)
 
 
+def test_a_weld_that_takes_its_angle_from_a_start_that_does_not_fit_is_refused() -> None:
+    ends = {"a": ([0.0, 0.0], "start"), "b": ([0.98, 0.0], "end")}
+    joints = {
+        name: {"kind": "weld", "first": {"body": "ground", "point": place}, "second": {"body": "wire", "point": end}}
+        for name, (place, end) in ends.items()
+    }
+    with pytest.raises(InputError, match=r"joints\.a: takes a number from the start.*joints; state its `angle`"):
+        statics(between_pins(0.98, joints=joints))
+    held = {name: joint | {"angle": 0.0} for name, joint in joints.items()}
+    chord = statics(between_pins(0.98, joints=held))
+    k = brentq(lambda k: 2 * ellipe(k * k) / ellipk(k * k) - 1 - 0.98, 1e-3, 0.9)
+    assert abs(chord.marker("middle")[1]) == pytest.approx(k / ellipk(k * k), rel=1e-3)
+
+
 def test_a_stretched_wire_goes_on_where_a_run_has_stretched_it() -> None:
     """A pin that moves stretches it; the pin that stands where that one ended holds the same force."""
     moving = {"x": "1 + 2e-3*ramp(t/0.02)"}

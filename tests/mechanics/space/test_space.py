@@ -173,8 +173,13 @@ def test_what_slides_on_an_incline_has_its_part_of_gravity(kind: str) -> None:
     assert not found.model["redundant_joints"]
 
 
-def test_a_universal_joint_passes_on_a_driven_shaft_as_cardan_says() -> None:
-    """tan(second) = tan(first) cos(bend), counted from where the first yoke is at a right angle to both shafts."""
+@pytest.mark.parametrize("away", [0.0, 1.0])
+@pytest.mark.parametrize("kind", ["cylindrical", "revolute"])
+def test_a_universal_joint_passes_on_a_driven_shaft_as_cardan_says(kind: str, away: float) -> None:
+    """tan(second) = tan(first) cos(bend), counted from where the first yoke is at a right angle to both shafts.
+
+    The bearing of the second shaft, some way away, holds what the joint holds already.
+    """
     bend, rate = 0.5, 2.0
     shaft = [math.cos(bend), math.sin(bend), 0.0]
     drive = scene(
@@ -183,9 +188,10 @@ def test_a_universal_joint_passes_on_a_driven_shaft_as_cardan_says() -> None:
             "in": joint("revolute", GROUND, {"body": "A"}, axis=[1, 0, 0]),
             "cross": joint("universal", {"body": "A", "point": "ex"}, {"body": "B"}, axis=[0, 0, 1],
                            second_axis=[-shaft[1], shaft[0], 0]),
-            "out": joint("cylindrical", {"body": "ground", "point": [1, 0, 0]}, {"body": "B"}, axis=shaft),
+            "out": joint(kind, {"body": "ground", "point": [1 + away * shaft[0], away * shaft[1], 0.0]},
+                         {"body": "B", "point": [away, 0, 0]}, axis=shaft),
         },
-        initial={"A": {"spin": [rate, 0, 0]}},
+        initial={"A": {"spin": [rate, 0, 0]}, "B": {"rotation": [0, 0, bend]}},
         markers={"o": {"body": "A"}, "a": {"body": "A", "point": "ez"}, "p": {"body": "B"},
                  "z": {"body": "B", "point": "ez"}},
     )  # fmt: skip
@@ -196,6 +202,7 @@ def test_a_universal_joint_passes_on_a_driven_shaft_as_cardan_says() -> None:
     across = np.array([-shaft[1], shaft[0], 0])
     second = np.arctan2(-out @ across, out[:, 2])
     assert np.tan(second) == pytest.approx(np.tan(first) * math.cos(bend), abs=1e-8)
+    assert np.max(np.abs(second)) > 0.9
 
 
 def test_a_driven_angle_turns_about_its_axis() -> None:

@@ -264,12 +264,6 @@ def test_what_a_cable_cannot_hold_is_refused(change: dict[str, Any], message: st
         simulate(swinging(OBLIQUE, **change), FEW)
 
 
-def test_friction_about_an_axis_of_a_rod_is_refused() -> None:
-    hinge = {"kind": "revolute", "axis": [1, 2, -1], "friction": 0.1}
-    with pytest.raises(InputError, match=r"joints.C.friction: turns about an axis of the flexible rod A; in space"):
-        simulate(swinging(OBLIQUE, joint=hinge), FEW)
-
-
 def test_a_weld_between_the_nodes_of_a_rod_is_refused() -> None:
     data = swinging(OBLIQUE).model_dump(mode="json", exclude_unset=True)
     data["joints"]["C"]["first"]["point"] = [0.3, 0, 0]

@@ -156,7 +156,7 @@ def _identifiable(
         reasons.append(f"{', '.join(at_bound)} ended at a bound and is not identified")
         advice.append("widen the bound, or give the parameter its value there")
     if unknown:
-        reasons.append(f"only combinations are known: {len(unknown)} direction(s) leave the motion unchanged")
+        reasons.append("only combinations are known: some changes of the parameters leave the motion unchanged")
         advice.append("fix one parameter of each combination, or rely on the quantities that are identifiable")
     elif vague := [name for name, v in parameters.items() if not v.identifiable and not v.at_bound]:
         reasons.append(f"{', '.join(vague)}: less certain than the range of what is possible")

@@ -29,7 +29,7 @@ LONGEST = 0.2
 WIDEST = 1.5
 """and its largest turn [rad] of any body or section, so that turns can be counted."""
 FAR = 30.0
-"""A machine that has moved by so many times its own size falls for ever."""
+"""A machine whose bodies have moved (rms) by so many times its own size falls for ever."""
 STRAINED = 1e-9
 """Forces that strain the machine by less than this count for nothing."""
 SEEN = 1e-9
@@ -196,9 +196,13 @@ class Balance:
             q, view, shift = trial, ahead, shift / 8.0 if correction > 1e-6 else 0.0
             if held and correction < CLOSE:
                 return Found(q, True, iteration, correction)
-            if float(np.max(np.abs(q - begin))) > FAR * self.size:
+            if self._way(q - begin) > FAR * self.unit:
                 return Found(q, False, iteration, correction, "falls without end")
         return Found(q, False, most, correction, f"not at rest after {most} steps downhill")
+
+    def _way(self, move: Array) -> float:
+        """How far a move goes [kg^1/2 m]; among its components are curvatures, which may be large."""
+        return float(np.sqrt(max(0.0, float(move @ (self.evaluator.mass @ move)))))
 
     def _relax(self, q: Array, stiff: float) -> tuple[Array, float]:
         """Newton's method in the directions stiffer than `stiff` [rad^2/s^2] alone."""

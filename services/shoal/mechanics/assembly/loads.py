@@ -17,7 +17,8 @@ from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.rods import rod_axis
 from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
-from shoal.mechanics.assembly.space.holding import direction, hinge, line_of
+from shoal.mechanics.assembly.space.hinges import axis_of, turning
+from shoal.mechanics.assembly.space.holding import line_of
 from shoal.mechanics.forces import ANGLE, DISTANCE, PLACE, Forces
 from shoal.mechanics.frames import BeamFrame, ModalFrame, RigidFrame
 from shoal.mechanics.functions import Piecewise
@@ -113,7 +114,7 @@ class Loads:
     def _torsion_spring(self, name: str, load: TorsionSpring) -> None:
         places = load.first_to is not None or load.second_to is not None
         ways = self._ways(name, load) if places else []
-        start = self._opening(ways) if places else self._rest(load)
+        start = self._opening(ways) if places else self._rest(name, load)
         rest = start if load.angle is None else load.angle
         law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0]
         if places:
@@ -140,11 +141,11 @@ class Loads:
         first, second = (self.placement.start_of(way)[0] for way in ways)
         return np.arctan2(plane.cross(first, second), sum(first * second))
 
-    def _rest(self, load: TorsionSpring) -> Number:
+    def _rest(self, name: str, load: TorsionSpring) -> Number:
         """The angle between two bodies at the start."""
         if not isinstance(self.placement, SpatialPlacement):
             return self._turn(load.first, load.second)
-        a, b, ahead = hinge(self.scene, self.placement, load.first, load.second, load.axis)
+        a, b, ahead = turning(self.scene, name, self.placement, load.first, load.second, load.axis)
         first, second, third = (self.placement.start_of(one)[0] for one in (a, b, ahead))
         return np.arctan2(sum(third * second), sum(first * second))
 
@@ -158,8 +159,8 @@ class Loads:
 
     def _turn_body(self, name: str, load: Torque, placement: SpatialPlacement) -> None:
         """A torque in space about an axis of the body that takes it, or of the ground."""
-        holder = GROUND if load.reaction is None else load.reaction.body
-        axis = direction(placement, holder, load.axis)
+        holder = load.reaction or Attachment(body=GROUND, point=(0.0, 0.0, 0.0))
+        axis = axis_of(self.scene, name, placement, holder, load.axis)
         number = self._function(f"loads.{name}.torque", load.torque)
         for side, sense in ((load.at, 1.0), (load.reaction, -1.0)):
             if side is not None and side.body != GROUND:
@@ -230,13 +231,7 @@ class Loads:
         for side in (first, second):
             self._require_angle(name, side)
         if isinstance(self.placement, SpatialPlacement):
-            if isinstance(self.placement.frames.get(first.body), BeamFrame):
-                where = f"joints.{name}.friction" if name in self.scene.joints else f"loads.{name}.first.body"
-                raise InputError(
-                    f"{where}: turns about an axis of the flexible rod {first.body}; in space `first` is a rigid body "
-                    "there, such as a small one that is welded to the rod"
-                )
-            directions = list(hinge(self.scene, self.placement, first, second, axis))
+            directions = list(turning(self.scene, name, self.placement, first, second, axis))
             a, b, ahead = (self.placement.start_of(one)[0] for one in directions)
             turn: Number = np.arctan2(sum(ahead * b), sum(a * b))
         else:

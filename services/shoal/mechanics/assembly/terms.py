@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,10 @@ from shoal.mechanics.assembly.rows import Rows
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.numerics.tile import Array, Number, index, stacked
 from shoal.scene.function import Composed
+
+CONSTANT = -1
+ROUND_OFF = 1e-12
+"""Of unit vectors, and of a machine of one metre."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,16 @@ class Term:
             return [(-1, y[k], part, u, w) for k, part in enumerate(parts) if np.any(part)]
         x = rows(u)
         return [(x[i], y[j], form[i, j], u, w) for i, j in zip(*np.nonzero(form), strict=True)]
+
+    def is_constant(self, size: float) -> bool:
+        """Whether every product of unknowns counts by round-off only. size: a length of the machine [m]."""
+        small = ROUND_OFF * min(size**self.lengths, size ** (self.lengths - 1))
+        one, other = ({CONSTANT: vector.constant, **vector.terms} for vector in (self.u, self.w))
+        found: dict[frozenset[int], Number] = {}
+        for (i, u), (j, w) in product(one.items(), other.items()):
+            found[frozenset((i, j))] = found.get(frozenset((i, j)), 0.0) + np.sum(u * (self.form @ w), axis=0)
+        found.pop(frozenset((CONSTANT,)))
+        return all(np.all(np.abs(factor) <= small) for factor in found.values())
 
 
 @dataclass(frozen=True)
@@ -98,6 +113,15 @@ class Terms:
     def mesh(self, name: str, parts: tuple[tuple[float, Affine], ...], constant: Number, period: float) -> None:
         """Sum of factor * angle of unit vector + constant = 0, but for multiples of the period [rad]."""
         self.held.append(Mesh(name, parts, constant, period))
+
+    def settle(self, size: float) -> None:
+        """Take the unknowns out of what does not depend on them; however small its slopes, they would count as a row.
+
+        size: a length of the machine [m].
+        """
+        for k, held in enumerate(self.held):
+            if isinstance(held, Term) and held.is_constant(size):
+                self.held[k] = replace(held, u=fixed(held.u.constant), w=fixed(held.w.constant))
 
     def press(self, name: str, condition: Any, before: int) -> None:
         """Note a joint whose force somebody wants to know. before: constraints that were there before its own."""

@@ -15,11 +15,12 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.frames import Frame, ModalFrame
-from shoal.mechanics.joints import Apart, Geared, Meet, Turned, of_scene
+from shoal.mechanics.joints import Meet, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.start.closure import Rows
 from shoal.mechanics.start.poses import Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
+from shoal.mechanics.start.strained import gives_way, numbers_of_start, require_numbers
 from shoal.scene import GROUND, InitialState, Scene
 from shoal.scene.ended import End
 from shoal.scene.initial import POSES, RATES, Quantity
@@ -60,8 +61,11 @@ def complete(scene: Scene) -> Start:
     lanes = max(count, 1)
     assembly = Assembly(scene, lanes)
     placed = assembly.run()
-    if not np.all(placed.ok) and _gives_way(scene):
-        placed = placed._replace(ok=np.ones_like(placed.ok))
+    if not np.all(placed.ok) and gives_way(scene):
+        if not count:
+            require_numbers(scene)
+        if not gives_numbers(scene):
+            placed = placed._replace(ok=np.ones_like(placed.ok))
     if not count and not placed.ok[0]:
         raise _pose_refused(assembly)
     velocities = Velocities(assembly, placed.poses)
@@ -95,29 +99,12 @@ def complete(scene: Scene) -> Start:
     return Start(scene.model_copy(update={"initial": initial}), ~(placed.ok & moving.ok))
 
 
-def _gives_way(scene: Scene) -> bool:
-    """Whether a machine starts with elastic rods strained, so that rigid ones in their place need not close."""
-    elastic = any(body.element not in ("rigid", "modal") for body in scene.bodies.values())
-    return scene.initial_from is not None and elastic and not gives_numbers(scene)
-
-
 def gives_numbers(scene: Scene) -> bool:
     """Whether joints or loads take a number of theirs (an angle, a length, a side) from the start.
 
     In space they take their axes from it.
     """
-    if scene.dimensions == 3:
-        return True
-    kept = any(
-        (isinstance(one, Turned) and one.angle is None)
-        or (isinstance(one, Apart) and one.length is None)
-        or isinstance(one, Geared)
-        for _, one in of_scene(scene)
-    )
-    return kept or any(
-        (load.kind == "spring" and load.length is None) or (load.kind == "torsion-spring" and load.angle is None)
-        for load in scene.loads.values()
-    )
+    return scene.dimensions == 3 or next(numbers_of_start(scene), None) is not None
 
 
 def is_direct(scene: Scene) -> bool:

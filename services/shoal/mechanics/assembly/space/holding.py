@@ -15,6 +15,7 @@ from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.joints import Aligned, Along, Apart, Geared, Hinged, InPlane, Meet, Square, Sum, Turned
 from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.plane import vector
 from shoal.scene import GROUND, Attachment, Scene
 
 
@@ -114,14 +115,15 @@ def _keep_mesh(name: str, condition: Geared, result: SpatialPlacement) -> None:
         if not isinstance(result.frames[side.body], RigidFrame):
             raise InputError(f"joints.{name}: turns {side.body}, which is not rigid; weld a rigid body to it instead")
         if not rests(direction(result, side.body, axis)):
+            told = ", ".join(f"{np.ravel(part)[-1]:g}" for part in axis)
             raise InputError(
-                f"joints.{name}: {side.body} does not turn about an axis at rest, ({axis[0]:g}, {axis[1]:g}, "
-                f"{axis[2]:g}) at the start; gears in space turn on hinges whose axes the ground holds"
+                f"joints.{name}: {side.body} does not turn about an axis at rest, ({told}) at the start; gears in "
+                "space turn on hinges whose axes the ground holds"
             )
         image = result.attitudes.image(side.body, axis)
         across = of_image(result, side.body, turns.across(image)[0])
-        one, other = turns.across(turns.unit(np.array(axis)[:, None]))
-        frame = np.stack([one, other, turns.cross(one, other)])
+        one, other = turns.across(turns.unit(vector(*axis)))
+        frame = np.stack(np.broadcast_arrays(one, other, turns.cross(one, other)))
         parts.append((factor, across.turned(frame)))
     result.terms.mesh(name, tuple(parts), 0.0, 2 * np.pi / condition.most)
 

@@ -16,13 +16,14 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics import joints
+from shoal.mechanics import joints, reach
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
 from shoal.mechanics.assembly.groups import JointPoint, is_stiff, moving, rotated, transposed
 from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
+from shoal.mechanics.assembly.space.hinges import make_axes
 from shoal.mechanics.assembly.space.holding import hold, rests
 from shoal.mechanics.assembly.space.rod_joints import hold_rod
 from shoal.mechanics.assembly.space.rods import place_rod
@@ -68,6 +69,8 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
         )
         if sides_of_rods and joint not in result.held:
             hold_rod(scene, joint, condition, result)
+    make_axes(scene, result)
+    result.terms.settle(reach.span(scene))
     return result
 
 
@@ -232,7 +235,7 @@ class _Rigid:
         if first.terms:
             result.terms.dot(name, first, first, 0, -1.0)
         basis = [first, first.turned(quarter), fixed(normal)]
-        images = np.stack([first_image, turns.cross(image, first_image), image])
+        images = np.stack(np.broadcast_arrays(first_image, turns.cross(image, first_image), image))
         return tuple(combined(tuple(basis), tuple(images[:, k])) for k in range(3))
 
     def free(self, axes: list[JointAxis], others: list[JointPoint]) -> tuple[Affine, ...]:
@@ -265,7 +268,8 @@ class _Rigid:
         for one in chosen:
             if one.axis is not None:
                 one.axis.holders.add(name)
-        weights = np.linalg.inv(np.stack([one.image for one in chosen], 1).transpose(2, 0, 1)).transpose(1, 2, 0)
+        images = np.stack(np.broadcast_arrays(*(one.image for one in chosen)), 1)
+        weights = np.linalg.inv(images.transpose(2, 0, 1)).transpose(1, 2, 0)
         vectors = tuple(one.where for one in chosen)
         return tuple(combined(vectors, tuple(weights[:, k])) for k in range(3))
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.mechanics.assembly.space.placement import place_in_space
-from shoal.mechanics.assembly.space.start import slopes, value_of
+from shoal.mechanics.assembly.space.values import slopes, value_of
 from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene

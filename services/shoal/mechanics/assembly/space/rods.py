@@ -11,15 +11,20 @@ from shoal.mechanics.affine import Affine, fixed
 from shoal.mechanics.assembly.groups import JointPoint
 from shoal.mechanics.assembly.pose import Pose, arm
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
-from shoal.mechanics.assembly.space.sections import ALIGNED, arc, material, node_of, turn_of
+from shoal.mechanics.assembly.space.sections import ALIGNED, arc, material, node_of
+from shoal.mechanics.assembly.space.strained import guessed, section_at
 from shoal.mechanics.frames import BeamFrame, is_on_axis
 from shoal.mechanics.joints import Turned
 from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.scene import GROUND, Rod, Scene
+
+FIT = 1e-6
+"""Distance from its unstrained start, relative to its length, from which a rod does not fit its joints."""
 
 
 def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: Pose, result: SpatialPlacement) -> None:
-    """Give a rod its nodes; they start unstrained. Raises InputError where they cannot."""
+    """Give a rod its nodes; they start unstrained, if joints allow it. Raises InputError where they cannot."""
     element = result.elements[name]
     shared: dict[int, JointPoint] = {}
     inner: list[JointPoint] = []
@@ -30,19 +35,29 @@ def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: P
             inner.append(point)
         else:
             shared[node] = point
+    strained = gives_way(scene)
+    known = {node: result.start_of(point.where)[0] for node, point in shared.items() if point.where is not None}
+    guess = guessed(scene, name, rod, pose, known, result) if strained else []
+    result.strained |= {(name, node): one.turn for node, one in enumerate(guess)}
     nodes = []
     for node in range(rod.elements + 1):
         s = arc(rod, node)
         at = material(scene, name, (s, 0.0, 0.0))
         joint = shared.get(node)
         r, v = pose.point(at), pose.point_velocity(at)
-        if joint is not None and joint.where is not None:
+        if strained:
+            if np.max(np.abs(guess[node].place - r)) > FIT * np.max(rod.length):
+                require_numbers(scene)
+            r = guess[node].place
+        elif joint is not None and joint.where is not None:
             _check_fit(name, rod, r, joint, result)
         position = result.new_vector(r, v) if joint is None else joint.where or result.make(joint, r, v)
         vectors = [
             (arm(pose.directors, tuple(vector)), arm(pose.turning, tuple(vector)))
             for vector in element.nodal_vectors(rod, s)
         ]
+        if strained:
+            vectors = [(turns.turned(guess[node].turn, value), rate) for value, rate in vectors]
         nodes.append((position, *_directions(scene, name, rod, node, vectors, result)))
     frame = BeamFrame(name, element, rod.length, tuple(nodes))
     result.frames[name] = frame
@@ -90,7 +105,7 @@ def _directions(
 
 
 def _ground_clamp(scene: Scene, name: str, rod: Rod, node: int, result: SpatialPlacement) -> str | None:
-    """The joint that welds a node to the ground as the unstrained rod starts."""
+    """The joint that welds a node to the ground as the rod starts."""
     for joint, condition in joints.of_scene(scene):
         if not isinstance(condition, Turned) or condition.driven:
             continue
@@ -103,7 +118,7 @@ def _ground_clamp(scene: Scene, name: str, rod: Rod, node: int, result: SpatialP
         if condition.angle is not None:
             turn = turns.about_z(condition.angle if mine[0] is condition.second else -np.asarray(condition.angle))
             wanted = turns.product(result.attitudes.rotation(others[0].body), turn)
-            if np.any(np.abs(wanted - turn_of(result.attitudes, scene, mine[0])) > ALIGNED):
+            if np.any(np.abs(wanted - section_at(scene, result, mine[0])) > ALIGNED):
                 continue
         return joint
     return None
@@ -114,7 +129,7 @@ def _check_fit(name: str, rod: Rod, planned: Array, point: JointPoint, result: S
     assert point.where is not None
     apart = np.sqrt(np.sum((result.start_of(point.where)[0] - planned) ** 2, axis=0))
     away = np.max(apart)
-    if np.any(apart > 1e-6 * rod.length):
+    if np.any(apart > FIT * rod.length):
         raise InputError(
             f"initial.{name}: joint {point.name} holds {name} {away:.3g} m away from where the unstrained rod would "
             "start"

@@ -15,26 +15,32 @@ from shoal.mechanics.affine import Affine, combined
 from shoal.mechanics.assembly.groups import is_stiff
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.holding import of_image
-from shoal.mechanics.assembly.space.sections import ALIGNED, turn_of
+from shoal.mechanics.assembly.space.sections import ALIGNED
+from shoal.mechanics.assembly.space.strained import section_at
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Attachment, Scene
 
 
+def field_of(scene: Scene, name: str) -> str:
+    """Where the scene has a joint or a load of that name."""
+    return f"joints.{name}" if name in scene.joints else f"loads.{name}"
+
+
 def director_of(scene: Scene, name: str, result: SpatialPlacement, side: Attachment) -> tuple[Affine, int] | None:
     """The director of a rod at a place, and which axis of the section it is; None: the body has none.
 
-    Raises InputError for a place between the nodes, which joint `name` holds.
+    Raises InputError for a place between the nodes, which the joint or load `name` holds.
     """
     frame = result.frames.get(side.body)
     if not isinstance(frame, BeamFrame) or frame.element.director is None:
         return None
     place = scene.location(side)
     if (node := frame.node(place)) is None:
-        apart = float(np.max(frame.element_length))
+        apart, where = float(np.max(frame.element_length)), float(np.max(place[0]))
         raise InputError(
-            f"joints.{name}: holds the section of the director-rod {side.body} at {float(np.max(place[0])):g} m, where "
-            f"it has no node; use a point at a multiple of {apart:g} m, or other elements than {len(frame.nodes) - 1}"
+            f"{field_of(scene, name)}: holds the section of the director-rod {side.body} at {where:g} m, where it has "
+            f"no node; use a point at a multiple of {apart:g} m, or other elements than {len(frame.nodes) - 1}"
         )
     return frame.nodes[node][2], frame.element.director
 
@@ -53,8 +59,8 @@ def unit(scene: Scene, name: str, result: SpatialPlacement, side: Attachment, im
     found = director_of(scene, name, result, side)
     if found is None:
         raise InputError(
-            f"joints.{name}: holds a section of {side.body}, and {scene.bodies[side.body].element} has none that turns "
-            "about its axis; use element: director-rod, or a small rigid body between"
+            f"{field_of(scene, name)}: holds a section of {side.body}, and {scene.bodies[side.body].element} has none "
+            "that turns about its axis; use element: director-rod, or a small rigid body between"
         )
     director, number = found
     image = np.where(np.abs(image) < ALIGNED, 0.0, image)
@@ -76,7 +82,7 @@ def _axis(
     node = frame.node(scene.location(side))
     assert node is not None
     if (node, number) not in frame.axes:
-        value = turn_of(result.attitudes, scene, side)[:, number]
+        value = section_at(scene, result, side)[:, number]
         made = result.new_vector(value, turns.cross(result.attitudes.spin(side.body), value))
         result.terms.dot(name, made, made, 0, -1.0)
         for other in others:

@@ -7,6 +7,7 @@ in the coordinates themselves: poses by Gauss and Newton's method, rates of leas
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,9 +18,11 @@ from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.placement import place_in_space
+from shoal.mechanics.assembly.space.values import at, drive_rate, everywhere, of_lane, slopes, value_of, values_of
 from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
+from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.scene import InitialState, Scene
 from shoal.scene.initial import Quantity
 from shoal.scene.paths import lanes_of
@@ -34,6 +37,10 @@ ITERATIONS = 60
 ATTEMPTS = 16
 DEPENDENT = 1e-9
 """Singular values below this, relative to the largest, are of rows that depend on others."""
+FREE = 1e-6
+"""Part of a guess that the joints and what is kept leave free, below which they tell it."""
+GUESSED = 10
+"""Iterations in which a guess is met, if it can be."""
 
 
 def place_started(scene: Scene) -> SpatialPlacement:
@@ -67,6 +74,21 @@ def _dense(stated: list[_Stated], unknowns: int) -> Array:
     return rows
 
 
+def _guesses(stated: list[_Stated]) -> Iterator[list[_Stated]]:
+    """The components of every guess, one after the other."""
+    for _, parts in groupby(stated, key=lambda one: (one.body, one.quantity)):
+        if not (guess := list(parts))[0].firm:
+            yield guess
+
+
+def _leaves_free(held: Array, asked: Array) -> bool:
+    """Whether some row of those asked for changes while those that are held do not."""
+    _, sizes, rows = np.linalg.svd(held, full_matrices=False)
+    told = rows[: int(np.sum(sizes > DEPENDENT * sizes[:1]))]
+    left = asked - (asked @ told.T) @ told
+    return bool(np.any(np.linalg.norm(left, axis=1) > FREE * np.linalg.norm(asked, axis=1)))
+
+
 class _Rates(NamedTuple):
     """What rates have to meet: constraints, their scales, how they are driven, what is stated, and the pace."""
 
@@ -86,6 +108,7 @@ class _Closing:
         self.meshes = [one for one in placement.terms.held if isinstance(one, Mesh)]
         self.q, self.v = stacked(placement.positions), stacked(placement.velocities)
         self.size = float(reach.span(scene))
+        self.gives_way = gives_way(scene)
         self.scale = np.array([self.size**term.lengths for term in self.terms])
         lanes = max(self.q.shape[1], self.v.shape[1], *(len(np.atleast_1d(one)) for one in self.residual(self.q)), 1)
         self.lanes = 0
@@ -111,12 +134,12 @@ class _Closing:
             failed[moving] |= not self._move(int(moving))
         self.placement.positions, self.placement.velocities = list(self.q), list(self.v)
         held = self.placement.terms.held  # teeth mesh as the bodies start
-        held[:] = [one.begin(lambda u: _all(u, self.q)) if isinstance(one, Mesh) else one for one in held]
+        held[:] = [one.begin(lambda u: everywhere(u, self.q)) if isinstance(one, Mesh) else one for one in held]
         self.placement.failed = failed
 
     def residual(self, q: Array) -> Array:
         """The constraints at time zero, (constraints, lanes)."""
-        found = [_value(term, q) for term in self.terms]
+        found = [values_of(term, q) for term in self.terms]
         lanes = max((len(one) for one in found), default=1)
         return np.stack([np.broadcast_to(one, lanes) for one in found]) if found else np.zeros((0, lanes))
 
@@ -141,17 +164,35 @@ class _Closing:
             shaken = 0.05 * 1.3**attempt * rng.normal(size=len(begin)) if attempt else 0.0
             found = self._newton(begin + shaken, lane, stated)
             if found is not None and not self._flipped(found, lane):
-                self._check_strain(begin, found, lane)
-                self.q[:, lane] = found
+                self.q[:, lane] = self._with_guesses(found, lane, stated)
+                self._check_strain(begin, self.q[:, lane], lane)
                 return True
         if self.lanes > 1:
             return False
         found = self._newton(begin, lane, [])
+        if self.gives_way:
+            require_numbers(self.scene)
+            self.q[:, lane] = begin if found is None else found
+            return True
         if found is None:
             off = np.abs(self.residual(begin[:, None])[:, 0]) / self.scale
             worst = self.terms[int(np.argmax(off))].name
             raise InputError(f"joints.{worst}: cannot be assembled; no poses near the stated ones close it")
         return self._corrected(found, stated)
+
+    def _with_guesses(self, q: Array, lane: int, kept: list[_Stated]) -> Array:
+        """Poses that keep the guesses too, one after the other, where the joints and those before let them."""
+        for guess in _guesses(self._rows(_POSES, lane)):
+            if max(abs(one.off(q)) for one in guess) > CLOSED * max(self.size, 1.0):
+                held = np.vstack([self.jacobian(q, lane, self.terms) / self.scale[:, None], _dense(kept, len(q))])
+                if not _leaves_free(held, _dense(guess, len(q))):
+                    continue
+                found = self._newton(q, lane, [*kept, *guess], GUESSED)
+                if found is None or self._flipped(found, lane):
+                    continue
+                q = found
+            kept = [*kept, *guess]
+        return q
 
     def _corrected(self, q: Array, stated: list[_Stated]) -> bool:
         """Whether the stated poses miss by rounding only. Raises InputError if they do not."""
@@ -168,11 +209,17 @@ class _Closing:
         return True
 
     def _check_strain(self, before: Array, after: Array, lane: int) -> None:
-        """Raises InputError where closing the joints would bend or stretch a rod, which starts unstrained."""
+        """Raises InputError where closing the joints would bend or stretch a rod that starts unstrained.
+
+        One that may start strained must not tell numbers of joints and loads then.
+        """
         for name, frame in self.placement.frames.items():
             if isinstance(frame, BeamFrame):
-                moved = (np.max(np.abs(_at(one, before, lane) - _at(one, after, lane))) for one in frame.vectors)
+                moved = (np.max(np.abs(at(one, before, lane) - at(one, after, lane))) for one in frame.vectors)
                 if max(moved) > STRAIN * max(self.size, 1.0):
+                    if self.gives_way:
+                        require_numbers(self.scene)
+                        return
                     raise InputError(
                         f"initial.{name}: the joints hold {name} where the unstrained rod would not start; state a "
                         "start that agrees with them"
@@ -181,11 +228,11 @@ class _Closing:
     def _unit(self, quantity: Quantity) -> float:
         return self.size if quantity == "position" else 1.0
 
-    def _newton(self, q: Array, lane: int, stated: list[_Stated]) -> Array | None:
+    def _newton(self, q: Array, lane: int, stated: list[_Stated], most: int = ITERATIONS) -> Array | None:
         held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
         small = CLOSED * self.scale
-        for _ in range(ITERATIONS):
+        for _ in range(most):
             gap = np.array([value_of(term, q, lane) for term in self.terms])
             away = held @ q - wanted
             if np.all(np.abs(gap) <= small) and np.all(np.abs(away) <= CLOSED * max(self.size, 1.0)):
@@ -202,7 +249,7 @@ class _Closing:
         """Whether a body has become its own mirror image."""
         for frame in self.placement.frames.values():
             if isinstance(frame, RigidFrame):
-                directors = np.array([_at(one, q, lane) for one in frame.directors])
+                directors = np.array([at(one, q, lane) for one in frame.directors])
                 if np.linalg.det(directors) < 0:
                     return True
         return False
@@ -217,8 +264,8 @@ class _Closing:
                     continue
                 for vector, target in self._targets(body, frame, quantity, value, lane):
                     for k in range(3):
-                        parts = [(unknown, float(_lane(one, lane)[k])) for unknown, one in vector.terms.items()]
-                        wanted = target[k] - _lane(vector.constant, lane)[k] * (quantity in _POSES)
+                        parts = [(unknown, float(of_lane(one, lane)[k])) for unknown, one in vector.terms.items()]
+                        wanted = target[k] - of_lane(vector.constant, lane)[k] * (quantity in _POSES)
                         found.append(_Stated(parts, float(wanted), quantity, body, quantity not in start.guess))
         return found
 
@@ -234,25 +281,45 @@ class _Closing:
         if quantity in ("angle", "rotation"):
             rotation = self.placement.attitudes.stated(body)
             assert rotation is not None
-            return [(one, _lane(rotation[:, k], lane)) for k, one in enumerate(frame.directors)]
+            return [(one, of_lane(rotation[:, k], lane)) for k, one in enumerate(frame.directors)]
         turning = self.placement.attitudes.stated_spin(body)
         assert turning is not None
-        spin = _lane(turning, lane)
-        return [(one, np.cross(spin, _at(one, self.q, lane))) for one in frame.directors]
+        spin = of_lane(turning, lane)
+        return [(one, np.cross(spin, at(one, self.q, lane))) for one in frame.directors]
 
     def _rates(self, lane: int) -> _Rates:
         terms: list[Term | Mesh] = [*self.terms, *self.meshes]
         scale = np.append(self.scale, np.ones(len(self.meshes)))
-        driven = np.array([_drive_rate(term) for term in terms]) / scale
-        stated = [one for one in self._rows(("velocity", "spin", "rate"), lane) if one.firm]
+        driven = np.array([drive_rate(term) for term in terms]) / scale
+        stated = [one for one in self._rows(_RATES, lane) if one.firm]
         return _Rates(terms, scale, driven, stated, max(1.0, float(np.max(np.abs(self.v[:, lane]), initial=0.0))))
 
     def _moves(self, lane: int, wanted: _Rates) -> bool:
-        """Whether the rates meet the constraints and what is stated."""
-        (terms, scale, driven, stated, pace), v = wanted, self.v[:, lane]
-        kept = all(abs(one.off(v)) <= CLOSED * pace for one in stated)
+        """Whether the rates meet the constraints and what is stated, guesses among it."""
+        (terms, scale, driven, _, pace), v = wanted, self.v[:, lane]
+        kept = all(abs(one.off(v)) <= CLOSED * pace for one in self._rows(_RATES, lane))
+        kept = kept and all(np.all(np.abs(rows @ v) <= CLOSED * pace) for rows in self._straining(lane))
         moving = np.array([sum(x * v[k] for k, x in slopes(term, self.q, lane)) for term in terms]) / scale
         return bool(kept and np.all(np.abs(moving + driven) <= CLOSED * pace))
+
+    def _straining(self, lane: int) -> Iterator[Array]:
+        """Of every flexible rod, the part of its vectors' rates that is no rigid motion, as rows of the rates.
+
+        A rod starts as a rigid body moves, unless the joints forbid it.
+        """
+        q = self.q[:, lane]
+        for frame in self.placement.frames.values():
+            if isinstance(frame, BeamFrame):
+                rates = np.zeros((len(frame.vectors), 3, len(q)))
+                for one, row in zip(frame.vectors, rates, strict=True):
+                    for unknown, coefficient in one.terms.items():
+                        row[:, unknown] = of_lane(coefficient, lane)
+                turning = [-turns.skew(at(one, q, lane)) for one in frame.vectors]
+                moving = [np.eye(3) * (k % len(frame.nodes[0]) == 0) for k in range(len(turning))]
+                motions = np.linalg.svd(np.hstack([np.vstack(turning), np.vstack(moving)]), full_matrices=False)
+                rigid = motions.U[:, DEPENDENT * motions.S[0] < motions.S]
+                flat = rates.reshape(-1, len(q))
+                yield flat - rigid @ (rigid.T @ flat)
 
     def _move(self, lane: int) -> bool:
         """Rates that meet the constraints and what is stated; false if there are none."""
@@ -267,6 +334,15 @@ class _Closing:
         root = np.linalg.cholesky(self._mass(lane))
         move = np.linalg.lstsq(np.linalg.solve(root, rows.T).T, right - rows @ v, DEPENDENT)[0]
         v = v + np.linalg.solve(root.T, move)
+        wishes = [(unstrained, np.zeros(len(unstrained))) for unstrained in self._straining(lane)]
+        guesses = _guesses(self._rows(_RATES, lane))
+        wishes += [(_dense(guess, len(q)), np.array([one.value for one in guess])) for guess in guesses]
+        for wish, value in wishes:
+            more, right_of_more = np.vstack([rows, wish]), np.concatenate([right, value])
+            move = np.linalg.lstsq(np.linalg.solve(root, more.T).T, right_of_more - more @ v, DEPENDENT)[0]
+            moved = v + np.linalg.solve(root.T, move)
+            if np.all(np.abs(more @ moved - right_of_more) <= 1e-9 * pace):
+                v, rows, right = moved, more, right_of_more
         left = rows @ v - right
         worst = int(np.argmax(np.abs(left))) if left.size else 0
         if left.size and abs(left[worst]) > ROUNDING * pace:
@@ -274,7 +350,7 @@ class _Closing:
                 return False
             if worst < len(terms) and not stated:
                 raise InputError(f"joints.{terms[worst].name}: cannot begin to move as it is driven")
-            off = np.abs(left[len(terms) :])
+            off = np.abs(left[len(terms) : len(terms) + len(stated)])
             guilty = stated[int(np.argmax(off))]
             raise InputError(
                 f"initial.{guilty.body}.{guilty.quantity}: contradicts the joints and the other rates, by "
@@ -293,72 +369,12 @@ class _Closing:
         count = len(self.q)
         matrix = np.zeros((count, count))
         for (i, j), value in Masses(self.scene, self.placement, Rows(count)).mass.items():
-            matrix[i, j] = matrix[j, i] = _lane(np.atleast_1d(value)[None], lane)[0]
+            matrix[i, j] = matrix[j, i] = of_lane(np.atleast_1d(value)[None], lane)[0]
         return matrix
 
 
 _POSES: tuple[Quantity, ...] = ("position", "rotation", "angle")
-
-
-def _lane(rows: Array, lane: int) -> Array:
-    """A column of (rows, lanes) or (rows, 1)."""
-    return np.asarray(rows[:, lane if rows.shape[1] > 1 else 0])
-
-
-def _at(vector: Affine, q: Array, lane: int) -> Array:
-    """A vector at the coordinates (unknowns,) or (unknowns, lanes) of a lane, (3,)."""
-    column = q if q.ndim == 1 else _lane(q, lane)
-    total = _lane(vector.constant, lane)
-    for unknown, coefficient in vector.terms.items():
-        total = total + _lane(coefficient, lane) * column[unknown]
-    return total
-
-
-def _all(vector: Affine, q: Array) -> Array:
-    """A vector in all lanes, (3, lanes)."""
-    total = vector.constant
-    for unknown, coefficient in vector.terms.items():
-        total = total + coefficient * q[unknown]
-    return total
-
-
-def slopes(term: Term | Mesh, q: Array, lane: int) -> Iterator[tuple[int, float]]:
-    """Unknowns and derivatives of a constraint at the coordinates of a lane; those of an unknown add up."""
-    if isinstance(term, Mesh):
-        for factor, vector in term.parts:
-            x, y, _ = _at(vector, q, lane)
-            for unknown, coefficient in vector.terms.items():
-                along, across, _ = _lane(coefficient, lane)
-                yield unknown, factor * float(x * across - y * along) / float(x * x + y * y)
-        return
-    u, w = (_at(vector, q, lane) for vector in (term.u, term.w))
-    for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
-        for unknown, coefficient in vector.terms.items():
-            yield unknown, float(_lane(coefficient, lane) @ other)
-
-
-def _value(term: Term, q: Array) -> Array:
-    """A constraint at time zero in all lanes, (lanes,)."""
-    u, w = _all(term.u, q), _all(term.w, q)
-    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
-    return np.atleast_1d(np.sum(u * (term.form @ w), axis=0) + term.constant + drive)
-
-
-def value_of(term: Term, q: Array, lane: int) -> float:
-    """A constraint at time zero at the coordinates (unknowns,) of a lane."""
-    constant = np.atleast_1d(term.constant)
-    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
-    u, w = _at(term.u, q, lane), _at(term.w, q, lane)
-    return float(u @ term.form @ w + constant[min(lane, constant.size - 1)] + drive)
-
-
-def _drive_rate(term: Term | Mesh) -> float:
-    """The rate of a constraint's function of time at time zero."""
-    if term.drive is None:
-        return 0.0
-    h = 1e-5
-    before, now, after = (float(x) for x in term.drive(np.array([0.0, h, 2 * h])))
-    return (4 * now - 3 * before - after) / (2 * h)
+_RATES: tuple[Quantity, ...] = ("velocity", "spin", "rate")
 
 
 def begun(frames: dict[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:

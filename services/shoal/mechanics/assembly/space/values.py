@@ -1,0 +1,72 @@
+"""Vectors and constraints of a machine in space at its coordinates, before they have rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from shoal.mechanics.affine import Affine
+from shoal.mechanics.assembly.terms import Mesh, Term
+from shoal.mechanics.numerics.tile import Array
+
+
+def of_lane(rows: Array, lane: int) -> Array:
+    """A column of (rows, lanes) or (rows, 1)."""
+    return np.asarray(rows[:, lane if rows.shape[1] > 1 else 0])
+
+
+def at(vector: Affine, q: Array, lane: int) -> Array:
+    """A vector at the coordinates (unknowns,) or (unknowns, lanes) of a lane, (3,)."""
+    column = q if q.ndim == 1 else of_lane(q, lane)
+    total = of_lane(vector.constant, lane)
+    for unknown, coefficient in vector.terms.items():
+        total = total + of_lane(coefficient, lane) * column[unknown]
+    return total
+
+
+def everywhere(vector: Affine, q: Array) -> Array:
+    """A vector in all lanes, (3, lanes)."""
+    total = vector.constant
+    for unknown, coefficient in vector.terms.items():
+        total = total + coefficient * q[unknown]
+    return total
+
+
+def slopes(term: Term | Mesh, q: Array, lane: int) -> Iterator[tuple[int, float]]:
+    """Unknowns and derivatives of a constraint at the coordinates of a lane; those of an unknown add up."""
+    if isinstance(term, Mesh):
+        for factor, vector in term.parts:
+            x, y, _ = at(vector, q, lane)
+            for unknown, coefficient in vector.terms.items():
+                along, across, _ = of_lane(coefficient, lane)
+                yield unknown, factor * float(x * across - y * along) / float(x * x + y * y)
+        return
+    u, w = (at(vector, q, lane) for vector in (term.u, term.w))
+    for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
+        for unknown, coefficient in vector.terms.items():
+            yield unknown, float(of_lane(coefficient, lane) @ other)
+
+
+def values_of(term: Term, q: Array) -> Array:
+    """A constraint at time zero in all lanes, (lanes,)."""
+    u, w = everywhere(term.u, q), everywhere(term.w, q)
+    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
+    return np.atleast_1d(np.sum(u * (term.form @ w), axis=0) + term.constant + drive)
+
+
+def value_of(term: Term, q: Array, lane: int) -> float:
+    """A constraint at time zero at the coordinates (unknowns,) of a lane."""
+    constant = np.atleast_1d(term.constant)
+    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
+    u, w = at(term.u, q, lane), at(term.w, q, lane)
+    return float(u @ term.form @ w + constant[min(lane, constant.size - 1)] + drive)
+
+
+def drive_rate(term: Term | Mesh) -> float:
+    """The rate of a constraint's function of time at time zero."""
+    if term.drive is None:
+        return 0.0
+    h = 1e-5
+    before, now, after = (float(x) for x in term.drive(np.array([0.0, h, 2 * h])))
+    return (4 * now - 3 * before - after) / (2 * h)

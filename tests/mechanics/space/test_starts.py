@@ -1,0 +1,132 @@
+"""Which values of a start in space give way when a length changes, against the same machine in the plane."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.mechanics.simulate import simulate
+from shoal.scene import Scene
+
+CRANK, ROD, ANGLE, RATE = 0.3, 1.0, 0.6, 7.0
+
+
+def slider_crank(dimensions: int) -> Scene:
+    """Its crank is stated first, so that the rod follows."""
+    turned = -math.asin(CRANK * math.sin(ANGLE) / ROD)
+    ground = {"body": "ground", "point": [0.0] * dimensions}
+    bar: dict[str, Any] = {"kind": "rod", "height": 0.02, "width": 0.02, "density": 7800.0}
+    space = dimensions == 3
+    return Scene.parse({
+        "name": "slider-crank", "dimensions": dimensions, "gravity": [0.0, -9.81],
+        "bodies": {"crank": {**bar, "length": CRANK}, "rod": {**bar, "length": ROD}},
+        "joints": {
+            "O": {"first": ground, "second": {"body": "crank"}},
+            "P": {"kind": "spherical" if space else "revolute", "first": {"body": "crank", "point": "end"},
+                  "second": {"body": "rod"}},
+            "S": {"kind": "slider", "first": ground, "second": {"body": "rod", "point": "end"},
+                  **({"axis": "x"} if space else {})},
+        },
+        "markers": {"P": {"body": "crank", "point": "end"}, "S": {"body": "rod", "point": "end"}},
+        "initial": {
+            "crank": {"rotation": [0, 0, ANGLE], "spin": [0, 0, RATE]} if space else {"angle": ANGLE, "rate": RATE},
+            "rod": {"rotation": [0, 0, turned]} if space else {"angle": turned},
+        },
+        "solver": {"integrator": "dop853"},
+    })  # fmt: skip
+
+
+def test_after_a_length_changes_a_loop_keeps_its_first_values_as_in_the_plane() -> None:
+    lengths = np.array([0.25, 0.3, 0.33])
+    times = np.linspace(0.0, 0.5, 6)
+    plane, space = (simulate(slider_crank(d), times, {"bodies.crank.length": lengths}) for d in (2, 3))
+    assert plane.ok
+    assert space.ok
+    for lane, length in enumerate(lengths):
+        assert space.marker("P", lane)[0, :2] == pytest.approx(length * np.array([math.cos(ANGLE), math.sin(ANGLE)]))
+        for name in ("P", "S"):
+            assert space.marker(name, lane)[:, :2] == pytest.approx(plane.marker(name, lane), abs=1e-9)
+    alone = simulate(slider_crank(3).with_values({"bodies.crank.length": 0.33}), times)
+    assert alone.marker("S") == pytest.approx(space.marker("S", 2), abs=1e-12)
+
+
+LINK = {"kind": "rigid-body", "mass": 1.5, "inertia": [0.2, 0.25, 0.3], "named_points": {"end": [0.8, 0.1, 0.0]}}
+GEARS = Scene.parse({
+    "name": "gears", "dimensions": 3, "gravity": [0.0, 0.0, -9.81],
+    "bodies": {"A": LINK, "B": LINK, "C": LINK},
+    "joints": {
+        "a": {"first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "A"}},
+        "b": {"first": {"body": "ground", "point": [1, 0, 0]}, "second": {"body": "B"}, "axis": "x"},
+        "gear": {"kind": "gear", "first": {"body": "A"}, "second": {"body": "B"}, "ratio": "-1/2", "second_axis": "x"},
+        "c": {"kind": "universal", "first": {"body": "B", "point": "end"}, "second": {"body": "C"}, "axis": [1, 0, 0],
+              "second_axis": [0, 1, 0]},
+    },
+    "markers": {"C": {"body": "C", "point": "end"}},
+    "initial": {"B": {"position": [1, 0, 0]}},
+    "solver": {"integrator": "dop853"},
+})  # fmt: skip
+
+
+@pytest.mark.parametrize(("path", "values"), [
+    ("joints.gear.axis.2", [1.0, 1.1]),
+    ("joints.c.second.point", None),
+    ("bodies.B.named_points.end.1", [0.1, 0.15]),
+    ("bodies.C.centre_of_mass.0", [0.0, 0.2]),
+])  # fmt: skip
+def test_what_is_varied_moves_as_a_machine_that_states_it(path: str, values: Any) -> None:
+    scene, times = GEARS, np.array([0.3, 1.0])
+    if values is None:
+        scene, path, values = GEARS.with_values({path: [0.1, 0.2, 0.0]}), f"{path}.0", [0.1, 0.3]
+    varied = simulate(scene, times, {path: np.array(values)})
+    for lane, value in enumerate(values):
+        assert varied.marker("C", lane) == pytest.approx(
+            simulate(scene.with_values({path: value}), times).marker("C"), abs=1e-9
+        )
+
+
+@pytest.mark.parametrize("path", ["joints.S.friction", "joints.S.coulomb_speed", "bodies.B.named_points.end.0"])
+def test_what_slides_keeps_its_speed_when_its_joint_changes(path: str) -> None:
+    """Down an incline at 0.6 rad, faster than friction holds."""
+    along = np.array([math.cos(0.6), 0.0, -math.sin(0.6)])
+    slope = along.tolist()
+    scene = Scene.parse({
+        "name": "slide", "dimensions": 3, "gravity": [0.0, 0.0, -9.81], "bodies": {"B": LINK},
+        "joints": {"S": {"kind": "slider", "first": {"body": "ground", "point": [0, 0, 0]}, "second": {"body": "B"},
+                         "axis": slope, "rotation": "locked", "coulomb": 1.0, "friction": 1e-9}},
+        "markers": {"B": {"body": "B"}}, "initial": {"B": {"velocity": slope}}, "solver": {"integrator": "dop853"},
+    })  # fmt: skip
+    changed = scene.with_values({path: {"joints.S.friction": 2e-9}.get(path, 0.005)})
+    pull = 9.81 * math.sin(0.6) - 1.0 / 1.5
+    for one in (scene, changed):
+        assert simulate(one, np.array([1.0])).marker("B")[0] @ along == pytest.approx(1.0 + 0.5 * pull, abs=1e-7)
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_a_rod_on_a_turning_hub_starts_as_a_rigid_body_as_in_the_plane(driven: bool) -> None:
+    """And stretches by rho w^2 L^3 / 3 E once its vibration along the axis is damped out."""
+    rate, times = 30.0, np.linspace(0.0, 0.04, 5)
+    rod = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 1000.0, "youngs_modulus": 2e9,
+           "element": "ancf-cable", "elements": 4, "retardation": 2e-3}  # fmt: skip
+    tips = []
+    for dimensions in (2, 3):
+        ground = {"body": "ground", "point": [0.0] * dimensions}
+        hub = {
+            "joints": {"D": {"kind": "driven-angle", "first": ground, "second": {"body": "H"}, "angle": f"{rate}*t"}}
+        }
+        spin = {"H": {"rate": rate} if dimensions == 2 else {"spin": [0, 0, rate]}}
+        scene = Scene.parse({
+            "name": "hub", "dimensions": dimensions, "gravity": [0.0] * dimensions,
+            "bodies": {"H": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.1}, "R": rod},
+            "joints": {"O": {"first": ground, "second": {"body": "H"}},
+                       "W": {"kind": "weld", "first": {"body": "H"}, "second": {"body": "R"}},
+                       **(hub["joints"] if driven else {})},
+            "markers": {"E": {"body": "R", "point": "end"}}, "initial": {} if driven else spin,
+            "solver": {"integrator": "generalized-alpha", "step": 1e-4},
+        })  # fmt: skip
+        found = simulate(scene, times)
+        assert found.ok, found.message
+        tips.append(found.marker("E")[:, :2])
+    assert tips[1] == pytest.approx(tips[0], abs=1e-6)
+    assert np.linalg.norm(tips[1][-1]) - 1.0 == pytest.approx(1000.0 * rate**2 / (3 * 2e9), rel=0.05)
