@@ -28,7 +28,7 @@ SMALL = 16
 FEW = 64
 """Up to so many it is used everywhere if some depend on others: without a choice of pivots the row that is left out
 stays the same one, and where the motion brings its part in the dependence near zero, those kept look singular."""
-REGULAR = 1e-4
+REGULAR = 1e-2
 """Pivot against its first value above which a position is far from singular ones, and few digits are lost."""
 SINGULAR = 1e-10
 """Pivot against its first value below which a row counts as dependent in an acceleration: 1e-5 from singular."""
