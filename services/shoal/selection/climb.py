@@ -8,10 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.scene import Scene
 from shoal.selection.levels import REFINEMENTS, Level, Levels, coarsest, words
-from shoal.selection.run import Rung, cannot_be, distance, flexible_scene, run
+from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import Forecast
 from shoal.trajectory import Array
 
@@ -96,7 +97,11 @@ class Runs:
 
     def knows(self, rod: str, level: Level) -> bool:
         """Whether a rod can be modelled so: not every one can bend by modes."""
-        return level.element != "modal" or cannot_be(self.scene, {**self.coarsest, rod: level}) is None
+        try:
+            self.forecast.own(rod, level)
+        except InputError:
+            return False
+        return True
 
     def refined(self, count: Mapping[str, int]) -> dict[str, Level]:
         """Rods of so many elements of the kind whose limit is their truth."""

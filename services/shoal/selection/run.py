@@ -76,11 +76,7 @@ def distance(one: Trajectory, other: Trajectory) -> float:
 def can_be_flexible(scene: Scene, rod: str, limit: str) -> str | None:
     """None, or why this rod has to stay rigid. limit: the element it would be made of."""
     coarse = coarsest(scene, open_rods(scene) | {rod: limit})
-    return cannot_be(scene, coarse | {rod: Level(limit, coarse[rod].elements)})
-
-
-def cannot_be(scene: Scene, levels: Levels) -> str | None:
-    """None, or why the rods of a scene cannot be modelled so."""
+    levels = coarse | {rod: Level(limit, coarse[rod].elements)}
     try:
         stable_step(apply(scene, levels), INTEGRATOR)
     except InputError as error:
