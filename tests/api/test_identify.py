@@ -86,6 +86,12 @@ def test_unknown_job(gauss: httpx.Client) -> None:
     assert gauss.delete("/v1/jobs/nothing").status_code == 404
 
 
+def test_job_of_an_unknown_operation(gauss: httpx.Client) -> None:
+    answer = gauss.post("/v1/jobs/simulat", json={"scene": "single-pendulum"})
+    assert (answer.status_code, answer.json()["field"]) == (404, "operation")
+    assert answer.json()["detail"].startswith("no operation 'simulat'; there are simulate, ")
+
+
 def test_wrong_recording_fails_the_job(gauss: httpx.Client, machine: Machine, problem: Machine) -> None:
     """What only reading shows is told by the job, as a problem document."""
     request = body(machine, problem, "pendulum", {"t": [0.0, 0.1, 0.2], "x": [1.0, 1.0, 1.0]})

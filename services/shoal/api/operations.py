@@ -6,19 +6,34 @@ own process knows the requests only; who computes them is `tasks`.
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from shoal.api.schemas import Asked, BuiltIn, Fields, Motion, Path, RecordingName, Table
 
 Times = list[float]
 Positive = Annotated[float, Field(gt=0)]
 Some = Annotated[Times, Field(min_length=1)]
-Distribution = Annotated[str, Field(max_length=200, pattern=r"^\s*[a-z-]+\s*\([-+0-9.eE,\s]*\)\s*$")]
+NUMBERS = r"^\s*[a-z-]+\s*\([-+0-9.eE,\s]*\)\s*$"
+Distribution = Annotated[str, Field(max_length=200, pattern=NUMBERS)]
 """With numbers: files of the service are not read for anybody."""
 End = float | Annotated[str, Field(max_length=30, pattern=r"^\s*[-+0-9.eE]+\s*%\s*$")]
 Window = tuple[float, float]
+
+
+def _known(given: Any) -> Any:
+    """Say in one line what a text that is no distribution should be. Raises ValueError."""
+    if isinstance(given, str) and not re.match(NUMBERS, given):
+        raise ValueError(
+            f"{given[:200]!r} is no distribution with numbers, such as normal(1,0.01); a service reads no files: "
+            "observations are studied by `shoal uncertain --engine URL`, which reads them on its own side"
+        )
+    return given
+
+
+Uncertainty = Annotated[tuple[End, End] | Distribution, BeforeValidator(_known)]
 
 
 class Request(Asked):
@@ -131,7 +146,7 @@ class Uncertain(OfScene):
 
     follows: ClassVar[tuple[str, ...]] = ("runs",)
 
-    vary: Annotated[dict[Path, tuple[End, End] | Distribution], Field(min_length=1, max_length=100)]
+    vary: Annotated[dict[Path, Uncertainty], Field(min_length=1, max_length=100)]
     correlations: Annotated[list[tuple[Path, Path, float]], Field(max_length=1000)] = []
     times: Some | None = None
     method: BuiltIn = "auto"

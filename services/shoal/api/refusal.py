@@ -92,7 +92,7 @@ def of_validation(error: RequestValidationError) -> Refusal:
     first = error.errors()[0]
     where = [str(part) for part in first["loc"] if part != "body"]
     others = len(error.errors()) - 1
-    detail = first["msg"] + (f" (and {others} more)" if others else "")
+    detail = first["msg"].removeprefix("Value error, ") + (f" (and {others} more)" if others else "")
     field = ".".join(where)
     return Refusal("input", f"{field}: {detail}" if field else detail, field or "body")
 

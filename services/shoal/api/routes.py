@@ -135,6 +135,12 @@ for _name, _kind in OPERATIONS.items():
     _answering(_name, _kind)
 
 
+@jobs.post("/{operation}", include_in_schema=False)
+async def no_operation(operation: JobId) -> None:
+    """A job of what there is not."""
+    raise Refusal("not-found", f"no operation {operation!r}; there are {', '.join(OPERATIONS)}", "operation")
+
+
 @by_id.get("/{id}", responses=documented("not-found", "input"))
 async def status(id: JobId, jobs: AllJobs) -> JobStatus:
     """How a job goes."""

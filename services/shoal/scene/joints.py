@@ -6,6 +6,7 @@ import math
 from fractions import Fraction
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from shoal.scene.function import Function
@@ -95,10 +96,16 @@ class Universal(Tie):
     axis: Axis
     second_axis: Axis
 
+    @property
+    def oblique(self) -> bool:
+        """Whether the axes are at no right angle, in any lane."""
+        first, second = np.stack(np.broadcast_arrays(*self.axis, *self.second_axis)).reshape(2, 3, -1)
+        lengths = np.linalg.norm(first, axis=0) * np.linalg.norm(second, axis=0)
+        return bool(np.any(np.abs(np.sum(first * second, axis=0)) > 1e-6 * lengths))
+
     @model_validator(mode="after")
     def _square(self) -> Universal:
-        cosine = sum(a * b for a, b in zip(self.axis, self.second_axis, strict=True))
-        if abs(cosine) > 1e-6 * math.hypot(*self.axis) * math.hypot(*self.second_axis):
+        if self.oblique:
             raise ValueError("second_axis: must be at a right angle to axis")
         return self
 

@@ -29,7 +29,7 @@ from shoal.scene.initial import (
     end_of,
     guessed,
 )
-from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint
+from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint, Universal
 from shoal.scene.loads import DistributedForce, Force, Load
 from shoal.scene.paths import key, shared, unknown, with_lanes
 from shoal.scene.record import Record, Vector, one_line
@@ -268,15 +268,19 @@ class Scene(Record):
         return Scene.parse(data, self.name)
 
     def with_lanes(self, values: Mapping[str, npt.NDArray[np.float64]]) -> Scene:
-        """This scene with numbers replaced by arrays, one entry per lane (population member), unchecked.
+        """This scene with numbers replaced by arrays, one entry per lane (population member).
 
         Every derived property broadcasts over the lanes. The extremes of each array are what
-        `with_values` should have accepted first; `engines` does so.
+        `with_values` should have accepted first; `engines` does so. Raises InputError where axes of a universal joint,
+        right one by one, are at no right angle together.
         """
         check_start(self.initial_from, values)
         scene = self._guessing(values)
         for path, lanes in values.items():
             scene = with_lanes(scene, path.split("."), np.asarray(lanes, dtype=float))
+        for name, joint in scene.joints.items():
+            if isinstance(joint, Universal) and joint.oblique:
+                raise InputError(f"joints.{name}.second_axis: must be at a right angle to axis in every lane")
         return scene
 
     def alone(self, paths: Iterable[str]) -> str | None:

@@ -205,6 +205,21 @@ def test_a_universal_joint_passes_on_a_driven_shaft_as_cardan_says(kind: str, aw
     assert np.max(np.abs(second)) > 0.9
 
 
+def test_axes_of_a_universal_joint_are_at_a_right_angle_in_every_lane() -> None:
+    """Each of two numbers may be right beside what the scene states, and both together not."""
+    cross = joint("universal", GROUND, {"body": "B"}, axis=[0, 0, 1], second_axis=[0, 1, 0])
+    hinged = {"bodies": {"B": body(centre_of_mass=[0.3, 0, 0])}, "joints": {"U": cross}, "markers": TIPS}
+    hung = scene(**hinged, gravity=[0, 0, -9.8])
+    first, second = "joints.U.axis.0", "joints.U.second_axis.0"
+    lanes = {first: np.array([0.3, 0.0]), second: np.array([0.0, 0.3])}
+    found = get_engine("gauss").simulate_many(hung, lanes, [0.3])
+    for lane in range(2):
+        alone = motion(hung.with_values({path: column[lane] for path, column in lanes.items()}), 0.3)
+        assert found.points[..., lane] == pytest.approx(alone.points[..., 0], abs=1e-9)
+    with pytest.raises(InputError, match=r"joints\.U\.second_axis: must be at a right angle to axis in every lane"):
+        get_engine("gauss").simulate_many(hung, {**lanes, first: np.array([0.3, 0.3])}, [0.3])
+
+
 def test_a_driven_angle_turns_about_its_axis() -> None:
     axis = np.array([1.0, 1.0, 1.0]) / math.sqrt(3)
     driven = scene(
