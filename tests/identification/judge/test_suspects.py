@@ -5,7 +5,11 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
+import pandas as pd
 import pytest
+import shoal
+import yaml
+from scipy.integrate import solve_ivp
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem, Verdict, identify, load_problem
 from shoal.identification.forward import ForwardModel
@@ -167,3 +171,27 @@ def test_the_zero_of_a_real_encoder() -> None:
     named = {suspect.name: suspect for suspect in estimate.suspects}
     assert named["tilt"].value == pytest.approx(-1.4e-3, abs=2e-4)
     assert named["tilt"].after < 6e-4
+
+
+def test_a_place_beside_the_axis_of_a_rigid_rod_keeps_it_rigid(tmp_path: Path) -> None:
+    """Outliers in a pendulum by scipy are rejected, though the rod, with a place beside its axis, cannot be bent."""
+    rod = {"kind": "rod", "length": 0.8, "height": 0.02, "width": 0.02, "density": 6250.0}
+    hinge = {"kind": "revolute", "first": {"body": "ground", "point": [0, 0]}, "second": {"body": "b"}}
+    scene = {
+        "name": "pendulum", "bodies": {"b": rod}, "joints": {"O": hinge}, "initial": {"b": {"angle": 0.3, "rate": 0.0}},
+        "markers": {"imu": {"body": "b", "point": [0.6, 0.1]}, "tip": {"body": "b", "point": "end"}},
+    }  # fmt: skip
+    t = np.linspace(0.0, 1.0, 101)
+    swing = solve_ivp(lambda _, y: (y[1], -1.5 * 9.81 / 0.8 * np.cos(y[0])), (0, 1), (0.4, 0.0), t_eval=t, rtol=1e-10)
+    x, y = 0.8 * np.cos(swing.y[0]), 0.8 * np.sin(swing.y[0])
+    x[::30] += 0.3
+    (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene))
+    problem = {
+        "name": "beside", "scene": str(tmp_path / "scene.yaml"), "noise": 1e-3,
+        "source": {"kind": "file", "path": "run.csv"},
+        "parameters": {"angle": {"path": "initial.b.angle", "lower": -1.0, "upper": 1.0}},
+        "channels": [{"marker": "tip", "quantity": q, "column": q} for q in "xy"],
+    }  # fmt: skip
+    run = pd.DataFrame({"t": t, "x": x, "y": y})
+    told = shoal.identify(Problem.parse(problem, "beside"), run, method="least-squares")
+    assert told.verdict is Verdict.REJECTED

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.size import size_of
@@ -21,7 +22,7 @@ _ELEMENTS, _FOR_ANGLES = 2, 3
 
 
 def bending(model: ForwardModel) -> Iterator[Candidate]:
-    """Young's modulus of each rigid rod."""
+    """Young's modulus of each rigid rod that may bend."""
     scene = model.scene
     size = size_of(scene)
     channels = [c for run in model.measurement.recordings.values() for c in run.channels]
@@ -35,7 +36,10 @@ def bending(model: ForwardModel) -> Iterator[Candidate]:
         probes = middle * np.geomspace(1 / _STIFFER, _STIFFER, _WAYS)
         free = Parameter(path=f"bodies.{name}.youngs_modulus", lower=probes[0] / 2, upper=probes[-1] * 2, scale="log")
         fields = {"youngs_modulus": middle, "element": "ancf-cable", "elements": _FOR_ANGLES if angles else _ELEMENTS}
-        bent = scene.with_values({f"bodies.{name}.{field}": value for field, value in fields.items()})
+        try:
+            bent = scene.with_values({f"bodies.{name}.{field}": value for field, value in fields.items()})
+        except InputError:
+            continue  # a place beside its axis, say, is one of a rigid rod only
         ways = np.reshape(probes, (-1, 1, 1))
         bases = np.full((len(probes), 1), np.inf)
         yield Candidate(f"bending of {name}", "machine", (free,), (np.inf,), ways, bases, "inverse", bent)
