@@ -58,6 +58,14 @@ class Affine:
         same = all(np.all(c == axis) for c, axis in zip(self.terms.values(), axes, strict=True))
         return tuple(self.terms) if same else None
 
+    @cached_property
+    def by_lane(self) -> tuple[list[int], Array, Array]:
+        """The unknowns, their coefficients (lanes or 1, unknowns, d) and the constant (lanes or 1, d)."""
+        parts = [self.constant, *self.terms.values()]
+        lanes = max(part.shape[1] for part in parts)
+        whole = np.stack([np.broadcast_to(part.T, (lanes, part.shape[0])) for part in parts], axis=1)
+        return list(self.terms), whole[:, 1:], whole[:, 0]
+
     def at(self, q: Array) -> Array:
         """Its value at coordinates, (d,), of a machine of one lane."""
         return sum((c[:, 0] * q[unknown] for unknown, c in self.terms.items()), self.constant[:, 0])

@@ -36,7 +36,7 @@ class Equilibrium:
     relative to all forces; gap: worst violation of a joint; correction: the last one, relative to the machine's size.
     eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
     stable. steps: load steps. reactions: in the joints. turns: what angle forces have counted [rad].
-    mesh_error: largest distance of a marker from where twice as many elements bring it [m], None where it is not known.
+    mesh_error: how far the markers are from the limit of ever finer meshes [m], None where it is not known.
     """
 
     scene: Scene

@@ -78,7 +78,7 @@ class Mode:
 class Modes:
     """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
 
-    mesh_errors: of each mode, how much its eigenvalue differs on twice as many elements, relative; empty if not known
+    mesh_errors: how far each eigenvalue is from the limit of ever finer meshes, relative; empty if not known
     """
 
     scene: Scene

@@ -8,17 +8,13 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
-from shoal.mechanics.analysis.mesh_error import finer
+from shoal.mechanics.analysis.mesh_error import apart, beyond, finer
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
 from shoal.scene.shear import with_shear
 
 DOUBLINGS = 7
 """So often the elements of all rods are doubled."""
-FALLS = (2.0, 4.0)
-"""Between these factors the distance of two meshes is taken to fall with each doubling: at most as at order two."""
-UNSEEN = 3.0
-"""The factor while only one distance is known."""
 SAFE = 2.0
 """By this factor the estimate has to be below the tolerance."""
 
@@ -39,18 +35,13 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
     if stout is None:
         return found
     other = statics(stout, time)
-    away = _apart(found, other) if found.ok and other.ok else np.nan
+    away = apart(found, other) if found.ok and other.ok else np.nan
     if SAFE * away <= tolerance:
         return found
     other = _refined(stout, tolerance, time, other)
     if other.ok and np.isfinite(away):
         return replace(other, message=f"with shear, which is worth {away:.1e} m")
     return other if other.ok or found.ok else found
-
-
-def _apart(one: Equilibrium, other: Equilibrium) -> float:
-    """The largest distance of a marker [m]."""
-    return float(np.max(np.linalg.norm(one.points - other.points, axis=1)))
 
 
 def _refined(scene: Scene, tolerance: float, time: float, begun: Equilibrium | None = None) -> Equilibrium:
@@ -64,9 +55,8 @@ def _refined(scene: Scene, tolerance: float, time: float, begun: Equilibrium | N
         if not (coarse.ok and found.ok):
             gap = np.nan
             continue
-        gap = _apart(coarse, found)
-        fall = np.clip(last / gap, *FALLS) if np.isfinite(last) and gap > 0 else UNSEEN
-        error = gap / (float(fall) - 1.0)
+        gap = apart(coarse, found)
+        error = beyond(gap, last)
         found = replace(found, mesh_error=error)
         if SAFE * error <= tolerance:
             return found

@@ -19,10 +19,9 @@ def of_lane(rows: Array, lane: int) -> Array:
 def at(vector: Affine, q: Array, lane: int) -> Array:
     """A vector at the coordinates (unknowns,) or (unknowns, lanes) of a lane, (3,)."""
     column = q if q.ndim == 1 else of_lane(q, lane)
-    total = of_lane(vector.constant, lane)
-    for unknown, coefficient in vector.terms.items():
-        total = total + of_lane(coefficient, lane) * column[unknown]
-    return total
+    unknowns, coefficients, constants = vector.by_lane
+    own = min(lane, len(constants) - 1)
+    return np.asarray(constants[own] + column[unknowns] @ coefficients[own])
 
 
 def everywhere(vector: Affine, q: Array) -> Array:
@@ -38,14 +37,17 @@ def slopes(term: Term | Mesh, q: Array, lane: int) -> Iterator[tuple[int, float]
     if isinstance(term, Mesh):
         for factor, vector in term.parts:
             x, y, _ = at(vector, q, lane)
-            for unknown, coefficient in vector.terms.items():
-                along, across, _ = of_lane(coefficient, lane)
-                yield unknown, factor * float(x * across - y * along) / float(x * x + y * y)
+            yield from _along(vector, factor / float(x * x + y * y) * np.array([-y, x, 0.0]), lane)
         return
     u, w = (at(vector, q, lane) for vector in (term.u, term.w))
     for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
-        for unknown, coefficient in vector.terms.items():
-            yield unknown, float(of_lane(coefficient, lane) @ other)
+        yield from _along(vector, other, lane)
+
+
+def _along(vector: Affine, direction: Array, lane: int) -> Iterator[tuple[int, float]]:
+    """Unknowns of a vector, and what each of them moves it along a direction (3,)."""
+    unknowns, coefficients, _ = vector.by_lane
+    return zip(unknowns, (coefficients[min(lane, len(coefficients) - 1)] @ direction).tolist(), strict=True)
 
 
 def values_of(term: Term, q: Array) -> Array:
