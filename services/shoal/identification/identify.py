@@ -24,6 +24,7 @@ from shoal.identification.judge.mirrors import with_mirror_images
 from shoal.identification.measure import Windows, measure
 from shoal.identification.methods import Method, Outcome, get_method
 from shoal.identification.methods.starts import starting_points
+from shoal.identification.pace import paced, repaced
 from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.plausible import check_constant
@@ -78,6 +79,8 @@ def identify(
     scene = problem.load_scene(values)
     deadline = None if time_limit is None else Deadline(time_limit)
     computed = any(isinstance(source, EngineSource) for source in problem.sources.values())
+    # Data that were computed with the scene's step are not to be fitted with another.
+    paces = tolerance is None and not computed
     if measurement is None:
         # Data are computed with the problem's values, not the user's.
         with deadline.paused() if deadline is not None and computed else nullcontext():
@@ -87,20 +90,35 @@ def identify(
         with deadline.paused():
             model.warm_up()
     unless_late(lambda: check_constant(model.measurement, model.at_start), None)
+    if paces:
+        model = _paced(model)
     if checkpoint is not None:
         model.memory = Memory(checkpoint, _fingerprint(model, name, seed, tolerance))
     with nullcontext() if model.memory is None else closing(model.memory):
         begin = time.perf_counter()
-        model, outcome, stages = _search(model, search, np.random.default_rng(seed), tolerance, progress)
+        model, outcome, stages = _search(model, search, np.random.default_rng(seed), tolerance, paces, progress)
         wall = time.perf_counter() - begin
         estimate = conclude(model, outcome, name, seed, wall, stages, wishes)
         return replace(estimate, notes=[*notes, *estimate.notes])
 
 
+def _paced(model: ForwardModel) -> ForwardModel:
+    """With the step that suits the noise where the search begins."""
+    return unless_late(lambda: paced(model, starting_points(model)[0]), model)
+
+
 def _search(
-    model: ForwardModel, search: Method, rng: np.random.Generator, tolerance: float | None, watch: Watch
+    model: ForwardModel,
+    search: Method,
+    rng: np.random.Generator,
+    tolerance: float | None,
+    paces: bool,
+    watch: Watch,
 ) -> tuple[ForwardModel, Outcome, list[Stage]]:
-    """Run a method as long as it may; returns the model it ended with, where, and the models on the way."""
+    """Run a method as long as it may; returns the model it ended with, where, and the models on the way.
+
+    paces: whether the step may be shortened where the search ended
+    """
 
     def progress(iteration: int, best: float, mean: float) -> None:
         watch(iteration, best, mean, asked.counter.evaluations)
@@ -114,6 +132,9 @@ def _search(
     except TimeIsUp as end:
         model = end.model if isinstance(end, Stopped) else model
         outcome = _best_so_far(model)
+    if paces and outcome.ended and np.isfinite(outcome.fitness):
+        searched, at_end = model, outcome
+        model, outcome = unless_late(lambda: repaced(searched, at_end, progress), (searched, at_end))
     if outcome.ended:
         found = outcome
         outcome = unless_late(lambda: with_mirror_images(model, found), found)
