@@ -52,7 +52,7 @@ demo: setup  ## identify and compare both cases of the paper; one table, one rep
 test: setup  ## the tests
 	@echo "compiling the kernels (once)"
 	@$(BIN)/python -m shoal.mechanics.warm
-	@$(BIN)/pytest -n 2 --dist worksteal $(ARGS)
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal $(ARGS)
 
 lint: setup  ## style and format
 	@$(BIN)/ruff check

@@ -36,7 +36,7 @@ FIRST = 0.3
 """Share of the runs of importance sampling that its proposals are fitted to."""
 LEAST = 0.3
 """Coefficient of variation that subset simulation has at least."""
-FOR_POINTS = 0.4
+FOR_POINTS = 0.2
 """Share of the runs that design points may take."""
 COARSE = 0.15
 """Coefficient of variation above which the estimate is told to be coarse."""

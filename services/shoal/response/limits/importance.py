@@ -1,16 +1,19 @@
 """Importance sampling: runs around the places where a limit is passed, weighted by how much rarer they really are.
 
 Proposals are mixtures of normal distributions: one around every design point (Melchers, Importance sampling in
-structural systems, Structural Safety 6, 1989), and one for the runs beyond the limit that belong to it, with their mean
-and covariance (Ang, Ang and Tang, Optimal importance-sampling density estimator, 1992, in the form of cross entropy).
+structural systems, Structural Safety 6, 1989), and some for the runs beyond the limit that belong to it, with their means
+and covariances (Ang, Ang and Tang, Optimal importance-sampling density estimator, 1992, in the form of cross entropy).
 """
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
+from scipy.cluster import vq
 
 from shoal.response.inputs import BoolArray
 from shoal.response.limits.estimate import Estimate, weighted
@@ -26,6 +29,8 @@ ENOUGH = 4
 """Runs that tell of a distribution."""
 PLAIN = 0.2
 """Share of the runs around design points where there are fitted distributions as well."""
+PARTS = (1, 2, 4, 6)
+"""Fitted distributions for each design point; which number serves best, runs tell."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,14 @@ class Mixture:
     shares: Array
     means: Array
     factors: Array
+
+    def beside(self, other: Mixture, share: float) -> Mixture:
+        """Both, of which the other has this share."""
+        return Mixture(
+            np.concatenate([(1 - share) * self.shares, share * other.shares]),
+            np.concatenate([self.means, other.means]),
+            np.concatenate([self.factors, other.factors]),
+        )
 
     def draw(self, count: int, random: np.random.Generator) -> Array:
         """As many of each part as its share says, but for rounding, which chance decides, (count, parameters)."""
@@ -104,10 +117,10 @@ def adapted(points: list[DesignPoint], found: Sample) -> Mixture:
     parameters, beyond = len(points[0].place), found.beyond
     fitted, unseen = beyond.halves
     best, least = around(points), _scatter(around(points), unseen)
-    for prior in (parameters + 1.0, 0.5 * parameters**2):
-        scatter = _scatter(_fitted(points, fitted, prior), unseen)
+    for parts, prior in itertools.product(PARTS, (parameters + 1.0, 0.5 * parameters**2)):
+        scatter = _scatter(_fitted(points, fitted, parts, prior), unseen)
         if scatter < least:
-            best, least = _fitted(points, beyond, prior), scatter
+            best, least = _fitted(points, beyond, parts, prior), scatter
     return best
 
 
@@ -116,12 +129,27 @@ def _scatter(proposal: Mixture, of: Sample) -> float:
     return float(of.weights @ proposal.weights(of.places))
 
 
-def _fitted(points: list[DesignPoint], beyond: Sample, prior: float) -> Mixture:
-    """prior: for how many observations of a unit covariance a part is taken, as few tell little of all directions."""
+def _centres(beyond: Sample, parts: int) -> Array:
+    """Of so many groups of alike weight, by k-means, (at most so many, parameters)."""
+    ends = np.cumsum(beyond.weights) / beyond.weights.sum()
+    alike = beyond.places[np.searchsorted(ends[:-1], (np.arange(len(ends)) + 0.5) / len(ends))]
+    guess = np.unique(alike, axis=0)
+    guess = guess[:: math.ceil(len(guess) / parts)]
+    # A guess of one row is taken for a number.
+    return np.asarray(vq.kmeans(alike, guess)[0]) if len(guess) > 1 else guess
+
+
+def _fitted(points: list[DesignPoint], beyond: Sample, parts: int, prior: float) -> Mixture:
+    """parts: for each design point, as no single normal distribution follows a limit that bends.
+
+    prior: for how many observations of a unit covariance a part is taken, as few tell little of all directions
+    """
     plain = around(points)
-    nearest = np.linalg.norm(beyond.places[:, None] - plain.means, axis=2).argmin(axis=1)
+    several = parts > 1 and len(beyond.places) >= ENOUGH * parts * len(points)
+    centres = _centres(beyond, parts * len(points)) if several else plain.means
+    nearest = np.linalg.norm(beyond.places[:, None] - centres, axis=2).argmin(axis=1)
     shares, means, factors = [], [], []
-    for k in range(len(points)):
+    for k in range(len(centres)):
         places, weights = beyond.places[nearest == k], beyond.weights[nearest == k]
         if len(places) < ENOUGH:
             continue
@@ -138,8 +166,4 @@ def _fitted(points: list[DesignPoint], beyond: Sample, prior: float) -> Mixture:
             factors.append(size * factor)
     if not means:
         return plain
-    return Mixture(
-        np.concatenate([PLAIN * plain.shares, (1 - PLAIN) * np.array(shares) / sum(shares)]),
-        np.concatenate([plain.means, means]),
-        np.concatenate([plain.factors, factors]),
-    )
+    return plain.beside(Mixture(np.array(shares) / sum(shares), np.array(means), np.array(factors)), 1 - PLAIN)
