@@ -45,7 +45,7 @@ JUDGES: Mapping[int, tuple[Mapping[str, Any], ...]] = {
 NORMAL = {path: 0.01 if path.endswith("angle") else 0.005 if path.endswith("length") else 0.025 for path in FIELDS}
 """Deviations of normal variables, as shares of what the scene states."""
 JUDGING = 16_384
-REPETITIONS = 200
+REPETITIONS = 600
 ROUNDING = 1e-9
 """Of the width."""
 FINE = {1: 400_001, 2: 1001}

@@ -1,8 +1,9 @@
 """Importance sampling: runs around the places where a limit is passed, weighted by how much rarer they really are.
 
 Proposals are mixtures of normal distributions: one around every design point (Melchers, Importance sampling in
-structural systems, Structural Safety 6, 1989), and some for the runs beyond the limit that belong to it, with their means
-and covariances (Ang, Ang and Tang, Optimal importance-sampling density estimator, 1992, in the form of cross entropy).
+structural systems, Structural Safety 6, 1989), and some for the runs beyond the limit that belong to it, with their
+means and covariances (Ang, Ang and Tang, Optimal importance-sampling density estimator, 1992, in the form of cross
+entropy).
 """
 
 from __future__ import annotations
