@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -125,6 +126,14 @@ def test_what_would_take_too_long_is_not_tried_and_not_met() -> None:
     assert not selection.met
     assert all(level == RIGID for rung in selection.rungs for level in rung.levels.values())
     assert "element steps, about" in selection.trajectory.message
+
+
+def test_where_no_theory_settles_it_is_told_of_both() -> None:
+    """A rod so soft that its slender runs are rejected, and with shear is not settled by what the patience allows."""
+    machine = draw(79)
+    found = select(machine.scene, machine.tolerance, patience=0.3)
+    assert not found.met
+    assert re.match("slender rods: the runs are rejected: .*; with shear and rotary inertia: the next", found.reason)
 
 
 def test_patience_is_stated_with_a_tolerance() -> None:

@@ -143,7 +143,11 @@ def _of_both(slender: Selection, stout: Selection) -> Selection:
         why = f"shear and rotary inertia, worth about {slender.shear:.1g} m, count; " if slender.met else ""
         return replace(stout, rungs=rungs, reason=why + stout.reason)
     if not slender.met:
-        return replace(stout if stout.chosen.error < slender.chosen.error else slender, rungs=rungs)
+        nearer = stout if stout.chosen.error < slender.chosen.error else slender
+        reason = f"slender rods: {slender.reason}; with shear and rotary inertia: {stout.reason}"
+        run = nearer.trajectory
+        told = _rejected(run, nearer.chosen.error, reason) if np.isfinite(nearer.chosen.error) else run
+        return replace(nearer, rungs=rungs, reason=reason, trajectory=told)
     reason = f"slender rods leave out about {slender.shear:.1g} m, and with shear and rotary inertia {stout.reason}"
     slender.chosen.error += slender.shear / COUNTS_FROM
     trajectory = _rejected(slender.trajectory, slender.chosen.error, reason)
