@@ -17,6 +17,7 @@ from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.selection import select
 from shoal.selection.climb import climb, settled
+from shoal.selection.folded import folded
 from shoal.selection.levels import LADDERS, RIGID, below, cable, quintic
 from shoal.selection.prior import estimate
 from shoal.selection.run import Rung, distance
@@ -133,7 +134,33 @@ def test_where_no_theory_settles_it_is_told_of_both() -> None:
     machine = draw(79)
     found = select(machine.scene, machine.tolerance, patience=0.3)
     assert not found.met
-    assert re.match("slender rods: the runs are rejected: .*; with shear and rotary inertia: the next", found.reason)
+    both = "slender rods: the runs are rejected: .*; with shear and rotary inertia: the next"
+    assert re.match(f"the torque load bends A to a strain of 3.1 .*; {both}", found.reason)
+
+
+@pytest.mark.parametrize(("torque", "strain"), [(0.9, None), (3.0, 3.0)])
+def test_a_torque_under_which_no_theory_holds_is_named(torque: float, strain: float | None) -> None:
+    """The end that it bends alone has the curvature M/(E I), and half a height further out the strain M h/(2 E I)."""
+    scene = draw(79).scene
+    rod = scene.bodies["A"]
+    half = torque * 2 * rod.youngs_modulus * rod.width * rod.height**3 / 12 / rod.height
+    scene = scene.with_values({"loads.load.torque": half})
+    said = folded(scene, ["A"])
+    assert said == "" if strain is None else f"load bends A to a strain of {strain:g} " in said
+
+
+def test_the_way_down_takes_a_share_of_the_work_of_the_climb(monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for the run that it is at when that much is done; what is found by then meets the tolerance."""
+    scene = _with_modulus(2e7).with_values({"solver.duration": 0.2})
+    free = select(scene, 1e-4)
+    monkeypatch.setattr("shoal.selection.trim.SEARCH", 0.0)
+    monkeypatch.setattr("shoal.selection.trim.SHARE", 0.2)
+    bound = select(scene, 1e-4)
+    climbed = select(scene, 1e-4, trimmed=False)
+    assert all(found.met for found in (free, bound, climbed))
+    work = [sum(rung.work for rung in found.rungs) for found in (climbed, bound, free)]
+    assert work[0] < work[1] < work[2]
+    assert bound.chosen.work <= climbed.chosen.work
 
 
 def test_patience_is_stated_with_a_tolerance() -> None:

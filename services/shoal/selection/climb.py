@@ -61,7 +61,8 @@ class Runs:
     """Runs of one scene on different levels, each made once.
 
     limits: the open rods with the element whose limit is their truth; coarsest: where their ladders begin; rungs: all
-    runs, in the order they were made; patience: how long a refinement may take [s]; meshed: see `select`
+    runs, in the order they were made; work: of all of them, in steps of one cable element; patience: how long a
+    refinement may take [s]; meshed: see `select`
     """
 
     def __init__(
@@ -79,6 +80,7 @@ class Runs:
         self.coarsest = coarsest(scene, limits, meshed)
         self.forecast = Forecast(scene, self.coarsest)
         self.rungs: list[Rung] = []
+        self.work = 0.0
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
 
     def __call__(self, levels: Levels, fraction: float = STEP_MARGIN, role: str = "") -> Rung:
@@ -89,6 +91,7 @@ class Runs:
             foreseen = self.forecast.work(levels) * STEP_MARGIN / fraction
             if (seconds := foreseen / PACE) > TELL:
                 self.progress(f"run {words(levels)}, about {seconds:.0f} s")
+            self.work += foreseen
             work = min(foreseen, self.forecast.work(levels))
             rung = Rung(dict(levels), scene, run(scene, self.times), work, role=role)
             self.add(rung)

@@ -81,7 +81,7 @@ def modal(n: int, rotary: bool = False) -> Level:
 
 
 MODES = 1, 2, 4
-COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
+COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024, 1536, 2048)
 SLENDER, SHEARS = "ancf-quintic", "simo-reissner"
 """The elements whose limits are the truth of slender rods, and in the plane of those with shear and rotary inertia."""
 LADDERS = {
@@ -99,8 +99,10 @@ LADDERS = {
 FRAMED = ("rigid", "modal")
 """Levels of a rod that moves with a frame: no element limits their step, and no section has a strain."""
 
-REFINEMENTS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
+REFINEMENTS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048)
 """Numbers of these elements in the models by which errors are estimated."""
+WOUND = 256
+"""Elements with which the ladder of a wound rod may begin."""
 
 
 def below(level: Level, limit: str, coarsest: Level) -> tuple[Level, ...]:
@@ -136,10 +138,10 @@ def coarsest(scene: Scene, limits: Mapping[str, str], meshed: Collection[str] = 
 def _coarsest(name: str, rod: Any, limit: str, meshed: bool) -> Level:
     if limit != "director-rod" or rod.straight:
         return next(level for level in LADDERS[limit] if not meshed or level.element not in FRAMED)
-    few = next((n for n in REFINEMENTS[:-1] if rod.winding <= n * np.pi / 2), None)
+    few = next((n for n in REFINEMENTS if rod.winding <= n * np.pi / 2 and n <= WOUND), None)
     if few is None:
         raise InputError(
-            f"bodies.{name}.element: models are chosen of rods that wind by {REFINEMENTS[-2] * np.pi / 2:.3g} rad at "
+            f"bodies.{name}.element: models are chosen of rods that wind by {WOUND * np.pi / 2:.3g} rad at "
             f"most, and {name} does by {rod.winding:.3g}; state its number of elements instead of a tolerance"
         )
     return Level(limit, few)

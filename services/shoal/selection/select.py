@@ -15,6 +15,7 @@ from shoal.engines.theory import left_out, softer
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Rod, Scene
 from shoal.selection.climb import PATIENCE, YARDSTICK, Progress, Runs, climb, settled
+from shoal.selection.folded import folded
 from shoal.selection.levels import SHEARS, SLENDER, Levels, open_rods
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
@@ -93,6 +94,7 @@ def select(
     progress: Progress = lambda _: None,
     patience: float = PATIENCE,
     meshed: Collection[str] = (),
+    trimmed: bool = True,
 ) -> Selection:
     """The cheapest model of a scene whose estimated error at the markers is within `tolerance` [m].
 
@@ -102,8 +104,9 @@ def select(
     own; a rigid rod in space is taken to twist as well as to bend; `solver.theory: slender` keeps the former.
     Integrator, step, element and number of elements are chosen; progress is told every model that is run.
     patience: the answer is "not met" where a refinement would take longer [s]; meshed: rods that have to be made of
-    elements, as the strains of their sections are asked for. Raises InputError, and ComputationError
-    where a curved or twisted rod in space, which is never rigid, takes too long.
+    elements, as the strains of their sections are asked for; trimmed: whether a cheaper model than the finest is
+    looked for. Raises InputError, and ComputationError where a curved or twisted rod in space, which is never rigid,
+    takes too long.
     """
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
@@ -114,12 +117,12 @@ def select(
     scene = scene.with_values({"solver.duration": float(asked[-1])}) if asked[-1] > 0 else scene
     limits, closed = _open(scene)
     priors = estimate(scene, tuple(limits)) if limits else {}
-    task = _Task(scene, tolerance, asked, priors, closed, progress, patience, meshed)
+    task = _Task(scene, tolerance, asked, priors, closed, progress, patience, meshed, trimmed)
     may_shear = scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
     found = _of_theory(task, limits, impatient=may_shear)
     if may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
         stout = {rod: SHEARS if limit == SLENDER else limit for rod, limit in limits.items()}
-        found = _of_both(found, _of_theory(task, stout))
+        found = _of_both(found, _of_theory(task, stout), folded(scene, limits))
     return replace(found, wall_s=time.perf_counter() - begin)
 
 
@@ -134,17 +137,19 @@ class _Task(NamedTuple):
     progress: Progress
     patience: float
     meshed: Collection[str]
+    trimmed: bool
 
 
-def _of_both(slender: Selection, stout: Selection) -> Selection:
-    """What to answer where slender rods leave out too much, or do not settle."""
+def _of_both(slender: Selection, stout: Selection, beyond: str) -> Selection:
+    """What to answer where slender rods leave out too much, or do not settle. beyond: see `folded`."""
     rungs = [*slender.rungs, *stout.rungs]
     if stout.met:
         why = f"shear and rotary inertia, worth about {slender.shear:.1g} m, count; " if slender.met else ""
         return replace(stout, rungs=rungs, reason=why + stout.reason)
     if not slender.met:
         nearer = stout if stout.chosen.error < slender.chosen.error else slender
-        reason = f"slender rods: {slender.reason}; with shear and rotary inertia: {stout.reason}"
+        both = f"slender rods: {slender.reason}; with shear and rotary inertia: {stout.reason}"
+        reason = f"{beyond}; {both}" if beyond else both
         run = nearer.trajectory
         told = _rejected(run, nearer.chosen.error, reason) if np.isfinite(nearer.chosen.error) else run
         return replace(nearer, rungs=rungs, reason=reason, trajectory=told)
@@ -166,7 +171,7 @@ def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) 
     known = sum(priors[rod].error for rod in surely)
     if flexible:
         worst = SURELY_RIGID * sum(prior.error for prior in priors.values())
-        chosen, reason = _flexible(runs, flexible, fixed, tolerance, known, worst, impatient)
+        chosen, reason = _flexible(runs, flexible, fixed, task, known, worst, impatient)
     else:
         chosen, reason = _rigid(runs, fixed, tolerance, known)
     met = bool(chosen.error <= tolerance)
@@ -239,25 +244,28 @@ def _flexible(
     runs: Runs,
     rods: tuple[str, ...],
     fixed: Levels,
-    tolerance: float,
+    task: _Task,
     known: float,
     worst: float,
     impatient: bool,
 ) -> tuple[Rung, str]:
     """Climb to a yardstick, then trim. worst: what rigid rods may cost a priori, for want of anything better [m]."""
-    yardstick = climb(runs, rods, fixed, tolerance - known, impatient)
+    yardstick = climb(runs, rods, fixed, task.tolerance - known, impatient)
     if isinstance(yardstick, str):
         refined = [rung for rung in runs.rungs if rung.role == YARDSTICK]
         if len(refined) < 2:
             if any(level.element != "rigid" for level in runs.coarsest.values()):
                 raise ComputationError(f"{yardstick}; state numbers of elements instead of a tolerance")
-            stiff, _ = _rigid(runs, runs.coarsest, tolerance, worst)
+            stiff, _ = _rigid(runs, runs.coarsest, task.tolerance, worst)
             return stiff, yardstick
         left, why = settled(refined)
         refined[-1].error = left + known
-        return refined[-1], why if refined[-1].error <= tolerance else yardstick
+        return refined[-1], why if refined[-1].error <= task.tolerance else yardstick
     yardstick.error += known
-    chosen = trim(runs, yardstick, rods, tolerance)
+    if not task.trimmed:
+        yardstick.rung.error = yardstick.error
+        return yardstick.rung, "the finest model"
+    chosen = trim(runs, yardstick, rods, task.tolerance)
     if chosen is None:
         return yardstick.rung, "no model that was run is within the tolerance"
     return chosen, f"the yardstick, {yardstick.rung.name}, is {chosen.error - yardstick.error:.1g} m away"

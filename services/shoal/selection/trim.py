@@ -9,7 +9,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.numerics.alike import FEW
 from shoal.mechanics.simulate import STEP_MARGIN
-from shoal.selection.climb import Runs, Yardstick
+from shoal.selection.climb import PACE, TELL, Runs, Yardstick
 from shoal.selection.levels import FRAMED, Level, Levels, below
 from shoal.selection.run import Rung, distance
 
@@ -29,6 +29,8 @@ TRIES = 10
 """Combinations that are run before the climb's own model is taken."""
 STRIDES = (3.0, 2.0, 1.4)
 """Longer steps, in stable ones, that are tried with capped inertia."""
+SHARE, SEARCH = 1.0, TELL * PACE
+"""The way down may take so much of the climb's work, and so much in any case."""
 VECTORS = {"rigid": 0, "ancf-cable": 2, "ancf-quintic": 3}
 """Nodal vectors that an element adds, of those whose inertia can be capped."""
 
@@ -37,22 +39,26 @@ def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: flo
     """The cheapest rung found within the tolerance; None if none is.
 
     Each rod alone goes down from the base. Their errors are taken to add up, which tells the combinations worth
-    trying, the cheapest first; what counts is the distance of the combination itself from the yardstick.
+    trying, the cheapest first; what counts is the distance of the combination itself from the yardstick. Their
+    search takes no more work than the climb did, or about five seconds.
     """
+    enough = runs.work + max(SHARE * runs.work, SEARCH)
     base = judged(runs, yardstick, yardstick.base)
     tables: dict[str, dict[Level, float]] = {}
     context = base
     for rod in sorted(rods, key=lambda rod: -runs.forecast.own(rod, yardstick.base[rod])):
-        tables[rod] = table = _alone(runs, yardstick, context, rod, tolerance)
+        tables[rod] = table = _alone(runs, yardstick, context, rod, tolerance, enough)
         harmless = [level for level, part in table.items() if part <= HARMLESS * tolerance]
         cheapest = min(harmless, key=lambda level: runs.forecast.own(rod, level))
         context = judged(runs, yardstick, {**context.levels, rod: cheapest})
     for rod, table in tables.items():
         if not np.all(np.isfinite(list(table.values()))):  # other rods, as fine as they were, may have diverged
-            again = _alone(runs, yardstick, context, rod, tolerance)
+            again = _alone(runs, yardstick, context, rod, tolerance, enough)
             table |= {level: part for level, part in again.items() if part < table.get(level, np.inf)}
     combinations = _combinations(runs, yardstick, base, tables, tolerance)
     for levels in combinations[:TRIES]:
+        if runs.work > enough:
+            break
         rung = judged(runs, yardstick, levels)
         if rung.error <= WITHIN * tolerance:
             return _strided(runs, yardstick, combinations, tolerance, rung)
@@ -89,8 +95,10 @@ def judged(runs: Runs, yardstick: Yardstick, levels: Levels, fraction: float = S
     return rung
 
 
-def _alone(runs: Runs, yardstick: Yardstick, context: Rung, rod: str, tolerance: float) -> dict[Level, float]:
-    """Distance from the context [m] of the models in which one rod alone is coarser."""
+def _alone(
+    runs: Runs, yardstick: Yardstick, context: Rung, rod: str, tolerance: float, enough: float
+) -> dict[Level, float]:
+    """Distance from the context [m] of the models in which one rod alone is coarser, until so much work is done."""
     start = context.levels[rod]
     table = {start: 0.0}
 
@@ -104,7 +112,7 @@ def _alone(runs: Runs, yardstick: Yardstick, context: Rung, rod: str, tolerance:
     before = np.inf
     for level in framed:
         miss(level)
-        if table[level] <= HARMLESS * tolerance or GAINS * table[level] > before:
+        if table[level] <= HARMLESS * tolerance or GAINS * table[level] > before or runs.work > enough:
             break
         before = table[level] if level.modes else np.inf
     last, misses = runs.forecast.own(rod, start), 0
@@ -114,7 +122,7 @@ def _alone(runs: Runs, yardstick: Yardstick, context: Rung, rod: str, tolerance:
             continue
         last = work
         misses = misses + 1 if miss(level) > 2 * tolerance else 0
-        if misses == MISSES:
+        if misses == MISSES or runs.work > enough:
             break
     return table
 

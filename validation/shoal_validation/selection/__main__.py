@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.progress import track
+from shoal.selection.climb import PATIENCE
 from shoal.trajectory import plain
 
 from shoal_validation.document import rewrite
@@ -34,16 +35,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m shoal_validation.selection", description=__doc__)
     parser.add_argument("--machines", type=int, default=200, help="how many random machines (default: 200)")
     parser.add_argument("--first", type=int, default=0, help="seed of the first (default: 0)")
+    parser.add_argument(
+        "--patience", type=float, default=PATIENCE, help=f"seconds a refinement may take (default: {PATIENCE:g})"
+    )
     parser.add_argument("--resume", action="store_true", help="keep the machines that selection.json holds already")
     parser.add_argument("--out", type=Path, default=DOCS / "charts", help="folder of chart and data")
     asked = parser.parse_args()
+    if not asked.patience > 0:
+        parser.error(f"--patience: needs a time above 0 s, found {asked.patience:g}")
     if asked.machines < 1:
         parser.error(f"--machines: needs one or more, found {asked.machines}")
     asked.out.mkdir(parents=True, exist_ok=True)
     record = asked.out / "selection.json"
     seeds = range(asked.first, asked.first + asked.machines)
     cases = [case for case in load(record) if case.seed in seeds] if asked.resume else []
-    for case in cases_of([seed for seed in seeds if seed not in {case.seed for case in cases}]):
+    left = [seed for seed in seeds if seed not in {case.seed for case in cases}]
+    for case in cases_of(left, asked.patience):
         cases.append(case)
         save(cases, record)
     draw_chart(cases, asked.out / "selection.png")
@@ -66,12 +73,12 @@ def load(record: Path) -> list[Case]:
     return [Case(**row) for row in known]
 
 
-def cases_of(seeds: Sequence[int]) -> Iterator[Case]:
+def cases_of(seeds: Sequence[int], patience: float = PATIENCE) -> Iterator[Case]:
     """What the machines of these seeds show, with progress on standard error."""
     for seed in track(seeds, "machines", console=Console(stderr=True)):
         machine = draw(seed)
         with np.errstate(invalid="ignore"):
-            yield study(machine, exhaustive=len(machine.scene.bodies) <= EXHAUSTIVE)
+            yield study(machine, exhaustive=len(machine.scene.bodies) <= EXHAUSTIVE, patience=patience)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 from shoal.selection import Selection, select
-from shoal.selection.climb import Runs
+from shoal.selection.climb import PATIENCE, Runs
 from shoal.selection.levels import LADDERS, Level
 from shoal.selection.run import Rung, distance
 
@@ -52,10 +52,10 @@ class Case:
         return bool(self.reference_error < 0.5 * self.tolerance)
 
 
-def study(machine: Draw, exhaustive: bool = False) -> Case:
-    """Select, then judge by a finer selection."""
-    seconds, chosen = undisturbed(lambda: select(machine.scene, machine.tolerance))
-    finer = select(machine.scene, machine.tolerance / FINER)
+def study(machine: Draw, exhaustive: bool = False, patience: float = PATIENCE) -> Case:
+    """Select, then judge by a finer selection. patience: see `select` [s]."""
+    seconds, chosen = undisturbed(lambda: select(machine.scene, machine.tolerance, patience=patience))
+    finer = select(machine.scene, machine.tolerance / FINER, trimmed=False)
     yardstick = min(
         (r for r in finer.rungs if np.isfinite(r.error) and _of(r, finer.limits)), key=lambda r: r.error, default=None
     )
