@@ -117,6 +117,17 @@ def test_no_row_is_folded(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert few > 0
 
 
+def test_a_rejected_run_shows_no_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even plausible ones."""
+    scene = DOUBLE.with_values({"solver.step": 0.5, "solver.integrator": "rk4"})
+    run = get_engine("gauss").simulate(scene, [2.0])
+    assert not run.ok
+    text = printed(lambda: tables.trajectory_table(run, scene), monkeypatch, WIDTH, log=True)
+    assert "no places are shown, as the run is rejected" in text
+    assert f"status {run.status[0]}" in text
+    assert " marker " not in text
+
+
 def test_numbers_have_their_units(monkeypatch: pytest.MonkeyPatch) -> None:
     """Brackets are no markup."""
     estimated = printed(TABLES["estimate"], monkeypatch, WIDTH, log=True)

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 def why(found: Selection) -> list[str]:
     """The reasons of the choice, in sentences."""
-    reasons = [f"Of {len(found.rungs)} models, {found.chosen.name} was taken: {found.reason}."]
+    taken = found.chosen.name if found.met else "none"
+    reasons = [f"Of {len(found.rungs)} models, {taken} was taken: {found.reason}."]
     reasons += [f"{rod} stays rigid: {reason}." for rod, reason in found.rigid.items()]
     if found.shear > found.tolerance:
         reasons.append(f"Shear and rotary inertia, which the beams leave out, are worth about {length(found.shear)}.")
@@ -25,7 +26,9 @@ def rows(found: Selection) -> list[list[str]]:
     """Every model that was run: name, unknowns, steps, time [ms], error [m], what came of it."""
     table = []
     for rung in found.rungs:
-        verdict = "chosen" if rung is found.chosen else "" if rung.ok else str(rung.trajectory.status[0])
+        verdict = str(rung.trajectory.status[0]) if not rung.ok else ""
+        if rung is found.chosen:
+            verdict = "chosen" if found.met else verdict or "nearest"
         name = f"{rung.name}, tolerance {rung.tolerance:g}" if np.isfinite(rung.tolerance) else rung.name
         error = f"{rung.error:.1e}" if np.isfinite(rung.error) else "–"
         cost = f"{rung.trajectory.wall_s * 1e3:.1f}"

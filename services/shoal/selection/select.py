@@ -100,8 +100,9 @@ def select(
 
     The truth is the converged theory, whatever element the scene names for rods with a modulus: Bernoulli-Euler's beam,
     or in the plane Simo and Reissner's rod where what the former leaves out is worth more than half of the tolerance,
-    or where the former does not settle. The elements ancf-full, simo-reissner and director-rod are theories of their
-    own; a rigid rod in space is taken to twist as well as to bend; `solver.theory: slender` keeps the former.
+    or where the former does not settle, unless torques fold rods (see `folded`). The elements ancf-full, simo-reissner
+    and director-rod are theories of their own; a rigid rod in space is taken to twist as well as to bend;
+    `solver.theory: slender` keeps the former.
     Integrator, step, element and number of elements are chosen; progress is told every model that is run.
     patience: the answer is "not met" where a refinement would take longer [s]; meshed: rods that have to be made of
     elements, as the strains of their sections are asked for; trimmed: whether a cheaper model than the finest is
@@ -120,9 +121,13 @@ def select(
     task = _Task(scene, tolerance, asked, priors, closed, progress, patience, meshed, trimmed)
     may_shear = scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
     found = _of_theory(task, limits, impatient=may_shear)
-    if may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
+    beyond = folded(scene, limits) if may_shear and not found.met else ""
+    if beyond:
+        reason = f"{beyond}; slender rods: {found.reason}"
+        found = replace(found, reason=reason, trajectory=_rejected(found.trajectory, found.chosen.error, reason))
+    elif may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
         stout = {rod: SHEARS if limit == SLENDER else limit for rod, limit in limits.items()}
-        found = _of_both(found, _of_theory(task, stout), folded(scene, limits))
+        found = _of_both(found, _of_theory(task, stout))
     return replace(found, wall_s=time.perf_counter() - begin)
 
 
@@ -140,18 +145,16 @@ class _Task(NamedTuple):
     trimmed: bool
 
 
-def _of_both(slender: Selection, stout: Selection, beyond: str) -> Selection:
-    """What to answer where slender rods leave out too much, or do not settle. beyond: see `folded`."""
+def _of_both(slender: Selection, stout: Selection) -> Selection:
+    """What to answer where slender rods leave out too much, or do not settle."""
     rungs = [*slender.rungs, *stout.rungs]
     if stout.met:
         why = f"shear and rotary inertia, worth about {slender.shear:.1g} m, count; " if slender.met else ""
         return replace(stout, rungs=rungs, reason=why + stout.reason)
     if not slender.met:
         nearer = stout if stout.chosen.error < slender.chosen.error else slender
-        both = f"slender rods: {slender.reason}; with shear and rotary inertia: {stout.reason}"
-        reason = f"{beyond}; {both}" if beyond else both
-        run = nearer.trajectory
-        told = _rejected(run, nearer.chosen.error, reason) if np.isfinite(nearer.chosen.error) else run
+        reason = f"slender rods: {slender.reason}; with shear and rotary inertia: {stout.reason}"
+        told = _rejected(nearer.trajectory, nearer.chosen.error, reason)
         return replace(nearer, rungs=rungs, reason=reason, trajectory=told)
     reason = f"slender rods leave out about {slender.shear:.1g} m, and with shear and rotary inertia {stout.reason}"
     slender.chosen.error += slender.shear / COUNTS_FROM
@@ -288,5 +291,7 @@ def _at(rung: Rung, grid: Array, asked: Array, met: bool, reason: str) -> Trajec
 
 
 def _rejected(run: Trajectory, error: float, reason: str) -> Trajectory:
-    """A run that is off by more than the tolerance [m]."""
+    """A run that is off by more than the tolerance [m]; one that is not believed at all keeps its status."""
+    if not np.isfinite(error):
+        return replace(run, message=reason)
     return replace(run, status=(Status.FAILED,), message=f"tolerance not met, estimated error {error:.2g} m: {reason}")

@@ -29,14 +29,14 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
     """Where the markers end, and the evidence."""
     if selection is not None:
         selection_table(selection)
-    table = screen.table(
-        f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s",
-        "marker",
-        *(f"{axis} [m]" for axis in trajectory.axes),
-    )
-    for name in trajectory.markers:
-        table.add_row(name, *(f"{part:z.9f}" for part in trajectory.marker(name)[-1]))
-    screen.out.print(table)
+    title = f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s"
+    if trajectory.ok or (selection is not None and np.isfinite(selection.chosen.error)):
+        table = screen.table(title, "marker", *(f"{axis} [m]" for axis in trajectory.axes))
+        for name in trajectory.markers:
+            table.add_row(name, *(f"{part:z.9f}" for part in trajectory.marker(name)[-1]))
+        screen.out.print(table)
+    else:
+        screen.say(f"{title}: no places are shown, as the run is rejected")
     verification = trajectory.model.get("verification")
     unknown = verification is not None and trajectory.ok and verification["time_error"] is None
     screen.say(
@@ -58,12 +58,14 @@ def selection_table(selection: Selection) -> None:
         f"models for {selection.tolerance:g} m at the markers: {len(selection.rungs)} runs, {selection.wall_s:.2f} s"
     )
     table = screen.table(title, "model", "unknowns", "steps", "ms", "error [m]", "")
+    table.columns[-1].no_wrap = True
     for row in rows(selection):
         table.add_row(*row)
     screen.out.print(table)
     screen.say(*(f"{rod} stays rigid: {reason}" for rod, reason in selection.rigid.items()))
     verdict = "met" if selection.met else "not met"
-    screen.say(f"{verdict}: {chosen.name}, estimated error {chosen.error:.1e} m; {selection.reason}")
+    known = f"{chosen.name}, estimated error {chosen.error:.1e} m; " if np.isfinite(chosen.error) else ""
+    screen.say(f"{verdict}: {known}{selection.reason}")
     if selection.shear > selection.tolerance:
         screen.say(f"beyond the beams' theory: shear and rotary inertia, about {selection.shear:.0e} m")
     screen.out.print()
