@@ -15,8 +15,12 @@ from shoal.selection.run import Rung, distance
 from shoal_validation.benchmarks.timing import undisturbed
 from shoal_validation.selection.machines import Draw
 
-FINER = 10.0
-"""The truth is the yardstick of a selection whose tolerance is smaller by this factor."""
+FINER = 4.0
+"""The truth is the finest model of a selection whose tolerance is smaller by this factor,"""
+JUDGE = 20.0
+"""none of whose refinements takes longer [s]."""
+AFFORDABLE = 3e9
+"""The cheapest model is looked for where all cheaper ones together take less work, in steps of one cable element."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ class Case:
 def study(machine: Draw, exhaustive: bool = False, patience: float = PATIENCE) -> Case:
     """Select, then judge by a finer selection. patience: see `select` [s]."""
     seconds, chosen = undisturbed(lambda: select(machine.scene, machine.tolerance, patience=patience))
-    finer = select(machine.scene, machine.tolerance / FINER, trimmed=False)
+    finer = select(machine.scene, machine.tolerance / FINER, patience=JUDGE, trimmed=False)
     yardstick = min(
         (r for r in finer.rungs if np.isfinite(r.error) and _of(r, finer.limits)), key=lambda r: r.error, default=None
     )
@@ -108,6 +112,8 @@ def _cheapest(machine: Draw, chosen: Selection, yardstick: Rung) -> tuple[float,
         work = runs.forecast.work(combination)
         if 0 < work < least and any(level.element != "rigid" for level in levels):
             cheaper.append((work, combination))
+    if sum(work for work, _ in cheaper) > AFFORDABLE:
+        return np.nan, ""
     for work, combination in sorted(cheaper, key=lambda pair: pair[0]):
         if distance(runs(combination).trajectory, yardstick.trajectory) <= machine.tolerance:
             return work, runs.rungs[-1].name
