@@ -19,7 +19,7 @@ FINER = 4.0
 """The truth is the finest model of a selection whose tolerance is smaller by this factor,"""
 JUDGE = 20.0
 """none of whose refinements takes longer [s]."""
-AFFORDABLE = 3e9
+AFFORDABLE = 3e8
 """The cheapest model is looked for where all cheaper ones together take less work, in steps of one cable element."""
 
 
