@@ -24,6 +24,8 @@ MEASUREMENT = (
     *("bias_ax", "bias_ay", "bias_az", "bias_rate", "bias_wx", "bias_wy", "bias_wz"),
 )
 """What a parameter can be that is none of the scene's: the path is `measurement.` and one of these."""
+PROPORTIONAL = {"x", "y", *(name for name in MEASUREMENT if name.startswith("bias_"))}
+"""Those of them that channels follow in proportion, so that a fit has one place for them."""
 RESERVED = "measurement"
 _FREE = (".angle", ".rate")
 _POSITIVE = {

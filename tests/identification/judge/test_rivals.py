@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from shoal.engines import get_engine
 from shoal.identification import Problem, Verdict, identify
 from shoal.identification.forward import ForwardModel
@@ -90,6 +93,37 @@ def test_a_curved_valley_is_one_place_and_a_mirror_image_another() -> None:
     assert connected(seen, there, beside, limit)
     image = seen.parameters.to_vector(np.array([np.pi - 0.6, 1.0, -9.81]))
     assert not connected(seen, there, image, limit)
+
+
+@pytest.mark.parametrize(("centre", "start", "upper"), [(0.35, 0.3, 1.5), (0.8, 1.0, 1.5), (0.35, 0.3, 0.5)])
+def test_two_centres_of_mass_swing_alike(centre: float, start: float, upper: float, tmp_path: Path) -> None:
+    """A pendulum of inertia I about its centre of mass, at a, has the angles of one at I / (m a) (Huygens)."""
+    inertia, ends = 0.25, sorted([centre, 0.25 / centre])
+
+    def slope(_: float, state: Sequence[float]) -> list[float]:
+        return [state[1], -9.81 * centre * np.cos(state[0]) / (inertia + centre**2)]
+
+    times = np.linspace(0.0, 3.0, 61)
+    swing = solve_ivp(slope, (0.0, 3.0), [-0.5, 0.0], t_eval=times, rtol=1e-10, atol=1e-12).y[0]
+    angle = swing + 0.05 * np.random.default_rng(3).standard_normal(61)
+    table = tmp_path / "swing.csv"
+    np.savetxt(table, np.column_stack([times, angle]), delimiter=",", header="t,angle", comments="")
+    seen = {
+        "name": "centre",
+        "scene": "single-pendulum",
+        "values": {"bodies.OA.inertia": inertia, "initial.OA.angle": -0.5},
+        "parameters": {"a": {"path": "bodies.OA.centre_of_mass.0", "lower": 0.1, "upper": upper, "start": start}},
+        "channels": [{"marker": "A", "quantity": "angle", "column": "angle"}],
+        "noise": 0.05,
+        "source": {"kind": "file", "path": str(table)},
+    }
+    found = identify(Problem.parse(seen, "centre"))
+    if upper < ends[1]:
+        assert found.verdict is Verdict.IDENTIFIED
+        return
+    assert found.verdict is Verdict.AMBIGUOUS
+    told = sorted([found.parameters["a"].value, found.minima[0]["a"]])
+    np.testing.assert_allclose(told, ends, rtol=0.03)
 
 
 @pytest.mark.parametrize(
