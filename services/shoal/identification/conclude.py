@@ -165,7 +165,11 @@ def conclude(
         wall_s=wall,
         history=searched.counter.history,
         iterations=outcome.iterations,
-        minima=[{**model.parameters.told(p), "fitness": f} for p, f in found.minima if np.isfinite(f)],
+        minima=[
+            {**model.parameters.told(p), "fitness": f}
+            for p, f in sorted(found.minima, key=lambda end: end[1])
+            if np.isfinite(f)
+        ],
         residual_autocorrelation=correlation,
         residual_tests=tests,
         suspects=judgement.suspects,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.special import ellipk
 from shoal.engines import get_engine
 from shoal.identification import Problem, Verdict, identify
 from shoal.identification.forward import ForwardModel
@@ -124,6 +125,19 @@ def test_two_centres_of_mass_swing_alike(centre: float, start: float, upper: flo
     assert found.verdict is Verdict.AMBIGUOUS
     told = sorted([found.parameters["a"].value, found.minima[0]["a"]])
     np.testing.assert_allclose(told, ends, rtol=0.03)
+
+
+def test_a_swing_that_was_recorded_a_period_later_looks_alike() -> None:
+    """The period is 4 K(sin(amplitude / 2)) sqrt(length / g)."""
+    delay = {"path": "measurement.delay", "lower": 0.0, "upper": 3.0, "start": 0.2}
+    truth = {"initial.OA.angle": -0.9}
+    late = problem("single-pendulum", {"d": delay}, ["x", "y"], truth, values=truth)
+    late = late.model_copy(update={"source": late.source.model_copy(update={"stop": 4.0, "delay": 0.3})})
+    found = identify(late)
+    assert found.verdict is Verdict.AMBIGUOUS
+    assert "recorded in different ways" in found.message
+    period = 4 * np.sqrt(1 / 9.81) * ellipk(np.sin((np.pi / 2 - 0.9) / 2) ** 2)
+    np.testing.assert_allclose(abs(found.minima[0]["d"] - found.parameters["d"].value), period, rtol=1e-3)
 
 
 @pytest.mark.parametrize(
