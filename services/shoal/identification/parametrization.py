@@ -46,7 +46,8 @@ class Parametrization:
         found: dict[str, Entry] = {}
         for key, parameter in self.problem.parameters.items():
             if parameter.own and self.problem.recordings:
-                found |= {f"{name}.{key}": Entry(key, parameter, name) for name in self.recordings}
+                owners = parameter.own if isinstance(parameter.own, tuple) else self.recordings
+                found |= {f"{name}.{key}": Entry(key, parameter, name) for name in self.recordings if name in owners}
             else:
                 found[key] = Entry(key, parameter, None)
         return found
