@@ -137,7 +137,8 @@ def conclude(
     notes = [judgement.message or outcome.message]
     notes += remarks(values, profiled, names, tests, mesh if limits else None, theory)
     if drawn is not None:
-        notes += [drawn.sentence(), *news(drawn, values)]
+        alone = judgement.verdict is Verdict.AMBIGUOUS
+        notes += [drawn.sentence(), *news(drawn, values), "the draws are about the first of them alone" * alone]
     elif wishes.sample:
         why = "no time was left" if minimum else f"'{judgement.verdict}' is no minimum to draw about"
         notes.append(f"no posterior was drawn: {why}")
@@ -164,7 +165,11 @@ def conclude(
         wall_s=wall,
         history=searched.counter.history,
         iterations=outcome.iterations,
-        minima=[{**model.parameters.told(p), "fitness": f} for p, f in found.minima if np.isfinite(f)],
+        minima=[
+            {**model.parameters.told(p), "fitness": f}
+            for p, f in sorted(found.minima, key=lambda end: end[1])
+            if np.isfinite(f)
+        ],
         residual_autocorrelation=correlation,
         residual_tests=tests,
         suspects=judgement.suspects,

@@ -32,6 +32,7 @@ class Estimate:
     evaluations: simulations; work: simulated time over that of one run of all recordings
     choice: which method was taken, and why; notes: what was found and mended in the recordings
     advice: what to do next; suspects: properties of the measurement that would explain the misfit
+    minima: others that were found, by their parameters, the best first
     sensitivity_doubt: relative difference of derivatives by two step sizes
     profiles, bootstrap, posterior: where wished for
     scenes: the identified machine, by recording; predicted: its channels at the samples of each recording

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from shoal.identification.problem import MEASUREMENT, RESERVED, Parameter, Prior, Problem
+from shoal.identification.problem import MEASUREMENT, PROPORTIONAL, RESERVED, Parameter, Prior, Problem
 from shoal.identification.recording.source import Clocked
 from shoal.scene import Scene, expression
 from shoal.trajectory import Array
@@ -46,7 +46,8 @@ class Parametrization:
         found: dict[str, Entry] = {}
         for key, parameter in self.problem.parameters.items():
             if parameter.own and self.problem.recordings:
-                found |= {f"{name}.{key}": Entry(key, parameter, name) for name in self.recordings}
+                owners = parameter.own if isinstance(parameter.own, tuple) else self.recordings
+                found |= {f"{name}.{key}": Entry(key, parameter, name) for name in self.recordings if name in owners}
             else:
                 found[key] = Entry(key, parameter, None)
         return found
@@ -68,8 +69,14 @@ class Parametrization:
 
     @cached_property
     def turning(self) -> npt.NDArray[np.bool_]:
-        """Which of them are angles, of which whole turns do not count, (components,), bool."""
-        return np.array([path.endswith(".angle") for path in self.paths]) & self.initial
+        """Which components are angles, of which whole turns do not count, (components,), bool."""
+        measured = np.array([path in (f"{RESERVED}.tilt", f"{RESERVED}.mounting") for path in self.paths])
+        return np.asarray(measured | self.initial & np.array([path.endswith(".angle") for path in self.paths]))
+
+    @cached_property
+    def proportional(self) -> npt.NDArray[np.bool_]:
+        """Which components the channels follow in proportion, with a single minimum, (components,), bool."""
+        return np.array([path.startswith(RESERVED) and path.partition(".")[2] in PROPORTIONAL for path in self.paths])
 
     @cached_property
     def priors(self) -> list[tuple[int, Prior]]:

@@ -24,6 +24,8 @@ MEASUREMENT = (
     *("bias_ax", "bias_ay", "bias_az", "bias_rate", "bias_wx", "bias_wy", "bias_wz"),
 )
 """What a parameter can be that is none of the scene's: the path is `measurement.` and one of these."""
+PROPORTIONAL = {"x", "y", *(name for name in MEASUREMENT if name.startswith("bias_"))}
+"""Those of them that channels follow in proportion, so that a fit has one place for them."""
 RESERVED = "measurement"
 _FREE = (".angle", ".rate")
 _POSITIVE = {
@@ -60,7 +62,8 @@ class Parameter(Record):
         the parameter only stands in `ties`
     scale: `log` for numbers that are known in order of magnitude only; `auto` is that for quantities that are positive
         by nature (a mass, a length, a modulus, friction) where `lower` is above 0, else `linear`
-    own: every recording has its own (an initial state, for instance), named RECORDING.NAME
+    own: every recording has its own (an initial state, for instance), named RECORDING.NAME; or the names of those that
+        have, the others are as they state (a delay of the second sensor)
     """
 
     path: str | None = None
@@ -69,7 +72,7 @@ class Parameter(Record):
     start: float | None = None
     scale: Literal["auto", "linear", "log"] = "auto"
     prior: Prior | None = None
-    own: bool = False
+    own: bool | tuple[Name, ...] = False
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -141,7 +144,20 @@ class Problem(Record):
         for name, parameter in self.parameters.items():
             if parameter.path is None and name not in used:
                 raise ValueError(f"parameters.{name}: has no path and stands in none of the ties")
+        self._check_own({name for text in expressions.values() for name in expression.names(text)})
         return self
+
+    def _check_own(self, used: set[str]) -> None:
+        """Raise ValueError where a parameter of some recordings names others, or stands where all of them need it."""
+        for name, parameter in self.parameters.items():
+            if isinstance(parameter.own, bool):
+                continue
+            unknown = [one for one in parameter.own if one not in self.recordings]
+            if unknown or not parameter.own:
+                there = f"the recordings ({', '.join(self.recordings)})" if self.recordings else "several recordings"
+                raise ValueError(f"parameters.{name}.own: {', '.join(unknown) or 'nobody'} is none of {there}")
+            if name in used and len(set(parameter.own)) < len(self.recordings):
+                raise ValueError(f"parameters.{name}.own: ties and quantities need it of every recording")
 
     @model_validator(mode="after")
     def _data(self) -> Self:

@@ -121,7 +121,7 @@ def _remarks(estimate: Estimate) -> list[str]:
             f"{rounded(one.upper, one.sd)}; {one.size:.0f} effective draws, R-hat {one.r_hat:.3f}."
             for name, one in estimate.posterior.marginals.items()
         ]
-    for other in sorted(estimate.minima, key=lambda minimum: minimum["fitness"])[:_ENDS]:
+    for other in estimate.minima[:_ENDS]:
         values = ", ".join(f"{name} {value:.4g}" for name, value in other.items() if name != "fitness")
         fit = f"{power(other['fitness'], 2)} {units.fitness_unit(estimate)}"
         remarks.append(f"Another search ended at {values}; fitness {fit}.")

@@ -104,7 +104,7 @@ def _broken_off(runs: Runs) -> Found:
     """What is known when the time is up. Raises TimeIsUpError if that is nothing."""
     if runs.evaluations == 0:
         raise TimeIsUpError
-    return Found(f"{runs.evaluations} runs, until the time was up")
+    return Found("broken off when the time was up")
 
 
 def _statistics(study: Study, found: Found) -> Statistics:

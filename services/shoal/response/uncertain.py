@@ -157,7 +157,9 @@ def uncertain(
         missing = [one.text for one in asked[len(judged) :]]
         status, message = (
             "time-limit",
-            f"the {time_limit:g} s were over" + (f"; nothing is known of {', '.join(missing)}" if missing else ""),
+            f"the {time_limit:g} s were over"
+            + (f"; nothing is known of {', '.join(missing)}" if missing else "")
+            + ("; the same again goes on from here" if checkpoint else ""),
         )
     if status == "ok" and allocation is not None and not allocation.ok:
         status, message = "allocation-not-met", allocation.message

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipk
 from shoal.engines import get_engine
 from shoal.identification import Problem, Verdict, identify
 from shoal.identification.forward import ForwardModel
@@ -90,6 +94,50 @@ def test_a_curved_valley_is_one_place_and_a_mirror_image_another() -> None:
     assert connected(seen, there, beside, limit)
     image = seen.parameters.to_vector(np.array([np.pi - 0.6, 1.0, -9.81]))
     assert not connected(seen, there, image, limit)
+
+
+@pytest.mark.parametrize(("centre", "start", "upper"), [(0.35, 0.3, 1.5), (0.8, 1.0, 1.5), (0.35, 0.3, 0.5)])
+def test_two_centres_of_mass_swing_alike(centre: float, start: float, upper: float, tmp_path: Path) -> None:
+    """A pendulum of inertia I about its centre of mass, at a, has the angles of one at I / (m a) (Huygens)."""
+    inertia, ends = 0.25, sorted([centre, 0.25 / centre])
+
+    def slope(_: float, state: Sequence[float]) -> list[float]:
+        return [state[1], -9.81 * centre * np.cos(state[0]) / (inertia + centre**2)]
+
+    times = np.linspace(0.0, 3.0, 61)
+    swing = solve_ivp(slope, (0.0, 3.0), [-0.5, 0.0], t_eval=times, rtol=1e-10, atol=1e-12).y[0]
+    angle = swing + 0.05 * np.random.default_rng(3).standard_normal(61)
+    table = tmp_path / "swing.csv"
+    np.savetxt(table, np.column_stack([times, angle]), delimiter=",", header="t,angle", comments="")
+    seen = {
+        "name": "centre",
+        "scene": "single-pendulum",
+        "values": {"bodies.OA.inertia": inertia, "initial.OA.angle": -0.5},
+        "parameters": {"a": {"path": "bodies.OA.centre_of_mass.0", "lower": 0.1, "upper": upper, "start": start}},
+        "channels": [{"marker": "A", "quantity": "angle", "column": "angle"}],
+        "noise": 0.05,
+        "source": {"kind": "file", "path": str(table)},
+    }
+    found = identify(Problem.parse(seen, "centre"))
+    if upper < ends[1]:
+        assert found.verdict is Verdict.IDENTIFIED
+        return
+    assert found.verdict is Verdict.AMBIGUOUS
+    told = sorted([found.parameters["a"].value, found.minima[0]["a"]])
+    np.testing.assert_allclose(told, ends, rtol=0.03)
+
+
+def test_a_swing_that_was_recorded_a_period_later_looks_alike() -> None:
+    """The period is 4 K(sin(amplitude / 2)) sqrt(length / g)."""
+    delay = {"path": "measurement.delay", "lower": 0.0, "upper": 3.0, "start": 0.2}
+    truth = {"initial.OA.angle": -0.9}
+    late = problem("single-pendulum", {"d": delay}, ["x", "y"], truth, values=truth)
+    late = late.model_copy(update={"source": late.source.model_copy(update={"stop": 4.0, "delay": 0.3})})
+    found = identify(late)
+    assert found.verdict is Verdict.AMBIGUOUS
+    assert "recorded in different ways" in found.message
+    period = 4 * np.sqrt(1 / 9.81) * ellipk(np.sin((np.pi / 2 - 0.9) / 2) ** 2)
+    np.testing.assert_allclose(abs(found.minima[0]["d"] - found.parameters["d"].value), period, rtol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -97,10 +97,13 @@ def within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -
 
 
 def relation(model: ForwardModel, one: Array, other: Array) -> str:
-    """What another solution is to the first: a mirror image, or just different."""
+    """What another solution is to the first: a mirror image, another clock or camera, or just different."""
     differing = np.flatnonzero(_differing(model, one, other))
     if np.all(model.parameters.initial[differing]):
         return "mirror images: the same marker positions with another pose"
+    entries = list(model.parameters.entries.values())
+    if all(entries[k].parameter.of_measurement for k in differing):
+        return "one machine, recorded in different ways"
     span = model.upper - model.lower
     if np.all(np.abs(np.abs(one) - np.abs(other)) <= _APART * span):
         return "mirror images: parameters with the opposite sign"

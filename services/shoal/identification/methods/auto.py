@@ -30,8 +30,9 @@ _UNEXPLAINED = 0.05
 _NOISES = 3.0
 _SWINGS = 3
 """A record that swings more often may be fitted with another phase: false minima."""
-_FACTOR, _ELSEWHERE, _DESCENTS = 5.0, 31, 6
-"""Positive quantities are tried within this factor, at so many points, and the best of them are followed."""
+_FACTOR, _ELSEWHERE, _DESCENTS, _DIPS = 5.0, 31, 6, 3
+"""Positive quantities are tried within this factor, others all over their bounds, at so many points; the best of them
+are followed, first so many of those that are lower than their neighbours."""
 _GAINED = 1e-3
 _LINE, _WIDTH, _LOOKED_AT = 41, 0.05, 2
 """Points of the line on which false minima are sought, its half by the box, and the dips that are followed."""
@@ -94,20 +95,20 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
     """The outcome, or where descents end from other values of what is no initial state.
 
     A modulus, a mass or a length that is wrong by a factor leads a fit to a false minimum with every pose, and a small
-    motion on a large one hides it in the noise: so what is positive is looked at even where the fit explains the data.
+    motion on a large one hides it in the noise; a centre of mass on either side of a radius of gyration swings alike.
+    So they are looked at even where the fit explains the data, all but what the channels follow in proportion.
     """
-    free = model.parameters.logarithmic
-    if not explained(model, outcome):
-        free = free | ~model.parameters.initial
-    points = _others(model, outcome.point, np.flatnonzero(free))
+    free = ~model.parameters.initial
+    if explained(model, outcome):
+        free = free & ~model.parameters.proportional
+    points, dips = _others(model, outcome.point, np.flatnonzero(free))
     if not len(points):
         return outcome
-    values = model.fitness(points)
-    spacing = 2 * np.log(_FACTOR) / _ELSEWHERE
+    spacing = np.where(model.parameters.logarithmic, 2 * np.log(_FACTOR), model.upper - model.lower) / _ELSEWHERE
     chosen = [outcome.point]
-    for k in np.argsort(values, kind="stable"):
-        if len(chosen) <= _DESCENTS and all(np.max(np.abs((points[k] - p)[free])) > spacing for p in chosen):
-            chosen.append(points[k])
+    for point in [*dips[:_DIPS], *points]:
+        if len(chosen) <= _DESCENTS and all(np.max((np.abs(point - p) / spacing)[free]) > 1.0 for p in chosen):
+            chosen.append(point)
     ends = distinct(model, descend_many(model, np.array(chosen), progress, patience=PATIENCE))
     rivals = [d for d in ends if d.converged and distance(model, d.point, outcome.point) > ENDS_APART]
     best = min(ends, key=lambda d: d.fitness, default=None)
@@ -121,17 +122,28 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
     return Outcome(best.point, best.fitness, rows, best.message, rest, choice, converged=best.converged)
 
 
-def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> Array:
-    """Other values of these parameters within the bounds, each alone and all together, (points, parameters)."""
-    width = (model.upper - model.lower) / 2
-    width = np.where(model.parameters.logarithmic, np.minimum(np.log(_FACTOR), width), width)
-    moves = [shift * np.eye(len(point))[k] for k in free for shift in np.linspace(-1.0, 1.0, _ELSEWHERE)]
-    if len(free) > 1:
-        together = np.zeros((len(free) * _ELSEWHERE, len(point)))
-        together[:, free] = 2 * scatter(len(together), len(free)) - 1
-        moves += list(together)
-    points = point + np.array(moves).reshape(-1, len(point)) * width
-    return np.unique(np.clip(points, model.lower, model.upper), axis=0)
+def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> tuple[Array, Array]:
+    """Other values of these parameters within the bounds, and those among them where the fitness dips, the best first.
+
+    Each is varied alone and all together, by factors or, the nearer to the point the closer, from bound to bound.
+    """
+    logarithmic = model.parameters.logarithmic
+    reach = np.minimum(np.log(_FACTOR), (model.upper - model.lower) / 2)
+
+    def moved(shifts: Array) -> Array:
+        far = np.where(shifts < 0.0, point - model.lower, model.upper - point) * np.abs(shifts) * shifts
+        return np.asarray(np.clip(point + np.where(logarithmic, reach * shifts, far), model.lower, model.upper))
+
+    unit = np.eye(len(point))
+    lines = [moved(np.linspace(-1.0, 1.0, _ELSEWHERE)[:, None] * unit[k]) for k in free]
+    together = np.zeros((len(free) * _ELSEWHERE if len(free) > 1 else 0, len(point)))
+    together[:, free] = 2 * scatter(len(together), len(free)) - 1
+    points = np.concatenate([*lines, moved(together)]) if lines else together
+    values = model.fitness(points) if len(points) else np.empty(0)
+    along = np.pad(values[: len(lines) * _ELSEWHERE].reshape(-1, _ELSEWHERE), ((0, 0), (1, 1)), constant_values=np.inf)
+    lower = (along[:, 1:-1] < along[:, :-2]) & (along[:, 1:-1] < along[:, 2:])
+    dips = np.flatnonzero(lower)
+    return points[np.argsort(values, kind="stable")], points[dips[np.argsort(values[dips], kind="stable")]]
 
 
 def explained(model: ForwardModel, outcome: Outcome) -> bool:

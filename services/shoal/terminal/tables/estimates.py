@@ -84,7 +84,7 @@ def _minima(estimate: Estimate) -> None:
     """At most five other minima, the best first."""
     from shoal.pictures.units import fitness_unit
 
-    others = sorted(estimate.minima, key=lambda minimum: minimum["fitness"])
+    others = estimate.minima
     for other in others[:5]:
         values = ", ".join(f"{name} {value:.4g}" for name, value in other.items() if name != "fitness")
         screen.say(f"another minimum, fitness {other['fitness']:.3g} {fitness_unit(estimate)}: {values}")

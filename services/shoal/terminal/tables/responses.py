@@ -64,10 +64,9 @@ def response_table(response: Response) -> None:
         screen.say(f"{response.repeated} runs were repeated with smaller steps, {response.failed} failed all the same")
     if response.bounds is not None:
         gap = response.bounds.gap
-        known = (
-            "the gap to the outer ones is not known" if np.isnan(gap) else f"outer ones lie {gap:.1e} of the width off"
-        )
-        screen.say(f"bounds are attained by runs; {known}; they hold until {response.horizon:g} s")
+        known = f"outer ones lie {gap:.1e} of the width off; they hold until {response.horizon:g} s"
+        unknown = "how much farther other values go is not known"
+        screen.say(f"bounds are attained by runs; {unknown if np.isnan(gap) else known}")
     if response.boxes is not None:
         screen.say(
             f"statistics lie between these values, whatever the intervals are; they are known to "
@@ -151,6 +150,8 @@ def _shares(response: Response) -> None:
     assert response.statistics is not None
     marker = response.markers[-1]
     axes = response.axes
+    if np.all(np.isnan(response.statistics.total)):
+        return
     table = screen.table(f"share of the variance of {marker} (total Sobol index)", "", *axes)
     for k, name in enumerate(response.inputs.names):
         shares = [response.column(marker, axis, response.statistics.total[k])[-1] for axis in axes]
