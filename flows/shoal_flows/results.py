@@ -14,6 +14,7 @@ from shoal.scene import Scene
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory, plain
 
+from shoal_flows.exports import Exports
 from shoal_flows.jobs import Fit
 from shoal_flows.pictures import Picture
 
@@ -141,6 +142,11 @@ class Selected:
 @dataclass(frozen=True)
 class Designed(Logged[Design]):
     """What to measure."""
+
+
+@dataclass(frozen=True)
+class Exported(Logged[Exports]):
+    """Files of other tools."""
 
 
 @dataclass(frozen=True)

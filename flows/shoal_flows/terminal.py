@@ -57,7 +57,18 @@ def show(result: Any) -> None:
     """The table of a result."""
     from shoal.terminal import tables
 
-    from shoal_flows.results import AtRest, Compared, DemoResult, Designed, Responded, Selected, Simulated, Study, Swept
+    from shoal_flows.results import (
+        AtRest,
+        Compared,
+        DemoResult,
+        Designed,
+        Exported,
+        Responded,
+        Selected,
+        Simulated,
+        Study,
+        Swept,
+    )
 
     console = Console(highlight=False)
     if isinstance(result, Study):
@@ -68,8 +79,8 @@ def show(result: Any) -> None:
         demo_tables(console, result)
     elif isinstance(result, Simulated):
         for name in result.motion.markers:
-            x, y = result.motion.marker(name)[-1]
-            console.print(f"{name} at {result.motion.times[-1]:g} s: ({x:.9f}, {y:.9f}) m")
+            place = ", ".join(f"{part:.9f}" for part in result.motion.marker(name)[-1])
+            console.print(f"{name} at {result.motion.times[-1]:g} s: ({place}) m")
     elif isinstance(result, AtRest):
         tables.equilibrium_table(result.answer)
     elif isinstance(result, Selected):
@@ -78,6 +89,11 @@ def show(result: Any) -> None:
         tables.design_table(result.answer)
     elif isinstance(result, Responded):
         tables.response_table(result.answer)
+    elif isinstance(result, Exported):
+        for name in result.answer.files:
+            console.print(f"export/{name}", soft_wrap=True)
+        for tool, distance in result.answer.distances.items():
+            console.print(f"{tool}: its motion is within {distance:.2g} m of `shoal simulate`", soft_wrap=True)
     elif isinstance(result, Swept):
         console.print(f"{len(result.answer.status)} points in {result.answer.wall_s:.2f} s")
         if result.answer.check is not None:

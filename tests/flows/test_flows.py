@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -159,6 +160,9 @@ def test_a_night_is_a_run_with_a_metric_per_line() -> None:
         ("identify", {"methods": "[guess]"}, "guess"),
         ("compare", {"scene": "single-pendulum", "engines": "gauss"}, "engines"),
         ("compare", {"scene": "single-pendulum", "engines": "[gauss, gauss]"}, "two different"),
+        ("export", {"scene": "single-pendulum", "to": "csv,step"}, "to: no form 'step'; there are exudyn, mjcf, fmu"),
+        ("export", {"scene": "single-pendulum", "to": "csv", "inputs": "gravity.1"}, "`to` has no fmu"),
+        ("export", {"scene": "flexible-double-pendulum", "to": "csv,mjcf"}, "MJCF has no ancf-cable"),
     ],
 )
 def test_bad_parameters_are_refused_in_one_line(flow: str, parameters: dict[str, str], word: str) -> None:
@@ -227,6 +231,42 @@ def test_a_scene_may_be_given_as_yaml() -> None:
     with get_client(sync_client=True) as client:
         messages = {one.state.message for one in client.read_flow_runs() if one.state and one.state.is_failed()}
     assert any("InputError: scene: bodies.OA.mass: " in str(message) for message in messages), messages
+
+
+def test_exports_are_artifacts_of_their_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a machine in space, byte for byte what the commands write."""
+    monkeypatch.chdir(tmp_path)
+    short = {"values": "{solver.duration: 0.2}"}
+    found = run.run_flow("export", {"scene": "spherical-pendulum", "to": "exudyn,csv,nc,fmu", **short})
+    assert found.trusted
+    (tmp_path / "kept").mkdir()
+    _client().download_artifacts(found.run_id, "export", str(tmp_path / "kept"))
+    kept = {file.name: file for file in (tmp_path / "kept" / "export").iterdir()}
+    assert {*kept} == {f"spherical-pendulum.{ending}" for ending in ("py", "csv", "nc")} | {"spherical_pendulum.fmu"}
+    spherical = ["spherical-pendulum", "--set", "solver.duration=0.2"]
+    for command in (["export", "--to", "exudyn"], ["simulate", "--out", "spherical-pendulum.csv"]):
+        assert CliRunner().invoke(main, [command[0], *spherical, *command[1:]]).exit_code == 0
+    for name in ("spherical-pendulum.py", "spherical-pendulum.csv"):
+        assert kept[name].read_bytes() == (tmp_path / name).read_bytes()
+    metrics = _client().get_run(found.run_id).data.metrics
+    last = simulate("spherical-pendulum", values={"solver.duration": 0.2}).marker("A")[-1]
+    np.testing.assert_allclose([metrics[f"final/{axis}"] for axis in "xyz"], last, atol=1e-12)
+    assert 0 < metrics["final/distance/exudyn"] < 1e-3
+    description = zipfile.ZipFile(kept["spherical_pendulum.fmu"]).read("modelDescription.xml").decode()
+    assert 'name="gravity.2"' in description
+    assert not rerun(found.run_id).different
+
+
+def test_machines_in_space_are_logged_with_all_their_coordinates() -> None:
+    """A pendulum at rest hangs below; engines and motions have three components."""
+    short, still = "{solver.duration: 0.1}", "{initial.A.position: [0.6, 0, -0.8], initial.A.velocity: [0, 0, 0]}"
+    compared = run.run_flow("compare", {"scene": "spherical-pendulum", "engines": "gauss,exudyn", "values": short})
+    assert compared.trusted
+    tips = [_client().get_metric_history(child.info.run_id, "tip/z") for child in _children(compared.run_id)]
+    assert [len(tip) > 5 for tip in tips] == [True, True]
+    rest = run.run_flow("statics", {"scene": "spherical-pendulum", "values": still})
+    metrics = _client().get_run(rest.run_id).data.metrics
+    np.testing.assert_allclose([metrics[f"final/A/{axis}"] for axis in "xyz"], [0.0, 0.0, -1.0], atol=1e-9)
 
 
 STUDY = """

@@ -142,6 +142,13 @@ def test_what_no_data_tell_is_infinite_and_null_in_json() -> None:
     text = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert text["now"]["std"]["density"] is None
     assert text["status"] == "failed"
+    assert text["message"].startswith("no sensor alone tells what is to be sharpened")
+
+
+def test_a_chaotic_motion_is_no_ground_for_a_design() -> None:
+    found = design(problem(), duration=60.0, rate=5.0)
+    assert not found.ok
+    assert "the motion is chaotic" in found.message
 
 
 def test_a_prior_counts() -> None:

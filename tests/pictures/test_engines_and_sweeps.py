@@ -48,6 +48,24 @@ def test_engines_over_each_other() -> None:
     assert "[s]" in below.get_xlabel()
 
 
+def test_in_space_all_three_axes_are_drawn() -> None:
+    scene = load_scene("spherical-pendulum").with_values({"solver.duration": 0.2})
+    path = "initial.A.velocity.1"
+    compared = compare(scene, ["gauss", "exudyn"])
+    above, _ = engines(compared, "A", "both").axes
+    assert [text.get_text() for text in above.texts] == ["x", "y", "z"]
+    np.testing.assert_allclose(
+        [line.get_ydata() for line in above.lines[:3]], compared.trajectories["gauss"].marker("A").T
+    )
+    found = sweep(scene, {path: np.linspace(1, 2, 3)}, get_engine("gauss"), 0.2)
+    (axes,) = draw_sweep(found, "A").axes
+    np.testing.assert_allclose([line.get_ydata() for line in axes.lines], found.displacements["A"].T)
+    maps = draw_sweep(
+        sweep(scene, {path: np.arange(1.0, 3.0), "gravity.2": np.array([-9.81, -1.6])}, get_engine("gauss"), 0.2), "A"
+    )
+    assert sum(axes.get_ylabel() == "gravity.2 [m/s²]" for axes in maps.axes) == 3
+
+
 def test_files_are_png(tmp_path: Path) -> None:
     files.trajectory(get_engine("gauss").simulate(SCENE), SCENE, tmp_path / "motion.png")
     assert (tmp_path / "motion.png").read_bytes().startswith(b"\x89PNG")

@@ -13,6 +13,7 @@ from prefect import Flow  # noqa: E402 - it reads the settings when it is import
 from shoal_flows.flows.compare import compare  # noqa: E402
 from shoal_flows.flows.demo import demo  # noqa: E402
 from shoal_flows.flows.design import design  # noqa: E402
+from shoal_flows.flows.export import export  # noqa: E402
 from shoal_flows.flows.forward import forward  # noqa: E402
 from shoal_flows.flows.identify import identify  # noqa: E402
 from shoal_flows.flows.marked import marked  # noqa: E402
@@ -23,7 +24,8 @@ from shoal_flows.flows.sweep import sweep  # noqa: E402
 from shoal_flows.flows.uncertain import uncertain  # noqa: E402
 
 FLOWS: dict[str, Flow[..., Any]] = {
-    flow.name: flow for flow in (forward, select, compare, sweep, uncertain, statics, identify, design, nightly, demo)
+    flow.name: flow
+    for flow in (forward, select, compare, sweep, uncertain, statics, export, identify, design, nightly, demo)
 }
 for flow in FLOWS.values():
     marked(flow)

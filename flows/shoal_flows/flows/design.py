@@ -50,4 +50,4 @@ def design(
     with progress(1, f"a measurement for {name}"):
         result = Designed(*plan(problem, data or None, {**how, "parameter": parameter, "values": values}))
     show_result(f"{name}: what to measure", tables.of_design(result.answer), result.run_id)
-    return ended(result, ["no candidate tells every parameter; name one as `parameter`"])
+    return ended(result, [result.answer.message])

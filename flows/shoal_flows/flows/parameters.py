@@ -20,6 +20,7 @@ from shoal_validation.nightly.plan import IDENTIFICATION
 from shoal_validation.problems import PROBLEMS
 
 from shoal_flows.choices import MARK, names
+from shoal_flows.exports import FORMS
 
 
 def _one_of(names: Iterable[str]) -> Any:
@@ -42,6 +43,8 @@ Data = Annotated[str, _named("recordings", "name, path or address")]
 EngineName = Annotated[str, _one_of(ENGINES)]
 Engines = Annotated[list[EngineName], Field(min_length=2, json_schema_extra={"uniqueItems": True})]
 Methods = Annotated[list[Annotated[str, _one_of(METHODS)]], Field(min_length=1)]
+Forms = Annotated[list[Annotated[str, _one_of(FORMS)]], Field(min_length=1, json_schema_extra={"uniqueItems": True})]
+Paths = list[str]
 Seeds = Annotated[list[int], Field(min_length=1)]
 Values = dict[str, Any]
 Instant = Annotated[float | None, Field(ge=0)]

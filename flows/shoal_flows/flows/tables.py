@@ -14,6 +14,8 @@ from shoal.response import Response
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory
 
+from shoal_flows.exports import Exports
+
 _ROWS = 50
 
 
@@ -24,7 +26,7 @@ def of_motion(motion: Trajectory) -> str:
     evidence += f"{motion.constraint_drift[0]:.1e}, {motion.steps} steps, {motion.wall_s:.3f} s"
     verification = motion.model.get("verification")
     notes = [] if verification is None else list(estimates(verification))
-    return "\n\n".join([table(("marker", "x [m]", "y [m]"), ends), evidence, *notes])
+    return "\n\n".join([table(("marker", *_places(motion.axes)), ends), evidence, *notes])
 
 
 def of_comparison(comparison: Comparison) -> str:
@@ -68,7 +70,8 @@ def of_equilibrium(found: Equilibrium) -> str:
     """Where the markers rest, and the evidence."""
     rows = [(name, *found.marker(name), found.angle(name)) for name in found.markers]
     evidence = f"{found.status}; {found.residual:.1e} of the forces is not balanced, {found.iterations} iterations"
-    return table(("marker", "x [m]", "y [m]", "angle [rad]"), rows) + f"\n\n{evidence}"
+    places = _places("xyz"[: found.scene.dimensions])
+    return table(("marker", *places, "angle [rad]"), rows) + f"\n\n{evidence}"
 
 
 def of_selection(found: Selection) -> str:
@@ -77,10 +80,21 @@ def of_selection(found: Selection) -> str:
     return table(("model", "role", "estimated error [m]", ""), rows) + f"\n\n{found.reason}"
 
 
+def of_exports(found: Exports) -> str:
+    """What was written, and how far the tools' motions are from Shoal's."""
+    shown = table(("file", "bytes"), ((name, len(content)) for name, content in found.files.items()))
+    told = (f"{tool}: its motion is within {distance:.2g} m of Shoal's" for tool, distance in found.distances.items())
+    return "\n\n".join([shown, *told])
+
+
 def of_design(found: Design) -> str:
     """What could be measured, the best first: how well it would tell every parameter."""
     rows = [(sensor.label, *precision.std) for sensor, precision in found.ranked]
     return table(("sensor", *(f"std of {name}" for name in found.aim.names)), [("today", *found.now.std), *rows])
+
+
+def _places(axes: str) -> list[str]:
+    return [f"{axis} [m]" for axis in axes]
 
 
 def table(headings: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:

@@ -22,6 +22,7 @@ from shoal.selection import Selection
 from shoal.trajectory import Array, Trajectory
 
 from shoal_flows import events, fingerprint, inputs, jobs, pictures, remembered, workers
+from shoal_flows.exports import Exports, exported
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.pictures import Picture
 from shoal_flows.tracking import analyses, responses
@@ -96,6 +97,14 @@ def respond(study: str, values: Mapping[str, Any]) -> tuple[Response, str]:
     with events.work(f"{inputs.title(study)}: uncertain response"):
         found, album = workers.run(pictures.responded, study, values)
         return found, responses.log_response(inputs.title(study), found, album)
+
+
+@task(task_run_name="export", cache_policy=NO_CACHE)
+def write(scene: str, to: Sequence[str], values: Mapping[str, Any], how: Mapping[str, Any]) -> tuple[Exports, str]:
+    """Files of a scene, with the id of the run that keeps them."""
+    with events.work(f"{inputs.title(scene)} for {', '.join(to)}"):
+        found = workers.run(exported, scene, to, values, **how)
+        return found, analyses.log_exports(found)
 
 
 @task(task_run_name="sweep", cache_policy=NO_CACHE)

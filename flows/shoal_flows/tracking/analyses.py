@@ -1,4 +1,4 @@
-"""Equilibria, chosen models and designs of measurements in MLflow: one run each, which ends in its figures."""
+"""Equilibria, chosen models, designs of measurements and exports in MLflow: one run each, which ends in its figures."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from shoal.pictures.style import png
 from shoal.selection import Selection
 from shoal.trajectory import json_text
 
+from shoal_flows.exports import Exports
 from shoal_flows.tracking.engines import log_motion_of, stated
 from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.store import open_run
@@ -24,7 +25,7 @@ def log_statics(found: Equilibrium) -> str:
         run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
         run.text(json_text(found.to_json(), indent=1), "equilibrium.json")
         for name in found.markers:
-            for axis, value in zip("xy", found.marker(name), strict=True):
+            for axis, value in zip("xyz"[: scene.dimensions], found.marker(name), strict=True):
                 run.metric(f"final/{name}/{axis}", float(value))
         run.metric("final/residual", found.residual)
         run.metric("final/iterations", found.iterations)
@@ -58,4 +59,23 @@ def log_design(found: Design) -> str:
         run.metric("final/doubt", found.doubt)
         run.text(json_text(found.to_json(), indent=1), "design.json")
         run.picture(png(draw_design(found)), "design.png")
+        return run.run_id
+
+
+def log_exports(found: Exports) -> str:
+    """One run with the files, and the motion where its table was asked for; returns its id."""
+    scene = found.scene
+    tags = {"kind": "export", "scene": scene.name, "verdict": "ok" if found.ok else "failed"}
+    with open_run("Export", f"{scene.name} · export", description=scene.description, tags=tags) as run:
+        if found.motion is None:
+            run.params(stated(scene))
+            run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
+        else:
+            log_motion_of(run, scene, found.motion)
+        run.params({"files": ", ".join(found.files)})
+        run.metric("final/files", len(found.files))
+        for tool, distance in found.distances.items():
+            run.metric(f"final/distance/{tool}", distance)
+        for name, content in found.files.items():
+            run.file(content, f"export/{name}")
         return run.run_id

@@ -85,9 +85,8 @@ def log_motion_of(run: Run, scene: Scene, motion: Trajectory) -> None:
     made = {f"model.{name}": value for name, value in kept}
     run.params({**stated(scene), "engine": motion.engine, **made})
     run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
-    x, y = motion.marker(tip(scene))[-1]
-    run.metric("final/x", float(x))
-    run.metric("final/y", float(y))
+    for axis, place in zip(motion.axes, motion.marker(tip(scene))[-1].tolist(), strict=True):
+        run.metric(f"final/{axis}", place)
     run.metric("final/energy_drift", float(motion.energy_drift[0]))
     run.metric("final/constraint_drift", float(motion.constraint_drift[0]))
     run.metric("final/steps", motion.steps)

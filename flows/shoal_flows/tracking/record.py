@@ -92,6 +92,10 @@ class Run:
 
     def picture(self, content: bytes, path: str) -> None:
         """A picture at `path`."""
+        self.file(content, path)
+
+    def file(self, content: bytes, path: str) -> None:
+        """An artifact of any kind at `path`."""
         self.files[path] = content
 
     def end(self, status: str) -> None:

@@ -33,6 +33,7 @@ _EXPERIMENTS = {
     "Forward": "Motion of one scene on one engine.",
     "Statics": "Where a scene comes to rest.",
     "Selection": "The cheapest model of a scene that meets a tolerance.",
+    "Export": "Scenes as files of other tools, with the files.",
     "Design": "What to measure to know the parameters of a problem.",
     "Validation": "The nights of `shoal validate`: error and time of every problem, engine and method.",
 }

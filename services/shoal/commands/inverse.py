@@ -141,7 +141,7 @@ def design(
     if out is not None:
         files.design(found, out)
     screen.show(found.to_json(), as_json, lambda: tables.design_table(found))
-    check_trusted(found.ok, "no candidate tells every parameter; name one with --parameter")
+    check_trusted(found.ok, found.message)
 
 
 @contextmanager

@@ -17,15 +17,15 @@ _LINES = ("-", "--", ":", "-.")
 
 @styled
 def engines(comparison: Comparison, marker: str, title: str) -> Figure:
-    """Above, x and y of a marker by every engine; below, the distance of each pair, logarithmic."""
+    """Above, x, y and in space z of a marker by every engine; below, the distance of each pair, logarithmic."""
     figure, (above, below) = canvas(6.2, nrows=2, sharex=True, height_ratios=[1.2, 1])
     for k, (name, motion) in enumerate(comparison.trajectories.items()):
         style = {**ENGINES.get(name, OTHER), "linewidth": _WIDTHS[min(k, 2)]}
         path = motion.marker(marker)
-        above.plot(motion.times, path[:, 0], label=name, **style)
-        above.plot(motion.times, path[:, 1], **style)
+        for j, coordinate in enumerate(path.T):
+            above.plot(motion.times, coordinate, label=None if j else name, **style)
     times, path = next((m.times, m.marker(marker)) for m in comparison.trajectories.values())
-    for axis, value in zip("xy", path[-1], strict=True):
+    for axis, value in zip("xyz", path[-1], strict=False):
         above.annotate(axis, (times[-1], value), (6, 0), textcoords="offset points", va="center")
     for k, ((one, a), (other, b)) in enumerate(combinations(comparison.trajectories.items(), 2)):
         distance = np.linalg.norm(a.marker(marker) - b.marker(marker), axis=1)

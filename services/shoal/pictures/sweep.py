@@ -8,14 +8,18 @@ from matplotlib.figure import Figure
 from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
 from shoal.pictures.numbers import length
-from shoal.pictures.style import BLUE, ORANGE, canvas, headline, styled
+from shoal.pictures.style import BLACK, BLUE, ORANGE, canvas, headline, styled
 from shoal.pictures.units import labelled
 from shoal.trajectory import Array, Status
 
 
+def _directions(moved: Array) -> tuple[str, ...]:
+    return ("horizontal", "vertical") if moved.shape[1] == 2 else ("along x", "along y", "along z")
+
+
 @styled
 def sweep(result: Sweep, marker: str) -> Figure:
-    """One value: displacement in x and y as lines. Two values: two maps. Raises InputError for more."""
+    """One value: displacement along every axis as lines. Two values: as maps. Raises InputError for more."""
     if len(result.grid) == 1:
         return _lines(result, marker)
     if len(result.grid) == 2:
@@ -41,8 +45,9 @@ def _says(result: Sweep, marker: str, moved: Array) -> str:
 def _lines(result: Sweep, marker: str) -> Figure:
     (path, values), moved = next(iter(result.grid.items())), _moved(result, marker)
     figure, axes = canvas()
-    axes.plot(values, moved[:, 0], color=BLUE, label="horizontal")
-    axes.plot(values, moved[:, 1], color=ORANGE, linestyle="--", label="vertical")
+    styles = ((BLUE, "-"), (ORANGE, "--"), (BLACK, ":"))
+    for part, direction, (color, line) in zip(moved.T, _directions(moved), styles, strict=False):
+        axes.plot(values, part, color=color, linestyle=line, label=direction)
     headline(figure, _says(result, marker, moved))
     axes.set_xlabel(labelled(path))
     axes.set_ylabel(f"displacement of {marker} [m]")
@@ -54,8 +59,9 @@ def _maps(result: Sweep, marker: str) -> Figure:
     (one, first), (other, second) = result.grid.items()
     moved = _moved(result, marker)
     x, y = np.unique(first), np.unique(second)
-    figure, axes = canvas(6.6, nrows=2, sharex=True)
-    for k, (panel, direction) in enumerate(zip(axes, ("horizontal", "vertical"), strict=True)):
+    directions = _directions(moved)
+    figure, axes = canvas(3.3 * len(directions), nrows=len(directions), sharex=True)
+    for k, (panel, direction) in enumerate(zip(axes, directions, strict=True)):
         image = panel.pcolormesh(x, y, moved[:, k].reshape(len(x), len(y)).T, cmap="viridis", shading="nearest")
         figure.colorbar(image, ax=panel, label=f"{direction} [m]")
         panel.set_ylabel(labelled(other))

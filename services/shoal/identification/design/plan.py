@@ -23,13 +23,15 @@ from shoal.identification.identify import identify
 from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.source import Channel, EngineSource
-from shoal.identification.spread.sensitivity import AGREED, sensitivity
+from shoal.identification.spread.sensitivity import sensitivity
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
 _DURATIONS = (0.25, 0.5, 1.0, 1.5, 2.0)
 _RATES = (0.25, 0.5, 1.0, 2.0)
 _COURSE = 40
+_ENOUGH = 0.1
+"""Relative difference of the sensitivities by two steps: who compares sensors wants no more digits."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +62,20 @@ class Design:
     doubt: float
 
     @property
+    def message(self) -> str:
+        """Why it cannot be trusted; empty where it can."""
+        if not self.doubt <= _ENOUGH:
+            return (
+                f"sensitivities by two steps differ by {self.doubt:.0e}: the motion is chaotic, or rough by its solver"
+            )
+        if not np.isfinite(self.aim.score(self.ranked[0][1])):
+            return "no sensor alone tells what is to be sharpened; name another `parameter`"
+        return ""
+
+    @property
     def ok(self) -> bool:
         """Whether the best sensor tells the parameter, by sensitivities that can be believed."""
-        return bool(np.isfinite(self.aim.score(self.ranked[0][1])) and self.doubt <= AGREED)
+        return not self.message
 
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal design --json` prints; null where nothing is told."""
@@ -74,7 +87,7 @@ class Design:
         def rows(found: list[tuple[Sensor, Precision]]) -> list[dict[str, Any]]:
             return [sensor.to_json() | told(precision) for sensor, precision in found]
 
-        stated = ("problem", "values", "duration", "rate")
+        stated = ("message", "problem", "values", "duration", "rate")
         noise: dict[str, Any] = {"noise": self.noise.get(POSITION), "angle_noise": self.noise.get(ANGLE)}
         noise["sensor_noise"] = {kind: size for kind, size in self.noise.items() if kind in SENSORS}
         return plain(  # type: ignore[no-any-return]
@@ -114,7 +127,8 @@ def design(
     present = problem.channels_of(source)
     sensors = _possible(problem, scene, sensors, at)
     channels = (*present, *(channel for sensor in sensors for channel in sensor.channels))
-    model = _model(problem, scene, channels, grid(duration, rate))
+    size = np.array([noise_in(channel, sizes) for channel in channels])
+    model = _model(problem, scene, channels, size, grid(duration, rate))
     aim = Aim(model.names, model.upper - model.lower, parameter)
     if parameter is not None and parameter not in aim.names:
         raise InputError(f"parameter: no parameter {parameter!r}; there are {', '.join(aim.names)}")
@@ -123,8 +137,9 @@ def design(
     if not np.all(np.isfinite(seen.residual)):
         reason = model.refusal or "it fails"
         raise InputError(f"{problem.name}: the motion about these values cannot be simulated: {reason}")
-    size = np.array([noise_in(channel, sizes) for channel in channels])
-    bundle = Bundle.of(model.measurement.first.times, seen.jacobian, size, aim.span, len(present))
+    assert model.rows.noise is not None
+    over_noise = np.stack([seen.jacobian, seen.error], axis=1) / model.rows.noise
+    bundle = Bundle.of(model.measurement.first.times, over_noise, len(channels), aim.span, len(present))
     now = bundle.precision(range(bundle.present), duration)
 
     def order(pair: tuple[Sensor, Precision]) -> tuple[float, int, float]:
@@ -168,21 +183,21 @@ def _possible(problem: Problem, scene: Scene, sensors: list[Sensor], at: Mapping
     """Without load cells in joints whose force is not unique."""
     beyond = set[str]()
     for name, sensor in {sensor.name: sensor for sensor in sensors if sensor.in_joint}.items():
-        model = _model(problem, scene, sensor.channels, np.array([0.0, 1e-3]))
+        model = _model(problem, scene, sensor.channels, np.ones(len(sensor.channels)), np.array([0.0, 1e-3]))
         if not np.all(np.isfinite(model.observe(_point(model, at)[None]))):
             beyond.add(name)
     return [sensor for sensor in sensors if not (sensor.in_joint and sensor.name in beyond)]
 
 
-def _model(problem: Problem, scene: Scene, channels: tuple[Channel, ...], times: Array) -> ForwardModel:
-    """Of the first recording, with other channels at other times, of which nothing was measured yet."""
+def _model(problem: Problem, scene: Scene, channels: tuple[Channel, ...], noise: Array, times: Array) -> ForwardModel:
+    """Of the first recording, with other channels of some noise at other times, of which nothing was measured yet."""
     name, source = next(iter(problem.sources.items()))
     # Standard deviations are told in the parameters' own units, but for those that are stated to be logarithms.
     scales = {n: p.model_copy(update={"scale": "linear"}) for n, p in problem.parameters.items() if p.scale == "auto"}
     changes = {"loss": "squares", "recordings": {name: source} if problem.recordings else {}}
     changes["parameters"] = {**problem.parameters, **scales}
-    zeros, unknown = np.zeros((len(times), len(channels))), np.full(len(channels), np.nan)
-    nothing = Measurement({name: Recording(times, channels, zeros, "", unknown, source.as_stated())})
+    zeros = np.zeros((len(times), len(channels)))
+    nothing = Measurement({name: Recording(times, channels, zeros, "", noise, source.as_stated())})
     return ForwardModel(problem.model_copy(update=changes), scene, get_engine("gauss"), nothing)
 
 

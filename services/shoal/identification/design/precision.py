@@ -27,35 +27,47 @@ class Precision:
 
 @dataclass(frozen=True)
 class Bundle:
-    """Sensitivities over the noise, (times, channels, parameters): `present` channels of today, then the sensors'."""
+    """Sensitivities over the noise, (times, channels, parameters): `present` channels of today, then the sensors'.
+
+    error: by how much they may be off, likewise; prior: the rows of priors, (priors, parameters)
+    """
 
     times: Array
     table: Array
+    error: Array
     prior: Array
     span: Array
     present: int
 
     @classmethod
-    def of(cls, times: Array, jacobian: Array, noise: Array, span: Array, present: int) -> Bundle:
-        """From a Jacobian (rows and priors, parameters) at all times, of channels with some noise, (channels,)."""
-        rows = len(times) * len(noise)
-        table = jacobian[:rows].reshape(len(times), len(noise), -1) / noise[:, None]
-        return cls(times, table, jacobian[rows:], span, present)
+    def of(cls, times: Array, jacobian: Array, channels: int, span: Array, present: int) -> Bundle:
+        """From a Jacobian over the noise and its error, (rows and priors, 2, parameters), of channels at all times."""
+        rows = len(times) * channels
+        table, error = np.moveaxis(jacobian[:rows].reshape(len(times), channels, 2, -1), 2, 0)
+        return cls(times, table, error, jacobian[rows:, 0], span, present)
 
     def precision(self, columns: Sequence[int], end: float, every: int = 2) -> Precision:
         """By some of the channels until a time [s], every so many instants."""
         # The grid is twice as fine as today's sampling.
         keep = (self.times <= end * (1 + 1e-9))[every - 1 :: every]
-        rows = self.table[every - 1 :: every][keep][:, list(columns)].reshape(-1, len(self.span))
-        return precision(np.concatenate([rows, self.prior]), self.span)
+        rows, error = (
+            part[every - 1 :: every][keep][:, list(columns)].reshape(-1, len(self.span))
+            for part in (self.table, self.error)
+        )
+        return precision(np.concatenate([rows, self.prior]), self.span, error)
 
 
-def precision(jacobian: Array, span: Array) -> Precision:
-    """What rows of sensitivities over the noise tell, (rows, parameters), for ranges `span` (parameters,)."""
+def precision(jacobian: Array, span: Array, error: Array | None = None) -> Precision:
+    """What rows of sensitivities over the noise tell, (rows, parameters), for ranges `span` (parameters,).
+
+    error: by how much they may be off, (rows, parameters); what is no larger, along some direction, tells nothing
+    """
     count = len(span)
     rows = np.concatenate([jacobian * span, np.zeros((count, count))])
     _, singular, right = np.linalg.svd(np.linalg.qr(rows, mode="r"))
     known = singular > RANK_TOLERANCE * singular[0] if singular[0] > 0 else np.zeros(count, dtype=bool)
+    if error is not None:
+        known &= singular > np.linalg.norm(error * span @ right.T, axis=0)
     inverse = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
     relative = np.sqrt(np.sum((right.T * inverse) ** 2, axis=1))
     hidden = np.linalg.norm(right[~known], axis=0) > 1e-3

@@ -19,6 +19,8 @@ from shoal.scene.joints import Revolute
 
 _SAME = 1e-3
 """Two places whose sensitivities differ by less tell the same."""
+_NOTHING = 1e-6
+"""Of its noise: what the whole range of every parameter changes by less, such as a clamped place, is round-off."""
 _TILTS = 8
 """Directions of an accelerometer of one axis that are tried, over half a turn; the other half differs by the sign."""
 _DIRECTIONS = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (1, 0, 1), (1, 0, -1), (0, 1, 1), (0, 1, -1))
@@ -180,7 +182,8 @@ def _towards(axis: tuple[int, ...]) -> tuple[float, ...]:
     along = np.array(axis) / np.linalg.norm(axis)
     about = np.cross((1.0, 0.0, 0.0), along)
     sine = float(np.linalg.norm(about))
-    return tuple((about * (np.arctan2(sine, along[0]) / sine)).tolist()) if sine else (0.0, 0.0, 0.0)
+    # Adding zero makes -0 a zero that tables show without its sign.
+    return tuple((about * (np.arctan2(sine, along[0]) / sine) + 0.0).tolist()) if sine else (0.0, 0.0, 0.0)
 
 
 def columns_of(bundle: Bundle, sensors: list[Sensor]) -> dict[Sensor, list[int]]:
@@ -194,7 +197,7 @@ def columns_of(bundle: Bundle, sensors: list[Sensor]) -> dict[Sensor, list[int]]
         size = float(np.linalg.norm(mine))
         same = [k for k in found.values() if len(k) == len(own)]
         repeated = any(np.linalg.norm(bundle.table[:, k] * bundle.span - mine) < _SAME * size for k in same)
-        if size > 0 and not repeated:
+        if size > _NOTHING and not repeated:
             found[sensor] = own
     if not found:
         raise InputError("parameters: no marker and no end of a body moves with any of them")

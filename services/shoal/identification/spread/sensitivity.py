@@ -6,7 +6,7 @@ orders of magnitude); a step that is too small drowns in round-off. Both show wh
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,6 +38,7 @@ class Sensitivity:
     doubt: relative difference of two step sizes, the worst of all directions
     growth: largest over smallest singular value, of parameters in units of their size
     end: until when the derivatives can be believed [s by the clock]; those of later rows are zero; None: all can
+    error: by how much the derivatives by the two steps differ, (rows, parameters)
     """
 
     residual: Array
@@ -45,6 +46,7 @@ class Sensitivity:
     doubt: float
     growth: float
     end: float | None = None
+    error: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def reliable(self) -> bool:
@@ -63,17 +65,18 @@ def sensitivity(model: ForwardModel, point: Array, residual: Array | None = None
     sizes = model.sizes(point)
     basis = np.eye(len(point))
     residual = model.uncounted(point[None])[0] if residual is None else residual
-    columns, doubt = _differences(model, point, sizes, basis, _USUAL)
+    columns, doubt, error = _differences(model, point, sizes, basis, _USUAL)
     if np.max(doubt) < _SURE and (growth := _growth(columns)) < _WELL_CONDITIONED:
-        return Sensitivity(residual, columns / sizes, float(np.max(doubt)), growth)
+        return Sensitivity(residual, columns / sizes, float(np.max(doubt)), growth, error=error / sizes)
     for _ in range(_ROUNDS):
-        columns, doubt = _differences(model, point, sizes, basis, _STEPS)
+        columns, doubt, error = _differences(model, point, sizes, basis, _STEPS)
         turned = np.linalg.svd(columns, full_matrices=False)[2]
         growth = _growth(columns)
         if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(turned) - np.eye(len(point)))) < AGREED / growth:
             break
         basis = basis @ turned.T
-    return Sensitivity(residual, columns @ basis.T / sizes, float(np.max(doubt)), growth)
+    turned_back = basis.T / sizes
+    return Sensitivity(residual, columns @ turned_back, float(np.max(doubt)), growth, error=error @ turned_back)
 
 
 def believed(model: ForwardModel, point: Array, residual: Array | None = None) -> Sensitivity:
@@ -102,8 +105,10 @@ def _growth(columns: Array) -> float:
     return float(singular[0] / singular[-1]) if singular[-1] > _NONE * singular[0] else np.inf
 
 
-def _differences(model: ForwardModel, point: Array, sizes: Array, basis: Array, widths: Array) -> tuple[Array, Array]:
-    """Derivatives of the residuals along the columns of `basis` (scaled parameters), and the doubt of each."""
+def _differences(
+    model: ForwardModel, point: Array, sizes: Array, basis: Array, widths: Array
+) -> tuple[Array, Array, Array]:
+    """Derivatives of the residuals along the columns of `basis` (scaled parameters), and doubt and error of each."""
     count = len(point)
     steps = np.concatenate([step * sizes * basis.T for step in widths])
     ahead, behind = (_inside(model, point, move) for move in (steps, -steps))
@@ -113,6 +118,7 @@ def _differences(model: ForwardModel, point: Array, sizes: Array, basis: Array, 
         slopes = (seen[: len(steps)] - seen[len(steps) :]) / width[:, None]
     slopes = slopes.reshape(len(widths), count, -1)
     columns, doubts = np.zeros((slopes.shape[2], count)), np.full(count, np.inf)
+    errors = np.zeros_like(columns)
     least = np.zeros(count)
     for k in range(count):
         table = slopes[:, k]
@@ -125,14 +131,14 @@ def _differences(model: ForwardModel, point: Array, sizes: Array, basis: Array, 
         # Round-off adds to a difference, so that the smallest says the most where they disagree.
         least[k] = np.min(size[np.isfinite(size)], initial=np.inf)
         if np.all(np.isfinite(table[best])):
-            columns[:, k], doubts[k] = table[best], doubt[best]
+            columns[:, k], doubts[k], errors[:, k] = table[best], doubt[best], table[best] - table[best + 1]
     # Where two steps never agree and next to nothing changes, there is nothing but round-off. The spread of the data is
     # the measure of that, and not what chaos magnifies.
     size = np.linalg.norm(columns, axis=0)
     usual = min(float(np.max(size)), np.sqrt(columns.shape[0]) * model.rows.signal)
     nothing = (doubts > AGREED) & (np.minimum(size, least) < _NOTHING * usual)
-    columns[:, nothing], doubts[nothing] = 0.0, 0.0
-    return columns, doubts
+    columns[:, nothing], doubts[nothing], errors[:, nothing] = 0.0, 0.0, 0.0
+    return columns, doubts, errors
 
 
 def _inside(model: ForwardModel, point: Array, moves: Array) -> Array:
