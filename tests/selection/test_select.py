@@ -243,7 +243,7 @@ class Meshes:
     """Runs whose distance from the truth is a function of the levels."""
 
     forecast, patience = SimpleNamespace(work=lambda _: 0.0), 1.0
-    coarsest = dict.fromkeys("AB", quintic(1))
+    coarsest, fewest = dict.fromkeys("AB", quintic(1)), dict.fromkeys("AB", 1)
 
     def __init__(self, error: Any) -> None:
         self.error = error

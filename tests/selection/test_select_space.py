@@ -128,6 +128,42 @@ def test_a_flat_rod_with_a_head_is_not_called_rigid() -> None:
 
 
 def test_a_flexible_rod_that_no_other_model_suits_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(import_module("shoal.selection.select"), "can_be_flexible", lambda *_: "for a reason")
+    monkeypatch.setattr(import_module("shoal.selection.select"), "fewest", lambda *_: "for a reason")
     with pytest.raises(InputError, match=r"bodies.B.element: no other model can take the place .*: for a reason"):
         select(clamped(), 1e-2)
+
+
+def headed(place: float) -> Scene:
+    """A light round shaft of 0.9 m between two bearings that hold its direction, with a heavy head."""
+    ground, end = {"body": "ground"}, {"body": "B", "point": "end"}
+    bearings = {
+        "left": {"kind": "revolute", "first": ground | {"point": [0, 0, 0]}, "second": {"body": "B"}},
+        "right": {"kind": "cylindrical", "first": ground | {"point": [0.9, 0, 0]}, "second": end},
+    }
+    hub = {"kind": "weld", "first": {"body": "B", "point": [place, 0.0]}, "second": {"body": "H"}}
+    rod = {"kind": "rod", "length": 0.9, "height": 0.012, "section": "round", "density": 30.0, "youngs_modulus": 7e10}
+    return Scene.parse({
+        "name": "headed", "dimensions": 3, "gravity": [0, 0, -9.81],
+        "bodies": {"B": rod | {"element": "director-rod"}, "H": {"kind": "rigid-body", "mass": 1.5, "inertia": 1e-5}},
+        "joints": {name: joint | {"axis": "x"} for name, joint in bearings.items()} | {"hub": hub},
+        "markers": {"H": {"body": "H"}}, "solver": {"duration": 0.05, "samples": 20},
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "multiple"), [(0.3, 3), (0.45, 2)])
+def test_a_rod_that_is_held_between_its_ends_has_a_node_there(place: float, multiple: int) -> None:
+    """A mass on a spring of 3 E I L^3 / (a b)^3, which falls by g / w^2 (1 - cos(w t))."""
+    tolerance = 2e-5
+    found = select(headed(place), tolerance)
+    stiffness = 3 * 7e10 * np.pi * 0.012**4 / 64 * 0.9**3 / (place * (0.9 - place)) ** 3
+    square = stiffness / 1.5
+    fall = 9.81 / square * (1 - np.cos(np.sqrt(square) * found.trajectory.times))
+    assert found.met
+    assert found.chosen.levels["B"].elements % multiple == 0
+    assert np.max(fall) > 50 * tolerance
+    assert np.max(np.abs(found.trajectory.marker("H")[:, 2] + fall)) < tolerance
+
+
+def test_a_rod_that_is_held_where_no_mesh_has_a_node_is_refused() -> None:
+    with pytest.raises(InputError, match=r"holds the section .* at 0.37 m.*or state elements instead of a tolerance"):
+        select(headed(0.37), 1e-3)

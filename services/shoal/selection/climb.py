@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.mechanics.simulate import STEP_MARGIN
+from shoal.mechanics.simulate import STEP_MARGIN, stable_step
 from shoal.scene import Scene
-from shoal.selection.levels import REFINEMENTS, Level, Levels, coarsest, words
+from shoal.selection.levels import FRAMED, REFINEMENTS, Level, Levels, apply, coarsest, words
 from shoal.selection.run import Rung, distance, flexible_scene, run
-from shoal.selection.work import Forecast
+from shoal.selection.work import INTEGRATOR, Forecast
 from shoal.trajectory import Array
 
 PATIENCE = 60.0
@@ -60,9 +60,9 @@ class Yardstick:
 class Runs:
     """Runs of one scene on different levels, each made once.
 
-    limits: the open rods with the element whose limit is their truth; coarsest: where their ladders begin; rungs: all
-    runs, in the order they were made; work: of all of them, in steps of one cable element; patience: how long a
-    refinement may take [s]; meshed: see `select`
+    limits: the open rods with the element whose limit is their truth; fewest: see `run.fewest`; coarsest: where their
+    ladders begin; rungs: all runs, in the order they were made; work: of all of them, in steps of one cable element;
+    patience: how long a refinement may take [s]; meshed: see `select`
     """
 
     def __init__(
@@ -73,12 +73,18 @@ class Runs:
         progress: Progress,
         patience: float = PATIENCE,
         meshed: Collection[str] = (),
+        fewest: Mapping[str, int] | None = None,
     ) -> None:
         scene = scene.with_values({"solver.inertia_cap": False})
         self.scene, self.times, self.limits, self.progress = scene, times, limits, progress
         self.patience = patience
-        self.coarsest = coarsest(scene, limits, meshed)
-        self.forecast = Forecast(scene, self.coarsest)
+        coarse = coarsest(scene, limits, meshed)
+        self.fewest = {rod: (fewest or {}).get(rod, level.elements) for rod, level in coarse.items()}
+        self.coarsest = {
+            rod: level if level.element in FRAMED else replace(level, elements=self.fewest[rod])
+            for rod, level in coarse.items()
+        }
+        self.forecast = Forecast(scene, self.coarsest, self.fewest)
         self.rungs: list[Rung] = []
         self.work = 0.0
         self._done: dict[tuple[tuple[tuple[str, Level], ...], float], Rung] = {}
@@ -99,9 +105,11 @@ class Runs:
         return self._done[key]
 
     def knows(self, rod: str, level: Level) -> bool:
-        """Whether a rod can be modelled so: not every one can bend by modes."""
+        """Whether a rod can be modelled so: not every one can bend by modes, or has nodes where joints hold it."""
         try:
             self.forecast.own(rod, level)
+            if level.element == "director-rod":
+                stable_step(apply(self.scene, {**self.coarsest, rod: level}), INTEGRATOR)
         except InputError:
             return False
         return True
@@ -124,15 +132,15 @@ def climb(
     impatient: another theory is left; so also where runs are rejected, or a doubling of the elements gains little, as
     where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one.
     """
-    count, growing, rejected = {rod: runs.coarsest[rod].elements for rod in rods}, rods, 0
+    count, growing, rejected = {rod: runs.fewest[rod] for rod in rods}, rods, 0
     gaps: list[float] = []
     behind: dict[str, float] = {}
     fine = _refinement(runs, {**fixed, **runs.refined(count)})
     while isinstance(fine, Rung):
         coarse, base = fine, dict(count)
-        if any(count[rod] == REFINEMENTS[-1] for rod in growing):
-            return f"{REFINEMENTS[-1]} elements for {', '.join(growing)} do not settle it"
-        count |= {rod: REFINEMENTS[REFINEMENTS.index(count[rod]) + 1] for rod in growing}
+        if any(2 * count[rod] > REFINEMENTS[-1] for rod in growing):
+            return f"{max(count[rod] for rod in growing)} elements for {', '.join(growing)} do not settle it"
+        count |= {rod: 2 * count[rod] for rod in growing}
         fine = _refinement(runs, {**fixed, **runs.refined(count)})
         if isinstance(fine, str):
             break

@@ -99,6 +99,8 @@ LADDERS = {
 FRAMED = ("rigid", "modal")
 """Levels of a rod that moves with a frame: no element limits their step, and no section has a strain."""
 
+FEWEST = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
+"""Numbers with which refinements may begin; all that follow by doubling are among COUNTS."""
 REFINEMENTS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048)
 """Numbers of these elements in the models by which errors are estimated."""
 WOUND = 256

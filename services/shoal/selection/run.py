@@ -10,7 +10,7 @@ from shoal.engines.gauss import GaussEngine
 from shoal.errors import InputError
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Scene
-from shoal.selection.levels import Level, Levels, apply, coarsest, open_rods, words
+from shoal.selection.levels import FEWEST, Level, Levels, apply, coarsest, open_rods, words
 from shoal.selection.work import INTEGRATOR
 from shoal.trajectory import Array, Trajectory
 
@@ -73,12 +73,18 @@ def distance(one: Trajectory, other: Trajectory) -> float:
     return one.distance(other)
 
 
-def can_be_flexible(scene: Scene, rod: str, limit: str) -> str | None:
-    """None, or why this rod has to stay rigid. limit: the element it would be made of."""
+def fewest(scene: Scene, rod: str, limit: str) -> int | str:
+    """The least number of elements by which this rod can bend, or why it has to stay rigid.
+
+    limit: the element it would be made of. Of director rods several numbers are tried, as joints hold them at nodes.
+    """
     coarse = coarsest(scene, open_rods(scene) | {rod: limit})
-    levels = coarse | {rod: Level(limit, coarse[rod].elements)}
-    try:
-        stable_step(apply(scene, levels), INTEGRATOR)
-    except InputError as error:
-        return str(error)
-    return None
+    least, reason = coarse[rod].elements, ""
+    for n in (least, *(n for n in FEWEST if n > least and limit == "director-rod")):
+        try:
+            stable_step(apply(scene, coarse | {rod: Level(limit, n)}), INTEGRATOR)
+        except InputError as error:
+            reason = reason or str(error)
+        else:
+            return n
+    return reason.replace(f"other elements than {least}", "state elements instead of a tolerance")

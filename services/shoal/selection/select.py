@@ -18,7 +18,7 @@ from shoal.selection.climb import PATIENCE, YARDSTICK, Progress, Runs, climb, se
 from shoal.selection.folded import folded
 from shoal.selection.levels import SHEARS, SLENDER, Levels, open_rods
 from shoal.selection.prior import Prior, estimate
-from shoal.selection.run import Rung, can_be_flexible, distance, rigid_scene, run
+from shoal.selection.run import Rung, distance, fewest, rigid_scene, run
 from shoal.selection.trim import WITHIN, trim
 from shoal.trajectory import Array, Status, Trajectory, plain
 
@@ -116,9 +116,9 @@ def select(
     begin = time.perf_counter()
     asked = sampling_times(scene, times)
     scene = scene.with_values({"solver.duration": float(asked[-1])}) if asked[-1] > 0 else scene
-    limits, closed = _open(scene)
+    limits, closed, counts = _open(scene)
     priors = estimate(scene, tuple(limits)) if limits else {}
-    task = _Task(scene, tolerance, asked, priors, closed, progress, patience, meshed, trimmed)
+    task = _Task(scene, tolerance, asked, priors, closed, progress, patience, meshed, counts, trimmed)
     may_shear = scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
     found = _of_theory(task, limits, impatient=may_shear)
     beyond = folded(scene, limits) if may_shear and not found.met else ""
@@ -132,7 +132,10 @@ def select(
 
 
 class _Task(NamedTuple):
-    """What is asked for, and what is known before any theory is chosen, see `Selection`. closed: see `_open`."""
+    """What is asked for, and what is known before any theory is chosen, see `Selection`.
+
+    closed, fewest: see `_open`
+    """
 
     scene: Scene
     tolerance: float
@@ -142,6 +145,7 @@ class _Task(NamedTuple):
     progress: Progress
     patience: float
     meshed: Collection[str]
+    fewest: dict[str, int]
     trimmed: bool
 
 
@@ -168,7 +172,7 @@ def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) 
     unmoved = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
     surely = [rod for rod in unmoved if rod not in task.meshed]
     closed = task.closed | {rod: f"would move the markers by about {priors[rod].error:.1g} m" for rod in surely}
-    runs = Runs(task.scene, grid, limits, task.progress, task.patience, task.meshed)
+    runs = Runs(task.scene, grid, limits, task.progress, task.patience, task.meshed, task.fewest)
     fixed = runs.coarsest
     flexible = tuple(rod for rod in limits if rod not in surely)
     known = sum(priors[rod].error for rod in surely)
@@ -199,8 +203,9 @@ def _shear(chosen: Rung) -> float:
     return (softer if shaped else left_out)(chosen.trajectory, scene, GaussEngine()) or 0.0
 
 
-def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
-    """Rods whose model is open with the element of their limit, and the other rods with the reason."""
+def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str], dict[str, int]]:
+    """Rods whose model is open with the element of their limit, the others with the reason, `fewest` of the former."""
+    counts = dict[str, int]()
     closed = {
         name: "no youngs_modulus"
         for name, body in scene.bodies.items()
@@ -213,11 +218,14 @@ def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
         if start.modes or start.mode_rates:
             field = "modes" if start.modes else "mode_rates"
             raise InputError(f"initial.{rod}.{field}: models are chosen of rods that start unstrained; leave it out")
-        if reason := can_be_flexible(scene, rod, limit):
-            if body.element != "rigid":
-                raise InputError(f"bodies.{rod}.element: no other model can take the place of {body.element}: {reason}")
-            closed[rod] = reason
-    return {rod: limit for rod, limit in limits.items() if rod not in closed}, closed
+        found = fewest(scene, rod, limit)
+        if isinstance(found, int):
+            counts[rod] = found
+        elif body.element != "rigid":
+            raise InputError(f"bodies.{rod}.element: no other model can take the place of {body.element}: {found}")
+        else:
+            closed[rod] = found
+    return {rod: limit for rod, limit in limits.items() if rod not in closed}, closed, counts
 
 
 def _rigid(runs: Runs, levels: Levels, tolerance: float, known: float) -> tuple[Rung, str]:

@@ -7,6 +7,8 @@ rho, r the radius of gyration of the section, l the element's length).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from shoal.mechanics.simulate import stable_step
@@ -35,10 +37,15 @@ _BENDING = {"ancf-cable": 4.7, "ancf-quintic": 16.8, "director-rod": 4.6}
 
 
 class Forecast:
-    """Work of the models of one scene. coarse: of the rods whose model is open the coarsest levels."""
+    """Work of the models of one scene.
 
-    def __init__(self, scene: Scene, coarse: Levels) -> None:
+    coarse: of the rods whose model is open the coarsest levels; fewest: numbers of elements by which they can bend,
+    else those of coarse
+    """
+
+    def __init__(self, scene: Scene, coarse: Levels, fewest: Mapping[str, int] | None = None) -> None:
         self.scene, self.coarse = scene, coarse
+        self.fewest = fewest or {rod: level.elements for rod, level in coarse.items()}
         self._steps: dict[tuple[str, Level], float] = {}
 
     def step(self, levels: Levels) -> float:
@@ -55,7 +62,7 @@ class Forecast:
     def _rod_step(self, name: str, level: Level) -> float:
         if level.element == "rigid":
             return np.inf
-        few = max(2, self.coarse[name].elements)
+        few = max(2, self.fewest[name])
         # few elements shear, many stretch
         probe = level if level.element in (SHEARS, "modal") else Level(level.element, few)
         key = (name, probe)
