@@ -45,7 +45,7 @@ def enclosure(
 
 def looked_at(study: Study, surrogate: Surrogate, error: Array) -> Looked:
     """Bounds by all runs there are; error: see `enclosure`."""
-    named = extremes(surrogate, len(study.inputs), len(error), study.seed)
+    named = extremes(surrogate, len(study.inputs), len(error), study.seed, known=study.runs.attaining)
     return Looked(study.runs.evaluations, enclosure(study, surrogate, named, error))
 
 

@@ -26,7 +26,8 @@ class Expansion:
 
     terms: degrees, (terms, parameters); coefficients: of the orthonormal products, (terms, columns); left_out: error at
     each run of the fit to all others, root of the mean square, (columns,); squares: the same of the squares of what
-    differs from the mean, over twice the deviation, (columns,)
+    differs from the mean, over twice the deviation, (columns,); whole: whether the runs tell all of its terms: if not,
+    what is left out says nothing of what none of them tells
     """
 
     inputs: Inputs
@@ -34,6 +35,7 @@ class Expansion:
     coefficients: Array
     left_out: Array
     squares: Array | None = None
+    whole: bool = True
 
     def __call__(self, germs: Array) -> Array:
         """The answers at these germs."""
@@ -79,14 +81,12 @@ def fit(inputs: Inputs, germs: Array, values: Array, terms: Terms) -> Expansion:
     basis = inputs.basis(germs, terms)
     q, r = np.linalg.qr(basis)
     diagonal = np.abs(np.diag(r))
-    if len(germs) >= len(terms) and diagonal.min() > RANK * diagonal.max():
-        coefficients = solve_triangular(r, q.T @ values)
-    else:
-        coefficients = np.linalg.lstsq(basis, values, rcond=RANK)[0]
+    whole = bool(len(germs) >= len(terms) and diagonal.min() > RANK * diagonal.max())
+    coefficients = solve_triangular(r, q.T @ values) if whole else np.linalg.lstsq(basis, values, rcond=RANK)[0]
     # A run that decides about a term by itself has all of the influence on its own misfit.
     influence = (q**2).sum(axis=1, keepdims=True)
     left_out, squares = unexplained(values, (values - basis @ coefficients) / np.maximum(1 - influence, SOLE))
-    return Expansion(inputs, terms, np.asarray(coefficients), left_out, squares)
+    return Expansion(inputs, terms, np.asarray(coefficients), left_out, squares, whole)
 
 
 def unexplained(values: Array, missed: Array) -> tuple[Array, Array]:

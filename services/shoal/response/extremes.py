@@ -73,14 +73,18 @@ def extremes(
     settled: Array | None = None,
     *,
     rough: bool = False,
+    known: Array | None = None,
 ) -> Extremes:
     """The extremes over [-1, 1]^p: scanned, then sought along each axis and by slopes.
 
     starts: how many places are sought from, the best of as many parts of what is scanned; settled: what a round of
     searches may still gain, (columns,): before that further rounds are made from elsewhere, None: one is enough; rough:
-    fewer places are scanned
+    fewer places are scanned; known: places from the best of which it is sought as well, (places, parameters): nothing
+    that is scanned may lie in their valley, nor they in that of what is scanned
     """
     best, at = _round(surrogate, places(parameters, seed, rough=rough), columns, starts)
+    if known is not None:
+        best, at = _better(best, at, *_round(surrogate, known, columns, 1))
     gained = np.zeros((0, columns))
     if settled is None:
         return Extremes(best[0], -best[1], at[0], at[1], np.zeros(columns))
@@ -90,11 +94,15 @@ def extremes(
         also, there = _round(surrogate, looked_at, columns, starts)
         _beside(surrogate, also, there)
         gained = np.vstack([gained, np.maximum(best - also, 0.0).max(axis=0)])[-IDLE:]
-        at = np.where((also < best)[:, :, None], there, at)
-        best = np.minimum(best, also)
+        best, at = _better(best, at, also, there)
         if len(gained) == IDLE and np.all(gained <= settled):
             break
     return Extremes(best[0], -best[1], at[0], at[1], gained.max(axis=0, initial=0.0))
+
+
+def _better(best: Array, at: Array, also: Array, there: Array) -> tuple[Array, Array]:
+    """The lower of two values, and where, as of `_round`."""
+    return np.minimum(best, also), np.where((also < best)[:, :, None], there, at)
 
 
 def _round(surrogate: Surrogate, looked_at: Array, columns: int, starts: int) -> tuple[Array, Array]:

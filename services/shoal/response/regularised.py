@@ -11,6 +11,7 @@ form (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, sec
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from scipy.linalg import cho_solve, cholesky
@@ -53,15 +54,20 @@ class Decay:
         return found
 
 
-def likeliest(inputs: Inputs, germs: Array, answers: Array) -> Decay:
-    """Of one column, (runs,), by the likelihood with its overall size left free."""
+def likeliest(inputs: Inputs, germs: Array, answers: Array, begun: Decay | None = None) -> Decay:
+    """Of one column, (runs,), or one for several, (runs, columns), by the likelihood with the size of each left free.
+
+    begun: where the search begins
+    """
     count, some = len(inputs), slice(TOLD)
-    bases, y = _bases(inputs, germs[some]), answers[some] - answers[some].mean()
+    y = answers[some].reshape(len(germs[some]), -1)
+    bases, y = _bases(inputs, germs[some]), y - y.mean(axis=0)
 
     def unlikely(x: Array) -> tuple[float, Array]:
         return _unlikely(Decay(x[:-1].reshape(count, 2), float(x[-1])), bases, y)
 
-    start = np.append(np.tile(FIRST[:2], count), FIRST[2])
+    first = begun or Decay(np.tile(FIRST[:2], (count, 1)), FIRST[2])
+    start = np.append(first.parameters.ravel(), first.noise)
     limits = [*[SIZES, RATIOS] * count, NOISE]
     found = minimize(unlikely, start, jac=True, method="L-BFGS-B", bounds=limits, options={"maxiter": STEPS}).x
     return Decay(found[:-1].reshape(count, 2), float(found[-1]))
@@ -74,10 +80,13 @@ def _bases(inputs: Inputs, germs: Array) -> list[Array]:
 
 
 def _unlikely(decay: Decay, bases: list[Array], y: Array) -> tuple[float, Array]:
-    """Twice the negative logarithm of the likelihood, but for a constant, and its slope."""
-    runs, every = len(y), decay.variances(tuple(basis.shape[1] for basis in bases))
+    """Twice the negative logarithm of the likelihood, but for a constant, and its slope; y: (runs, columns)."""
+    (runs, columns), every = y.shape, decay.variances(tuple(basis.shape[1] for basis in bases))
     parts = [(basis * of) @ basis.T for basis, of in zip(bases, every, strict=True)]
-    kernel = np.prod([1 + part for part in parts], axis=0)
+    # Products of the factors before each parameter, and of those from it on.
+    before = list(accumulate((1 + part for part in parts), np.multiply, initial=np.ones((runs, runs))))
+    behind = list(accumulate((1 + part for part in parts[::-1]), np.multiply, initial=before[0]))[::-1]
+    kernel = before[-1]
     middle = float(np.mean(np.diag(kernel)))
     noise = np.exp(decay.noise)
     try:
@@ -86,17 +95,18 @@ def _unlikely(decay: Decay, bases: list[Array], y: Array) -> tuple[float, Array]
         return 1e10, np.zeros(2 * len(bases) + 1)
     inverse = cho_solve((factor, True), np.eye(runs))
     weights = inverse @ y
-    square = float(y @ weights)
-    slope = inverse - runs * np.outer(weights, weights) / square
-    found = np.empty((len(bases), 2))
+    squares = np.maximum(np.sum(y * weights, axis=0), np.finfo(float).tiny)
+    slope = columns * inverse - runs * (weights / squares) @ weights.T
+    found, trace = np.empty((len(bases), 2)), np.trace(slope)
     for k, (basis, of) in enumerate(zip(bases, every, strict=True)):
-        others = np.prod([1 + part for j, part in enumerate(parts) if j != k], axis=0)
-        change = parts[k], (basis * (of * np.arange(len(of)))) @ basis.T
-        for j, one in enumerate(change):
-            moved = others * one
-            found[k, j] = np.sum(slope * moved) + noise * np.trace(slope) * np.mean(np.diag(moved))
-    value = runs * np.log(square / runs) + 2 * np.log(np.diag(factor)).sum()
-    return float(value), np.append(found, noise * middle * np.trace(slope))
+        others = before[k] * behind[k + 1]
+        there, part = slope * others, np.diag(others)
+        for j, share in enumerate((of, of * np.arange(len(of)))):
+            # The sum of slope times change, of all pairs of runs, and that of the noise.
+            found[k, j] = np.sum((there @ basis) * basis * share)
+            found[k, j] += noise * trace * np.mean(part * ((basis**2) @ share))
+    value = runs * np.log(squares / runs).sum() + 2 * columns * np.log(np.diag(factor)).sum()
+    return float(value), np.append(found, noise * middle * trace)
 
 
 def regularised(inputs: Inputs, germs: Array, values: Array, decay: Decay) -> Expansion:

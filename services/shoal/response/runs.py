@@ -125,3 +125,9 @@ class Runs:
     def values(self) -> Array:
         """Of the good runs, (runs, columns)."""
         return np.concatenate(self._values)[np.concatenate(self._good)]
+
+    @property
+    def attaining(self) -> Array:
+        """Germs of the runs that attain the least or the largest answer of some column, (some, parameters)."""
+        values = self.values
+        return np.asarray(self.germs[np.union1d(values.argmin(axis=0), values.argmax(axis=0))])

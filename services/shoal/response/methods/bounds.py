@@ -16,6 +16,7 @@ from shoal.response.enclosure import enclosure, looked_at
 from shoal.response.expansion import Expansion, fit
 from shoal.response.extremes import Extremes, extremes
 from shoal.response.polynomials import HIGHEST
+from shoal.response.regularised import Decay, likeliest, regularised, trimmed
 from shoal.response.runs import TooManyRunsError
 from shoal.response.screening import Screened, screened
 from shoal.response.study import FINE_GAP, Found, Looked, Study
@@ -29,12 +30,16 @@ ENOUGH = 4
 """Times the fair number of runs after which it is looked for."""
 FEW = 2
 """New extremal points after which the degree grows at once."""
-ROUNDS = 6
+ROUNDS = 12
 """Parts of the fair number of runs: as many extremal points are run at once, at most."""
 SPARED = 20
 """One in so many of the fair number of runs is kept for extremal points of the last degree."""
+MANY_TERMS = 2
+"""Degree from which more terms than runs are tried."""
 CLEARLY = 0.5
-"""Share of the error of a polynomial that one of lower degree has to have to take its place."""
+"""Share of the error of a polynomial that one of lower degree has to have to take its place; and of the error of one of
+more terms than runs that a polynomial has to have to keep its own.
+"""
 APART = 1e-3
 """Germs that are nearer to each other are one extremal point."""
 MORE = 8
@@ -47,7 +52,7 @@ class Round:
 
     surrogate: fitted to all runs; error: of the last one at runs that it had not seen, (columns,); gap: by which outer
     bounds lie at least beyond attained ones, as a share of the width, (columns,); found: extremal points that were run;
-    looked: the bounds, where they may end the study
+    looked: the bounds, where they may end the study; decay: of coefficients, where it is known
     """
 
     surrogate: Expansion
@@ -55,6 +60,7 @@ class Round:
     gap: Array
     found: int
     looked: Looked | None = None
+    decay: Decay | None = None
 
 
 def bounds(study: Study) -> Found:
@@ -70,11 +76,12 @@ def bounds(study: Study) -> Found:
             # New extremal points teach more than a higher degree, once.
             again = 0 if again or here.found <= FEW else 1
             degree = degree if again else _next(plan, degree)
-            here = _round(plan, degree)
+            here = _round(plan, degree, here.decay)
     except TooManyRunsError:
         pass
     top = int(here.surrogate.terms.sum(axis=1).max())
-    why = f"polynomials of total degree {top}; their extremal points are run and entered into the fit{plan.why}"
+    kind = "regularised " if len(here.surrogate.terms) > len(runs.germs) / SHARE else ""
+    why = f"{kind}polynomials of total degree {top}; their extremal points are run and entered into the fit{plan.why}"
     return Found(why, here.surrogate, here.error, looked=here.looked)
 
 
@@ -108,13 +115,36 @@ def _foretold(plan: Screened, degree: int) -> Expansion:
     best = fit(inputs, runs.germs, runs.values, plan.terms(degree))
     for lower in range(degree - 1, 0, -1):
         other = fit(inputs, runs.germs, runs.values, plan.terms(lower))
-        better = other.left_out < CLEARLY * best.left_out
+        better = (other.left_out < CLEARLY * best.left_out) | (not best.whole)
         if better.any():
             fewer = np.zeros_like(best.coefficients)
             fewer[: len(other.terms)] = other.coefficients
             coefficients = np.where(better, fewer, best.coefficients)
-            best = Expansion(inputs, best.terms, coefficients, np.where(better, other.left_out, best.left_out))
+            left_out = np.where(better, other.left_out, best.left_out)
+            best = Expansion(inputs, best.terms, coefficients, left_out, whole=best.whole or other.whole)
     return best
+
+
+def _falling(plan: Screened, found: Expansion, before: Decay | None) -> Decay | None:
+    """How fast coefficients fall, as the column of every group tells that is foretold worst; None where none varies.
+
+    before: of fewer runs
+    """
+    study, runs = plan.study, plan.study.runs
+    varies = (study.widths(runs.values) > 0) & (np.ptp(runs.values, axis=0) > 0)
+    missed = np.where(varies, found.left_out, -1.0)
+    worst = [int(np.where(study.groups == group, missed, -1.0).argmax()) for group in np.unique(study.groups[varies])]
+    return likeliest(study.inputs, runs.germs, runs.values[:, worst], before) if worst else None
+
+
+def _with_more_terms(plan: Screened, found: Expansion, decay: Decay | None) -> Expansion:
+    """Each column by more terms than there are runs, unless that one foretells clearly better what is left out."""
+    if decay is None:
+        return found
+    runs = plan.study.runs
+    other = regularised(plan.study.inputs, runs.germs, runs.values, decay)
+    better = CLEARLY * other.left_out < found.left_out
+    return trimmed(other.where(better, found)) if better.any() else found
 
 
 def _run_signs(plan: Screened, linear: Expansion) -> None:
@@ -131,11 +161,13 @@ def _run_signs(plan: Screened, linear: Expansion) -> None:
     study.runs(ways[np.argsort(-count, kind="stable")[:most]])
 
 
-def _round(plan: Screened, degree: int) -> Round:
+def _round(plan: Screened, degree: int, before: Decay | None = None) -> Round:
     """Fit, find the extremal points, run those that promise most, fit again."""
     study, runs, parameters = plan.study, plan.study.runs, len(plan.study.inputs)
     surrogate, columns = _foretold(plan, degree), runs.values.shape[1]
-    found = extremes(surrogate, parameters, columns, study.seed + degree, rough=True)
+    decay = _falling(plan, surrogate, before) if degree >= MANY_TERMS else None
+    surrogate = _with_more_terms(plan, surrogate, decay)
+    found = extremes(surrogate, parameters, columns, study.seed + degree, rough=True, known=runs.attaining)
     new = _promising(plan, surrogate, found)
     made = len(runs.germs)
     if runs(new) == 0:
@@ -146,7 +178,7 @@ def _round(plan: Screened, degree: int) -> Round:
     error = study.beside(np.maximum(error, surrogate.left_out))
     if _carried(plan, degree):
         # What the new runs tell makes the polynomial better; its error is what it was without them.
-        surrogate = _foretold(plan, degree)
+        surrogate = _with_more_terms(plan, _foretold(plan, degree), decay)
     # What shows at once that a study is not done saves the rest, unless the horizon is looked for.
     looked = None
     gap = enclosure(study, surrogate, found, error, look="there").gap
@@ -156,7 +188,7 @@ def _round(plan: Screened, degree: int) -> Round:
         # If this ends the study it is the answer.
         looked = looked_at(study, surrogate, error)
         gap = looked.told.gap
-    return Round(surrogate, error, gap, len(new), looked)
+    return Round(surrogate, error, gap, len(new), looked, decay)
 
 
 def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
