@@ -143,6 +143,12 @@ def test_the_command_prints_what_the_contract_says(tmp_path: Path) -> None:
     assert out.read_text().startswith("t,A.x.lower")
 
 
+def test_the_table_tells_units() -> None:
+    words = ["uncertain", "single-pendulum", "--vary", "initial.OA.angle=-0.1:0.1", "--at", "0.5", "--no-verify"]
+    printed = CliRunner().invoke(main, words).stdout
+    assert all(f"A.{quantity} [{unit}]" in printed for quantity, unit in (("x", "m"), ("y", "m"), ("angle", "rad")))
+
+
 def test_statistics_of_a_machine() -> None:
     """A pendulum at rest that hangs down stays there whatever its mass: no variance, and no shares of it."""
     scene = Scene.parse({**PENDULUM, "initial": {"OA": {"angle": -np.pi / 2}}})

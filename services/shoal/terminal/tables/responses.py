@@ -44,7 +44,7 @@ def response_table(response: Response) -> None:
             if response.bounds is not None:
                 gap = response.gap(marker, quantity)
                 cells.append("-" if np.isnan(gap) else f"{gap:.0e}")
-            table.add_row(f"{marker}.{quantity} [{unit}]", *cells)
+            table.add_row(escape(f"{marker}.{quantity} [{unit}]"), *cells)
     screen.out.print(table)
     if response.statistics is not None:
         _shares(response)
