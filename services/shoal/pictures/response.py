@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from shoal.pictures.instants import instants, over, time_axis
 from shoal.pictures.numbers import length
 from shoal.pictures.style import BLUE, GREY, ORANGE, canvas, headline, styled
 from shoal.response import Response
@@ -23,10 +24,7 @@ def response(found: Response, marker: str) -> Figure:
     for panel, quantity in zip(axes, found.axes, strict=True):
         widest = max(widest, _panel(panel, found, marker, quantity))
     axes[0].legend()
-    axes[-1].set_xlabel("time [s]")
-    if len(found.times) == 1:
-        axes[-1].set_xticks(found.times)
-        axes[-1].set_xlim(*(found.times[0] + 5 * (_times(found) - found.times[0])))
+    time_axis(axes[-1], found.times)
     says = (
         "places of {0} are {1} apart at most, as attained by runs"
         if found.bounds is not None
@@ -39,19 +37,12 @@ def response(found: Response, marker: str) -> Figure:
     return figure
 
 
-def _times(found: Response) -> Array:
-    """The instants [s]; the two ends of a bar about a single one, which had no width to see."""
-    t = found.times
-    return t if len(t) > 1 else t[0] + 0.01 * (t[0] or 1.0) * np.array([-1.0, 1.0])
-
-
 def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
     """One coordinate; the largest width or deviation [m]."""
-    t = _times(found)
+    t = instants(found.times)
 
     def column(of: Array) -> Array:
-        values = found.column(marker, quantity, of)
-        return np.broadcast_to(values, (*values.shape[:-1], len(t)))
+        return over(found.times, found.column(marker, quantity, of))
 
     if found.bounds is not None:
         lower, upper, low, high = (
@@ -59,7 +50,7 @@ def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
             for of in (found.bounds.lower, found.bounds.upper, found.bounds.lower_outer, found.bounds.upper_outer)
         )
         panel.fill_between(t, lower, upper, color=BLUE, alpha=0.35, label="attained by runs")
-        within = np.broadcast_to(found.times <= found.horizon, t.shape)
+        within = over(found.times, found.times <= found.horizon)
         panel.plot(t[within], low[within], color=ORANGE, linestyle="--", label="outer bounds")
         panel.plot(t[within], high[within], color=ORANGE, linestyle="--")
         if not within.all():
