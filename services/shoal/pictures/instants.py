@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from shoal.trajectory import Array
 
@@ -16,7 +19,7 @@ def instants(times: Array) -> Array:
     return times if len(times) > 1 else times[0] + 0.5 * WIDTH * (times[0] or 1.0) * np.array([-1.0, 1.0])
 
 
-def over(times: Array, values: Array) -> Array:
+def over(times: Array, values: NDArray[Any]) -> NDArray[Any]:
     """Values (..., times) at `instants(times)`."""
     return np.broadcast_to(values, (*values.shape[:-1], len(instants(times))))
 
