@@ -75,6 +75,18 @@ def test_the_gap_shows_and_six_panels_are_enough(several: Answer) -> None:
     assert "2.9 mm and" in follows(several.estimate)
 
 
+def test_no_line_crosses_a_window_that_was_held_out(several: Answer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its samples are not fitted, and a chord over it looked like the model."""
+    whole = signals(several.estimate)[1]
+    kept = np.flatnonzero((np.arange(len(whole.times)) < 5) | (np.arange(len(whole.times)) > 9))
+    cut = replace(whole, **{name: getattr(whole, name)[kept] for name in ("times", "measured", "fitted")})
+    monkeypatch.setattr("shoal.pictures.overlay.signals", lambda _: [cut])
+    (axes,) = overlay(several.estimate, "cut").axes
+    times, model = (np.asarray(values, dtype=float) for values in axes.lines[1].get_data())
+    assert np.flatnonzero(np.isnan(times)).tolist() == np.flatnonzero(np.isnan(model)).tolist() == [5]
+    np.testing.assert_array_equal(times[~np.isnan(times)], cut.times)
+
+
 def test_autocorrelation_of_known_noise() -> None:
     rng = np.random.default_rng(1)
     noise = rng.standard_normal(20_000)
