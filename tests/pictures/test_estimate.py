@@ -11,6 +11,7 @@ import pytest
 from shoal.identification.conclude import Wishes
 from shoal.identification.design import design
 from shoal.identification.identify import identify
+from shoal.identification.problem import Problem
 from shoal.pictures import files
 from shoal.pictures.answer import Answer
 from shoal.pictures.correlations import strongest
@@ -194,3 +195,19 @@ def test_a_design_is_a_page_that_shows_the_best_sensor_of_every_kind(flexible: A
     page = (tmp_path / "design.html").read_text(encoding="utf-8")
     assert all(sensor.label in page for sensor, _ in found.ranked)
     assert "http://" not in page.replace("http://www.w3.org", "")
+
+
+def test_a_machine_measured_by_load_cells_alone_is_shown(tmp_path: Path) -> None:
+    """No channel names a marker; the page of such an identification was an IndexError."""
+    problem = Problem.model_validate(
+        {
+            "name": "cell",
+            "scene": "single-pendulum",
+            "parameters": {"angle": {"path": "initial.OA.angle", "lower": -0.5, "upper": 0.5}},
+            "channels": [{"joint": "O", "quantity": "fx"}, {"joint": "O", "quantity": "fy"}],
+            "source": {"kind": "engine", "engine": "gauss", "stop": 0.5, "count": 20},
+        }
+    )
+    found = motion(Answer(problem, identify(problem, method="least-squares")), "recording")
+    assert list(found.markers) == ["A"]
+    assert np.isfinite(found.markers["A"]).all()
