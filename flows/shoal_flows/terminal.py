@@ -190,8 +190,11 @@ def _differences(console: Console, results: list[Compared]) -> None:
             if row["marker"] == marker
             for one, other in [row["engines"]]
         ]
-        console.print(f"{comparison.scene.name}, largest distance at {marker}:", soft_wrap=True)
-        console.print(f"  {', '.join(parts)}", soft_wrap=True)
+        if parts:
+            console.print(f"{comparison.scene.name}, largest distance at {marker}:", soft_wrap=True)
+            console.print(f"  {', '.join(parts)}", soft_wrap=True)
+        elif not comparison.refused:
+            console.print(f"{comparison.scene.name}: {comparison.complaint}", soft_wrap=True)
         for engine, reason in comparison.refused.items():
             console.print(f"  {engine} refused: {reason}", soft_wrap=True)
 

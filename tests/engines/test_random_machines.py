@@ -14,6 +14,7 @@ from shoal.engines import get_engine
 from shoal.engines.verification import WRONG, verified
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Rod, Scene
+from shoal.trajectory import Trajectory
 
 Random = np.random.Generator
 FEW, MANY, DAMPED = 3, 60, 100
@@ -107,7 +108,10 @@ def fault(seed: int) -> str:
     estimates = run.model.get("verification", {})
     if not run.ok:
         right = (
-            judge is None or not judge.ok or ("mesh error" in run.message and mesh_matters(scene, estimates["scale"]))
+            judge is None
+            or not judge.ok
+            or turned(run, judge) > WRONG
+            or ("mesh error" in run.message and mesh_matters(scene, estimates["scale"]))
         )
         return "" if right else f"{run.status[0]}: {run.message}"
     if estimates["time_error"] is None:
@@ -116,6 +120,11 @@ def fault(seed: int) -> str:
         return ""
     away, allowed = run.distance(judge), 3 * estimates["time_error"] + 2e-3 * estimates["scale"]
     return "" if away <= allowed else f"{away:.2g} m away, estimated {estimates['time_error']:.2g} m"
+
+
+def turned(run: Trajectory, judge: Trajectory) -> float:
+    """The largest difference of an angle [rad]: a soft rod's end may have turned too far where its place is right."""
+    return max(float(np.abs(run.angle(name) - judge.angle(name)).max()) for name in run.markers)
 
 
 def mesh_matters(scene: Scene, scale: float) -> bool:

@@ -18,6 +18,7 @@ from shoal.errors import InputError
 from shoal.shelf import shelf
 from shoal_flows import run
 from shoal_flows.rerun import rerun
+from shoal_flows.terminal import show
 
 
 @pytest.fixture(scope="module")
@@ -267,6 +268,49 @@ def test_machines_in_space_are_logged_with_all_their_coordinates() -> None:
     rest = run.run_flow("statics", {"scene": "spherical-pendulum", "values": still})
     metrics = _client().get_run(rest.run_id).data.metrics
     np.testing.assert_allclose([metrics[f"final/A/{axis}"] for axis in "xyz"], [0.0, 0.0, -1.0], atol=1e-9)
+
+
+def modal() -> str:
+    """YAML of a slider-crank with a modal rod, a loop and a drive that was recorded."""
+    machine = yaml.safe_load((files("shoal.scene") / "library" / "flexible-slider-crank.yaml").read_text())
+    table = [[t, 150 * t] for t in np.linspace(0.0, 0.02, 21).tolist()]
+    machine["joints"]["drive"]["angle"] = {"table": table, "smooth": True}
+    machine["solver"] |= {"duration": 0.01, "relative_tolerance": 1e-8, "absolute_tolerance": 1e-8}
+    return json.dumps(yaml.safe_dump(machine))
+
+
+@pytest.mark.parametrize(
+    ("flow", "asked", "artifacts"),
+    [
+        ("forward", {}, {"trajectory.csv", "scene.yaml"}),
+        ("select", {"tolerance": "1e-3"}, {"trajectory.csv", "ladder.png"}),
+        ("statics", {}, {"equilibrium.json"}),
+        ("compare", {}, {"engines.png", "differences.json"}),
+        ("sweep", {"vary": "{gravity.1: [-1, 0, 2]}", "time": "0.01"}, {"sweep.csv"}),
+        ("export", {"to": "csv"}, {"export", "trajectory.csv"}),
+    ],
+)
+@pytest.mark.parametrize(("scene", "axes"), [("swinging-strip", "xyz"), ("modal", "xy")])
+def test_unusual_machines_pass_through_every_flow(
+    flow: str, asked: dict[str, str], artifacts: set[str], scene: str, axes: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Told with every coordinate, on the terminal too; who has nothing to compare with hears why."""
+    short = (
+        {} if flow == "sweep" or scene == "modal" else {"values": "{solver.duration: 0.01, bodies.strip.elements: 2}"}
+    )
+    found = run.run_flow(flow, {"scene": modal() if scene == "modal" else scene, **asked, **short})
+    assert found.trusted == (flow != "compare")
+    show(found)
+    told = capsys.readouterr().out
+    if flow == "compare":
+        assert ("only gauss ran: name exudyn-ge too" if scene != "modal" else "no other engine can run") in told
+    json.dumps(found.to_json(), allow_nan=False, default=str)
+    assert artifacts <= {item.path for item in _client().list_artifacts(found.run_id)}
+    metrics = (
+        _client().get_run(_children(found.run_id)[0].info.run_id if flow == "compare" else found.run_id).data.metrics
+    )
+    if flow != "sweep":
+        assert axes == "".join(axis for axis in "xyz" if any(name.endswith(f"/{axis}") for name in metrics))
 
 
 STUDY = """

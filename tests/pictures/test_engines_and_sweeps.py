@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,11 @@ from shoal.engines.compare import compare
 from shoal.engines.sweep import sweep
 from shoal.pictures import files
 from shoal.pictures.engines import engines
+from shoal.pictures.gaps import gaps
+from shoal.pictures.indices import indices
+from shoal.pictures.response import response
 from shoal.pictures.sweep import sweep as draw_sweep
+from shoal.response import uncertain
 from shoal.scene import load_scene
 
 
@@ -64,6 +69,30 @@ def test_in_space_all_three_axes_are_drawn() -> None:
         sweep(scene, {path: np.arange(1.0, 3.0), "gravity.2": np.array([-9.81, -1.6])}, get_engine("gauss"), 0.2), "A"
     )
     assert sum(axes.get_ylabel() == "gravity.2 [m/s²]" for axes in maps.axes) == 3
+
+
+def test_engines_that_end_at_one_height_are_named_together() -> None:
+    """The point of Bricard's mechanism starts at (1, -1, 1): z was written over x. One engine has no distances."""
+    bricard = load_scene("bricard").with_values({"solver.duration": 0.01})
+    above, below = engines(compare(bricard, ["gauss", "exudyn"]), "P3", "two").axes
+    assert [text.get_text() for text in above.texts] == ["x, z", "y"]
+    assert len(below.lines) == 1
+    alone = engines(compare(bricard, ["gauss"]), "P3", "one").axes
+    assert [len(axes.lines) for axes in alone] == [3]
+
+
+@pytest.mark.parametrize("marginal", [(0.9, 1.1), "normal(1, 0.1)"])
+def test_bounds_at_a_single_instant_can_be_seen(marginal: Any) -> None:
+    """The chart was empty."""
+    found = uncertain(SCENE, {"initial.OA.angle": marginal}, times=[0.5])
+    for axes, quantity in zip(response(found, "A").axes, found.axes, strict=True):
+        low, high = axes.get_xlim()
+        begin, end = axes.collections[0].get_paths()[0].get_extents().intervalx
+        assert low < begin < 0.5 < end < high
+        assert end - begin > 0.1 * (high - low)
+        assert axes.get_ylabel() == f"{quantity} of A [m]"
+    for axes in (gaps if found.bounds is not None else indices)(found, "A").axes:
+        assert np.ptp(np.asarray(axes.lines[0].get_xdata())) > 0.1 * np.ptp(axes.get_xlim())
 
 
 def test_files_are_png(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 from shoal.identification.conclude import Wishes
 from shoal.identification.design import design
 from shoal.identification.identify import identify
+from shoal.identification.problem import Problem
 from shoal.pictures import files
 from shoal.pictures.answer import Answer
 from shoal.pictures.correlations import strongest
@@ -73,6 +74,18 @@ def test_the_gap_shows_and_six_panels_are_enough(several: Answer) -> None:
     assert len(figure.axes) == 5
     assert [len(axes.patches) for axes in figure.axes] == [1, 0, 0, 0, 0]
     assert "2.9 mm and" in follows(several.estimate)
+
+
+def test_no_line_crosses_a_window_that_was_held_out(several: Answer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its samples are not fitted, and a chord over it looked like the model."""
+    whole = signals(several.estimate)[1]
+    kept = np.flatnonzero((np.arange(len(whole.times)) < 5) | (np.arange(len(whole.times)) > 9))
+    cut = replace(whole, **{name: getattr(whole, name)[kept] for name in ("times", "measured", "fitted")})
+    monkeypatch.setattr("shoal.pictures.overlay.signals", lambda _: [cut])
+    (axes,) = overlay(several.estimate, "cut").axes
+    times, model = (np.asarray(values, dtype=float) for values in axes.lines[1].get_data())
+    assert np.flatnonzero(np.isnan(times)).tolist() == np.flatnonzero(np.isnan(model)).tolist() == [5]
+    np.testing.assert_array_equal(times[~np.isnan(times)], cut.times)
 
 
 def test_autocorrelation_of_known_noise() -> None:
@@ -182,3 +195,19 @@ def test_a_design_is_a_page_that_shows_the_best_sensor_of_every_kind(flexible: A
     page = (tmp_path / "design.html").read_text(encoding="utf-8")
     assert all(sensor.label in page for sensor, _ in found.ranked)
     assert "http://" not in page.replace("http://www.w3.org", "")
+
+
+def test_a_machine_measured_by_load_cells_alone_is_shown(tmp_path: Path) -> None:
+    """No channel names a marker; the page of such an identification was an IndexError."""
+    problem = Problem.model_validate(
+        {
+            "name": "cell",
+            "scene": "single-pendulum",
+            "parameters": {"angle": {"path": "initial.OA.angle", "lower": -0.5, "upper": 0.5}},
+            "channels": [{"joint": "O", "quantity": "fx"}, {"joint": "O", "quantity": "fy"}],
+            "source": {"kind": "engine", "engine": "gauss", "stop": 0.5, "count": 20},
+        }
+    )
+    found = motion(Answer(problem, identify(problem, method="least-squares")), "recording")
+    assert list(found.markers) == ["A"]
+    assert np.isfinite(found.markers["A"]).all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -38,6 +39,13 @@ def test_figure_is_drawn_without_warnings_and_labelled(
     assert figure.get_suptitle() == "title"
     assert figure.axes[-1].get_xlabel()
     assert all(axes.get_ylabel() for axes in figure.axes)
+
+
+def test_a_fit_better_than_its_mesh_stays_in_the_picture(estimates: Estimates) -> None:
+    """The axis began a little below the mesh error: the curve lay beneath it, and the chart was empty."""
+    fine = estimates["fine"]
+    (axes,) = convergence({"fine": replace(fine, model_error_rms=1e3 * float(np.sqrt(fine.fitness)))}, "title").axes
+    assert axes.get_ylim()[0] <= fine.fitness
 
 
 def test_two_values_make_maps_and_three_no_picture() -> None:

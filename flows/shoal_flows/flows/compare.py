@@ -33,6 +33,4 @@ def compare(
     with progress(1, f"{name} on {', '.join(engines or ['several engines'])}"):
         comparison, picture, run_id = run_engines(scene, engines, values)
     show_result(f"{name}: engines", tables.of_comparison(comparison), run_id)
-    wrong = [f"{engine}: {motion.message}" for engine, motion in comparison.trajectories.items() if not motion.ok]
-    refused = [f"{engine} refuses the scene: {reason}" for engine, reason in comparison.refused.items()]
-    return ended(Compared(comparison, run_id, picture), [*refused, *wrong])
+    return ended(Compared(comparison, run_id, picture), [comparison.complaint])

@@ -32,6 +32,20 @@ class Comparison:
         """Whether at least two engines ran and every run may be believed."""
         return len(self.trajectories) >= 2 and not self.refused and all(t.ok for t in self.trajectories.values())
 
+    @property
+    def complaint(self) -> str:
+        """Why `ok` is not so, in one line: every reason; empty if it is."""
+        wrong = {name: motion.message for name, motion in self.trajectories.items() if not motion.ok}
+        said = [f"{name} refuses the scene: {reason}" for name, reason in self.refused.items()]
+        said += [f"{name}: {reason}" for name, reason in wrong.items()]
+        if len(self.trajectories) < 2 and not self.refused:
+            (only,) = self.trajectories
+            others = " or ".join(name for name in able(self.scene) if name != only)
+            said.append(
+                f"only {only} ran: " + (f"name {others} too" if others else "no other engine can run this scene")
+            )
+        return "; ".join(said)
+
     def differences(self) -> list[dict[str, Any]]:
         """Per pair of engines and marker: largest distance over all samples and distance at the end [m]."""
         rows = []

@@ -28,15 +28,15 @@ def convergence(estimates: Mapping[str, Estimate], title: str) -> Figure:
             **{**style, "linestyle": "none", "markersize": 8},
             label=f"{name if several else estimate.method} ({estimate.evaluations})",
         )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
     floor = [(e.model_error_rms, e) for e in estimates.values() if e.model_error_rms is not None]
     if floor:
         error, estimate = min(floor, key=lambda pair: pair[0])
         level = estimate.measurement.first.things * error**2
         axes.axhline(level, color=GREY, linewidth=1, linestyle=(0, (1, 2)))
         axes.annotate("mesh error of the model", (1, level), (0, -4), textcoords="offset points", va="top", color=GREY)
-        axes.set_ylim(bottom=level / 6)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+        axes.set_ylim(bottom=min(level / 6, axes.get_ylim()[0]))
     low, high = axes.get_ylim()
     axes.set_ylim(low, max(2 * high, 100 * low))
     log_ticks(axes)

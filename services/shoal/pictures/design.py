@@ -88,10 +88,13 @@ def says(found: Design) -> str:
     gain = found.aim.score(found.now) / found.aim.score(precision)
     parts = [f"{found.problem}: measure {best.label}"]
     if np.isfinite(gain) and gain > 1.05:
-        parts.append(f"{gain:.2g} times sharper than now")
+        parts.append(f"{_times(gain)} sharper than now")
     if found.second:
         second, both = found.second[0]
-        parts.append(
-            f"then {second.label}, {found.aim.score(precision) / found.aim.score(both):.2g} times sharper again"
-        )
+        parts.append(f"then {second.label}, {_times(found.aim.score(precision) / found.aim.score(both))} sharper again")
     return "; ".join(parts)
+
+
+def _times(gain: float) -> str:
+    """A gain to two digits, 110 and not 1.1e+02."""
+    return f"{float(f'{gain:.2g}'):g} times"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from shoal.pictures.instants import instants, over, time_axis
 from shoal.pictures.style import LINES, canvas, headline, styled
 from shoal.response import Response
 from shoal.trajectory import Array
@@ -21,19 +22,20 @@ def indices(found: Response, marker: str) -> Figure:
     """
     names, low, high = _totals(found)
     figure, axes = canvas(2.2 + 2.0 * len(found.axes), nrows=len(found.axes), sharex=True)
-    ends = {axis: (found.column(marker, axis, low), found.column(marker, axis, high)) for axis in found.axes}
+    t = instants(found.times)
+    ends = {axis: [over(found.times, found.column(marker, axis, of)) for of in (low, high)] for axis in found.axes}
     largest = np.max([np.nan_to_num(of).max(axis=1) for _, of in ends.values()], axis=0)
     shown = sorted(np.argsort(-largest, kind="stable")[:MOST].tolist())
     for panel, (quantity, (least, most)) in zip(axes, ends.items(), strict=True):
         for look, k in zip(LINES, shown, strict=False):
-            panel.plot(found.times, most[k], label=names[k], **look)
+            panel.plot(t, most[k], label=names[k], **look)
             if found.boxes is not None:
-                panel.plot(found.times, least[k], **look)
-                panel.fill_between(found.times, least[k], most[k], color=look["color"], alpha=0.2, linewidth=0)
+                panel.plot(t, least[k], **look)
+                panel.fill_between(t, least[k], most[k], color=look["color"], alpha=0.2, linewidth=0)
         panel.set_ylim(-0.03, 1.05)
         panel.set_ylabel(f"share of {quantity} of {marker}")
     axes[0].legend(fontsize=10)
-    axes[-1].set_xlabel("time [s]")
+    time_axis(axes[-1], found.times)
     first = names[int(np.argmax(largest))]
     which = "total Sobol indices" + ("" if found.boxes is None else ", between bounds")
     headline(figure, f"{found.scene}: {marker} scatters most by {first} ({which})")

@@ -149,9 +149,12 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
     samples = answer.estimate.measurement.recordings[recording]
     earliest = max(0.0, -view["delay"] * view["clock"])
     times = np.linspace(earliest, float(samples.times[-1]), frames)
-    traced, read = _traced(answer.estimate.scenes[recording])
+    scene = answer.estimate.scenes[recording]
+    traced, read = _traced(scene)
     seen = answer.model.engine.simulate(traced, np.maximum(0.0, times / view["clock"] + view["delay"]))
-    markers = {channel.marker: seen.marker(channel.marker) for channel in samples.channels if channel.marker}
+    # Who measured by load cells alone sees all there are.
+    watched = [channel.marker for channel in samples.channels if channel.marker] or scene.markers
+    markers = {name: seen.marker(name) for name in watched}
     nearest = np.abs(samples.times[None] - times[:, None]).argmin(axis=1)
     close = np.abs(samples.times[nearest] - times) <= 1.01 * max(times[1] - times[0], _step(samples.times))
     places: dict[str, dict[str, Array]] = {}
@@ -160,10 +163,10 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
             continue
         values = np.where(close, samples.values[nearest, k], np.nan)
         places.setdefault(channel.marker, {})[channel.quantity] = values
-    needed = {"x", "y"} if answer.estimate.scenes[recording].dimensions == 2 else {"x", "y", "z"}
+    needed = {"x", "y"} if scene.dimensions == 2 else {"x", "y", "z"}
     measured = {m: _place(found, view) for m, found in places.items() if needed <= found.keys()}
     directions = {m: found["angle"] + view["tilt"] for m, found in places.items() if "angle" in found}
-    fixed = ground(answer.estimate.scenes[recording])
+    fixed = ground(scene)
     shown = read(seen, frames)
     return Motion(recording, times, fixed, markers=markers, measured=measured, directions=directions, **shown)
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from shoal.identification import Estimate
 from shoal.pictures.numbers import handy
-from shoal.pictures.signals import Signal, gaps, signals, worst
+from shoal.pictures.signals import LONG, Signal, gaps, signals, worst
 from shoal.pictures.style import BLACK, SKY, VERMILION, canvas, headline, styled
 
 _PANELS = 6
@@ -70,5 +70,8 @@ def _draw(panel: Axes, signal: Signal, gap: str) -> None:
         color=SKY if many else BLACK,
         label="measured",
     )
-    panel.plot(signal.times, signal.fitted, color=VERMILION, linewidth=1.4, label="fitted model")
+    # Across a gap a chord would pass for the model.
+    after = 1 + np.flatnonzero(np.diff(signal.times) > LONG * np.median(np.diff(signal.times)))
+    model = (np.insert(values, after, np.nan) for values in (signal.times, signal.fitted))
+    panel.plot(*model, color=VERMILION, linewidth=1.4, label="fitted model")
     panel.set_ylabel(f"{signal.name}\n[{signal.unit}]")

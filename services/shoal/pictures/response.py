@@ -6,9 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from shoal.pictures.instants import instants, over, time_axis
 from shoal.pictures.numbers import length
 from shoal.pictures.style import BLUE, GREY, ORANGE, canvas, headline, styled
 from shoal.response import Response
+from shoal.trajectory import Array
 
 FANS = ((0, -1, 0.2), (1, -2, 0.3), (2, -3, 0.4))
 """Pairs of quantiles, from the widest, and how dark what lies between them is."""
@@ -22,7 +24,7 @@ def response(found: Response, marker: str) -> Figure:
     for panel, quantity in zip(axes, found.axes, strict=True):
         widest = max(widest, _panel(panel, found, marker, quantity))
     axes[0].legend()
-    axes[-1].set_xlabel("time [s]")
+    time_axis(axes[-1], found.times)
     says = (
         "places of {0} are {1} apart at most, as attained by runs"
         if found.bounds is not None
@@ -37,14 +39,18 @@ def response(found: Response, marker: str) -> Figure:
 
 def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
     """One coordinate; the largest width or deviation [m]."""
-    t = found.times
+    t = instants(found.times)
+
+    def column(of: Array) -> Array:
+        return over(found.times, found.column(marker, quantity, of))
+
     if found.bounds is not None:
         lower, upper, low, high = (
-            found.column(marker, quantity, of)
+            column(of)
             for of in (found.bounds.lower, found.bounds.upper, found.bounds.lower_outer, found.bounds.upper_outer)
         )
         panel.fill_between(t, lower, upper, color=BLUE, alpha=0.35, label="attained by runs")
-        within = t <= found.horizon
+        within = over(found.times, found.times <= found.horizon)
         panel.plot(t[within], low[within], color=ORANGE, linestyle="--", label="outer bounds")
         panel.plot(t[within], high[within], color=ORANGE, linestyle="--")
         if not within.all():
@@ -52,22 +58,20 @@ def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
         widest = float(np.max(upper - lower))
     elif found.boxes is not None:
         mean, levels = found.boxes.mean, found.boxes.quantiles
-        low, high = (found.column(marker, quantity, of) for of in (levels[1].lower, levels[-2].upper))
+        low, high = (column(of) for of in (levels[1].lower, levels[-2].upper))
         panel.fill_between(t, low, high, color=BLUE, alpha=0.25, linewidth=0, label="5 % and 95 % at their farthest")
-        low, high = (found.column(marker, quantity, of) for of in (mean.lower, mean.upper))
+        low, high = (column(of) for of in (mean.lower, mean.upper))
         panel.fill_between(t, low, high, color=ORANGE, alpha=0.5, linewidth=1.5, label="means over the intervals")
-        if found.horizon < t[-1]:
+        if found.horizon < found.times[-1]:
             panel.axvline(found.horizon, color=GREY, linestyle=":", label="horizon")
-        widest = float(np.max(found.column(marker, quantity, found.boxes.std.upper)))
+        widest = float(np.max(column(found.boxes.std.upper)))
     else:
         told = found.statistics
         assert told is not None
-        quantiles = found.column(marker, quantity, told.quantiles)
+        quantiles = column(told.quantiles)
         for one, other, dark in FANS:
             panel.fill_between(t, quantiles[one], quantiles[other], color=BLUE, alpha=dark, linewidth=0)
-        panel.plot(
-            t, found.column(marker, quantity, told.mean), color=BLUE, label="mean; 50, 90, 98 % lie in the bands"
-        )
-        widest = float(np.max(found.column(marker, quantity, told.std)))
+        panel.plot(t, column(told.mean), color=BLUE, label="mean; 50, 90, 98 % lie in the bands")
+        widest = float(np.max(column(told.std)))
     panel.set_ylabel(f"{quantity} of {marker} [m]")
     return widest

@@ -13,6 +13,9 @@ from shoal.identification.recording.source import Channel
 from shoal.identification.recording.units import of_channel
 from shoal.trajectory import Array
 
+LONG = 1.9
+"""A step of time that is so many times the usual one is a gap."""
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -94,8 +97,8 @@ def gaps(signal: Signal) -> list[tuple[float, float]]:
     if len(known) < 2:
         return []
     usual = float(np.median(np.diff(signal.times)))
-    long = np.flatnonzero(np.diff(known) > 1.9 * usual)
+    long = np.flatnonzero(np.diff(known) > LONG * usual)
     found = [(float(known[k]), float(known[k + 1])) for k in long]
-    if signal.times[-1] - known[-1] > 1.9 * usual:
+    if signal.times[-1] - known[-1] > LONG * usual:
         found.append((float(known[-1]), float(signal.times[-1])))
     return found

@@ -112,6 +112,8 @@ def comparison_table(comparison: Comparison) -> None:
         table.add_row(name, *place, f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0]))
     screen.out.print(table)
     screen.say(*(f"{name} refused: {reason}" for name, reason in comparison.refused.items()))
+    if len(comparison.trajectories) < 2:
+        return
     table = screen.table("distances over all samples", "engines", "marker", "largest [m]", "final [m]")
     for row in comparison.differences():
         distances = ("-" if row[key] is None else f"{row[key]:.2e}" for key in ("largest", "final"))
