@@ -20,7 +20,7 @@ FINE_GAP = 1e-6
 """The gap that is aimed at where none is asked for: a share of the width."""
 ROUNDING = 1e-11
 """A spread below this share of the answers is none."""
-LEAST, FAIR = 18, 1.35
+LEAST, FAIR = 18, 1.39
 """Runs that a study may take without further reason: this number, or so many for every term of a polynomial of degree
 four."""
 SAFETY = 3.0

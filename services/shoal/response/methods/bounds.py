@@ -34,8 +34,8 @@ ROUNDS = 12
 """Parts of the fair number of runs: as many extremal points are run at once, at most."""
 SPARED = 20
 """One in so many of the fair number of runs is kept for extremal points of the last degree."""
-MANY_TERMS = 2
-"""Degree from which more terms than runs are tried."""
+MISSED = {2: 0.1, 4: 0.01}
+"""More terms than runs are tried where a polynomial of so many degrees or more misses so much of the width."""
 CLEARLY = 0.5
 """Share of the error of a polynomial that one of lower degree has to have to take its place; and of the error of one of
 more terms than runs that a polynomial has to have to keep its own.
@@ -125,15 +125,16 @@ def _foretold(plan: Screened, degree: int) -> Expansion:
     return best
 
 
-def _falling(plan: Screened, found: Expansion, before: Decay | None) -> Decay | None:
-    """How fast coefficients fall, as the column of every group tells that is foretold worst; None where none varies.
+def _falling(plan: Screened, found: Expansion, degree: int, before: Decay | None) -> Decay | None:
+    """How fast coefficients fall, as the worst told column of every group tells; None where all are told well.
 
     before: of fewer runs
     """
     study, runs = plan.study, plan.study.runs
-    varies = (study.widths(runs.values) > 0) & (np.ptp(runs.values, axis=0) > 0)
-    missed = np.where(varies, found.left_out, -1.0)
-    worst = [int(np.where(study.groups == group, missed, -1.0).argmax()) for group in np.unique(study.groups[varies])]
+    widths, least = study.widths(runs.values), min((share for d, share in MISSED.items() if degree >= d), default=1.0)
+    coarse = (widths > 0) & (np.ptp(runs.values, axis=0) > 0) & (found.left_out > least * widths)
+    missed = np.where(coarse, found.left_out, -1.0)
+    worst = [int(np.where(study.groups == group, missed, -1.0).argmax()) for group in np.unique(study.groups[coarse])]
     return likeliest(study.inputs, runs.germs, runs.values[:, worst], before) if worst else None
 
 
@@ -165,7 +166,7 @@ def _round(plan: Screened, degree: int, before: Decay | None = None) -> Round:
     """Fit, find the extremal points, run those that promise most, fit again."""
     study, runs, parameters = plan.study, plan.study.runs, len(plan.study.inputs)
     surrogate, columns = _foretold(plan, degree), runs.values.shape[1]
-    decay = _falling(plan, surrogate, before) if degree >= MANY_TERMS else None
+    decay = _falling(plan, surrogate, degree, before)
     surrogate = _with_more_terms(plan, surrogate, decay)
     found = extremes(surrogate, parameters, columns, study.seed + degree, rough=True, known=runs.attaining)
     new = _promising(plan, surrogate, found)
