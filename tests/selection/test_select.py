@@ -157,6 +157,51 @@ def test_a_torque_under_which_no_theory_holds_is_named(torque: float, strain: fl
     assert said == "" if strain is None else f"load bends A to a strain of {strain:g} " in said
 
 
+@pytest.mark.parametrize(
+    ("others", "strain"),
+    [
+        ({"back": {"kind": "torque", "at": {"body": "A", "point": "end"}, "torque": -2.5}}, None),
+        ({"more": {"kind": "torque", "at": {"body": "A", "point": "end"}, "torque": 1.0}}, 4.0),
+        (
+            {
+                "taken": {
+                    "kind": "torque",
+                    "at": {"body": "ground", "point": [0.0, 0.0]},
+                    "torque": -1.0,
+                    "reaction": {"body": "A", "point": "end"},
+                }
+            },
+            4.0,
+        ),
+        ({"late": {"kind": "torque", "at": {"body": "A", "point": "end"}, "torque": "-2.5*sin(t)"}}, None),
+        (
+            {
+                "held": {
+                    "kind": "torsion-spring",
+                    "first": {"body": "ground", "point": [0.0, 0.0]},
+                    "second": {"body": "A", "point": "end"},
+                    "stiffness": 1.0,
+                }
+            },
+            None,
+        ),
+    ],
+)
+def test_what_acts_at_one_end_is_told_together(others: dict, strain: float | None) -> None:
+    """Torques in units of that which bends the end to a strain of 1, of which the first is three."""
+    scene = draw(79).scene
+    rod = scene.bodies["A"]
+    unit = 2 * rod.youngs_modulus * rod.width * rod.height**3 / 12 / rod.height
+    data = scene.model_dump(mode="json")
+    data["loads"]["load"]["torque"] = 3 * unit
+    for name, load in others.items():
+        if isinstance(load.get("torque"), float):
+            load = load | {"torque": load["torque"] * unit}
+        data["loads"][name] = load
+    said = folded(Scene.parse(data), ["A"])
+    assert said == "" if strain is None else f"to a strain of {strain:g} " in said
+
+
 def test_the_way_down_takes_a_share_of_the_work_of_the_climb(monkeypatch: pytest.MonkeyPatch) -> None:
     """But for the run that it is at when that much is done; what is found by then meets the tolerance."""
     scene = _with_modulus(2e7).with_values({"solver.duration": 0.2})
