@@ -1,4 +1,5 @@
-"""`python -m shoal_validation.uncertain [--studies N] [--runs N] [--only PART] [--quick] [--first SEED] [--page FILE]`.
+"""`python -m shoal_validation.uncertain [--studies N] [--runs N] [--only PART] [--quick] [--first SEED] [--page FILE]
+[--record FILE]`.
 
 Prints accuracy by number of runs of every method for intervals on every problem (`methods`), N random studies of
 machines in closed form by `auto`, whose bounds 100 000 random runs try to leave (`studies`), and ten scenes of other
@@ -10,14 +11,16 @@ most three parameters, the problems of one, demands of few seconds, and a map of
 from __future__ import annotations
 
 import argparse
+import itertools
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from shoal.response.methods import METHODS
 
 from shoal_validation.document import publish, table
+from shoal_validation.resumed import resumed
 from shoal_validation.uncertain import chart, maps, reached, scenes
 from shoal_validation.uncertain.measure import Line, measured
 from shoal_validation.uncertain.problems import PROBLEMS
@@ -45,6 +48,7 @@ def main(arguments: list[str]) -> bool:
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--chart", type=Path, default=Path("docs/charts/uncertain-map.png"))
     parser.add_argument("--page", type=Path, default=Path("docs/uncertain.md"))
+    parser.add_argument("--record", type=Path, help="keeps the studies that are done, so that they can go on")
     chosen = parser.parse_args(arguments)
     told, good = {}, True
     if chosen.only in (None, "methods"):
@@ -52,7 +56,8 @@ def main(arguments: list[str]) -> bool:
         told["uncertain-methods"] = methods_table(lines)
         good = all(line.verdict != "silent" for line in lines if line.method == "auto")
     if chosen.only in (None, "studies"):
-        found = tried(20 if chosen.quick else chosen.studies, chosen.runs, FEW if chosen.quick else None, chosen.first)
+        count, most = (20, FEW) if chosen.quick else (chosen.studies, None)
+        found = tried(count, chosen.runs, most, chosen.first, chosen.record)
         told["uncertain-studies"] = studies_text(found, chosen.runs)
         good = good and all(one.kept for one in found)
     if chosen.only in (None, "scenes"):
@@ -82,19 +87,17 @@ def compared(*, quick: bool) -> list[Line]:
     return lines
 
 
-def tried(count: int, runs: int, most: int | None = None, first: int = 0) -> list[Judged]:
+def tried(count: int, runs: int, most: int | None = None, first: int = 0, record: Path | None = None) -> list[Judged]:
     """So many random studies against so many runs each; most: parameters. One that fails is printed."""
-    found, seed = list[Judged](), first
-    while len(found) < count:
-        asked = drawn(seed)
-        seed += 1
-        if most is not None and len(asked.varied) > most:
-            continue
-        one = judged(asked, runs)
-        found.append(one)
+    every = (drawn(seed) for seed in itertools.count(first))
+    asked = itertools.islice((one for one in every if most is None or len(one.varied) <= most), count)
+    cases = {f"seed {one.seed}, {runs} runs": one for one in asked}
+    found = []
+    for _, kept in resumed(list(cases), lambda key: asdict(judged(cases[key], runs)), record):
+        found.append(one := Judged(**kept))
         if not one.kept:
             sys.stdout.write(
-                f"seed {asked.seed}, {asked.kind.name}, {len(asked.varied)} parameters, {asked.cycles:.3g} cycles: gap "
+                f"seed {one.seed}, {one.machine}, {one.parameters} parameters, {one.cycles:.3g} cycles: gap "
                 f"{one.gap:.1e}, but a run lies {one.beyond:.1e} beyond ({one.why})\n"
             )
     return found
@@ -144,8 +147,8 @@ def studies_text(studies: Sequence[Judged], runs: int) -> str:
     made = sorted(study.runs for study in whole)
     furthest = max((study.beyond for study in whole), default=0.0)
     gaps = sorted(study.gap for study in whole)
-    kinds = len({study.drawn.kind.name for study in studies})
-    most = max(len(study.drawn.varied) for study in studies)
+    kinds = len({study.machine for study in studies})
+    most = max(study.parameters for study in studies)
     middle_runs, middle_gap = made[len(made) // 2] if made else 0, gaps[len(gaps) // 2] if gaps else 0.0
     return (
         f"Of {len(studies)} random studies of {kinds} machines with one to {most} intervals of 0.5 to 30 % after "

@@ -101,12 +101,16 @@ def drawn(seed: int) -> Drawn:
 
 @dataclass(frozen=True)
 class Judged:
-    """runs: made by the method; gap: told; ok: whether it refused no instant and knows its gap; beyond: how far a
-    random run lies beyond the outer bounds within the horizon, short: how far beyond those that are called attained,
-    as shares of the width; broken: how far the run at the arguments named stays inside the bound that it should attain
+    """seed, machine, parameters, cycles: of the study; runs: made by the method; gap: told; ok: whether it refused no
+    instant and knows its gap; beyond: how far a random run lies beyond the outer bounds within the horizon, short: how
+    far beyond those that are called attained, as shares of the width; broken: how far the run at the arguments named
+    stays inside the bound that it should attain
     """
 
-    drawn: Drawn
+    seed: int
+    machine: str
+    parameters: int
+    cycles: float
     why: str
     runs: int
     gap: float
@@ -161,7 +165,10 @@ def against(asked: Drawn, answer: Answer, runs: int) -> Judged:
         broken = max(broken, float((sign * (reached - bound) / width)[within].max(initial=0.0)))
     ok = math.isinf(bounds.horizon) and not math.isnan(bounds.gap)
     return Judged(
-        drawn=asked,
+        seed=asked.seed,
+        machine=asked.kind.name,
+        parameters=len(asked.varied),
+        cycles=asked.cycles,
         why=answer.found.why,
         runs=answer.runs.evaluations,
         gap=bounds.gap,
