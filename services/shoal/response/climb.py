@@ -71,19 +71,16 @@ def _slopes(objective: Objective, at: Array, value: Array, searches: IntArray) -
     Those of first order are off by half a difference times the curvature: across a narrow valley more than what is
     gained along it.
     """
-    found, curved = np.empty_like(at), np.empty_like(at)
-    for axis in range(at.shape[1]):
-        place = at[:, axis]
-        one = np.where(place - DIFFERENCE < -1, DIFFERENCE, -DIFFERENCE)
-        other = np.where(np.abs(place - one) > 1, 2 * one, -one)
-        chords = []
-        for way in (one, other):
-            beside = at.copy()
-            beside[:, axis] += way
-            chords.append((objective(beside, searches) - value) / way)
-        found[:, axis] = (chords[0] * other - chords[1] * one) / (other - one)
-        curved[:, axis] = 2 * (chords[1] - chords[0]) / (other - one)
-    return found, curved
+    parameters = at.shape[1]
+    one = np.where(at - DIFFERENCE < -1, DIFFERENCE, -DIFFERENCE)
+    other = np.where(np.abs(at - one) > 1, 2 * one, -one)
+    ways = np.stack([one, other])
+    # All places that are needed, (ways, axes, searches, parameters), at one go.
+    beside = at + ways.transpose(0, 2, 1)[..., None] * np.eye(parameters)[:, None]
+    told = objective(beside.reshape(-1, parameters), np.tile(searches, 2 * parameters))
+    chords = (told.reshape(2, parameters, len(at)).transpose(0, 2, 1) - value[:, None]) / ways
+    found = (chords[0] * other - chords[1] * one) / (other - one)
+    return found, 2 * (chords[1] - chords[0]) / (other - one)
 
 
 def _begun(slope: Array, curved: Array) -> Array:

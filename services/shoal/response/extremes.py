@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Protocol
@@ -26,6 +26,8 @@ GRID = {1: 1001, 2: 41, 3: 15, 4: 7}
 """Places along each axis of the grid, by the number of parameters."""
 HELD, AT_HAND = 4_000_000, 2**17
 """Numbers of a surrogate that are asked for and that are compared at once."""
+PLACES = 512
+"""At once, where each is asked for one column."""
 STEPS = 0.25, 0.1
 """Of the search along each axis from the best place that was scanned, before it goes downhill by slopes."""
 
@@ -82,38 +84,38 @@ def extremes(
     fewer places are scanned; known: places from the best of which it is sought as well, (places, parameters): nothing
     that is scanned may lie in their valley, nor they in that of what is scanned
     """
-    best, at = _round(surrogate, places(parameters, seed, rough=rough), columns, starts)
-    if known is not None:
-        best, at = _better(best, at, *_round(surrogate, known, columns, 1))
+    sets = _apart(places(parameters, seed, rough=rough), starts)
+    best, at = _round(surrogate, sets if known is None else [*sets, known], columns)
     gained = np.zeros((0, columns))
     if settled is None:
         return Extremes(best[0], -best[1], at[0], at[1], np.zeros(columns))
     for further in range(1, ROUNDS):
         # The place of an extreme at one instant is often near that of another.
         looked_at = np.concatenate([places(parameters, (seed, further)), np.unique(at.reshape(-1, parameters), axis=0)])
-        also, there = _round(surrogate, looked_at, columns, starts)
+        also, there = _round(surrogate, _apart(looked_at, starts), columns)
         _beside(surrogate, also, there)
         gained = np.vstack([gained, np.maximum(best - also, 0.0).max(axis=0)])[-IDLE:]
-        best, at = _better(best, at, also, there)
+        best, at = np.minimum(best, also), np.where((also < best)[:, :, None], there, at)
         if len(gained) == IDLE and np.all(gained <= settled):
             break
     return Extremes(best[0], -best[1], at[0], at[1], gained.max(axis=0, initial=0.0))
 
 
-def _better(best: Array, at: Array, also: Array, there: Array) -> tuple[Array, Array]:
-    """The lower of two values, and where, as of `_round`."""
-    return np.minimum(best, also), np.where((also < best)[:, :, None], there, at)
+def _apart(looked_at: Array, starts: int) -> list[Array]:
+    """As many parts: every n-th place of Sobol's sequence lies in one of its own, where n is a power of two."""
+    return [looked_at[start::starts] for start in range(starts)]
 
 
-def _round(surrogate: Surrogate, looked_at: Array, columns: int, starts: int) -> tuple[Array, Array]:
-    """The least of both sides, (2, columns), the upper one with its sign turned, and where."""
-    parameters = looked_at.shape[1]
+def _round(surrogate: Surrogate, sets: Sequence[Array], columns: int) -> tuple[Array, Array]:
+    """The least of both sides, (2, columns), the upper one with its sign turned, and where.
+
+    It is sought from the best place of each set, (places, parameters).
+    """
+    starts, parameters = len(sets), sets[0].shape[1]
     best = np.full((starts, 2, columns), np.inf)
     at = np.zeros((starts, 2, columns, parameters))
     every = np.arange(columns)
-    for start in range(starts):
-        # Every n-th place of Sobol's sequence lies in a part of the box of its own, where n is a power of two.
-        mine = looked_at[start::starts]
+    for start, mine in enumerate(sets):
         for some, told in in_parts(surrogate, mine, columns):
             found = np.ascontiguousarray(told.T)
             for side, (sign, least) in enumerate(((1.0, found.argmin(axis=1)), (-1.0, found.argmax(axis=1)))):
@@ -149,26 +151,28 @@ def _beside(surrogate: Surrogate, best: Array, at: Array) -> None:
 
 
 def _signed(surrogate: Surrogate, signs: Array, columns: IntArray) -> Objective:
-    return lambda at, searches: signs[searches] * surrogate.each(at, columns[searches])
+    return lambda at, searches: signs[searches] * _each(surrogate, at, columns[searches])
+
+
+def _each(surrogate: Each, at: Array, columns: IntArray) -> Array:
+    """One column at each place, as many at once as a processor has at hand."""
+    parts = [slice(k, k + PLACES) for k in range(0, max(len(at), 1), PLACES)]
+    return np.concatenate([surrogate.each(at[part], columns[part]) for part in parts])
 
 
 def along(
     surrogate: Each, sign: Array | float, axis: int, step: float, best: Array, at: Array, every: IntArray
 ) -> None:
     """Improve all columns along one axis: at both sides and where the parabola through the three is least."""
-    here, sides, tried = best.copy(), [], []
-    for way in (-step, step):
-        place = at.copy()
-        place[:, axis] = np.clip(place[:, axis] + way, -1, 1)
-        tried.append(place)
-        sides.append(sign * surrogate.each(place, every))
-    curved = sides[0] - 2 * here + sides[1]
-    shift = np.divide(sides[0] - sides[1], 2 * curved, out=np.zeros_like(here), where=curved > 0)
-    place = at.copy()
-    place[:, axis] = np.clip(place[:, axis] + step * np.clip(shift, -2, 2), -1, 1)
-    tried.append(place)
-    sides.append(sign * surrogate.each(place, every))
-    for place, value in zip(tried, sides, strict=True):
+    here, sides = best.copy(), np.stack([at, at])
+    sides[:, :, axis] = np.clip(at[:, axis] + np.array([[-step], [step]]), -1, 1)
+    told = sign * _each(surrogate, np.concatenate(sides), np.tile(every, 2)).reshape(2, -1)
+    curved = told[0] - 2 * here + told[1]
+    shift = np.divide(told[0] - told[1], 2 * curved, out=np.zeros_like(here), where=curved > 0)
+    lowest = at.copy()
+    lowest[:, axis] = np.clip(lowest[:, axis] + step * np.clip(shift, -2, 2), -1, 1)
+    tried = [(sides[0], told[0]), (sides[1], told[1]), (lowest, sign * _each(surrogate, lowest, every))]
+    for place, value in tried:
         better = value < best
         best[better], at[better] = value[better], place[better]
 

@@ -89,28 +89,36 @@ class Masses:
     def _add_rod(self, name: str, rod: Rod, frame: BeamFrame) -> None:
         element = frame.element
         length = frame.element_length * np.ones(1) if np.ndim(frame.element_length) else frame.element_length
+        nodes = [self._unstrained(rod, frame, node) for node in range(rod.elements + 1)]
         for number in range(rod.elements):
-            section = rod.section_at((number + 0.5) / rod.elements)
+            if number == 0 or rod.tapered:
+                section = rod.section_at((number + 0.5) / rod.elements)
+                masses = element.mass(rod.density, section, length)
+                weight = element.weight(rod.density * section.area, length)
             vectors = frame.of_element(number)
-            _add(self.mass, vectors, element.mass(rod.density, section, length))
+            _add(self.mass, vectors, masses)
             if element.stretching is not None and self.scene.solver.caps_inertia:
                 _add(self.stretching, vectors, element.stretching(rod.youngs_modulus * section.area, length))
-            self._add_load(vectors, element.weight(rod.density * section.area, length))
-            nodal: list[Any] = []
-            for node in (number, number + 1):
-                s = rod.length * node / rod.elements
-                axis = plane.vector(*rod_axis(rod, s)) if self.scene.dimensions == 2 else unstrained(rod, s)[0]
-                nodal += [axis, *element.nodal_vectors(rod, s)]
+            self._add_load(vectors, weight)
             for (node, _), vector in frame.axes.items():
                 if node in (number, number + 1):
-                    masses = element.mass(rod.density, section, length)
                     lent = sum(share * masses[k][k] for share, k in zip(LENT, (-2, -1), strict=True))
                     _add(self.mass, [vector], [[lent]])
-            part = element.part(rod, section, length, nodal)
+            part = element.part(rod, section, length, nodes[number] + nodes[number + 1])
             self.families[element.family].add(name, self.rows.of_all(vectors), part)
+
+    def _unstrained(self, rod: Rod, frame: BeamFrame, node: int) -> list[Any]:
+        """The nodal vectors of a rod at rest."""
+        s = rod.length * node / rod.elements
+        axis = plane.vector(*rod_axis(rod, s)) if self.scene.dimensions == 2 else unstrained(rod, s)[0]
+        return [axis, *frame.element.nodal_vectors(rod, s)]
 
     def _add_load(self, vectors: list[Affine], masses: list[Number]) -> None:
         for vector, mass in zip(vectors, masses, strict=True):
+            if vector.own:
+                for unknown, g in zip(vector.own, self.gravity, strict=True):
+                    self.weight[unknown] = self.weight[unknown] + mass * g
+                continue
             for unknown, coefficient in vector.terms.items():
                 force = sum(c * mass * g for c, g in zip(coefficient, self.gravity, strict=True))
                 self.weight[unknown] = self.weight[unknown] + force
@@ -157,6 +165,11 @@ def _add(entries: Entries, vectors: list[Affine], matrix: list[list[Number]]) ->
     for left, row in zip(vectors, matrix, strict=False):
         for right, weight in zip(vectors, row, strict=True):
             if _vanishes(weight):
+                continue
+            if left.own and right.own:
+                for i, j in zip(left.own, right.own, strict=True):
+                    if i >= j:
+                        entries[i, j] = entries.get((i, j), 0.0) + weight
                 continue
             for i, ci in left.terms.items():
                 for j, cj in right.terms.items():

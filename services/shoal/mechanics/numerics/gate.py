@@ -60,7 +60,7 @@ def _laid(value: Any, at: int, memory: memoryview) -> tuple[int, int]:
 def _alignment(value: Any) -> int:
     """In bytes."""
     if isinstance(value, tuple):
-        return max((_alignment(part) for part in value), default=1)
+        return 8 if any(_alignment(part) == 8 for part in value) else 1
     return 1 if isinstance(value, bool | np.bool_) else 8
 
 
