@@ -39,6 +39,15 @@ def test_cells_and_their_picture(tmp_path: Path) -> None:
     assert "| auto | 1 | 1 | 0 | 0 | 0 | 3e+02 |" in findings(cells)
 
 
+@pytest.mark.parametrize("method", ["chebyshev-total", "kriging", "legendre", "rbf", "taylor"])
+@pytest.mark.parametrize("width", [0.01, 0.1])
+def test_what_a_surrogate_misses_of_runs_left_out_counts(method: str, width: float) -> None:
+    """Runs at its extremes alone once told too small an error of kriging where neighbours part."""
+    found = cell(method, Question(4, width, 0.2))
+    assert found.told
+    assert not found.silent
+
+
 def test_the_night_tries_uncertain_bounds() -> None:
     lines = plan("uncertain-bounds", quick=True)
     assert [line.limit for line in lines] == [1e-5, 1e-9]

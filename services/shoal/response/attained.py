@@ -87,14 +87,18 @@ def likely(study: Study, bounds: Bounds) -> Bounds:
 
 
 def _confirmed(study: Study, surrogate: Surrogate, foretold: Extremes) -> Array | None:
-    """The error of a surrogate at its own extremal points, which are run; None if there are no runs left for it."""
+    """The error of a surrogate at its own extremal points, which are run; None if there are no runs left for it.
+
+    At least that at runs that are left out of it, where it knows that.
+    """
     runs = study.runs
     wanted: Array = np.unique(np.round(np.vstack([foretold.at_lower, foretold.at_upper]), 2), axis=0)
     wanted = wanted[: max(0, min(len(wanted), runs.left, study.fair))]
     made = len(runs.germs)
     if not len(wanted) or runs(wanted) == 0:
         return None
-    return np.asarray(np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0))
+    missed = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
+    return np.asarray(np.maximum(missed, getattr(surrogate, "left_out", 0.0)))
 
 
 def _tested(study: Study, surrogate: Surrogate, named: Extremes, error: Array) -> Array:

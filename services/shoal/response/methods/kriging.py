@@ -25,12 +25,16 @@ NUGGET = 1e-10
 
 @dataclass(frozen=True)
 class Process:
-    """The mean of a process: middle + correlation with every run times its weight."""
+    """The mean of a process: middle + correlation with every run times its weight.
+
+    left_out: error at each run of the process through all others, root of the mean square, (columns,)
+    """
 
     germs: Array
     middle: Array
     weights: Array
     length: float
+    left_out: Array
 
     def __call__(self, germs: Array) -> Array:
         """The answers at these germs."""
@@ -60,7 +64,7 @@ def kriging(study: Study) -> Found:
     for length in LENGTHS:
         inverse = np.linalg.inv(_correlation(germs, germs, length) + NUGGET * np.eye(len(germs)))
         weights = inverse @ (values - middle)
-        left_out = float(np.sqrt(np.mean((weights / np.diag(inverse)[:, None]) ** 2)))
-        if best is None or left_out < error:
-            best, error = Process(germs, middle, weights, length), left_out
+        missed = (weights / np.diag(inverse)[:, None]) ** 2
+        if best is None or missed.mean() < error:
+            best, error = Process(germs, middle, weights, length, np.sqrt(missed.mean(axis=0))), missed.mean()
     return Found(f"kriging through {len(germs)} runs", best)
