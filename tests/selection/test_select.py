@@ -17,7 +17,6 @@ from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
 from shoal.selection import select
 from shoal.selection.climb import climb, settled
-from shoal.selection.folded import folded
 from shoal.selection.levels import LADDERS, RIGID, below, cable, quintic
 from shoal.selection.prior import estimate
 from shoal.selection.run import Rung, distance
@@ -144,62 +143,6 @@ def test_a_torque_that_folds_a_rod_ends_the_search() -> None:
     assert not found.met
     assert found.trajectory.message.startswith("the torque load bends A to a strain of 3.1 at its surface")
     assert not any("reissner" in rung.name for rung in found.rungs)
-
-
-@pytest.mark.parametrize(("torque", "strain"), [(0.9, None), (3.0, 3.0)])
-def test_a_torque_under_which_no_theory_holds_is_named(torque: float, strain: float | None) -> None:
-    """The end that it bends alone has the curvature M/(E I), and half a height further out the strain M h/(2 E I)."""
-    scene = draw(79).scene
-    rod = scene.bodies["A"]
-    half = torque * 2 * rod.youngs_modulus * rod.width * rod.height**3 / 12 / rod.height
-    scene = scene.with_values({"loads.load.torque": half})
-    said = folded(scene, ["A"])
-    assert said == "" if strain is None else f"load bends A to a strain of {strain:g} " in said
-
-
-@pytest.mark.parametrize(
-    ("others", "strain"),
-    [
-        ({"back": {"kind": "torque", "at": {"body": "A", "point": "end"}, "torque": -2.5}}, None),
-        ({"more": {"kind": "torque", "at": {"body": "A", "point": "end"}, "torque": 1.0}}, 4.0),
-        (
-            {
-                "taken": {
-                    "kind": "torque",
-                    "at": {"body": "ground", "point": [0.0, 0.0]},
-                    "torque": -1.0,
-                    "reaction": {"body": "A", "point": "end"},
-                }
-            },
-            4.0,
-        ),
-        ({"late": {"kind": "torque", "at": {"body": "A", "point": "end"}, "torque": "-2.5*sin(t)"}}, None),
-        (
-            {
-                "held": {
-                    "kind": "torsion-spring",
-                    "first": {"body": "ground", "point": [0.0, 0.0]},
-                    "second": {"body": "A", "point": "end"},
-                    "stiffness": 1.0,
-                }
-            },
-            None,
-        ),
-    ],
-)
-def test_what_acts_at_one_end_is_told_together(others: dict, strain: float | None) -> None:
-    """Torques in units of that which bends the end to a strain of 1, of which the first is three."""
-    scene = draw(79).scene
-    rod = scene.bodies["A"]
-    unit = 2 * rod.youngs_modulus * rod.width * rod.height**3 / 12 / rod.height
-    data = scene.model_dump(mode="json")
-    data["loads"]["load"]["torque"] = 3 * unit
-    for name, load in others.items():
-        if isinstance(load.get("torque"), float):
-            load = load | {"torque": load["torque"] * unit}
-        data["loads"][name] = load
-    said = folded(Scene.parse(data), ["A"])
-    assert said == "" if strain is None else f"to a strain of {strain:g} " in said
 
 
 def test_the_way_down_takes_a_share_of_the_work_of_the_climb(monkeypatch: pytest.MonkeyPatch) -> None:

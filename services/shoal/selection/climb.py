@@ -11,7 +11,8 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.simulate import STEP_MARGIN, stable_step
 from shoal.scene import Scene
-from shoal.selection.levels import FRAMED, REFINEMENTS, Level, Levels, apply, coarsest, words
+from shoal.selection.beyond import torn
+from shoal.selection.levels import FRAMED, REFINEMENTS, SHEARS, Level, Levels, apply, coarsest, words
 from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import INTEGRATOR, Forecast
 from shoal.trajectory import Array
@@ -28,6 +29,8 @@ AGREE = 0.5
 """Two neighbours agree when they are closer than this fraction of the tolerance."""
 FINE, GAIN = 16, 3.0
 """From so many elements on a doubling that gains less than this factor is little."""
+FOLLOWED = 64
+"""Elements that follow a rod so far as its strains go."""
 HALF = 0.5 * STEP_MARGIN
 """A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
 SLOW = 1.25
@@ -99,7 +102,11 @@ class Runs:
                 self.progress(f"run {words(levels)}, about {seconds:.0f} s")
             self.work += foreseen
             work = min(foreseen, self.forecast.work(levels))
-            rung = Rung(dict(levels), scene, run(scene, self.times), work, role=role)
+            shears = role == YARDSTICK and any(level.element == SHEARS for level in levels.values())
+            trajectory = run(scene, self.times, whole=shears)
+            rung = Rung(dict(levels), scene, replace(trajectory, states=None), work, role=role)
+            if shears:
+                rung.torn = torn(scene, trajectory.states, self.times)
             self.add(rung)
             self._done[key] = rung
         return self._done[key]
@@ -130,7 +137,8 @@ def climb(
     """Refine the rods until two neighbours agree; else say why that was not to be had.
 
     impatient: another theory is left; so also where runs are rejected, or a doubling of the elements gains little, as
-    where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one.
+    where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one, but for rods that two
+    meshes strain beyond what any theory of rods says.
     """
     count, growing, rejected = {rod: runs.fewest[rod] for rod in rods}, rods, 0
     gaps: list[float] = []
@@ -147,6 +155,8 @@ def climb(
         rejected = 0 if fine.ok else rejected + 1
         if impatient and rejected == REJECTED:
             return f"the runs are rejected: {fine.trajectory.message}"
+        if coarse.torn and fine.torn and max(base.values()) >= FOLLOWED:
+            return fine.torn
         gaps.append(distance(coarse.trajectory, fine.trajectory))
         coarse.error = gaps[-1]
         error = left(gaps, fine.levels)[0] + sum(behind.values())

@@ -20,7 +20,10 @@ CLOSE = 1e-8
 
 @dataclass
 class Rung:
-    """A model that was run. error: estimated distance from the truth at the markers [m], nan if unknown."""
+    """A model that was run.
+
+    error: estimated distance from the truth at the markers [m], nan if unknown; torn: see `beyond.torn`, of yardsticks
+    """
 
     levels: dict[str, Level]
     scene: Scene
@@ -29,6 +32,7 @@ class Rung:
     error: float = np.nan
     role: str = ""
     tolerance: float = field(default=np.nan)
+    torn: str = ""
 
     @property
     def ok(self) -> bool:
@@ -61,9 +65,9 @@ def rigid_scene(scene: Scene, levels: Levels, tolerance: float) -> Scene:
     return apply(scene, levels).with_values({"solver.integrator": "auto", **values})
 
 
-def run(scene: Scene, times: Array) -> Trajectory:
-    """The motion. Raises InputError."""
-    return GaussEngine().simulate(scene, times)
+def run(scene: Scene, times: Array, *, whole: bool = False) -> Trajectory:
+    """The motion; whole: with its states. Raises InputError."""
+    return GaussEngine().simulate(scene, times, whole=whole)
 
 
 def distance(one: Trajectory, other: Trajectory) -> float:

@@ -14,8 +14,8 @@ from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import left_out, softer
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Rod, Scene
+from shoal.selection.beyond import folded
 from shoal.selection.climb import PATIENCE, YARDSTICK, Progress, Runs, climb, settled
-from shoal.selection.folded import folded
 from shoal.selection.levels import SHEARS, SLENDER, Levels, open_rods
 from shoal.selection.prior import Prior, estimate
 from shoal.selection.run import Rung, distance, fewest, rigid_scene, run
