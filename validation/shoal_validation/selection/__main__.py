@@ -48,7 +48,7 @@ def main() -> None:
     asked.out.mkdir(parents=True, exist_ok=True)
     record = asked.out / "selection.json"
     seeds = range(asked.first, asked.first + asked.machines)
-    cases = [case for case in load(record) if case.seed in seeds] if asked.resume else []
+    cases = [case for case in load(record) if case.seed in seeds] if asked.resume and record.exists() else []
     left = [seed for seed in seeds if seed not in {case.seed for case in cases}]
     for case in cases_of(left, asked.patience):
         cases.append(case)
