@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -39,16 +38,11 @@ class Expansion:
 
     def __call__(self, germs: Array) -> Array:
         """The answers at these germs."""
-        return np.asarray(self.inputs.basis(germs, self.terms) @ self.coefficients)
+        return np.asarray(self.inputs.products(germs, self.terms).T @ self.coefficients)
 
     def each(self, germs: Array, columns: IntArray) -> Array:
         """One column at each germ, (places,): as cheap as one answer instead of all."""
-        return np.asarray(np.einsum("ij,ij->i", self.inputs.basis(germs, self.terms), self._by_column[columns]))
-
-    @cached_property
-    def _by_column(self) -> Array:
-        """Coefficients, (columns, terms)."""
-        return np.ascontiguousarray(self.coefficients.T)
+        return np.asarray(np.einsum("ji,ji->i", self.inputs.products(germs, self.terms), self.coefficients[:, columns]))
 
     def where(self, better: BoolArray, other: Expansion) -> Expansion:
         """This one in some columns, (columns,), the other elsewhere; without terms that no column has."""

@@ -218,18 +218,23 @@ class Inputs:
 
     def basis(self, germs: Array, terms: Terms) -> Array:
         """Every product of polynomials at every germ, (runs, terms)."""
-        highest = terms.max(axis=0)
-        found = np.ones((len(terms), len(germs)))
-        # Parameters with the same polynomials are evaluated together, and terms are rows, which is faster.
+        return np.ascontiguousarray(self.products(germs, terms).T)
+
+    def products(self, germs: Array, terms: Terms) -> Array:
+        """The same the other way round, (terms, runs), which is faster."""
+        highest, found = terms.max(axis=0), None
+        # Parameters with the same polynomials are evaluated together.
         for recurrence, which in self._alike:
             degrees = highest[which]
             degree = int(degrees.max())
             if degree:
                 told = recurrence.rows(np.ascontiguousarray(germs[:, which].T), degree)
                 for row, k in enumerate(which):
-                    if degrees[row]:
+                    if degrees[row] and found is None:
+                        found = told[terms[:, k], row]
+                    elif degrees[row]:
                         found *= told[terms[:, k], row]
-        return np.ascontiguousarray(found.T)
+        return np.ones((len(terms), len(germs))) if found is None else found
 
     @cached_property
     def _alike(self) -> list[tuple[Recurrence, list[int]]]:

@@ -31,11 +31,12 @@ class Recurrence:
     def rows(self, s: Array, degree: int) -> Array:
         """The same at places of any shape, (degree + 1, ...)."""
         found = np.ones((degree + 1, *np.shape(s)))
+        a, roots = self.a.tolist(), np.sqrt(self.b).tolist()
         for k in range(degree):
-            now = (s - self.a[k]) * found[k]
+            now = np.multiply(s - a[k] if a[k] else s, found[k], out=found[k + 1])
             if k:
-                now -= np.sqrt(self.b[k]) * found[k - 1]
-            np.divide(now, np.sqrt(self.b[k + 1]), out=found[k + 1])
+                now -= roots[k] * found[k - 1]
+            now /= roots[k + 1]
         return found
 
 

@@ -29,8 +29,8 @@ AGREE = 0.5
 """Two neighbours agree when they are closer than this fraction of the tolerance."""
 FINE, GAIN = 16, 3.0
 """From so many elements on a doubling that gains less than this factor is little."""
-FOLLOWED = 64
-"""Elements that follow a rod so far as its strains go."""
+FOLLOWED, FAR = 64, 10.0
+"""Meshes of so many elements that differ by so many tolerances and strain a rod beyond all theory end the climb."""
 HALF = 0.5 * STEP_MARGIN
 """A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
 SLOW = 1.25
@@ -137,8 +137,7 @@ def climb(
     """Refine the rods until two neighbours agree; else say why that was not to be had.
 
     impatient: another theory is left; so also where runs are rejected, or a doubling of the elements gains little, as
-    where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one, but for rods that two
-    meshes strain beyond what any theory of rods says.
+    where no limit is near. Else a kink that coarse meshes cannot follow may be met by a fine one; see `FOLLOWED`.
     """
     count, growing, rejected = {rod: runs.fewest[rod] for rod in rods}, rods, 0
     gaps: list[float] = []
@@ -155,9 +154,9 @@ def climb(
         rejected = 0 if fine.ok else rejected + 1
         if impatient and rejected == REJECTED:
             return f"the runs are rejected: {fine.trajectory.message}"
-        if coarse.torn and fine.torn and max(base.values()) >= FOLLOWED:
-            return fine.torn
         gaps.append(distance(coarse.trajectory, fine.trajectory))
+        if coarse.torn and fine.torn and max(base.values()) >= FOLLOWED and gaps[-1] > FAR * tolerance:
+            return fine.torn
         coarse.error = gaps[-1]
         error = left(gaps, fine.levels)[0] + sum(behind.values())
         if max(error, gaps[-1]) <= AGREE * tolerance:

@@ -273,13 +273,14 @@ def _flexible(
         refined[-1].error = left + known
         return refined[-1], why if refined[-1].error <= task.tolerance else yardstick
     yardstick.error += known
+    beyond = f"; but {yardstick.rung.torn}" if yardstick.rung.torn else ""
     if not task.trimmed:
         yardstick.rung.error = yardstick.error
-        return yardstick.rung, "the finest model"
+        return yardstick.rung, f"the finest model{beyond}"
     chosen = trim(runs, yardstick, rods, task.tolerance)
     if chosen is None:
-        return yardstick.rung, "no model that was run is within the tolerance"
-    return chosen, f"the yardstick, {yardstick.rung.name}, is {chosen.error - yardstick.error:.1g} m away"
+        return yardstick.rung, f"no model that was run is within the tolerance{beyond}"
+    return chosen, f"the yardstick, {yardstick.rung.name}, is {chosen.error - yardstick.error:.1g} m away{beyond}"
 
 
 def _grid(asked: Array) -> Array:

@@ -8,6 +8,7 @@ elements for chains.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -49,7 +50,15 @@ class Pattern(NamedTuple):
 
 
 def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dict[tuple[int, int], int]]:
-    """Pattern of the factor of a matrix with these entries, and the slot of each (row, column), row >= column."""
+    """Pattern of the factor of a matrix with these entries, and the slot of each (row, column), row >= column.
+
+    Both are shared by all that ask for the same: they are not to be changed.
+    """
+    return _analysed(size, frozenset(entries))
+
+
+@lru_cache(maxsize=16)
+def _analysed(size: int, entries: frozenset[tuple[int, int]]) -> tuple[Pattern, dict[tuple[int, int], int]]:
     below: list[set[int]] = [set() for _ in range(size)]
     for i, j in entries:
         if i != j:
