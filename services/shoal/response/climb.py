@@ -12,9 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from shoal.response.inputs import IntArray
 from shoal.trajectory import Array
-
-IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 DIFFERENCE = 1e-6
 """Of germs, for slopes."""

@@ -14,8 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from shoal.response.expansion import Expansion
-from shoal.response.extremes import IntArray
-from shoal.response.inputs import BoolArray, Inputs
+from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.polynomials import Terms
 from shoal.trajectory import Array
 

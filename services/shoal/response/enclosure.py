@@ -15,7 +15,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from shoal.response.expansion import Expansion
-from shoal.response.extremes import Extremes, IntArray, Surrogate, extremes, in_parts, places
+from shoal.response.extremes import Extremes, Surrogate, extremes, in_parts, places
+from shoal.response.inputs import IntArray
 from shoal.response.study import SAFETY, Enclosure, Looked, Study
 from shoal.trajectory import Array
 

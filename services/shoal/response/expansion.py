@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from shoal.response.inputs import BoolArray, Inputs
+from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.polynomials import Terms
 from shoal.trajectory import Array
-
-IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 RANK = 1e-13
 """A direction that runs tell of less than this is left out."""
@@ -42,7 +41,17 @@ class Expansion:
 
     def each(self, germs: Array, columns: IntArray) -> Array:
         """One column at each germ, (places,): as cheap as one answer instead of all."""
-        return np.asarray(np.einsum("ji,ji->i", self.inputs.products(germs, self.terms), self.coefficients[:, columns]))
+        # Where nobody searches, the compiler is not loaded.
+        from shoal.response.one_column import one_column
+
+        highest, terms, coefficients = self._laid
+        return np.asarray(one_column(self.inputs.table(germs, highest), terms, coefficients, columns))
+
+    @cached_property
+    def _laid(self) -> tuple[IntArray, Terms, Array]:
+        """Highest degrees, (parameters,), terms and coefficients, as the compiled kernel wants them."""
+        highest: IntArray = self.terms.max(axis=0)
+        return highest, np.ascontiguousarray(self.terms), np.ascontiguousarray(self.coefficients)
 
     def where(self, better: BoolArray, other: Expansion) -> Expansion:
         """This one in some columns, (columns,), the other elsewhere; without terms that no column has."""

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.stats import qmc
 
 from shoal.response.climb import Objective, climb_down
+from shoal.response.inputs import IntArray
 from shoal.response.valleys import beside
 from shoal.trajectory import Array
 
-IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 SCANNED, FEWER = 2048, 512
 """Quasi-random places that are looked at within the box, and as many on its faces, beside corners and a grid; while a
 study goes on, fewer and no grid."""
@@ -26,7 +26,7 @@ GRID = {1: 1001, 2: 41, 3: 15, 4: 7}
 """Places along each axis of the grid, by the number of parameters."""
 HELD, AT_HAND = 4_000_000, 2**17
 """Numbers of a surrogate that are asked for and that are compared at once."""
-PLACES = 512
+PLACES = 2048
 """At once, where each is asked for one column."""
 STEPS = 0.25, 0.1
 """Of the search along each axis from the best place that was scanned, before it goes downhill by slopes."""

@@ -18,6 +18,7 @@ from shoal.scene import expression
 from shoal.trajectory import Array
 
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 Correlations = Mapping[tuple[str, str], float]
 """Of the normal variables behind two parameters (a Gaussian copula), by their names."""
 
@@ -222,19 +223,27 @@ class Inputs:
 
     def products(self, germs: Array, terms: Terms) -> Array:
         """The same the other way round, (terms, runs), which is faster."""
-        highest, found = terms.max(axis=0), None
-        # Parameters with the same polynomials are evaluated together.
-        for recurrence, which in self._alike:
-            degrees = highest[which]
-            degree = int(degrees.max())
-            if degree:
-                told = recurrence.rows(np.ascontiguousarray(germs[:, which].T), degree)
-                for row, k in enumerate(which):
-                    if degrees[row] and found is None:
-                        found = told[terms[:, k], row]
-                    elif degrees[row]:
-                        found *= told[terms[:, k], row]
+        highest = terms.max(axis=0)
+        told, found = self.table(germs, highest), None
+        for k in np.flatnonzero(highest).tolist():
+            if found is None:
+                found = told[terms[:, k], k]
+            else:
+                found *= told[terms[:, k], k]
         return np.ones((len(terms), len(germs))) if found is None else found
+
+    def table(self, germs: Array, highest: IntArray) -> Array:
+        """Polynomials of each parameter up to its highest degree, (degrees, parameters, runs); higher ones are 1."""
+        rows = [
+            (which, recurrence.rows(np.ascontiguousarray(germs[:, which].T), int(highest[which].max())))
+            for recurrence, which in self._alike
+        ]
+        if len(rows) == 1:
+            return rows[0][1]
+        found = np.ones((int(highest.max()) + 1, len(self), len(germs)))
+        for which, told in rows:
+            found[: len(told), which] = told
+        return found
 
     @cached_property
     def _alike(self) -> list[tuple[Recurrence, list[int]]]:

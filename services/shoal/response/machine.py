@@ -10,8 +10,7 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.errors import InputError, UnstableStepError
-from shoal.response.extremes import IntArray
-from shoal.response.inputs import BoolArray
+from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.kept import Keep
 from shoal.response.runs import Answers
 from shoal.scene import Scene

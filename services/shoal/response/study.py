@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.response.extremes import IntArray, Surrogate
-from shoal.response.inputs import BoolArray, Inputs
+from shoal.response.extremes import Surrogate
+from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.polynomials import size
 from shoal.response.runs import Model, Runs
 from shoal.trajectory import Array

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shoal.response.climb import IntArray, Objective, climb_down
+from shoal.response.climb import Objective, climb_down
+from shoal.response.inputs import IntArray
 from shoal.trajectory import Array
 
 LINE = 129

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.response.extremes import IntArray
+from shoal.response.inputs import IntArray
 from shoal.trajectory import Array
 
 CONFIDENCE = 1.959963984540054

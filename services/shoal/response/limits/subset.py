@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.response.extremes import IntArray
-from shoal.response.inputs import BoolArray
+from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.limits.estimate import Estimate, first_passages
 from shoal.response.limits.margins import Margins, least
 from shoal.response.runs import TooManyRunsError

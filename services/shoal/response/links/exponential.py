@@ -10,9 +10,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from shoal.response.expansion import Expansion
-from shoal.response.extremes import IntArray
 from shoal.response.indices import designs, jansen
-from shoal.response.inputs import BoolArray, inside
+from shoal.response.inputs import BoolArray, IntArray, inside
 from shoal.response.links.combined import REACH, nodes
 from shoal.response.links.link import Fitted, of, some
 from shoal.response.study import Study

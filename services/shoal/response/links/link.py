@@ -9,8 +9,7 @@ from typing import Protocol, Self
 import numpy as np
 
 from shoal.response.expansion import Expansion
-from shoal.response.extremes import IntArray
-from shoal.response.inputs import BoolArray, Inputs
+from shoal.response.inputs import BoolArray, Inputs, IntArray
 from shoal.response.runs import Runs
 from shoal.response.study import Study
 from shoal.trajectory import Array

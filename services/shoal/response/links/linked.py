@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shoal.response.expansion import Expansion, unexplained
-from shoal.response.extremes import IntArray
-from shoal.response.inputs import BoolArray
+from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.links.exponential import exponentials
 from shoal.response.links.link import CLEARLY, Fitted, Link, some
 from shoal.response.links.ridge import ridges

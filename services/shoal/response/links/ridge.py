@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shoal.response.expansion import Expansion, fit
-from shoal.response.extremes import IntArray
 from shoal.response.indices import designs, jansen
-from shoal.response.inputs import BoolArray, Inputs, Parameter
+from shoal.response.inputs import BoolArray, Inputs, IntArray, Parameter
 from shoal.response.links.combined import combined
 from shoal.response.links.link import CLEARLY, Fitted, of, some
 from shoal.response.marginals import Marginal, Normal

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.response.extremes import IntArray
+from shoal.response.inputs import IntArray
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 

@@ -15,7 +15,8 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.response.course import UnsuitableError, Watch, refuse_without_course, watch
 from shoal.response.design import box_design
-from shoal.response.extremes import IntArray, Surrogate
+from shoal.response.extremes import Surrogate
+from shoal.response.inputs import IntArray
 from shoal.response.polynomials import Terms, size, total_degree
 from shoal.response.runs import TooManyRunsError
 from shoal.response.study import FINE_GAP, SAFETY, Found, Study

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 
-from shoal.response.extremes import IntArray
+from shoal.response.inputs import IntArray
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array
 

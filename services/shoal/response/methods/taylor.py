@@ -16,7 +16,7 @@ import numpy as np
 
 from shoal.errors import ComputationError
 from shoal.response.expansion import Expansion, fit
-from shoal.response.extremes import IntArray
+from shoal.response.inputs import IntArray
 from shoal.response.polynomials import total_degree
 from shoal.response.study import Found, Study
 from shoal.trajectory import Array

@@ -16,8 +16,7 @@ import numpy as np
 
 from shoal.response.course import UnsuitableError, Watch, spline, turning_points
 from shoal.response.expansion import fit
-from shoal.response.extremes import IntArray
-from shoal.response.inputs import Inputs
+from shoal.response.inputs import Inputs, IntArray
 from shoal.response.methods.long_time import TooSlowError, at_every_instant, stated
 from shoal.response.polynomials import Terms
 from shoal.response.study import Found, Study

@@ -15,8 +15,7 @@ from scipy.signal import windows
 
 from shoal.response.course import UnsuitableError, Watch
 from shoal.response.expansion import fit
-from shoal.response.extremes import IntArray
-from shoal.response.inputs import Inputs
+from shoal.response.inputs import Inputs, IntArray
 from shoal.response.methods.long_time import at_every_instant, stated
 from shoal.response.polynomials import Terms
 from shoal.response.study import Found, Study
