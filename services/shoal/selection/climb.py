@@ -29,7 +29,7 @@ AGREE = 0.5
 """Two neighbours agree when they are closer than this fraction of the tolerance."""
 FINE, GAIN = 16, 3.0
 """From so many elements on a doubling that gains less than this factor is little."""
-FOLLOWED, FAR = 64, 10.0
+FOLLOWED, FAR = 64, 4.0
 """Meshes of so many elements that differ by so many tolerances and strain a rod beyond all theory end the climb."""
 HALF = 0.5 * STEP_MARGIN
 """A yardstick takes half the stable step, so that its time error is a quarter of its neighbours'."""
