@@ -54,7 +54,7 @@ def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dic
 
     Both are shared by all that ask for the same: they are not to be changed.
     """
-    return _analysed(size, frozenset(entries))
+    return _analysed(size, frozenset((i, j) for i, j in entries))
 
 
 @lru_cache(maxsize=16)
