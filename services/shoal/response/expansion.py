@@ -37,7 +37,7 @@ class Expansion:
 
     def __call__(self, germs: Array) -> Array:
         """The answers at these germs."""
-        return np.asarray(self.inputs.products(germs, self.terms).T @ self.coefficients)
+        return np.asarray(self.inputs.basis(germs, self.terms) @ self.coefficients)
 
     def each(self, germs: Array, columns: IntArray) -> Array:
         """One column at each germ, (places,): as cheap as one answer instead of all."""

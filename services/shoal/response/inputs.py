@@ -219,21 +219,18 @@ class Inputs:
 
     def basis(self, germs: Array, terms: Terms) -> Array:
         """Every product of polynomials at every germ, (runs, terms)."""
-        return np.ascontiguousarray(self.products(germs, terms).T)
-
-    def products(self, germs: Array, terms: Terms) -> Array:
-        """The same the other way round, (terms, runs), which is faster."""
         highest = terms.max(axis=0)
-        told, found = self.table(germs, highest), None
+        told, found = self.table(germs, highest), np.ones((len(terms), len(germs)))
+        # Terms are rows, which is faster.
         for k in np.flatnonzero(highest).tolist():
-            if found is None:
-                found = told[terms[:, k], k]
-            else:
-                found *= told[terms[:, k], k]
-        return np.ones((len(terms), len(germs))) if found is None else found
+            found *= told[terms[:, k], k]
+        return np.ascontiguousarray(found.T)
 
     def table(self, germs: Array, highest: IntArray) -> Array:
-        """Polynomials of each parameter up to its highest degree, (degrees, parameters, runs); higher ones are 1."""
+        """Polynomials of each parameter up to its highest degree at least, (degrees, parameters, runs).
+
+        Parameters with the same polynomials are evaluated together.
+        """
         rows = [
             (which, recurrence.rows(np.ascontiguousarray(germs[:, which].T), int(highest[which].max())))
             for recurrence, which in self._alike

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
@@ -69,11 +69,11 @@ def _at(load: Load, body: str, end: str) -> float:
     return load.torque.number * sum(sign for side, sign in here if side and (side.body, side.point) == (body, end))
 
 
-def torn(scene: Scene, states: States, times: Array) -> str:
+def torn(scene: Scene, states: States, times: Array, believed: Callable[[float], bool] = lambda _: True) -> str:
     """Which rod with shear a motion strains too much, and when first, or nothing.
 
     By the strain of bending at the surface of an element and by the shear at its nodes; curved rods are not looked at.
-    times: of the states [s], (samples,)
+    times: of the states [s], (samples,); believed: whether the motion may be believed up to a time [s]
     """
     worst: tuple[float, str, str] | None = None
     for name, frame in states.model.frames.items():
@@ -84,7 +84,7 @@ def torn(scene: Scene, states: States, times: Array) -> str:
                 if len(late) and (worst is None or times[late[0]] < worst[0]):
                     first = late[0]
                     worst = float(times[first]), name, f"{what} of {strain[first]:.2g}"
-    if worst is None:
+    if worst is None or not believed(worst[0]):
         return ""
     when, name, what = worst
     return f"{name} has a {what} after {when:.3g} s, and no theory of rods holds beyond {BEYOND:g}"

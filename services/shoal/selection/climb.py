@@ -106,7 +106,14 @@ class Runs:
             trajectory = run(scene, self.times, whole=shears)
             rung = Rung(dict(levels), scene, replace(trajectory, states=None), work, role=role)
             if shears:
-                rung.torn = torn(scene, trajectory.states, self.times)
+                # A run that is rejected at its end is believed where it is accepted up to there: meshes that are too
+                # coarse lose their energy, and what they are strained by then is nothing of the rod's.
+                rung.torn = torn(
+                    scene,
+                    trajectory.states,
+                    self.times,
+                    lambda until: rung.ok or run(scene, self.times[self.times <= until]).ok,
+                )
             self.add(rung)
             self._done[key] = rung
         return self._done[key]

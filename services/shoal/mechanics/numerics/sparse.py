@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     import scipy.sparse
 
 
+KEPT = 500
+"""Rows of a matrix up to which its pattern is kept: runs side by side ask for it again, and it takes little memory."""
+
+
 class Pattern(NamedTuple):
     """Lower triangle by columns, fill included. Slots 0..n-1 are the diagonal, then the columns in order.
 
@@ -52,13 +56,19 @@ class Pattern(NamedTuple):
 def analyse(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dict[tuple[int, int], int]]:
     """Pattern of the factor of a matrix with these entries, and the slot of each (row, column), row >= column.
 
-    Both are shared by all that ask for the same: they are not to be changed.
+    Small ones are kept and shared by all that ask for the same: they are not to be changed.
     """
-    return _analysed(size, frozenset((i, j) for i, j in entries))
+    if size > KEPT:
+        return _analysed(size, entries)
+    return _kept(size, frozenset((i, j) for i, j in entries))
 
 
 @lru_cache(maxsize=16)
-def _analysed(size: int, entries: frozenset[tuple[int, int]]) -> tuple[Pattern, dict[tuple[int, int], int]]:
+def _kept(size: int, entries: frozenset[tuple[int, int]]) -> tuple[Pattern, dict[tuple[int, int], int]]:
+    return _analysed(size, entries)
+
+
+def _analysed(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, dict[tuple[int, int], int]]:
     below: list[set[int]] = [set() for _ in range(size)]
     for i, j in entries:
         if i != j:
