@@ -125,12 +125,25 @@ def test_bending_is_that_of_the_surface(strain: float) -> None:
     assert bool(torn(scene, states, np.array([0.0, 0.3]))) == (strain > 1)
 
 
+def test_what_a_motion_that_is_not_believed_is_strained_by_is_nothing_of_the_rods() -> None:
+    """Asked of the time when the strain is too large first, and only then."""
+    scene, states = _bent(0.0, 1.5)
+    asked = list[float]()
+    assert torn(scene, states, np.array([0.0, 0.3]), lambda until: bool(asked.append(until))) == ""
+    assert asked == [0.3]
+    scene, states = _bent(0.0, 0.5)
+    assert torn(scene, states, np.array([0.0, 0.3]), lambda until: bool(asked.append(until))) == ""
+    assert asked == [0.3]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "said"), [(25, "A has a strain of shear"), (86, "B has a strain of shear")])
-def test_runs_that_tear_a_rod_end_the_search(seed: int, said: str) -> None:
-    """Instead of 2048 elements that do not settle it."""
+@pytest.mark.parametrize(
+    ("seed", "said", "elements"), [(25, "A has a strain of shear", 128), (86, "B has a strain of shear", 256)]
+)
+def test_runs_that_tear_a_rod_end_the_search(seed: int, said: str, elements: int) -> None:
+    """Instead of 2048 elements that do not settle it; 64 elements of 86 are off in energy before they tear a rod."""
     machine = draw(seed)
     found = select(machine.scene, machine.tolerance)
     assert not found.met
     assert said in found.reason
-    assert max(rod.elements for rung in found.rungs for rod in rung.levels.values()) == 128
+    assert max(rod.elements for rung in found.rungs for rod in rung.levels.values()) == elements
