@@ -8,14 +8,16 @@ from typing import Any
 
 from matplotlib.figure import Figure
 from shoal.engines.compare import Comparison
+from shoal.errors import ComputationError, InputError
 from shoal.identification import Estimate, Measurement, load_problem
-from shoal.pictures import titles
+from shoal.pictures import simulation, titles
 from shoal.pictures.answer import Answer
 from shoal.pictures.archive import archived
 from shoal.pictures.convergence import convergence
 from shoal.pictures.engines import engines
 from shoal.pictures.files import draws, moving_picture
 from shoal.pictures.gallery import gallery, motions
+from shoal.pictures.ladder import ladder
 from shoal.pictures.mesh_error import mesh_error
 from shoal.pictures.motion import motion
 from shoal.pictures.overlay import follows, overlay
@@ -27,7 +29,10 @@ from shoal.pictures.study import study
 from shoal.pictures.style import png, svg
 from shoal.pictures.uncertainty import uncertainty
 from shoal.response import Response
+from shoal.scene import Scene
 from shoal.scene.edited import as_yaml
+from shoal.selection import Selection
+from shoal.trajectory import Trajectory
 
 from shoal_flows.jobs import Cell, Fit, fit
 from shoal_flows.jobs import responded as respond
@@ -75,6 +80,17 @@ def responded(study: str, values: Mapping[str, Any]) -> tuple[Response, dict[str
     for k, case in enumerate(cases):
         album[f"worst-{k + 1}.yaml"] = as_yaml(case.scene.model_dump(mode="json", exclude_unset=True)).encode()
     return found, album
+
+
+def moved(trajectory: Trajectory, scene: Scene, selection: Selection | None = None) -> dict[str, bytes]:
+    """The page of a run, which moves, and its pictures, by the name of their file; of what cannot move the ladder."""
+    try:
+        moving = simulation.moved(trajectory, scene)
+    except (InputError, ComputationError):
+        return {} if selection is None else {"ladder.png": png(ladder(selection))}
+    drawn = simulation.drawn(scene, moving, selection)
+    page = simulation.page(trajectory, scene, moving, drawn, selection)
+    return {"motion.html": page.encode(), **{f"{one.name}.png": png(one.figure) for one in drawn}}
 
 
 def draw_trajectory(fits: Sequence[Fit], name: str) -> Picture:

@@ -282,8 +282,8 @@ def modal() -> str:
 @pytest.mark.parametrize(
     ("flow", "asked", "artifacts"),
     [
-        ("forward", {}, {"trajectory.csv", "scene.yaml"}),
-        ("select", {"tolerance": "1e-3"}, {"trajectory.csv", "ladder.png"}),
+        ("forward", {}, {"trajectory.csv", "scene.yaml", "motion.html", "poses.png", "paths.png"}),
+        ("select", {"tolerance": "1e-3"}, {"trajectory.csv", "ladder.png", "motion.html", "poses.png"}),
         ("statics", {}, {"equilibrium.json"}),
         ("compare", {}, {"engines.png", "differences.json"}),
         ("sweep", {"vary": "{gravity.1: [-1, 0, 2]}", "time": "0.01"}, {"sweep.csv"}),

@@ -64,7 +64,8 @@ def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene,
     """One motion, with the id of its run."""
     with events.work(f"{inputs.title(scene)} on {engine}"):
         wanted, motion = workers.run(jobs.simulated, scene, engine, values)
-        return wanted, motion, tracked.log_forward(wanted, motion)
+        album = workers.run(pictures.moved, motion, wanted)
+        return wanted, motion, tracked.log_forward(wanted, motion, album)
 
 
 @task(task_run_name="statics", cache_policy=NO_CACHE)
@@ -80,7 +81,8 @@ def select(scene: str, tolerance: float, values: Mapping[str, Any]) -> tuple[Sel
     """The cheapest model that meets a tolerance, with the id of its run."""
     with events.work(f"{inputs.title(scene)} within {tolerance:g} m"):
         found = workers.run(notebook.select, scene, tolerance, values=values)
-        return found, analyses.log_selection(found)
+        album = workers.run(pictures.moved, found.trajectory, found.chosen.scene, found)
+        return found, analyses.log_selection(found, album)
 
 
 @task(task_run_name="design", cache_policy=NO_CACHE)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.design import design as draw_design
-from shoal.pictures.ladder import ladder
 from shoal.pictures.style import png
 from shoal.selection import Selection
 from shoal.trajectory import json_text
@@ -32,8 +33,10 @@ def log_statics(found: Equilibrium) -> str:
         return run.run_id
 
 
-def log_selection(found: Selection) -> str:
-    """One run with the motion of the chosen model, and the ladder that led there; returns its id."""
+def log_selection(found: Selection, album: Mapping[str, bytes]) -> str:
+    """One run with the motion of the chosen model, and the ladder that led there; album: pictures by the name of their
+    file. Returns its id.
+    """
     scene = found.chosen.scene
     tags = {"kind": "selection", "scene": scene.name, "verdict": "met" if found.met else "not met"}
     with open_run("Selection", f"{scene.name} · select", description=scene.description, tags=tags) as run:
@@ -42,7 +45,8 @@ def log_selection(found: Selection) -> str:
         run.metric("final/estimated_error", found.chosen.error)
         run.metric("final/rungs", len(found.rungs))
         run.text(json_text(found.to_json(), indent=1), "selection.json")
-        run.picture(png(ladder(found)), "ladder.png")
+        for file, content in album.items():
+            run.picture(content, file)
         return run.run_id
 
 

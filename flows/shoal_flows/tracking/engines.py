@@ -40,8 +40,8 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
         return study.run_id
 
 
-def log_forward(scene: Scene, motion: Trajectory) -> str:
-    """One run; returns its id."""
+def log_forward(scene: Scene, motion: Trajectory, album: Mapping[str, bytes]) -> str:
+    """One run; album: pictures by the name of their file. Returns its id."""
     tags = {"kind": "forward", "scene": scene.name}
     name = f"{scene.name} · {motion.engine}"
     with open_run("Forward", name, description=scene.description, tags=tags) as run:
@@ -49,6 +49,8 @@ def log_forward(scene: Scene, motion: Trajectory) -> str:
         for name, error in motion.model.get("verification", {}).items():
             if name.endswith("_error") and error is not None:
                 run.metric(f"final/{name}", error)
+        for file, content in album.items():
+            run.picture(content, file)
         return run.run_id
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -122,13 +124,17 @@ def windows(
 
 
 def times_list(context: click.Context, parameter: click.Parameter, text: str | None) -> Times:
-    """T,T,... as numbers."""
+    """T,T,... as numbers that increase from 0 on."""
     if text is None:
         return None
     try:
-        return [float(part) for part in text.split(",")]
+        times = [float(part) for part in text.split(",")]
     except ValueError:
-        raise click.BadParameter(f"{text!r} is not a list of times in s, such as 0.1,0.2,0.5") from None
+        times = []
+    # Not a number is at no place of an order.
+    if not times or not times[0] >= 0.0 or not all(a < b for a, b in pairwise([*times, math.inf])):
+        raise click.BadParameter(f"{text!r} is not a list of times in s that increase from 0 on, such as 0.1,0.2,0.5")
+    return times
 
 
 def _carried(context: click.Context, parameter: click.Parameter, path: Path | None) -> Carried | None:

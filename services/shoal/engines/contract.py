@@ -64,9 +64,13 @@ def sampling_times(scene: Scene, times: Sequence[float] | Array | None) -> Array
         return np.linspace(0.0, scene.solver.duration, scene.solver.samples + 1)[1:]
     wanted = np.asarray(times, dtype=float)
     if wanted.ndim != 1 or wanted.size == 0 or not np.all(np.isfinite(wanted)):
-        raise InputError(f"at: needs a list of finite times in s, found {times!r}")
-    if wanted[0] < 0 or np.any(np.diff(wanted) <= 0):
-        raise InputError("at: times must increase and start at or after 0 s")
+        found = np.array2string(wanted, threshold=8, separator=", ")
+        raise InputError(f"times: needs a list of one or more finite times in s, found {found}")
+    if wanted[0] < 0:
+        raise InputError(f"times: must start at or after 0 s, found {wanted[0]:g}")
+    if np.any(falls := np.diff(wanted) <= 0):
+        first = int(np.argmax(falls))
+        raise InputError(f"times: must increase, found {wanted[first + 1]:g} after {wanted[first]:g} s")
     return wanted
 
 
@@ -79,7 +83,7 @@ def check_lanes(
     """
     sizes = {path: np.asarray(lanes).size for path, lanes in values.items()}
     if len(set(sizes.values())) != 1:
-        raise InputError(f"values: every path needs the same number of lanes, found {sizes}")
+        raise InputError(f"lanes: every path needs as many numbers as the others, found {sizes}")
     known = {} if accepted is None else accepted
     for path, lanes in values.items():
         low, high = float(np.min(lanes)), float(np.max(lanes))

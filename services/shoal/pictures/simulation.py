@@ -28,6 +28,11 @@ if TYPE_CHECKING:
 def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None = None) -> str:
     """The page as HTML without a reference to anything outside. Raises InputError, ComputationError."""
     moving = moved(trajectory, scene)
+    return page(trajectory, scene, moving, drawn(scene, moving, selection), selection)
+
+
+def drawn(scene: Scene, moving: Motion, selection: Selection | None = None) -> list[Drawn]:
+    """What the page shows on paper: poses, paths and, of a chosen model, the ladder."""
     pictures = [_poses(scene, moving), _paths(scene, moving)]
     if selection is not None:
         tried, name = len(selection.rungs), selection.chosen.name
@@ -35,6 +40,13 @@ def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None
         pictures.append(
             Drawn("ladder", ladder(selection), alt, "Left is cheaper, below the dashed line is good enough.")
         )
+    return pictures
+
+
+def page(
+    trajectory: Trajectory, scene: Scene, moving: Motion, pictures: list[Drawn], selection: Selection | None = None
+) -> str:
+    """The page of a run whose motion and pictures are at hand."""
     return render(
         "simulation.html.j2",
         title=scene.name,
