@@ -26,8 +26,11 @@ GRID = 50
 """The tolerance holds at so many instants spread over the run, beside those that were asked for."""
 SURELY_RIGID = 100.0
 """A rod whose a priori error is below the tolerance by this factor is not modelled any further."""
-COUNTS_FROM = 0.5
-"""What slender rods leave out counts from this fraction of the tolerance on: it is known by order of magnitude."""
+COUNTS_FROM = 0.1
+"""What slender rods leave out counts from this fraction of the tolerance on: it is known by order of magnitude.
+
+It is told for the first bending mode; in higher ones shear and rotary inertia are worth up to five times as much.
+"""
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
 """Of the adaptive integrator for rigid machines, from coarse to fine."""
 
@@ -99,10 +102,10 @@ def select(
     """The cheapest model of a scene whose estimated error at the markers is within `tolerance` [m].
 
     The truth is the converged theory, whatever element the scene names for rods with a modulus: Bernoulli-Euler's beam,
-    or in the plane Simo and Reissner's rod where what the former leaves out is worth more than half of the tolerance,
-    or where the former does not settle, unless torques fold rods (see `folded`). The elements ancf-full, simo-reissner
-    and director-rod are theories of their own; a rigid rod in space is taken to twist as well as to bend;
-    `solver.theory: slender` keeps the former.
+    or in the plane Simo and Reissner's rod where what the former leaves out is estimated to be worth more than a tenth
+    of the tolerance, or where the former does not settle, unless torques fold rods (see `folded`). The elements
+    ancf-full, simo-reissner and director-rod are theories of their own; a rigid rod in space is taken to twist as well
+    as to bend; `solver.theory: slender` keeps the former.
     Integrator, step, element and number of elements are chosen; progress is told every model that is run.
     patience: the answer is "not met" where a refinement would take longer [s]; meshed: rods that have to be made of
     elements, as the strains of their sections are asked for; trimmed: whether a cheaper model than the finest is
