@@ -133,7 +133,8 @@ def times_list(context: click.Context, parameter: click.Parameter, text: str | N
         times = []
     # Not a number is at no place of an order.
     if not times or not times[0] >= 0.0 or not all(a < b for a, b in pairwise([*times, math.inf])):
-        raise click.BadParameter(f"{text!r} is not a list of times in s that increase from 0 on, such as 0.1,0.2,0.5")
+        right = "a list of finite times in s that increase from 0 on, such as 0.1,0.2,0.5"
+        raise click.BadParameter(f"{text!r} is not {right}")
     return times
 
 
