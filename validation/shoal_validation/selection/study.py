@@ -60,8 +60,10 @@ def study(machine: Draw, exhaustive: bool = False, patience: float = PATIENCE) -
     """Select, then judge by a finer selection. patience: see `select` [s]."""
     seconds, chosen = undisturbed(lambda: select(machine.scene, machine.tolerance, patience=patience))
     finer = select(machine.scene, machine.tolerance / FINER, patience=JUDGE, trimmed=False)
+    # A finer selection that is not met may have stayed with another theory, by which nothing is judged.
+    limits = finer.limits if finer.met else chosen.limits
     yardstick = min(
-        (r for r in finer.rungs if np.isfinite(r.error) and _of(r, finer.limits)), key=lambda r: r.error, default=None
+        (r for r in finer.rungs if np.isfinite(r.error) and _of(r, limits)), key=lambda r: r.error, default=None
     )
     error = distance(chosen.chosen.trajectory, yardstick.trajectory) if yardstick is not None else np.nan
     least, cheapest = (np.nan, "") if not exhaustive or yardstick is None else _cheapest(machine, chosen, yardstick)
