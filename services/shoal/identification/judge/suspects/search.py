@@ -31,6 +31,8 @@ from shoal.trajectory import Array
 
 _FITTED = 8
 """Candidates that are fitted at a time."""
+_FOLLOWED = 3
+"""Fits that ended before they had converged are followed to their end, at most."""
 _DEAR = 2
 """Fitted at most of a kind that takes long to simulate; its scores are those of many values, and can be trusted."""
 _READ = 6
@@ -115,6 +117,7 @@ class _Search:
         self.found: list[Suspect] = []
         self.effects: dict[str, Array] = {}
         self.ends: list[tuple[float, Array]] = []
+        self.unfinished: list[tuple[float, Candidate, Array]] = []
         self.better: Descent | None = None
 
     def run(self) -> None:
@@ -132,6 +135,8 @@ class _Search:
             places = np.vstack([self.point, starting_points(self.model)[:3]])
             scans = [s for group in self._groups(simple) for s in self._scanned(group, places)]
             self._fit(sorted(scans, key=lambda s: s.promise)[:_AFTER_SCAN])
+        if not self._explained:
+            self._follow()
         self._look_back()
 
     def _groups(self, candidates: list[Candidate]) -> list[Together]:
@@ -244,18 +249,29 @@ class _Search:
             for k, end in zip(numbers, together.fit(numbers, starts), strict=True):
                 self._keep(together.group[k], end)
 
+    def _follow(self) -> None:
+        """Descend on where a fit was the best but for what it had still to go."""
+        begun = sorted(self.unfinished, key=lambda entry: entry[0])
+        for _, candidate, point in [entry for entry in begun if entry[0] <= _FAR * self._least][:_FOLLOWED]:
+            self._keep(candidate, *descend_many(candidate.freed(self.model), point[None]))
+
     def _keep(self, candidate: Candidate, end: Descent) -> None:
         """Note where a fit ended, and the suspect that it makes if it explains the misfit."""
         known, after = len(self.point), misfit(end.residual)
         free = candidate.freed(self.model)
         values = free.parameters.to_values(end.point)[known:]
         self.ends.append((after, end.point[:known]))
+        if not end.converged:
+            self.unfinished.append((after, candidate, end.point))
         if not explains(self.before, after, self.noise, len(self.residual)):
             return
         value, change = candidate.told(values)
         stated = 0.0 if candidate.tell else candidate.stated[0]
         told = (candidate.name, stated, value, self.before, after, change, of_channels(self.model.measurement))
-        self.found.append(Suspect(*told, candidate.kind, len(values)))
+        suspect = Suspect(*told, candidate.kind, len(values))
+        rivals = [other for other in self.found if other.name == suspect.name and other.kind == suspect.kind]
+        if all(suspect.after < other.after for other in rivals):
+            self.found = [*(other for other in self.found if other not in rivals), suspect]
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""
