@@ -432,6 +432,18 @@ def test_open_chains_take_the_direct_path() -> None:
     assert done(chain, b={"position": [0.0, 1.0]}).initial["a"].angle == pytest.approx(np.pi / 2, abs=1e-9)
 
 
+@pytest.mark.parametrize(("rate", "told"), [(3000.0, set()), (1.0, {"velocity"})])
+def test_round_off_is_told_by_the_speed_of_the_machine(rate: float, told: set[str]) -> None:
+    """A joint holds the body where a velocity is stated; one of 6e-10 m/s is round-off beside 30 m/s on 1 cm."""
+    bodies = {"a": {"kind": "rigid-body", "mass": 1.0, "inertia": 1e-5}}
+    data = scene(bodies, {"O": pin("ground", [0.0, 0.0], "a", [0.0, 0.0])})
+    data["markers"] = {"m": {"body": "a", "point": [0.01, 0.0]}}
+    data["initial"] = {"a": {"angle": 0.0, "rate": rate, "velocity": [6e-10, 0.0]}}
+    run = simulate(Scene.parse(data), np.array([0.001]))
+    assert run.ok, run.message
+    assert set(run.model["initial_changes"].get("a", {})) == told
+
+
 def test_a_weight_between_two_bars_in_one_line_stays() -> None:
     """A truss that only the second derivative of its joints holds."""
     sides = {"L": [-1.0, 0.0], "R": [1.0, 0.0]}

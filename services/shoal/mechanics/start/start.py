@@ -32,7 +32,7 @@ _EFFORT = 8_000
 _SLACK = 1e-3
 """Part of the largest pull on a statement below which one is not pulled."""
 ROUND_OFF = 1e-9
-"""Changes below this, relative to the value, 1 rad or the size of the machine, are not spoken of."""
+"""Changes below this, relative to the value, 1 rad, the size or the speed of the machine, are not spoken of."""
 _UNITS: dict[Quantity, str] = {
     "angle": "rad",
     "position": "m",
@@ -281,16 +281,24 @@ def _bending(frame: ModalFrame, q: Array, v: Array) -> tuple[tuple[float, ...], 
 def changes(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:
     """What was stated and is not what is used: body -> quantity -> stated, used; round-off of any size [m] left out."""
     found: dict[str, Any] = {}
+    turning, moving = _largest_stated(scene, "rate", "spin"), _largest_stated(scene, "velocity")
+    rate = max(1.0, turning)
+    least = {"position": size, "velocity": max(size * rate, moving), "rate": rate, "spin": rate}
     for name, start in () if isinstance(scene.initial_from, End) else scene.initial.items():
         for quantity, unit in _UNITS.items():
             stated, now = getattr(start, quantity), getattr(used[name], quantity)
             if stated is None or now is None:
                 continue
             off = float(max(abs(a - b) for a, b in zip(np.atleast_1d(now), np.atleast_1d(stated), strict=False)))
-            scale = max(float(np.max(np.abs(stated))), size if unit.startswith("m") else 1.0)
-            if off > ROUND_OFF * scale:
+            if off > ROUND_OFF * max(float(np.max(np.abs(stated))), least.get(quantity, 1.0)):
                 found.setdefault(name, {})[quantity] = {"stated": stated, "used": now, "unit": unit}
     return found
+
+
+def _largest_stated(scene: Scene, *quantities: Quantity) -> float:
+    """The largest of these that a body is stated to have, else zero."""
+    stated = (getattr(start, quantity) for start in scene.initial.values() for quantity in quantities)
+    return max((float(np.max(np.abs(value))) for value in stated if value is not None), default=0.0)
 
 
 def facts(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:
