@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from shoal.engines.compare import Comparison
 from shoal.errors import ComputationError, InputError
 from shoal.identification import Estimate, Measurement, load_problem
+from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures import simulation, titles
 from shoal.pictures.answer import Answer
 from shoal.pictures.archive import archived
@@ -25,6 +26,7 @@ from shoal.pictures.pages import animation
 from shoal.pictures.remainders import remainders
 from shoal.pictures.report import report
 from shoal.pictures.response import response
+from shoal.pictures.rest import rest
 from shoal.pictures.study import study
 from shoal.pictures.style import png, svg
 from shoal.pictures.uncertainty import uncertainty
@@ -91,6 +93,11 @@ def moved(trajectory: Trajectory, scene: Scene, selection: Selection | None = No
     drawn = simulation.drawn(scene, moving, selection)
     page = simulation.page(trajectory, scene, moving, drawn, selection)
     return {"motion.html": page.encode(), **{f"{one.name}.png": png(one.figure) for one in drawn}}
+
+
+def rested(found: Equilibrium) -> bytes:
+    """The machine at rest, and where it was placed."""
+    return png(rest(found))
 
 
 def draw_trajectory(fits: Sequence[Fit], name: str) -> Picture:

@@ -344,8 +344,11 @@ def design(
     return design(wanted, values=stated, parameter=parameter, **how)
 
 
-def plot(result: Scene | Trajectory | Estimate | Sweep | Comparison) -> Picture:
-    """The picture of a scene (its motion), a trajectory, an estimate, a sweep or a comparison. Raises InputError."""
+def plot(result: Scene | Trajectory | Equilibrium | Estimate | Sweep | Comparison) -> Picture:
+    """The picture of a scene (its motion), a trajectory, a place of rest, an estimate, a sweep or a comparison.
+
+    Raises InputError.
+    """
     from shoal.pictures.inline import plot
 
     return plot(result)

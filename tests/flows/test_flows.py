@@ -270,6 +270,13 @@ def test_machines_in_space_are_logged_with_all_their_coordinates() -> None:
     np.testing.assert_allclose([metrics[f"final/A/{axis}"] for axis in "xyz"], [0.0, 0.0, -1.0], atol=1e-9)
 
 
+def test_a_place_of_rest_within_a_tolerance_has_its_error() -> None:
+    """The mesh of the strip is refined until the error at its end is told and small."""
+    asked = {"scene": "swinging-strip", "tolerance": "5e-3", "values": "{bodies.strip.elements: 2}"}
+    metrics = _client().get_run(run.run_flow("statics", asked).run_id).data.metrics
+    assert 0.0 < metrics["final/mesh_error"] <= 2.5e-3
+
+
 def modal() -> str:
     """YAML of a slider-crank with a modal rod, a loop and a drive that was recorded."""
     machine = yaml.safe_load((files("shoal.scene") / "library" / "flexible-slider-crank.yaml").read_text())
@@ -284,7 +291,7 @@ def modal() -> str:
     [
         ("forward", {}, {"trajectory.csv", "scene.yaml", "motion.html", "poses.png", "paths.png"}),
         ("select", {"tolerance": "1e-3"}, {"trajectory.csv", "ladder.png", "motion.html", "poses.png"}),
-        ("statics", {}, {"equilibrium.json"}),
+        ("statics", {}, {"equilibrium.json", "rest.png"}),
         ("compare", {}, {"engines.png", "differences.json"}),
         ("sweep", {"vary": "{gravity.1: [-1, 0, 2]}", "time": "0.01"}, {"sweep.csv"}),
         ("export", {"to": "csv"}, {"export", "trajectory.csv"}),

@@ -69,11 +69,11 @@ def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene,
 
 
 @task(task_run_name="statics", cache_policy=NO_CACHE)
-def at_rest(scene: str, time: float, values: Mapping[str, Any]) -> tuple[Equilibrium, str]:
+def at_rest(scene: str, time: float, tolerance: float | None, values: Mapping[str, Any]) -> tuple[Equilibrium, str]:
     """Where a scene comes to rest, with the id of its run."""
     with events.work(f"{inputs.title(scene)} at rest"):
-        found = workers.run(notebook.statics, scene, time, values=values)
-        return found, analyses.log_statics(found)
+        found = workers.run(notebook.statics, scene, time, values=values, tolerance=tolerance)
+        return found, analyses.log_statics(found, workers.run(pictures.rested, found))
 
 
 @task(task_run_name="select", cache_policy=NO_CACHE)

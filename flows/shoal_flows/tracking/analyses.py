@@ -17,8 +17,8 @@ from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.store import open_run
 
 
-def log_statics(found: Equilibrium) -> str:
-    """One run; returns its id."""
+def log_statics(found: Equilibrium, picture: bytes) -> str:
+    """One run; returns its id. picture: of the machine at rest"""
     scene = found.scene
     tags = {"kind": "statics", "scene": scene.name, "verdict": str(found.status)}
     with open_run("Statics", f"{scene.name} · statics", description=scene.description, tags=tags) as run:
@@ -30,6 +30,9 @@ def log_statics(found: Equilibrium) -> str:
                 run.metric(f"final/{name}/{axis}", float(value))
         run.metric("final/residual", found.residual)
         run.metric("final/iterations", found.iterations)
+        if found.mesh_error is not None:
+            run.metric("final/mesh_error", found.mesh_error)
+        run.picture(picture, "rest.png")
         return run.run_id
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 import click
 
 from shoal.commands import options
-from shoal.commands.options import Values
+from shoal.commands.options import Out, Values
 from shoal.errors import check_trusted
 
 
@@ -18,15 +18,21 @@ from shoal.errors import check_trusted
 @options.values
 @options.verify
 @options.as_json
-def statics(scene: str, time: float, tolerance: float | None, values: Values, verify: bool, as_json: bool) -> None:
+@options.out(".json", ".png")
+def statics(
+    scene: str, time: float, tolerance: float | None, values: Values, verify: bool, as_json: bool, out: Out
+) -> None:
     """Find where SCENE comes to rest, and if it is stable there."""
     from shoal.notebook import statics
+    from shoal.pictures import files
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"balancing {wanted.name}"):
         equilibrium = statics(wanted, time, verify=verify, tolerance=tolerance)
+    if out is not None:
+        files.equilibrium(equilibrium, out)
     screen.show(equilibrium.to_json(), as_json, lambda: tables.equilibrium_table(equilibrium))
     check_trusted(equilibrium.ok, equilibrium.message)
 

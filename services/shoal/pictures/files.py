@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from shoal.engines.sweep import Sweep
     from shoal.identification import Estimate, Problem
     from shoal.identification.design import Design
+    from shoal.mechanics.analysis.equilibrium import Equilibrium
     from shoal.pictures.answer import Answer
     from shoal.response import Response
     from shoal.scene import Scene
@@ -198,7 +199,12 @@ def comparison(result: Comparison, path: Path) -> None:
     save(path, {".json": _json(result), ".png": lambda: _plotted(result)})
 
 
-def _plotted(result: Estimate | Sweep | Comparison) -> bytes:
+def equilibrium(found: Equilibrium, path: Path) -> None:
+    """The place of rest, or the machine there and where it was placed."""
+    save(path, {".json": _json(found), ".png": lambda: _plotted(found)})
+
+
+def _plotted(result: Estimate | Sweep | Comparison | Equilibrium) -> bytes:
     """The picture that a notebook shows."""
     from shoal.pictures.inline import plot
     from shoal.pictures.style import png
@@ -206,6 +212,6 @@ def _plotted(result: Estimate | Sweep | Comparison) -> bytes:
     return png(plot(result).figure)
 
 
-def _json(result: Trajectory | Design | Sweep | Comparison | Response) -> Callable[[], str]:
+def _json(result: Trajectory | Design | Sweep | Comparison | Response | Equilibrium) -> Callable[[], str]:
     """What `--json` prints, one number a line."""
     return lambda: json_text(result.to_json(), indent=1)

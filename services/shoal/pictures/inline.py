@@ -15,6 +15,7 @@ from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
 from shoal.identification import Estimate
+from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.engines import engines
 from shoal.pictures.motion import Motion, scene_motion
@@ -23,6 +24,7 @@ from shoal.pictures.pages import render
 from shoal.pictures.paths import paths
 from shoal.pictures.poses import poses
 from shoal.pictures.report import shown, verdict
+from shoal.pictures.rest import rest
 from shoal.pictures.style import png
 from shoal.pictures.sweep import sweep
 from shoal.pictures.titles import agrees, ends
@@ -46,7 +48,7 @@ class Picture:
 
 @singledispatch
 def plot(result: Any) -> Picture:
-    """The picture of a scene (its motion), a trajectory, an estimate, a sweep or a comparison. Raises InputError."""
+    """Of a scene (its motion), a trajectory, a place of rest, an estimate, a sweep, a comparison. Raises InputError."""
     raise InputError(f"plot: there is no picture of a {type(result).__name__}")
 
 
@@ -60,6 +62,11 @@ def _(scene: Scene) -> Picture:
 @plot.register
 def _(trajectory: Trajectory) -> Picture:
     return Picture(_paths(trajectory))
+
+
+@plot.register
+def _(equilibrium: Equilibrium) -> Picture:
+    return Picture(rest(equilibrium))
 
 
 @plot.register

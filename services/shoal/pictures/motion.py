@@ -14,7 +14,7 @@ from shoal.pictures.outline import ground, outlined
 from shoal.pictures.solids import Bar, Solids
 from shoal.pictures.views import View, views
 from shoal.scene import Scene
-from shoal.trajectory import Array, Trajectory, plain
+from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
     from shoal.pictures.answer import Answer
@@ -107,29 +107,30 @@ def scene_motion(scene: Scene, engine: Engine, until: float, frames: int = _FRAM
     """The motion of a scene until a time [s], as far as it can be computed. Raises InputError, ComputationError."""
     if until <= 0:
         raise InputError("out: a motion that is shown lasts longer than 0 s; choose later times with --at")
-    traced, read = _traced(scene)
+    traced, read = traced_out(scene)
     seen = engine.simulate(traced, np.linspace(0.0, until, frames))
     known = np.all(np.isfinite(seen.points[..., 0]), axis=(1, 2))
     count = frames if np.all(known) else int(np.argmin(known))
     if count < 2:
         raise ComputationError(f"{scene.name}: there is no motion to show: {seen.message or seen.status[0]}")
     markers = {name: seen.marker(name)[:count] for name in scene.markers}
-    return Motion(scene.name, seen.times[:count], ground(scene), markers=markers, **read(seen, count))
+    shown = read(lambda name: seen.marker(name)[:count])
+    return Motion(scene.name, seen.times[:count], ground(scene), markers=markers, **shown)
 
 
-def _traced(scene: Scene) -> tuple[Scene, Callable[[Trajectory, int], dict[str, Any]]]:
-    """The scene with markers that make its bodies visible, and what reads the fields of a Motion from its frames."""
+def traced_out(scene: Scene) -> tuple[Scene, Callable[[Callable[[str], Array]], dict[str, Any]]]:
+    """The scene with markers that make its bodies visible, and what makes the fields of a Motion of their places.
+
+    Places of a marker by its name: [m], (frames, d).
+    """
     traced, points = outlined(scene)
     solids = Solids(traced, points, scene) if scene.dimensions == 3 else None
 
-    def read(seen: Trajectory, count: int) -> dict[str, Any]:
-        def at(name: str) -> Array:
-            return seen.marker(name)[:count]
-
+    def read(at: Callable[[str], Array]) -> dict[str, Any]:
         outlines = {body: np.stack([at(name) for name in names], axis=1) for body, names in points.items()}
         if solids is None:
             return {"outlines": outlines}
-        return {"outlines": outlines, "up": upwards(scene), **solids.shown(at, count)}
+        return {"outlines": outlines, "up": upwards(scene), **solids.shown(at, len(next(iter(outlines.values()))))}
 
     return traced if solids is None else solids.scene, read
 
@@ -150,7 +151,7 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
     earliest = max(0.0, -view["delay"] * view["clock"])
     times = np.linspace(earliest, float(samples.times[-1]), frames)
     scene = answer.estimate.scenes[recording]
-    traced, read = _traced(scene)
+    traced, read = traced_out(scene)
     seen = answer.model.engine.simulate(traced, np.maximum(0.0, times / view["clock"] + view["delay"]))
     # Who measured by load cells alone sees all there are.
     watched = [channel.marker for channel in samples.channels if channel.marker] or scene.markers
@@ -167,7 +168,7 @@ def motion(answer: Answer, recording: str, frames: int = _FRAMES) -> Motion:
     measured = {m: _place(found, view) for m, found in places.items() if needed <= found.keys()}
     directions = {m: found["angle"] + view["tilt"] for m, found in places.items() if "angle" in found}
     fixed = ground(scene)
-    shown = read(seen, frames)
+    shown = read(seen.marker)
     return Motion(recording, times, fixed, markers=markers, measured=measured, directions=directions, **shown)
 
 

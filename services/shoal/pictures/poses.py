@@ -18,21 +18,23 @@ _HALO = [withStroke(linewidth=3, foreground="white")]
 
 
 @styled
-def poses(found: Motion, title: str) -> Figure:
+def poses(found: Motion, title: str, way: str = "paths of the markers") -> Figure:
     """The machine at a few instants, the later the darker, the paths of its markers, and the measured places.
+
+    way: what the lines of the markers are called
 
     A machine in space from the front, from above it, from its right, as on a drawing, and from a corner.
     """
     if found.up is None:
         figure, axes = canvas(1.4 + 5.6 * found.aspect)
-        _draw(axes, found)
+        _draw(axes, found, way)
         axes.set_aspect("equal", adjustable="datalim")
         shown = axes
     else:
         figure, ((top, corner), (front, side)) = canvas(7.4, nrows=2, ncols=2)
         for axes, view in zip((front, top, side, corner), views(found.up), strict=True):
             seen = found.seen(view)
-            _draw(axes, seen)
+            _draw(axes, seen, way)
             _frame(axes, seen, 0.55 * found.size, view.name)
         shown = front
     headline(figure, title)
@@ -54,10 +56,11 @@ def _frame(axes: Axes, seen: Motion, half: float, name: str) -> None:
         axes.spines[:].set_visible(False)
 
 
-def _draw(axes: Axes, found: Motion) -> None:
-    chosen = np.linspace(0, len(found.times) - 1, _POSES).round().astype(int)
+def _draw(axes: Axes, found: Motion, way: str) -> None:
+    count = min(_POSES, len(found.times))
+    chosen = np.linspace(0, len(found.times) - 1, count).round().astype(int)
     for number, k in enumerate(chosen):
-        strength = min(1.0, 0.2 + 0.8 * number / (_POSES - 1))
+        strength = min(1.0, 0.2 + 0.8 * number / max(count - 1, 1))
         for line in found.thin.values():
             axes.plot(*line[k].T, color=GREY, alpha=strength, linewidth=0.7)
         for outline in found.outlines.values():
@@ -67,7 +70,7 @@ def _draw(axes: Axes, found: Motion) -> None:
     for number, place in enumerate(found.measured.values()):
         axes.plot(*place.T, "o", color=BLACK, markersize=4, fillstyle="none", label="" if number else "measured")
     for number, path in enumerate(found.markers.values()):
-        axes.plot(*path.T, color=VERMILION, linewidth=1.2, label="" if number else "paths of the markers")
+        axes.plot(*path.T, color=VERMILION, linewidth=1.2, label="" if number else way)
     _names(axes, found)
     _directions(axes, found, chosen)
     axes.set_xlabel(found.labels[0])
