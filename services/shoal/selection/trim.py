@@ -10,7 +10,7 @@ from shoal.errors import InputError
 from shoal.mechanics.numerics.alike import FEW
 from shoal.mechanics.simulate import STEP_MARGIN
 from shoal.selection.climb import PACE, TELL, Runs, Yardstick
-from shoal.selection.levels import FRAMED, Level, Levels, below
+from shoal.selection.levels import FRAMED, LADDERS, Level, Levels, below
 from shoal.selection.run import Rung, distance
 
 WITHIN = 0.9
@@ -38,15 +38,54 @@ VECTORS = {"rigid": 0, "ancf-cable": 2, "ancf-quintic": 3}
 def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: float) -> Rung | None:
     """The cheapest rung found within the tolerance; None if none is.
 
-    Each rod alone goes down from the base. Their errors are taken to add up, which tells the combinations worth
-    trying, the cheapest first; what counts is the distance of the combination itself from the yardstick. Their
-    search takes no more work than the climb did, or about five seconds.
+    The way goes down from the base, and before that from all rods in frames: beside elements, which limit the steps,
+    rods in frames cost more than they save. The search takes no more work than the climb did, or about five seconds.
     """
     enough = runs.work + max(SHARE * runs.work, SEARCH)
+    found = None
+    framed = _framed(runs, rods)
+    if framed and runs.forecast.work(yardstick.base | framed) < runs.forecast.work(yardstick.base):
+        top = judged(runs, yardstick, yardstick.base | framed)
+        found = _down(runs, yardstick, top, rods, tolerance, enough) if top.error <= WITHIN * tolerance else None
+        if found and found.work <= _lightest(runs, rods) / max(STRIDES):
+            return found
     base = judged(runs, yardstick, yardstick.base)
+    other = _down(runs, yardstick, base, rods, tolerance, enough)
+    among = [rung for rung in (found, other) if rung] or [r for r in (base, yardstick.rung) if r.error <= tolerance]
+    return min(among, key=lambda rung: rung.work, default=None)
+
+
+def _framed(runs: Runs, rods: tuple[str, ...]) -> dict[str, Level]:
+    """The finest levels of rods that move with a frame; empty where one of them has none."""
+    known = {
+        rod: [level for level in LADDERS[runs.limits[rod]] if level.element in FRAMED and runs.knows(rod, level)]
+        for rod in rods
+        if runs.coarsest[rod].element in FRAMED
+    }
+    return {rod: levels[-1] for rod, levels in known.items()} if len(known) == len(rods) else {}
+
+
+def _lightest(runs: Runs, rods: tuple[str, ...]) -> float:
+    """The least work of a model in which at least one rod has elements."""
+    works = []
+    for rod in rods:
+        fewest = {level.element: level for level in reversed(LADDERS[runs.limits[rod]]) if level.element not in FRAMED}
+        levels = [level for level in fewest.values() if runs.knows(rod, level)]
+        works += [runs.forecast.work({**runs.coarsest, rod: level}) for level in levels]
+    return min(works, default=np.inf)
+
+
+def _down(
+    runs: Runs, yardstick: Yardstick, base: Rung, rods: tuple[str, ...], tolerance: float, enough: float
+) -> Rung | None:
+    """The cheapest rung found below a base within the tolerance; None if none is.
+
+    Each rod alone goes down from the base. Their errors are taken to add up, which tells the combinations worth
+    trying, the cheapest first; what counts is the distance of the combination itself from the yardstick.
+    """
     tables: dict[str, dict[Level, float]] = {}
     context = base
-    for rod in sorted(rods, key=lambda rod: -runs.forecast.own(rod, yardstick.base[rod])):
+    for rod in sorted(rods, key=lambda rod: -runs.forecast.own(rod, base.levels[rod])):
         tables[rod] = table = _alone(runs, yardstick, context, rod, tolerance, enough)
         harmless = [level for level, part in table.items() if part <= HARMLESS * tolerance]
         cheapest = min(harmless, key=lambda level: runs.forecast.own(rod, level))
@@ -55,14 +94,14 @@ def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: flo
         if not np.all(np.isfinite(list(table.values()))):  # other rods, as fine as they were, may have diverged
             again = _alone(runs, yardstick, context, rod, tolerance, enough)
             table |= {level: part for level, part in again.items() if part < table.get(level, np.inf)}
-    combinations = _combinations(runs, yardstick, base, tables, tolerance)
+    combinations = _combinations(runs, base, tables, tolerance)
     for levels in combinations[:TRIES]:
         if runs.work > enough:
             break
         rung = judged(runs, yardstick, levels)
         if rung.error <= WITHIN * tolerance:
             return _strided(runs, yardstick, combinations, tolerance, rung)
-    return next((rung for rung in (base, yardstick.rung) if rung.error <= tolerance), None)
+    return None
 
 
 def _strided(runs: Runs, yardstick: Yardstick, combinations: list[Levels], tolerance: float, found: Rung) -> Rung:
@@ -127,13 +166,11 @@ def _alone(
     return table
 
 
-def _combinations(
-    runs: Runs, yardstick: Yardstick, base: Rung, tables: dict[str, dict[Level, float]], tolerance: float
-) -> list[Levels]:
+def _combinations(runs: Runs, base: Rung, tables: dict[str, dict[Level, float]], tolerance: float) -> list[Levels]:
     """Combinations that may meet the tolerance, by foreseen work."""
     found = []
     for chosen in product(*tables.values()):
-        levels = {**yardstick.base, **dict(zip(tables, chosen, strict=True))}
+        levels = {**base.levels, **dict(zip(tables, chosen, strict=True))}
         error = base.error + sum(table[level] for table, level in zip(tables.values(), chosen, strict=True))
         if np.isfinite(error) and error <= HOPEFUL * tolerance:
             found.append((runs.forecast.work(levels), levels))
