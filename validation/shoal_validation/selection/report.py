@@ -65,7 +65,12 @@ def _capped(cases: list[Case]) -> str:
 def _owned(cases: list[Case]) -> str:
     if not cases:
         return ""
-    reasons = {"too much work": "element steps", "runs rejected": "rejected", "does not settle": "settle"}
-    counts = {name: sum(word in case.reason for case in cases) for name, word in reasons.items()}
-    known = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
+    reasons = {
+        "no theory of rods holds": "strained beyond all theory",
+        "element steps": "too much work",
+        "rejected": "runs rejected",
+        "": "does not settle",
+    }
+    named = [next(name for word, name in reasons.items() if word in case.reason) for case in cases]
+    known = ", ".join(f"{name} {named.count(name)}" for name in reasons.values() if name in named)
     return f"Not met: {known}."
