@@ -30,7 +30,7 @@ TRIES = 10
 STRIDES = (3.0, 2.0, 1.4)
 """Longer steps, in stable ones, that are tried with capped inertia."""
 SHARE, SEARCH = 1.0, TELL * PACE
-"""The way down may take so much of the climb's work, and so much in any case."""
+"""A way down may take so much of the climb's work, and so much in any case."""
 VECTORS = {"rigid": 0, "ancf-cable": 2, "ancf-quintic": 3}
 """Nodal vectors that an element adds, of those whose inertia can be capped."""
 
@@ -39,18 +39,19 @@ def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: flo
     """The cheapest rung found within the tolerance; None if none is.
 
     The way goes down from the base, and before that from all rods in frames: beside elements, which limit the steps,
-    rods in frames cost more than they save. The search takes no more work than the climb did, or about five seconds.
+    rods in frames cost more than they save. Each way takes no more work than the climb did, or about five seconds.
     """
-    enough = runs.work + max(SHARE * runs.work, SEARCH)
+    share = max(SHARE * runs.work, SEARCH)
     found = None
     framed = _framed(runs, rods)
     if framed and runs.forecast.work(yardstick.base | framed) < runs.forecast.work(yardstick.base):
         top = judged(runs, yardstick, yardstick.base | framed)
-        found = _down(runs, yardstick, top, rods, tolerance, enough) if top.error <= WITHIN * tolerance else None
+        if top.error <= WITHIN * tolerance:
+            found = _down(runs, yardstick, top, rods, tolerance, runs.work + share)
         if found and found.work <= _lightest(runs, rods) / max(STRIDES):
             return found
     base = judged(runs, yardstick, yardstick.base)
-    other = _down(runs, yardstick, base, rods, tolerance, enough)
+    other = _down(runs, yardstick, base, rods, tolerance, runs.work + share)
     among = [rung for rung in (found, other) if rung] or [r for r in (base, yardstick.rung) if r.error <= tolerance]
     return min(among, key=lambda rung: rung.work, default=None)
 
