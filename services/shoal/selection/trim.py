@@ -44,6 +44,10 @@ def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: flo
     share = max(SHARE * runs.work, SEARCH)
     found = None
     framed = _framed(runs, rods)
+    if framed:
+        coarsest = judged(runs, yardstick, yardstick.base | {rod: runs.coarsest[rod] for rod in rods})
+        if coarsest.error <= WITHIN * tolerance:
+            return coarsest
     if framed and runs.forecast.work(yardstick.base | framed) < runs.forecast.work(yardstick.base):
         top = judged(runs, yardstick, yardstick.base | framed)
         if top.error <= WITHIN * tolerance:
