@@ -14,7 +14,6 @@ from shoal.pictures.outline import ground
 from shoal.pictures.poses import poses
 from shoal.trajectory import Array
 
-
 _ZERO = 1e-9
 """Of the farthest marker's coordinates: what is smaller is told as zero."""
 
