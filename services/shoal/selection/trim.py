@@ -42,32 +42,33 @@ def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: flo
     rods in frames cost more than they save. Each way takes no more work than the climb did, or about five seconds.
     """
     share = max(SHARE * runs.work, SEARCH)
-    found = None
-    framed = _framed(runs, rods)
-    if framed:
-        coarsest = judged(runs, yardstick, yardstick.base | {rod: runs.coarsest[rod] for rod in rods})
-        if coarsest.error <= WITHIN * tolerance:
-            return coarsest
-    if framed and runs.forecast.work(yardstick.base | framed) < runs.forecast.work(yardstick.base):
-        top = judged(runs, yardstick, yardstick.base | framed)
-        if top.error <= WITHIN * tolerance:
-            found = _down(runs, yardstick, top, rods, tolerance, runs.work + share)
-        if found and found.work <= _lightest(runs, rods) / max(STRIDES):
-            return found
+    framed = _in_frames(runs, yardstick, rods, tolerance, share)
+    if framed and framed.work <= _lightest(runs, rods) / max(STRIDES):
+        return framed
     base = judged(runs, yardstick, yardstick.base)
-    other = _down(runs, yardstick, base, rods, tolerance, runs.work + share)
-    among = [rung for rung in (found, other) if rung] or [r for r in (base, yardstick.rung) if r.error <= tolerance]
-    return min(among, key=lambda rung: rung.work, default=None)
+    meshed = _down(runs, yardstick, base, rods, tolerance, runs.work + share)
+    found = [rung for rung in (framed, meshed) if rung] or [r for r in (base, yardstick.rung) if r.error <= tolerance]
+    return min(found, key=lambda rung: rung.work, default=None)
 
 
-def _framed(runs: Runs, rods: tuple[str, ...]) -> dict[str, Level]:
-    """The finest levels of rods that move with a frame; empty where one of them has none."""
-    known = {
-        rod: [level for level in LADDERS[runs.limits[rod]] if level.element in FRAMED and runs.knows(rod, level)]
+def _in_frames(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: float, share: float) -> Rung | None:
+    """The cheapest rung within the tolerance all of whose rods move with frames; None if none is found."""
+    if any(runs.coarsest[rod].element not in FRAMED for rod in rods):
+        return None
+    ladders = [
+        [level for level in LADDERS[runs.limits[rod]] if level.element in FRAMED and runs.knows(rod, level)]
         for rod in rods
-        if runs.coarsest[rod].element in FRAMED
-    }
-    return {rod: levels[-1] for rod, levels in known.items()} if len(known) == len(rods) else {}
+    ]
+    coarsest, finest = (
+        yardstick.base | {rod: levels[end] for rod, levels in zip(rods, ladders, strict=True)} for end in (0, -1)
+    )
+    rung = judged(runs, yardstick, coarsest)
+    if rung.error <= WITHIN * tolerance:
+        return rung
+    if runs.forecast.work(finest) >= runs.forecast.work(yardstick.base):
+        return None
+    top = judged(runs, yardstick, finest)
+    return _down(runs, yardstick, top, rods, tolerance, runs.work + share) if top.error <= WITHIN * tolerance else None
 
 
 def _lightest(runs: Runs, rods: tuple[str, ...]) -> float:
