@@ -147,6 +147,7 @@ SIDEWAYS = {"y": 3.0, "z": -8.0}
 """Gravity [m/s^2]: small enough that the rod hardly bends."""
 
 
+@pytest.mark.slow
 def test_a_rod_at_rest_is_known_by_gauges_on_both_sides_and_a_load_cell(tmp_path: Path) -> None:
     """A gauge shows q (L - s)^2 h / (4 E I), of which the clamp's rho g A L tells q = rho g A."""
     rod = {"kind": "rod", "length": LENGTH, "height": HEIGHT, "width": WIDTH, "density": DENSITY,

@@ -159,6 +159,7 @@ def test_statistics_of_a_machine() -> None:
     assert found.to_json()["statistics"]["A"]["y"]["sobol"]["bodies.OA.mass"]["total"] == [None]
 
 
+@pytest.mark.slow
 def test_an_expansion_does_not_run_away() -> None:
     """Mean and deviation of the tip by chaos agree with those of a thousand other runs, within their scatter."""
     vary = ["initial.OA.angle~normal(0.785,0.02)"]
