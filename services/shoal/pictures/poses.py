@@ -21,9 +21,8 @@ _HALO = [withStroke(linewidth=3, foreground="white")]
 def poses(found: Motion, title: str, way: str = "paths of the markers") -> Figure:
     """The machine at a few instants, the later the darker, the paths of its markers, and the measured places.
 
-    way: what the lines of the markers are called
-
     A machine in space from the front, from above it, from its right, as on a drawing, and from a corner.
+    way: what the lines of the markers are called
     """
     if found.up is None:
         figure, axes = canvas(1.4 + 5.6 * found.aspect)
