@@ -17,7 +17,7 @@ OFTEN := click llvmlite numba numpy pydantic rich scipy yaml
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export DO_NOT_TRACK := true
 
-.PHONY: help setup demo test lint types imports containers bench charts docs up up-postgres secrets lock clean
+.PHONY: help setup demo kernels test lint types imports containers bench charts docs up up-postgres secrets lock clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 13
@@ -49,9 +49,11 @@ $(STAMP): pyproject.toml requirements.lock
 demo: setup  ## identify and compare both cases of the paper; one table, one report
 	@$(BIN)/shoal demo
 
-test: setup  ## the tests
+kernels: setup
 	@echo "compiling the kernels (once)"
 	@$(BIN)/python -m shoal.mechanics.warm
+
+test: kernels  ## the tests
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal $(ARGS)
 
 lint: setup  ## style and format

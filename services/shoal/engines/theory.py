@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from shoal.engines.contract import Engine
@@ -14,14 +16,14 @@ WITH_SHEAR = ("exudyn-ge",)
 """Engines whose flexible rods have shear and rotary inertia, whatever element the scene states."""
 
 
-def left_out(trajectory: Trajectory, scene: Scene, native: Engine) -> float | None:
+def left_out(trajectory: Trajectory, scene: Scene, native: Engine, share: Callable[..., float] = max) -> float | None:
     """Displacement of the markers [m] that shear and rotary inertia would cause in a run of a scene.
 
     None without rods that leave them out, or where it is not known. That the whole rod turns with its section's inertia
     is the distance of two runs with rigid rods, with and without it. In the first bending mode of a flexible rod shear
     and rotary inertia change the stiffness and the mass by pi^2 r^2 / L^2 times E / (kappa G) and 1 (Timoshenko 1921;
     r radius of gyration of the section, kappa by Cowper 1966); this share of the effect that bending has at all, the
-    distance from the run with rigid rods, is an order of magnitude.
+    distance from the run with rigid rods, is an order of magnitude. share: which rod's counts, if not the largest.
     """
     _, slender = _rods(scene, trajectory.engine in WITH_SHEAR)
     try:
@@ -31,8 +33,8 @@ def left_out(trajectory: Trajectory, scene: Scene, native: Engine) -> float | No
     if not runs or not all(run.ok for run in runs):
         return None
     rotary = runs[0].distance(runs[1])
-    share = max((slender_share(rod) for rod in slender.values() if rod.element != "rigid"), default=0.0)
-    return rotary + (share * runs[0].distance(trajectory) if share else 0.0)
+    counted = share((slender_share(rod) for rod in slender.values() if rod.element != "rigid"), default=0.0)
+    return rotary + (counted * runs[0].distance(trajectory) if counted else 0.0)
 
 
 def rigid_runs(scene: Scene, engine: str = "gauss") -> list[Scene]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -123,7 +123,7 @@ def select(
     priors = estimate(scene, tuple(limits)) if limits else {}
     task = _Task(scene, tolerance, asked, priors, closed, progress, patience, meshed, counts, trimmed)
     may_shear = scene.dimensions == 2 and scene.solver.theory == "auto" and SLENDER in limits.values()
-    found = _of_theory(task, limits, impatient=may_shear)
+    found = _of_theory(task, limits, another=may_shear)
     beyond = folded(scene, limits) if may_shear and not found.met else ""
     if beyond:
         reason = f"{beyond}; slender rods: {found.reason}"
@@ -169,8 +169,11 @@ def _of_both(slender: Selection, stout: Selection) -> Selection:
     return replace(slender, rungs=rungs, met=False, reason=reason, trajectory=trajectory)
 
 
-def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) -> Selection:
-    """The cheapest model where the truth of each rod is the limit of that element. impatient: see `climb`."""
+def _of_theory(task: _Task, limits: Mapping[str, str], another: bool = False) -> Selection:
+    """The cheapest model where the truth of each rod is the limit of that element.
+
+    another: whether there is a theory left for what this one leaves out; see `climb`
+    """
     tolerance, priors, grid = task.tolerance, task.priors, _grid(task.asked)
     unmoved = [rod for rod, prior in priors.items() if prior.error * SURELY_RIGID * len(limits) < tolerance]
     surely = [rod for rod in unmoved if rod not in task.meshed]
@@ -181,7 +184,7 @@ def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) 
     known = sum(priors[rod].error for rod in surely)
     if flexible:
         worst = SURELY_RIGID * sum(prior.error for prior in priors.values())
-        chosen, reason = _flexible(runs, flexible, fixed, task, known, worst, impatient)
+        chosen, reason = _flexible(runs, flexible, fixed, task, known, worst, another)
     else:
         chosen, reason = _rigid(runs, fixed, tolerance, known)
     met = bool(chosen.error <= tolerance)
@@ -199,11 +202,13 @@ def _of_theory(task: _Task, limits: Mapping[str, str], impatient: bool = False) 
     )
 
 
-def _shear(chosen: Rung) -> float:
-    """See `Selection`; 0 where it is not known."""
+def _shear(chosen: Rung, share: Callable[..., float] = max) -> float:
+    """See `Selection`, and `left_out` for the share; 0 where it is not known."""
     scene = chosen.scene
     shaped = scene.dimensions == 3 and any(isinstance(rod, Rod) and not rod.straight for rod in scene.bodies.values())
-    return (softer if shaped else left_out)(chosen.trajectory, scene, GaussEngine()) or 0.0
+    if shaped:
+        return softer(chosen.trajectory, scene, GaussEngine()) or 0.0
+    return left_out(chosen.trajectory, scene, GaussEngine(), share) or 0.0
 
 
 def _open(scene: Scene) -> tuple[dict[str, str], dict[str, str], dict[str, int]]:
@@ -261,10 +266,13 @@ def _flexible(
     task: _Task,
     known: float,
     worst: float,
-    impatient: bool,
+    another: bool,
 ) -> tuple[Rung, str]:
-    """Climb to a yardstick, then trim. worst: what rigid rods may cost a priori, for want of anything better [m]."""
-    yardstick = climb(runs, rods, fixed, task.tolerance - known, impatient)
+    """Climb to a yardstick, then trim; not if another theory is left and what this one leaves out counts.
+
+    worst: what rigid rods may cost a priori, for want of anything better [m]
+    """
+    yardstick = climb(runs, rods, fixed, task.tolerance - known, another)
     if isinstance(yardstick, str):
         refined = [rung for rung in runs.rungs if rung.role == YARDSTICK]
         if len(refined) < 2:
@@ -277,7 +285,7 @@ def _flexible(
         return refined[-1], why if refined[-1].error <= task.tolerance else yardstick
     yardstick.error += known
     beyond = f"; but {yardstick.rung.torn}" if yardstick.rung.torn else ""
-    if not task.trimmed:
+    if not task.trimmed or (another and _shear(yardstick.rung, min) > COUNTS_FROM * task.tolerance):
         yardstick.rung.error = yardstick.error
         return yardstick.rung, f"the finest model{beyond}"
     chosen = trim(runs, yardstick, rods, task.tolerance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -38,47 +39,67 @@ VECTORS = {"rigid": 0, "ancf-cable": 2, "ancf-quintic": 3}
 def trim(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: float) -> Rung | None:
     """The cheapest rung found within the tolerance; None if none is.
 
-    The way goes down from the base, and before that from all rods in frames: beside elements, which limit the steps,
-    rods in frames cost more than they save. Each way takes no more work than the climb did, or about five seconds.
+    A rod in a frame costs more than a few elements, unless it lets the machine take longer steps: so the rods whose
+    elements limit the step most go into frames, together. Each way down, from some of them or none, the one that
+    promises most first, takes no more work than the climb did, or about five seconds.
     """
     share = max(SHARE * runs.work, SEARCH)
-    framed = _in_frames(runs, yardstick, rods, tolerance, share)
-    if framed and framed.work <= _lightest(runs, rods) / max(STRIDES):
-        return framed
-    base = judged(runs, yardstick, yardstick.base)
-    meshed = _down(runs, yardstick, base, rods, tolerance, runs.work + share)
-    found = [rung for rung in (framed, meshed) if rung] or [r for r in (base, yardstick.rung) if r.error <= tolerance]
+    fewest = {rod: _fewest(runs, rod) for rod in rods}
+    fastest = sorted(rods, key=lambda rod: runs.forecast.step({rod: fewest[rod]}))
+    ways = [fastest[:count] for count in range(len(rods) + 1)]
+
+    def least(framed: Sequence[str]) -> float:
+        levels = {**runs.coarsest, **fewest, **{rod: runs.coarsest[rod] for rod in framed}}
+        return runs.forecast.work(levels) / (max(STRIDES) if _few(levels) else 1.0)
+
+    found: list[Rung] = []
+    for framed in sorted(ways, key=least):
+        if found and min(rung.work for rung in found) <= least(framed):
+            break
+        start = _start(runs, yardstick, framed, tolerance)
+        rung = _down(runs, yardstick, start, rods, tolerance, runs.work + share) if start else None
+        found += [rung] if rung else []
+    if not found:
+        finest = judged(runs, yardstick, yardstick.base), yardstick.rung
+        found = [rung for rung in finest if rung.error <= tolerance]
     return min(found, key=lambda rung: rung.work, default=None)
 
 
-def _in_frames(runs: Runs, yardstick: Yardstick, rods: tuple[str, ...], tolerance: float, share: float) -> Rung | None:
-    """The cheapest rung within the tolerance all of whose rods move with frames; None if none is found."""
-    if any(runs.coarsest[rod].element not in FRAMED for rod in rods):
+def _start(runs: Runs, yardstick: Yardstick, framed: Sequence[str], tolerance: float) -> Rung | None:
+    """The base with some rods in frames, rigid ones if that is near enough; None if it is with no number of modes."""
+    if any(runs.coarsest[rod].element not in FRAMED for rod in framed):
         return None
-    ladders = [
-        [level for level in LADDERS[runs.limits[rod]] if level.element in FRAMED and runs.knows(rod, level)]
-        for rod in rods
-    ]
-    coarsest, finest = (
-        yardstick.base | {rod: levels[end] for rod, levels in zip(rods, ladders, strict=True)} for end in (0, -1)
-    )
-    rung = judged(runs, yardstick, coarsest)
-    if rung.error <= WITHIN * tolerance:
-        return rung
-    if runs.forecast.work(finest) >= runs.forecast.work(yardstick.base):
-        return None
-    top = judged(runs, yardstick, finest)
-    return _down(runs, yardstick, top, rods, tolerance, runs.work + share) if top.error <= WITHIN * tolerance else None
+    if not framed:
+        return judged(runs, yardstick, yardstick.base)
+    for frames in ({rod: runs.coarsest[rod] for rod in framed}, _modes(runs, yardstick, framed)):
+        rung = judged(runs, yardstick, yardstick.base | frames)
+        if rung.error <= WITHIN * tolerance:
+            return rung
+    return None
 
 
-def _lightest(runs: Runs, rods: tuple[str, ...]) -> float:
-    """The least work of a model in which at least one rod has elements."""
-    works = []
-    for rod in rods:
-        fewest = {level.element: level for level in reversed(LADDERS[runs.limits[rod]]) if level.element not in FRAMED}
-        levels = [level for level in fewest.values() if runs.knows(rod, level)]
-        works += [runs.forecast.work({**runs.coarsest, rod: level}) for level in levels]
-    return min(works, default=np.inf)
+def _modes(runs: Runs, yardstick: Yardstick, framed: Sequence[str]) -> dict[str, Level]:
+    """Of these rods as many modes as take the same step, the most with which the model costs less than the base."""
+    ladders = {rod: [one for one in LADDERS[runs.limits[rod]] if one.element in FRAMED] for rod in framed}
+    steps = {
+        rod: {one: runs.forecast.step({rod: one}) for one in ladder if runs.knows(rod, one)}
+        for rod, ladder in ladders.items()
+    }
+    frames = dict[str, Level]()
+    for shortest in sorted({step for taken in steps.values() for step in taken.values()}):
+        frames = {rod: [one for one, step in taken.items() if step >= shortest][-1] for rod, taken in steps.items()}
+        if runs.forecast.work(yardstick.base | frames) < runs.forecast.work(yardstick.base):
+            break
+    return frames
+
+
+def _fewest(runs: Runs, rod: str) -> Level:
+    """The cheapest level of a rod that has elements."""
+    fewest = dict[str, Level]()
+    for level in LADDERS[runs.limits[rod]]:
+        if level.element not in (*FRAMED, *fewest) and runs.knows(rod, level):
+            fewest[level.element] = level
+    return min(fewest.values(), key=lambda level: runs.forecast.own(rod, level))
 
 
 def _down(
@@ -153,13 +174,14 @@ def _alone(
         return rung.error
 
     lower = [level for level in below(start, runs.limits[rod], runs.coarsest[rod]) if runs.knows(rod, level)]
-    framed = [level for level in reversed(lower) if level.element in FRAMED]
-    before = np.inf
-    for level in framed:
-        miss(level)
-        if table[level] <= HARMLESS * tolerance or GAINS * table[level] > before or runs.work > enough:
-            break
-        before = table[level] if level.modes else np.inf
+    if start.element in FRAMED:
+        before = np.inf
+        for level in reversed(lower):
+            miss(level)
+            if table[level] <= HARMLESS * tolerance or GAINS * table[level] > before or runs.work > enough:
+                break
+            before = table[level] if level.modes else np.inf
+        return table
     last, misses = runs.forecast.own(rod, start), 0
     for level in lower:
         work = runs.forecast.own(rod, level)

@@ -129,7 +129,7 @@ def product(fall: str) -> tuple[Problem, Measurement]:
 
 def test_a_bent_posterior_is_that_of_an_integral_over_a_grid(fall: str) -> None:
     problem, measurement = product(fall)
-    found = sampled(problem, measurement, wanted=3000).posterior
+    found = sampled(problem, measurement, wanted=1500).posterior
     assert found is not None
     assert found.converged
     a, b = np.linspace(0.1, 6.0, 1201), np.linspace(-4.0, 8.0, 1201)
@@ -146,7 +146,7 @@ def test_a_bent_posterior_is_that_of_an_integral_over_a_grid(fall: str) -> None:
         told = np.array([one.lower, one.median, one.upper])
         chance = np.array([0.025, 0.5, 0.975])
         height = np.interp([lower, median, upper], values, density / np.sum(density)) / (values[1] - values[0])
-        scatter = np.sqrt(chance * (1 - chance) / 3000) / height
+        scatter = np.sqrt(chance * (1 - chance) / 1500) / height
         assert np.all(np.abs(told - [lower, median, upper]) < 3 * scatter + 1e-3 * (upper - lower))
 
 

@@ -64,8 +64,8 @@ def test_a_tilted_pin_brakes_with_all_that_it_bears() -> None:
             bend = (pull - mu * radius * np.linalg.norm(force) * np.tanh(rate / 0.05)) / inertia
         return [rate, bend]
 
-    times = np.linspace(0.5, 3.0, 6)
-    angles = solve_ivp(slopes, (0, 3), [0.0, 0.0], rtol=1e-11, atol=1e-12, t_eval=times).y[0]
+    times = np.linspace(0.25, 1.5, 6)
+    angles = solve_ivp(slopes, (0, 1.5), [0.0, 0.0], rtol=1e-11, atol=1e-12, t_eval=times).y[0]
     exact = np.cos(angles)[:, None] * [1.0, 0.0, 0.0] + np.sin(angles)[:, None] * np.cross(axis, [1.0, 0.0, 0.0])
     run = simulate(pendulum(mu, radius), times)
     assert run.ok, run.message

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -77,38 +78,39 @@ def _analysed(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, d
         if below[k]:
             parent = min(below[k])
             below[parent] |= below[k] - {parent}
+    every = np.arange(size)
+    counts = np.array([len(rows) for rows in below], dtype=np.int64)
+    column = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(counts)])
+    row, owner = np.fromiter(chain.from_iterable(map(sorted, below)), np.int64), np.repeat(every, counts)
+    by_row = np.argsort(row * size + owner)
+    left, right = _pairs(column)
+    order = np.argsort((row[right] * size + owner[left]) * size + row[left])
+    left, right = left[order], right[order]
+    target = np.searchsorted(owner * size + row, row[right] * size + row[left])
+    pair = np.searchsorted(row[right], np.arange(size + 1))
+    across = np.searchsorted(row[by_row], np.arange(size + 1))
     slot = {(k, k): k for k in range(size)}
-    column: list[int] = [0]
-    row: list[int] = []
-    for k in range(size):
-        for i in sorted(below[k]):
-            slot[i, k] = size + len(row)
-            row.append(i)
-        column.append(len(row))
-    by_row = sorted((i, k, slot[i, k]) for i, k in slot if i != k)
-    before: list[list[int]] = [[] for _ in range(size)]
-    for i, k, _ in by_row:
-        before[i].append(k)
-    pair, pairs = [0], []
-    for k in range(size):
-        for j in before[k]:
-            below_k = [i for i in row[column[j] : column[j + 1]] if i > k]
-            pairs += [(slot[i, k], slot[i, j], slot[k, j]) for i in below_k]
-        pair.append(len(pairs))
-    target, left, right = zip(*pairs, strict=True) if pairs else ((), (), ())
-    across = np.searchsorted([i for i, _, _ in by_row], np.arange(size + 1))
-    slots, others = [p for _, _, p in by_row], [k for _, k, _ in by_row]
-    by_column = np.arange(size, size + len(row))
+    slot |= zip(zip(row.tolist(), owner.tolist(), strict=True), range(size, size + len(row)), strict=True)
 
-    def wide(values: list[int]) -> Index:
-        return np.array(values, dtype=np.int64)
-
-    def short(values: Iterable[int]) -> Index:
+    def short(values: Index) -> Index:
         """Long chains are limited by memory traffic."""
-        return np.array(list(values), dtype=np.int32)
+        return values.astype(np.int32)
 
-    by_rows = (np.asarray(across, dtype=np.int64), short(slots), short(others), short(by_column))
-    return Pattern(size, wide(column), short(row), wide(pair), short(target), short(left), short(right), *by_rows), slot
+    changed = [short(size + entries) for entries in (target, left, right)]
+    by_rows = across, short(size + by_row), short(owner[by_row]), short(size + np.arange(len(row)))
+    return Pattern(size, column, short(row), pair, *changed, *by_rows), slot
+
+
+def _pairs(column: Index) -> tuple[Index, Index]:
+    """Every two entries of a column, the lower and the upper one of each pair."""
+    counts = np.diff(column)
+    lower, upper = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for count in np.unique(counts):
+        one, other = np.triu_indices(count, 1)
+        begin = column[:-1][counts == count][:, None]
+        lower.append((begin + other).ravel())
+        upper.append((begin + one).ravel())
+    return np.concatenate(lower), np.concatenate(upper)
 
 
 def matrix(pattern: Pattern, values: Array) -> scipy.sparse.csc_array:
