@@ -96,9 +96,20 @@ def _analysed(size: int, entries: Iterable[tuple[int, int]]) -> tuple[Pattern, d
         """Long chains are limited by memory traffic."""
         return values.astype(np.int32)
 
-    changed = [short(size + entries) for entries in (target, left, right)]
-    by_rows = across, short(size + by_row), short(owner[by_row]), short(size + np.arange(len(row)))
-    return Pattern(size, column, short(row), pair, *changed, *by_rows), slot
+    pattern = Pattern(
+        size,
+        column,
+        short(row),
+        pair,
+        short(size + target),
+        short(size + left),
+        short(size + right),
+        across,
+        short(size + by_row),
+        short(owner[by_row]),
+        short(size + np.arange(len(row))),
+    )
+    return pattern, slot
 
 
 def _pairs(column: Index) -> tuple[Index, Index]:
