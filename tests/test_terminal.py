@@ -15,6 +15,7 @@ from collections.abc import Callable
 from functools import cache
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -28,10 +29,11 @@ from shoal.engines.compare import compare
 from shoal.engines.sweep import sweep
 from shoal.identification import Estimate, identify, load_problem
 from shoal.identification.design import design
-from shoal.mechanics import notes
+from shoal.mechanics import notes, warm
 from shoal.mechanics.analysis.modes import modes
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.analysis.statics import statics
+from shoal.mechanics.machine import Machine
 from shoal.scene import load_scene
 from shoal.selection import Selection, select
 from shoal.terminal import screen, tables
@@ -241,6 +243,13 @@ MISTAKES = {
 def test_a_mistake_is_one_line_that_says_what_is_right(
     command: str, advice: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Told before anything is compiled or simulated: nobody waits half a minute to hear of a misprint."""
+
+    def wait(*_: Any, **__: Any) -> None:
+        raise AssertionError("compiled or simulated first")
+
+    monkeypatch.setattr(warm, "warm_for", wait)
+    monkeypatch.setattr(Machine, "run", wait)
     monkeypatch.chdir(tmp_path)
     Path("folder").mkdir()
     for name, text in FILES.items():

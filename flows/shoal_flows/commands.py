@@ -20,7 +20,7 @@ from shoal.errors import ComputationError, check_trusted
 def run_flow(flow: str, parameters: dict[str, str], as_json: bool) -> None:
     """Run a Prefect FLOW and log it to MLflow.
 
-    It is forward, select, compare, sweep, uncertain, statics, export, identify, design or nightly.
+    It is forward, select, compare, sweep, uncertain, statics, export, identify, design, nightly or demo.
     """
     from shoal_flows import run
 

@@ -9,7 +9,7 @@ from shoal.errors import check_trusted
 
 @click.command()
 @click.option("--only", metavar="NAME", help="One problem of the library or of the paper.")
-@click.option("--quick", is_flag=True, help="A part that takes less than three minutes.")
+@click.option("--quick", is_flag=True, help="A part that takes one or two minutes.")
 @options.as_json
 def validate(only: str | None, quick: bool, as_json: bool) -> None:
     """Run the problem library over all engines, and write a page. Against its references and the nights before."""

@@ -42,7 +42,7 @@ def nightly(only: Only = ALL, quick: bool = False) -> Validated:
 
     Args:
         only: One problem or one scene of the library, or all.
-        quick: A part that takes about a minute.
+        quick: A part that takes one or two minutes.
     """
     problem = None if only == ALL else only
     lines = plan(problem, quick)

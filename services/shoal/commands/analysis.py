@@ -13,7 +13,7 @@ from shoal.errors import check_trusted
 
 @click.command()
 @click.argument("scene")
-@click.option("--time", default=0.0, show_default=True, metavar="T", help="Applied stand as they are at T [s].")
+@click.option("--time", default=0.0, show_default=True, metavar="T", help="Loads and drives as they are at T [s].")
 @click.option("--tolerance", type=float, metavar="METRES", help="Refine the mesh until its error stays below.")
 @options.values
 @options.verify
@@ -47,7 +47,7 @@ def statics(
 def modes(
     scene: str, count: int, about: Literal["equilibrium", "start"], values: Values, verify: bool, as_json: bool
 ) -> None:
-    """Eigenfrequencies and mode shapes of SCENE. About its equilibrium, or its start."""
+    """Eigenfrequencies [Hz], damping and mode shapes of SCENE. About its equilibrium, or its start."""
     from shoal.notebook import modes
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
@@ -67,7 +67,7 @@ def modes(
 @options.values
 @options.as_json
 def reactions(scene: str, times: list[float], values: Values, as_json: bool) -> None:
-    """Forces and torques in the joints of SCENE while it moves."""
+    """Forces [N] and torques [N m] in the joints of SCENE while it moves, as they act on the second body."""
     from shoal.mechanics.analysis.reactions import reactions
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables

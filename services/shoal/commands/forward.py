@@ -24,7 +24,7 @@ from shoal.errors import InputError, check_trusted
     "--patience",
     type=float,
     metavar="SECONDS",
-    help="With --tolerance: longest run before the answer is that it is not met (default: 60).",
+    help="With --tolerance: give up where a refinement would take longer (default: 60).",
 )
 @options.verify
 @options.as_json
@@ -81,7 +81,15 @@ def simulate(
 
 @click.command()
 @click.argument("scene")
-@click.option("--vary", "vary", multiple=True, required=True, metavar="PATH=LOW:HIGH:COUNT", callback=options.axes)
+@click.option(
+    "--vary",
+    "vary",
+    multiple=True,
+    required=True,
+    metavar="PATH=LOW:HIGH:COUNT",
+    callback=options.axes,
+    help="So many values of a field, in the units of the scene (repeatable: all combinations).",
+)
 @options.engine
 @options.values
 @click.option("--at", "time", type=float, metavar="T", help="Instant [s]; the scene's duration by default.")

@@ -38,7 +38,7 @@ def serve(engine: str, host: str, port: int | None, certificate: Path | None, ke
     "parameters",
     multiple=True,
     metavar="PATH",
-    help="A number of the scene that a host may set (repeatable); else gravity and the initial angles.",
+    help="A number of the scene that a host may set (repeatable); else gravity and the stated initial angles.",
 )
 @click.option(
     "--input",

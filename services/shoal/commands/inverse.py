@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -44,14 +45,21 @@ if TYPE_CHECKING:
     metavar="METRES",
     help="Error the model may have at the markers: coarse models for the search, the cheapest good one at the end.",
 )
-@click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="For all of it.")
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="SECONDS",
+    help="End after this time with what is known.",
+)
 @click.option(
     "--checkpoint",
     type=click.Path(path_type=Path, dir_okay=False),
     help="Keep the evaluations in this file; where it exists, go on from it.",
 )
-@click.option("--profiles", is_flag=True, help="The profile likelihood of every parameter.")
-@click.option("--bootstrap", type=click.IntRange(min=0), default=0, metavar="N", help="Draws of a bootstrap.")
+@click.option("--profiles", is_flag=True, help="Intervals by the profile likelihood as well.")
+@click.option(
+    "--bootstrap", type=click.IntRange(min=0), default=0, metavar="N", help="Refit so many resampled data sets."
+)
 @click.option(
     "--sample",
     type=click.IntRange(min=0),
@@ -86,9 +94,7 @@ def identify(
         how["progress"] = lambda _, best, __, count: tell(
             f"{wanted.name}: best fitness {best:.3e}, {count} evaluations"
         )
-        carried = how["fitted"]
-        starting, values = (wanted, how["values"]) if carried is None else carried.into(wanted, how["values"])[:2]
-        screen.compile_for(how["engine"], [1, 2], starting.load_scene(values))
+        how["ready"] = partial(screen.compile_for, how["engine"], [1, 2])
         estimate = identify(wanted, checkpoint=checkpoint, wishes=wishes, **how)
     if out is not None:
         files.estimate(estimate, wanted, out)
@@ -99,7 +105,7 @@ def identify(
 @click.command()
 @click.argument("problem")
 @click.option("--data", multiple=True, metavar="[NAME=]FILE", callback=options.recordings, help="As for identify.")
-@click.option("--about", type=click.Choice(["answer", "start"]), help="The answer from the data, where there are any.")
+@click.option("--about", type=click.Choice(["answer", "start"]), help="Default: the answer from the data.")
 @click.option("--noise", type=float, metavar="METRES", help="Standard deviation of positions; else the problem's.")
 @click.option("--angle-noise", type=float, metavar="RADIANS", help="Standard deviation of angles; else the problem's.")
 @click.option(
@@ -111,7 +117,7 @@ def identify(
 )
 @click.option("--duration", type=float, metavar="SECONDS", help="Of the measurement; else that of the data.")
 @click.option("--rate", type=float, metavar="HERTZ", help="Samples per second; else that of the data.")
-@click.option("--parameter", metavar="NAME", help="To be sharpened; else the weakest.")
+@click.option("--parameter", metavar="NAME", help="The one to be known better; else the weakest.")
 @options.set_only
 @options.fitted
 @options.as_json

@@ -17,7 +17,7 @@ _kind = click.option(
 
 @click.group()
 def library() -> None:
-    """Keep scenes, recordings and problems of your own under names.
+    """Keep scenes, recordings, problems and studies of your own under names.
 
     Their names stand beside the built-in ones in commands, in Python, in services and in flows. They lie in
     $SHOAL_LIBRARY, else in `library` below Shoal's home. NAME@VERSION is an earlier version.
@@ -32,8 +32,8 @@ def library() -> None:
 def add(file: Path, name: str | None, kind: str | None, as_json: bool) -> None:
     """Check FILE and keep it, with the files that it names.
 
-    FILE is a scene or a problem (YAML), or a recording (CSV, Parquet, or the YAML that describes one). A name that is
-    there stands for the new version from then on.
+    FILE is a scene, a problem or an uncertain study (YAML), or a recording (CSV, Parquet, or the YAML that describes
+    one). A name that is there stands for the new version from then on.
     """
     from shoal import library
     from shoal.terminal import screen

@@ -229,7 +229,9 @@ def values(command: Any) -> Any:
     return click.option("--set", "values", callback=_with_carried, **_set)(command)
 
 
-at = click.option("--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s].")
+at = click.option(
+    "--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s]; else as the scene says."
+)
 verify = click.option("--verify/--no-verify", default=True, show_default=True, help="Estimate errors by more runs.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
 engine = click.option("--engine", cls=LateHelp, told=_engines, default="gauss", show_default=True)

@@ -42,25 +42,42 @@ def _ways() -> str:
 @click.option("--correlate", "pairs", multiple=True, metavar="PATH,PATH=VALUE", help="Correlation of two of them.")
 @click.option("--method", cls=options.LateHelp, told=_methods, default="auto", show_default=True, metavar="NAME")
 @click.option(
-    "--gap", type=click.FloatRange(0, 1, min_open=True), metavar="SHARE", help="Between bounds, to be reached."
+    "--gap",
+    type=click.FloatRange(0, 1, min_open=True),
+    metavar="SHARE",
+    help="Go on until outer and attained bounds differ by this share of the width.",
 )
-@click.option("--runs", "most", type=click.IntRange(3), default=20_000, show_default=True, help="That may be made.")
-@click.option("--degree", type=click.IntRange(1, 40), help="Of a method that has one.")
-@click.option("--count", type=click.IntRange(1), help="Runs of a method that samples.")
+@click.option(
+    "--runs", "most", type=click.IntRange(3), default=20_000, show_default=True, help="Most runs that may be made."
+)
+@click.option("--degree", type=click.IntRange(1, 40), help="Of a method that has one (default: its own).")
+@click.option("--count", type=click.IntRange(1), help="Runs of a method that samples (default: its own).")
 @click.option(
     "--limit",
     "limits",
     multiple=True,
     metavar='"MARKER.QUANTITY < NUMBER"',
-    help="What must not happen (repeatable); also JOINT.force, .fx, .fy, .torque, and energy, kinetic, potential.",
+    help="What must not happen (repeatable); also JOINT.force, .torque, energy, .strain and so on (docs/uncertain.md).",
 )
 @click.option("--limit-method", cls=options.LateHelp, told=_ways, default="auto", show_default=True, metavar="NAME")
-@click.option("--limit-runs", type=click.IntRange(100), default=5_000, show_default=True, help="For each probability.")
+@click.option(
+    "--limit-runs", type=click.IntRange(100), default=5_000, show_default=True, help="Runs for each probability."
+)
 @click.option("--allocate", is_flag=True, help="Look for the widest tolerances that keep the limit.")
 @click.option(
-    "--target", type=click.FloatRange(0, 0.5, True, True), default=1e-3, show_default=True, help="Of passing."
+    "--target",
+    type=click.FloatRange(0, 0.5, True, True),
+    default=1e-3,
+    show_default=True,
+    help="With --allocate: the probability of passing the limit.",
 )
-@click.option("--cost", "costs", multiple=True, metavar="PATH=COST", help="Of tightening one, else 1 (repeatable).")
+@click.option(
+    "--cost",
+    "costs",
+    multiple=True,
+    metavar="PATH=COST",
+    help="With --allocate: of tightening this tolerance (default 1; repeatable).",
+)
 @click.option(
     "--worst",
     "worst_file",
@@ -69,7 +86,12 @@ def _ways() -> str:
     help="Write the scene that comes nearest to a limit, or goes furthest beyond, or attains a bound.",
 )
 @click.option("--worst-of", default="", metavar="LIMIT|BOUND", help="Which: a limit, or MARKER.QUANTITY.lower, .upper.")
-@click.option("--time-limit", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="For all of it.")
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="SECONDS",
+    help="End after this time with what is known by then.",
+)
 @click.option(
     "--checkpoint",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -78,7 +100,7 @@ def _ways() -> str:
 @options.engine
 @options.values
 @options.at
-@click.option("--tolerance", type=float, metavar="METRES", help="Find the cheapest model with errors below.")
+@click.option("--tolerance", type=float, metavar="METRES", help="Use the cheapest model whose errors stay below.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @options.verify
 @options.as_json

@@ -31,6 +31,7 @@ from shoal.identification.recording.plausible import check_constant
 from shoal.identification.recording.source import EngineSource
 from shoal.identification.spread.posterior import require_sampler
 from shoal.memory import Memory
+from shoal.scene import Scene
 from shoal.versions import versions
 
 Watch = Callable[[int, float, float, int], None]
@@ -53,6 +54,7 @@ def identify(
     checkpoint: Path | None = None,
     wishes: Wishes = NOTHING,
     progress: Watch = lambda *_: None,
+    ready: Callable[[Scene], None] = lambda _: None,
 ) -> Estimate:
     """Find the parameters of a problem.
 
@@ -65,7 +67,8 @@ def identify(
     time_limit [s]: of everything but data that are computed and kernels that are compiled; then the best so far is the
     answer; checkpoint: file of evaluations, which a run that was broken off finds when it is started again;
     wishes: what is to be known beyond the answer;
-    progress: is told how the search goes. Raises InputError, ComputationError.
+    progress: is told how the search goes; ready: is told the scene before anything is simulated, once recordings are
+    read. Raises InputError, ComputationError.
     """
     name = method or problem.method
     search = get_method(name)
@@ -81,9 +84,12 @@ def identify(
     computed = any(isinstance(source, EngineSource) for source in problem.sources.values())
     # Data that were computed with the scene's step are not to be fitted with another.
     paces = tolerance is None and not computed
-    if measurement is None:
-        # Data are computed with the problem's values, not the user's.
-        with deadline.paused() if deadline is not None and computed else nullcontext():
+    if measurement is None and not computed:
+        measurement = measure(problem, problem.load_scene(), data, hold_out)
+    with deadline.paused() if deadline is not None else nullcontext():
+        ready(scene)
+        if measurement is None:
+            # Data are computed with the problem's values, not the user's.
             measurement = measure(problem, problem.load_scene(), data, hold_out)
     model = ForwardModel(problem, scene, get_engine(engine), measurement, deadline)
     if deadline is not None:

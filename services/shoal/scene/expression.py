@@ -110,9 +110,8 @@ def _check_plain(node: ast.AST, text: str) -> None:
             pass
         raise InputError(f"expression: {text!r} has a number beyond 1e308")
     if not isinstance(node, _PLAIN):
-        raise InputError(
-            f"expression: {text!r} has {type(node).__name__}; use numbers, names, + - * / ** and functions"
-        )
+        found = "^, but a power is **" if isinstance(node, ast.BitXor) else type(node).__name__
+        raise InputError(f"expression: {text!r} has {found}; use numbers, names, + - * / ** and functions")
 
 
 def _check_call(node: ast.Call, text: str) -> None:

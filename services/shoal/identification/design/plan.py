@@ -20,6 +20,7 @@ from shoal.identification.design.precision import Aim, Bundle, Precision
 from shoal.identification.design.sensors import Sensor, columns_of, sensors_of
 from shoal.identification.forward import ForwardModel
 from shoal.identification.identify import identify
+from shoal.identification.measure import measure
 from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.source import Channel, EngineSource
@@ -216,7 +217,13 @@ def about_answer(
 
     Raises InputError, ComputationError where the answer cannot be trusted.
     """
-    found = identify(problem, data=data, values=values)
+    sources = list(problem.sources.values())
+    computed = any(isinstance(source, EngineSource) for source in sources)
+    measurement = None if computed else measure(problem, problem.load_scene(), data)
+    # What is asked for is looked at first, as an identification may take long.
+    stated_noise(problem, *(options.get(name) for name in ("noise", "angle_noise", "sensor_noise")))
+    grid(*today_of(sources[0], measurement, options.get("duration"), options.get("rate")))
+    found = identify(problem, data=data, values=values, measurement=measurement)
     if not found.verdict.trusted:
         raise ComputationError(
             f"{problem.name}: {found.verdict} ({found.message}); a design about the starts does without"
