@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from shoal.mechanics import fitting
-from shoal.mechanics.halts import narrow
+from shoal.mechanics.narrow import narrow
 from shoal.scene import Function
 from shoal.scene.branches import Branches, branches
 from shoal.scene.enclosure import at

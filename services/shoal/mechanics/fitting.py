@@ -9,7 +9,9 @@ accepted before interval arithmetic bounds what its interpolation leaves out (`e
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import lru_cache, partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,10 +19,13 @@ import numpy.typing as npt
 
 from shoal.errors import InputError
 from shoal.mechanics.functions import ORDER, Piecewise, value
+from shoal.mechanics.narrow import marks
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Function, formula
 from shoal.scene.branches import branches
+from shoal.scene.enclosure import at as derivative_at
 from shoal.scene.enclosure import enclose
+from shoal.scene.function import Composed
 
 _SMALLEST = 1e-9
 """Width, as a fraction of the range, at which bisecting ends."""
@@ -51,8 +56,18 @@ _CROWD, _TRIED, _MOST_OF = 2**10, 64, 0.6
 """From so many pieces on, so many of the shortest that the bound allows are tried before all the others; where they
 fail on that part of the range, halving the rest would go beyond the bound."""
 
-_LAW = 100.0
-"""A force law is known for elongations up to so many metres or radians."""
+_BEGINNING = 1e-9
+"""No function of time has its first kink so early [s], or else it goes on behind it."""
+
+_LAW = 1000.0
+"""A force law is known for elongations up to so many metres or radians, if it has values up to there."""
+_DECADES = 0.7 * 10.0 ** np.arange(-9, 4)
+"""Elongations between which a force law is met to as many digits as its values there have, whatever they are beyond."""
+_DIGITS = 1e-6
+"""To this part of its value a force law is met at any elongation, where it is fitted as one."""
+_STEEPEST = 1.3
+"""It ends where it cannot be told between two elongations of this ratio."""
+_ENDLESS = 1e300
 
 Extended = npt.NDArray[Any]
 
@@ -237,8 +252,79 @@ def _sample(function: Callable[[Any], Any], points: Extended) -> Extended:
 
 
 def fit_law(elastic: Function) -> Piecewise:
-    """The force of a spring as a function of its elongation [m or rad]. Raises InputError; see `fit`."""
-    return fit(elastic, _LAW, elastic.knots, begin=-_LAW)
+    """The force of a spring as a function of its elongation [m or rad], as far as it has finite values; see `fit`.
+
+    A law that is large somewhere leaves but round-off where it is small, and is fitted decade by decade then. Its kinks
+    are the places that no step may leap over. Raises InputError.
+    """
+    places = None
+    with suppress(InputError):
+        whole = fit(elastic, _LAW, elastic.knots, begin=-_LAW)
+        places = marks(whole)
+        if _has_digits(whole, elastic, np.outer([-4.7, -2.2, -1.0, 1.0, 2.2, 4.7], _DECADES[:-1]).ravel()):
+            return whole._replace(kinks=places)
+    parts = _by_decades(elastic)
+    breaks = np.concatenate([parts[0].breaks[:1], *(part.breaks[1:] for part in parts)])
+    kinks = np.concatenate([part.kinks for part in parts]) if places is None else places
+    return Piecewise(breaks, np.concatenate([part.coefficients for part in parts]), kinks)
+
+
+def _by_decades(elastic: Function) -> list[Piecewise]:
+    """A force law from the smallest elongations at which it can be told from round-off to where it ends."""
+    for first, least in enumerate(_DECADES.tolist()):
+        try:
+            parts = [fit(elastic, least, elastic.knots, begin=-least)]
+            break
+        except InputError:
+            if first == len(_DECADES) - 1:
+                raise
+    for side in (-1.0, 1.0):
+        ahead = [(near, far) for near, far in pairwise((side * _DECADES[first:]).tolist())]
+        while ahead:
+            near, far = ahead.pop(0)
+            part = None
+            with suppress(InputError):
+                part = fit(elastic, max(near, far), elastic.knots, begin=min(near, far))
+            if part is None or not _has_digits(part, elastic, np.linspace(near, far, 4)[:-1]):
+                if far / near < _STEEPEST:
+                    break
+                middle = np.sqrt(near / far) * far
+                ahead = [(near, middle), (middle, far), *ahead]
+                continue
+            parts = [part, *parts] if side < 0 else [*parts, part]
+    return parts
+
+
+def _has_digits(law: Piecewise, elastic: Function, at: Array) -> bool:
+    """Whether a law is met at these elongations to so many digits of its values there."""
+    wanted = np.asarray(elastic(at.astype(np.longdouble)), dtype=float)
+    found = np.array([value(law, float(x)) for x in at])
+    return bool(np.all(np.abs(found - wanted) <= _DIGITS * np.abs(wanted)))
+
+
+def ended(law: Piecewise) -> Piecewise:
+    """A force law or its energy that has no value beyond the range where it is known."""
+    none = np.full((1, ORDER), np.nan)
+    breaks = np.concatenate([[-_ENDLESS], law.breaks, [_ENDLESS]])
+    return Piecewise(breaks, np.concatenate([none, law.coefficients, none]), law.kinks)
+
+
+def start_slope(function: Function | Composed) -> float:
+    """The derivative of a function of time at t = 0, on its right side. Raises InputError."""
+    stated, operations = (function.function, function.operations) if isinstance(function, Composed) else (function, ())
+    if stated.number is not None:
+        return 0.0
+    node = stated.formula
+    if node is None:  # a table
+        slope = formula.make("*", stated.table_slope(0.0, left=False), "t")
+        node = formula.make("+", float(stated(np.zeros(1))[0]), slope)
+    for operation in operations:
+        node = formula.make(operation, node)
+    low, high = derivative_at(branches(node, 0.0, _BEGINNING).nodes[0], np.zeros(1))
+    slope = float(low[1, 0] + high[1, 0]) / 2
+    if np.isfinite(slope):
+        return slope
+    return value(fit(function, _BEGINNING, function.knots), 0.0, 1)  # such as sin(t)/t
 
 
 def require_no_jump(function: Function, horizon: float) -> None:
@@ -274,7 +360,10 @@ def antiderivative(piecewise: Piecewise) -> Piecewise:
     powers[:, 1:] = half * coefficients[:, :-1] / np.arange(1, ORDER)
     signs = (-1.0) ** np.arange(ORDER)
     powers[:, 0] = -(powers @ signs)
-    powers[1:, 0] += np.cumsum(powers.sum(axis=1))[:-1]
-    whole = Piecewise(breaks, powers, kinks)
-    powers[:, 0] -= value(whole, 0.0)
-    return whole
+    # From zero outwards: what lies far out may be so large that nothing near zero would be left of its digits.
+    each = powers.sum(axis=1)
+    middle = int(np.clip(np.searchsorted(breaks, 0.0, side="right") - 1, 0, len(powers) - 1))
+    inner = value(Piecewise(breaks[middle : middle + 2], powers[middle : middle + 1], kinks), 0.0)
+    powers[middle:, 0] += np.concatenate([np.zeros(1), np.cumsum(each[middle:-1])]) - inner
+    powers[:middle, 0] -= np.cumsum(each[:middle][::-1])[::-1] + inner
+    return Piecewise(breaks, powers, kinks)

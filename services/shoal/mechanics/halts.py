@@ -1,7 +1,7 @@
 """Where a march may not step across: times at which functions of time are not smooth, and narrow parts of force laws.
 
-A function is smooth between its jumps and kinks, where every step ends; but it may also be so narrow there that a step
-would pass over it unseen. How narrow it is shows in the widths of the pieces that were needed to fit it.
+A function is smooth between its jumps and kinks, where every step ends; but it may also be so narrow there (`narrow`)
+that a step would pass over it unseen.
 """
 
 from __future__ import annotations
@@ -13,17 +13,10 @@ from numba import njit
 
 from shoal.mechanics import forces
 from shoal.mechanics.forces import Forces
-from shoal.mechanics.functions import Piecewise
 from shoal.mechanics.model import Model
+from shoal.mechanics.narrow import narrow
 from shoal.mechanics.numerics.tile import Array, Index, Tile
 
-NARROW = 0.25
-"""Pieces narrower than this fraction of the longest step are not left to a step that sees its error, ..."""
-PARTS = 8
-"""... and fixed steps pass pieces narrower than themselves in so many, and in no fewer what is short beside its
-neighbours."""
-GRADED = 1.9
-"""Neighbouring pieces whose widths differ by more than this factor lead to something narrow."""
 CROSSED = 0.5
 """Largest fraction of an interval between two marks of a force law that one step may cross."""
 RESOLUTION = 1e-14
@@ -53,40 +46,9 @@ def halts(model: Model, end: float, longest: float, adaptive: bool) -> Halts:
     if found and not adaptive and np.ceil(end / longest - EDGE) * longest > end * (1 + EDGE):
         # Functions of time are known up to the end of the run.
         times = np.append(times[times < end * (1 - RESOLUTION)], end)
-    found = [marks(model.function(int(number))) if number >= 0 else np.zeros(0) for number in model.forces.table]
+    found = [model.function(int(number)).kinks if number >= 0 else np.zeros(0) for number in model.forces.table]
     start = np.cumsum([0, *(len(part) for part in found)], dtype=np.int64)
     return Halts(times, start, np.concatenate([np.zeros(0), *found]))
-
-
-def narrow(breaks: Array, longest: float, adaptive: bool) -> Array:
-    """Places at narrow pieces: for steps that see their error where widths change, for fixed ones PARTS to a piece."""
-    widths = np.diff(breaks)
-    least, most = np.minimum(widths[1:], widths[:-1]), np.maximum(widths[1:], widths[:-1])
-    uneven = most > GRADED * least
-    if not adaptive:
-        near = np.convolve(np.pad(uneven, 2), np.ones(4), "valid") > 0  # a change of width at most two pieces away
-        chosen = np.flatnonzero(widths < longest * np.where(near, PARTS, 1.0))
-        inside = breaks[chosen, None] + widths[chosen, None] * np.linspace(0.0, 1.0, PARTS + 1)
-        return np.unique(np.concatenate([inside[:, 1:].ravel(), breaks[chosen]]))
-    return breaks[1:-1][(least < NARROW * longest) & uneven]
-
-
-def marks(law: Piecewise) -> Array:
-    """Places on the elongation between which a force law is smooth and of one width.
-
-    Pieces that get narrower towards a kink and the force with them, as those of max(t, 0)**1.5, are no places to stop.
-    """
-    breaks, coefficients, kinks = law
-    widths, sizes = np.diff(breaks), np.abs(coefficients).sum(axis=1)
-    fading = np.zeros(len(breaks), dtype=bool)
-    for kink in np.searchsorted(breaks, kinks):
-        for step, first in ((1, kink), (-1, kink - 1)):
-            k = first
-            while 0 <= k + step < len(widths) and widths[k + step] >= widths[k] and sizes[k + step] >= sizes[k]:
-                k += step
-                fading[k if step > 0 else k + 1] = True
-    chosen = narrow(breaks, np.inf, True)
-    return np.union1d(kinks, chosen[~fading[np.searchsorted(breaks, chosen)]])
 
 
 @njit(cache=True, error_model="numpy")

@@ -39,6 +39,9 @@ class Limits:
         # Modal rods that turn faster than they vibrate fly apart, as they do not know that tension makes them stiff.
         modal = any(body.element == "modal" for body in scene.bodies.values())
         self._remark = "; modal rods are right for small bending: use element: ancf-cable for more" if modal else ""
+        laws = [model.function(int(number)).breaks[1:-1] for number in model.forces.table if number >= 0]
+        known = max((law[0] for law in laws), default=0.0), min((law[-1] for law in laws), default=0.0)
+        self._laws = f"; `elastic` of the loads is known from {known[0]:.3g} to {known[1]:.3g}" if laws else ""
         self._driven = any(not _constant(joint) for joint in scene.joints.values()) or bool(scene.ground_points)
         self._weight = float(np.max(np.abs(model.weight), initial=0.0))
         stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
@@ -94,7 +97,7 @@ class Limits:
             advice = "no step is short enough for it" if adaptive else "use a smaller step"
             if self._driven:
                 advice += ", or let the drives ask for no more than the joints can reach"
-            return Status.DIVERGED, f"the motion is not finite; {advice}"
+            return Status.DIVERGED, f"the motion is not finite; {advice}{self._laws}"
         if farthest > reach:
             return Status.OUT_OF_REACH, f"a marker is {farthest:.3g} m away, the reach is {reach:.3g} m"
         if energy_drift > allowed:

@@ -13,7 +13,6 @@ from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.chain import cross
 from shoal.engines.exudyn.ends import Ends
 from shoal.mechanics.fitting import fit_law
-from shoal.mechanics.halts import marks
 from shoal.scene import Attachment, Function
 from shoal.trajectory import Array
 
@@ -137,7 +136,7 @@ def exchange_of(law: Law, measure: Callable[[Array, Array], tuple[Array, Array]]
         x, rate = measure(q, v)
         return law.resisting(x, rate) * rate
 
-    places = np.zeros(0) if law.elastic is None else marks(fit_law(law.elastic))
+    places = np.zeros(0) if law.elastic is None else fit_law(law.elastic).kinks
     crossed = (lambda q, v: _crossed(places, measure(q, v)[0])) if places.size > 1 else None
     return Exchange(lost, lambda t, q, v: law.stored(measure(q, v)[0]), crossed)
 

@@ -15,9 +15,13 @@ from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import choose, facts, halting, pick
 from shoal.mechanics.machine import check_step
 from shoal.mechanics.march import march
+from shoal.mechanics.marched import NUMBERS, Marched, told
+from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import SINGLE, Array
+from shoal.mechanics.verdict import Limits
 from shoal.mechanics.workspace import at_start
 from shoal.scene import Scene
+from shoal.trajectory import Status
 
 LANE = slice(0, 1)
 """The only lane of a model of one scene."""
@@ -36,7 +40,7 @@ class State(NamedTuple):
 def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]]:
     """States at times >= 0 [s], each reached from the start by whole steps no longer than the scene's.
 
-    Raises InputError if the scene cannot be modelled, ComputationError if the motion is not finite.
+    Raises InputError if the scene cannot be modelled, ComputationError if the motion cannot be believed (`verdict`).
     """
     if not len(times) or not all(np.isfinite(t) and t >= 0 for t in times):
         raise InputError("times: give times of at least 0 s")
@@ -45,8 +49,7 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
     if max(times) > 0:
         check_step(scene, choice)
     evaluator = Evaluator(model)
-    n = model.unknowns
-    none = np.zeros(0, dtype=np.int64)
+    limits, n = Limits(scene, model), model.unknowns
     found = []
     for time in map(float, times):
         arrays, room = at_start(model, SINGLE, LANE)
@@ -56,10 +59,20 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
         if facts(choice.name).adaptive:
             steps, step = (scene.solver.max_steps if steps else 0), scene.solver.step
         stops = halting(scene.solver.model_copy(update={"step": step}), model, choice.name, time)
-        march(SINGLE, scheme, arrays, room, step, steps, np.array([time]), none, scene.solver.rank_tolerance, stops)
+        rows, tolerance = model.marker_rows.ravel(), scene.solver.rank_tolerance
+        record = march(SINGLE, scheme, arrays, room, step, steps, np.array([time]), rows, tolerance, stops)
+        (status,), reason = limits.verdict(_numbers(model, record, limits, time), choice, model.failed)
+        if status is not Status.OK:
+            raise ComputationError(f"{scene.name}: the motion up to {time:g} s is rejected ({status}): {reason}")
         q, v = room.z[:n].copy(), room.zdot[:n].copy()
-        if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))):
-            raise ComputationError(f"{scene.name}: the motion is not finite at {time:g} s; use a smaller step")
         evaluator.turns = room.memory
         found.append(State(time, q, v, evaluator.acceleration(q, v, time), room.memory.copy()))
     return evaluator, found
+
+
+def _numbers(model: Model, record: Marched, limits: Limits, end: float) -> Array:
+    """What the record of a run up to `end` [s] is judged by, (NUMBERS, 1)."""
+    markers, numbers = len(model.marker_rows), np.empty((NUMBERS, 1))
+    motion, turns = np.empty((1, markers, 2 * model.dimensions + 2, 1)), np.zeros((markers, 1))
+    told(record, 1, 0, turns, limits.anchors, limits.energy_floor(end), limits.span, motion, numbers)
+    return numbers

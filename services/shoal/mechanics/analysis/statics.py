@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from shoal.errors import InputError
 from shoal.mechanics import plane
 from shoal.mechanics.analysis.balance import Balance, Found, zero_level
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
@@ -51,6 +52,8 @@ def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True) -> 
     leave_unstable: go on from an unstable equilibrium (a column beyond its buckling load) to a stable one, where the
     loads have a potential. Raises InputError if the scene cannot be modelled.
     """
+    if not (np.isfinite(time) and time >= 0):
+        raise InputError(f"time: needs a time of at least 0 s, found {time:g}")
     evaluator = Evaluator.of(scene, horizon=time)
     return _Search(scene, evaluator, time).run(leave_unstable)
 

@@ -202,7 +202,7 @@ class Loads:
         if elastic is not None and self.horizon > 0.0:
             with naming(f"loads.{name}.elastic"):
                 fitted = fitting.fit_law(elastic)
-            self.fitted += [fitted, fitting.antiderivative(fitted)]
+            self.fitted += [fitting.ended(one) for one in (fitted, fitting.antiderivative(fitted))]
             table, energy = len(self.fitted) - 2, len(self.fitted) - 1
         driven = -1
         if drive is not None and self.horizon > 0.0:

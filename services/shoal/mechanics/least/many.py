@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics import constraints, functions, saddle
-from shoal.mechanics.least.projection import dot
+from shoal.mechanics.constraints import Constraints
+from shoal.mechanics.least.projection import NOTHING, dot
 from shoal.mechanics.least.work import GaussWork
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
@@ -51,6 +52,22 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array)
 
 
 @njit(cache=True, error_model="numpy")
+def _combine(tile: Tile, c: Constraints, w: GaussWork, number: int, lane: int, weights: Array) -> None:
+    """Shares of the rows in the combination of row `number` that vanishes, by its multipliers in w."""
+    width, largest = len(tile), 0.0
+    for turn in range(2):
+        for j in range(c.size):
+            square = 0.0
+            for e in range(c.entry[j], c.entry[j + 1]):
+                square += w.jacobian[e * width + lane] ** 2
+            share = (1.0 if j == number else 0.0) - w.multiplier[j * width + lane]
+            if turn == 0:
+                largest = max(largest, abs(share) * np.sqrt(square))
+            alien = j != number and abs(share) * np.sqrt(square) < NOTHING * largest
+            weights[j] = 0.0 if alien else share
+
+
+@njit(cache=True, error_model="numpy")
 def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Array, a: Array) -> None:
     """Correct `a` by the rows u' d3C/dt3 = 0 of the rows that the factorisation left out, one after the other."""
     width = len(tile)
@@ -77,8 +94,8 @@ def _add_third_derivatives(tile: Tile, m: Arrays, w: GaussWork, t: float, v: Arr
             target = 0.0
             for i in range(n):
                 rows[rank, i] = 0.0
+            _combine(tile, c, w, k, lane, weights)
             for j in range(count):
-                weights[j] = (1.0 if j == k else 0.0) - w.multiplier[j * width + lane]
                 target -= weights[j] * functions.evaluate(m.functions, c.drive[j], t, 3)
                 for e in range(c.entry[j], c.entry[j + 1]):
                     rows[rank, c.column[e]] += 3.0 * weights[j] * w.turning[e * width + lane]

@@ -19,6 +19,12 @@ from shoal.mechanics.numerics.tile import Array, Index
 
 NEW = 1e-6
 """What must be left of a row by third derivatives, as a part of its length, to add to the others."""
+NOTHING = 1e-10
+"""A row that has no larger share in a combination than this part of the largest is not in it, but for round-off.
+
+Where the rows that are in it change no more, as those of a driven crank at rest, round-off of others would be all that
+is left of their third derivatives: a row of its own, and wrong.
+"""
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -109,6 +115,12 @@ def dependence(number: int, rank: int, triangle: Array, norms: Array, order: Ind
         for j in range(k + 1, rank):
             total += triangle[k, j] * out[order[j]] * norms[order[j]]
         out[order[k]] = -total / triangle[k, k] / norms[order[k]]
+    largest = 0.0
+    for k in range(out.size):
+        largest = max(largest, abs(out[k]) * norms[k])
+    for k in range(out.size):
+        if abs(out[k]) * norms[k] < NOTHING * largest:
+            out[k] = 0.0
 
 
 @njit(cache=True, error_model="numpy")

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 
 from shoal.mechanics.constraints import Constraints
-from shoal.mechanics.numerics.simd import EIGHT, larger, least, load, root, spread, store
+from shoal.mechanics.least.projection import NOTHING
+from shoal.mechanics.numerics.simd import EIGHT, heaviside, larger, least, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Index
 
 APART = 1e-3
@@ -205,8 +206,13 @@ def _depend(w: GroupWork, rank: int, count: int, number: int) -> None:
             other = w.order[j]
             total = total + load(EIGHT, w.triangle, (k * count + other) * e) * load(EIGHT, w.wanted, other * e)
         store(w.wanted, w.order[k] * e, -total / load(EIGHT, w.triangle, (k * count + w.order[k]) * e))
+    largest = spread(EIGHT, 0.0)
     for k in range(count):
-        store(w.wanted, k * e, load(EIGHT, w.wanted, k * e) / load(EIGHT, w.norms, k * e))
+        largest = larger(largest, load(EIGHT, w.wanted, k * e))
+    for k in range(count):
+        share = load(EIGHT, w.wanted, k * e)
+        counts = heaviside(larger(share, share) - NOTHING * largest)
+        store(w.wanted, k * e, counts * share / load(EIGHT, w.norms, k * e))
 
 
 @njit(cache=True, error_model="numpy")

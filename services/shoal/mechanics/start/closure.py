@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from shoal.mechanics.fitting import start_slope
 from shoal.mechanics.joints import Along, Apart, Condition, Geared, Meet, Sum, Turned, conditions, unknown
 from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array, Index, Number
@@ -267,8 +268,5 @@ def value_of(f: Function) -> float:
 
 
 def rate_of(f: Function) -> float:
-    """Its derivative there, by forward differences of fourth order."""
-    if f.number is not None:
-        return 0.0
-    step = 1e-4
-    return float(np.array([-25, 48, -36, 16, -3]) @ f(step * np.arange(5))) / (12 * step)
+    """Its derivative there."""
+    return start_slope(f)

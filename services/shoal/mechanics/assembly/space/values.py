@@ -8,6 +8,7 @@ import numpy as np
 
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.terms import Mesh, Term
+from shoal.mechanics.fitting import start_slope
 from shoal.mechanics.numerics.tile import Array
 
 
@@ -67,8 +68,4 @@ def value_of(term: Term, q: Array, lane: int) -> float:
 
 def drive_rate(term: Term | Mesh) -> float:
     """The rate of a constraint's function of time at time zero."""
-    if term.drive is None:
-        return 0.0
-    h = 1e-5
-    before, now, after = (float(x) for x in term.drive(np.array([0.0, h, 2 * h])))
-    return (4 * now - 3 * before - after) / (2 * h)
+    return 0.0 if term.drive is None else start_slope(term.drive)
