@@ -83,3 +83,28 @@ def test_what_has_no_direction_is_refused(spring: dict[str, Any], message: str) 
 def test_it_is_for_the_plane() -> None:
     with pytest.raises(InputError, match=r"loads\.S\.second_to: is for scenes in the plane"):
         one().with_values({"dimensions": 3})
+
+
+@pytest.mark.parametrize("angle", [np.pi, -np.pi, 3.0])
+def test_a_chain_that_is_nearly_straight_is_not_wound_up_to_either_side(angle: float) -> None:
+    """Its mirror image, of the opposite rest angle, moves as its mirror image."""
+
+    def moved(side: float, rest: float) -> Any:
+        mass, place = {"kind": "point-mass", "mass": 0.1}, lambda name: {"body": name}
+        scene = Scene.parse({
+            "name": "chain", "gravity": [0, 0], "bodies": {"b": mass, "c": mass},
+            "joints": {"ab": {"kind": "distance", "first": GROUND, "second": place("b")},
+                       "bc": {"kind": "distance", "first": place("b"), "second": place("c")}},
+            "loads": {"t": {"kind": "torsion-spring", "first": place("b"), "first_to": GROUND, "second": place("b"),
+                            "second_to": place("c"), "stiffness": 0.8, "angle": rest}},
+            "markers": {"c": place("c")},
+            "initial": {"b": {"position": [0.2, 0.0]}, "c": {"position": [0.4, 0.02 * side]}},
+        })  # fmt: skip
+        run = simulate(scene, np.linspace(0.05, 0.5, 10))
+        assert run.ok, run.message
+        return run.marker("c") * [1.0, side]
+
+    up, down = moved(1.0, angle), moved(-1.0, -angle)
+    np.testing.assert_allclose(up, down, atol=1e-9)
+    if abs(angle) > 3.1:  # straight: it swings by as much as it was bent
+        assert np.max(np.abs(up[:, 1])) < 0.03

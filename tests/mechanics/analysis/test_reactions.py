@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shoal.errors import InputError
+from shoal.errors import ComputationError, InputError
 from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.joint_reactions import reactions_of
 from shoal.mechanics.analysis.modes import modes
@@ -216,3 +216,18 @@ def test_reactions_and_modes_number_the_bodies_as_the_motion_does() -> None:
     (found,) = reactions(scene, [0.2])
     assert found.ok
     assert modes(scene).balanced
+
+
+def test_no_forces_are_told_of_a_motion_that_is_rejected() -> None:
+    """They were those of where the run broke off, or of steps that had lost its energy."""
+    scene = load_scene("single-pendulum")
+    with pytest.raises(ComputationError, match="led to"):
+        reactions(scene.with_values({"solver.max_steps": 100}), [0.5, 50.0])
+    with pytest.raises(ComputationError, match="energy"):
+        reactions(scene.with_values({"solver.integrator": "leapfrog", "solver.step": 0.2}), [5.0])
+
+
+@pytest.mark.parametrize("time", [float("nan"), float("inf"), -1.0])
+def test_a_machine_rests_at_a_time(time: float) -> None:
+    with pytest.raises(InputError, match="time: needs"):
+        statics(load_scene("single-pendulum"), time)

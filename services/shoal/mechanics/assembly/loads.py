@@ -116,6 +116,8 @@ class Loads:
         ways = self._ways(name, load) if places else []
         start = self._opening(ways) if places else self._rest(name, load)
         rest = start if load.angle is None else load.angle
+        if places:  # which tell no whole turns: straight is pi on either side
+            start = start + 2 * np.pi * np.round((rest - start) / (2 * np.pi))
         law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0]
         if places:
             self._measure(name, ANGLE, ways, law, start, elastic=load.elastic)
