@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -94,7 +93,9 @@ def identify(
         how["progress"] = lambda _, best, __, count: tell(
             f"{wanted.name}: best fitness {best:.3e}, {count} evaluations"
         )
-        how["ready"] = partial(screen.compile_for, how["engine"], [1, 2])
+        carried = how["fitted"]
+        starting, values = (wanted, how["values"]) if carried is None else carried.into(wanted, how["values"])[:2]
+        screen.compile_for(how["engine"], [1, 2], starting.load_scene(values))
         estimate = identify(wanted, checkpoint=checkpoint, wishes=wishes, **how)
     if out is not None:
         files.estimate(estimate, wanted, out)

@@ -31,7 +31,6 @@ from shoal.identification.recording.plausible import check_constant
 from shoal.identification.recording.source import EngineSource
 from shoal.identification.spread.posterior import require_sampler
 from shoal.memory import Memory
-from shoal.scene import Scene
 from shoal.versions import versions
 
 Watch = Callable[[int, float, float, int], None]
@@ -54,7 +53,6 @@ def identify(
     checkpoint: Path | None = None,
     wishes: Wishes = NOTHING,
     progress: Watch = lambda *_: None,
-    ready: Callable[[Scene], None] = lambda _: None,
 ) -> Estimate:
     """Find the parameters of a problem.
 
@@ -67,13 +65,14 @@ def identify(
     time_limit [s]: of everything but data that are computed and kernels that are compiled; then the best so far is the
     answer; checkpoint: file of evaluations, which a run that was broken off finds when it is started again;
     wishes: what is to be known beyond the answer;
-    progress: is told how the search goes; ready: is told the scene before anything is simulated, once recordings are
-    read. Raises InputError, ComputationError.
+    progress: is told how the search goes. Raises InputError, ComputationError.
     """
     name = method or problem.method
     search = get_method(name)
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
+    if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0):
+        raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
     if wishes.sample:
         require_sampler()
     notes: list[str] = []
@@ -84,16 +83,12 @@ def identify(
     computed = any(isinstance(source, EngineSource) for source in problem.sources.values())
     # Data that were computed with the scene's step are not to be fitted with another.
     paces = tolerance is None and not computed
-    if measurement is None and not computed:
-        measurement = measure(problem, problem.load_scene(), data, hold_out)
     with deadline.paused() if deadline is not None else nullcontext():
-        ready(scene)
         if measurement is None:
             # Data are computed with the problem's values, not the user's.
             measurement = measure(problem, problem.load_scene(), data, hold_out)
-    model = ForwardModel(problem, scene, get_engine(engine), measurement, deadline)
-    if deadline is not None:
-        with deadline.paused():
+        model = ForwardModel(problem, scene, get_engine(engine), measurement, deadline)
+        if deadline is not None:
             model.warm_up()
     unless_late(lambda: check_constant(model.measurement, model.at_start), None)
     if paces:

@@ -59,14 +59,14 @@ fail on that part of the range, halving the rest would go beyond the bound."""
 _BEGINNING = 1e-9
 """No function of time has its first kink so early [s], or else it goes on behind it."""
 
-_LAW = 1000.0
-"""A force law is known for elongations up to so many metres or radians, if it has values up to there."""
+_LAW = 100.0
+"""A force law is fitted as one for elongations up to so many metres or radians, where that leaves its digits."""
 _DECADES = 0.7 * 10.0 ** np.arange(-9, 4)
-"""Elongations between which a force law is met to as many digits as its values there have, whatever they are beyond."""
+"""Elongations between which it is met to as many digits as its values there have, whatever they are beyond."""
 _DIGITS = 1e-6
 """To this part of its value a force law is met at any elongation, where it is fitted as one."""
 _STEEPEST = 1.3
-"""It ends where it cannot be told between two elongations of this ratio."""
+"""Between elongations of this ratio it is taken as it is fitted, and ends where it cannot be fitted."""
 _ENDLESS = 1e300
 
 Extended = npt.NDArray[Any]
@@ -257,39 +257,43 @@ def fit_law(elastic: Function) -> Piecewise:
     A law that is large somewhere leaves but round-off where it is small, and is fitted decade by decade then. Its kinks
     are the places that no step may leap over. Raises InputError.
     """
-    places = None
+    places, known = None, None
     with suppress(InputError):
         whole = fit(elastic, _LAW, elastic.knots, begin=-_LAW)
         places = marks(whole)
-        if _has_digits(whole, elastic, np.outer([-4.7, -2.2, -1.0, 1.0, 2.2, 4.7], _DECADES[:-1]).ravel()):
-            return whole._replace(kinks=places)
-    parts = _by_decades(elastic)
+        everywhere = np.outer([-4.7, -2.2, -1.0, 1.0, 2.2, 4.7], _DECADES[_DECADES < _LAW / 5]).ravel()
+        known = whole if _has_digits(whole, elastic, everywhere) else None
+    parts = _outwards(elastic, _innermost(elastic) if known is None else known)
     breaks = np.concatenate([parts[0].breaks[:1], *(part.breaks[1:] for part in parts)])
     kinks = np.concatenate([part.kinks for part in parts]) if places is None else places
     return Piecewise(breaks, np.concatenate([part.coefficients for part in parts]), kinks)
 
 
-def _by_decades(elastic: Function) -> list[Piecewise]:
-    """A force law from the smallest elongations at which it can be told from round-off to where it ends."""
-    for first, least in enumerate(_DECADES.tolist()):
-        try:
-            parts = [fit(elastic, least, elastic.knots, begin=-least)]
-            break
-        except InputError:
-            if first == len(_DECADES) - 1:
-                raise
+def _innermost(elastic: Function) -> Piecewise:
+    """A force law at the smallest elongations at which it can be told from round-off."""
+    for least in _DECADES[:-1]:
+        with suppress(InputError):
+            return fit(elastic, least, elastic.knots, begin=-least)
+    return fit(elastic, _DECADES[-1], elastic.knots, begin=-_DECADES[-1])
+
+
+def _outwards(elastic: Function, middle: Piecewise) -> list[Piecewise]:
+    """A force law from what is known of it about zero to where it ends, in order."""
+    parts, end = [middle], float(middle.breaks[-1])
+    edges = [end, *_DECADES[end < _DECADES].tolist()]
     for side in (-1.0, 1.0):
-        ahead = [(near, far) for near, far in pairwise((side * _DECADES[first:]).tolist())]
+        ahead = [(side * near, side * far) for near, far in pairwise(edges)]
         while ahead:
             near, far = ahead.pop(0)
             part = None
             with suppress(InputError):
                 part = fit(elastic, max(near, far), elastic.knots, begin=min(near, far))
-            if part is None or not _has_digits(part, elastic, np.linspace(near, far, 4)[:-1]):
-                if far / near < _STEEPEST:
-                    break
-                middle = np.sqrt(near / far) * far
-                ahead = [(near, middle), (middle, far), *ahead]
+            narrow = far / near < _STEEPEST
+            if part is None and narrow:
+                break
+            if part is None or not (narrow or _has_digits(part, elastic, np.linspace(near, far, 4)[:-1])):
+                half = np.sqrt(near / far) * far
+                ahead = [(near, half), (half, far), *ahead]
                 continue
             parts = [part, *parts] if side < 0 else [*parts, part]
     return parts

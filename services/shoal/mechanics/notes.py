@@ -1,4 +1,4 @@
-"""Who wants to be told what is being compiled; no part of the compiler is imported for it."""
+"""Who wants to be told what is being compiled, and what is done before the first model; nothing heavy is imported."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ Note = Callable[[str], None]
 """Takes a line of text."""
 
 _listening: list[Note] = []
+_first: list[Callable[[], None]] = []
 
 
 @contextmanager
@@ -25,3 +26,14 @@ def tell(line: str) -> None:
     """Pass a line to all who listen."""
     for note in _listening:
         note(line)
+
+
+def before_models(action: Callable[[], None]) -> None:
+    """Do this, in place of what was asked for before, when the first model is built: by then the input is right."""
+    _first[:] = [action]
+
+
+def begin() -> None:
+    """A model is about to be built."""
+    while _first:
+        _first.pop()()

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from shoal.mechanics import notes
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gates import Seek
@@ -107,6 +108,7 @@ def _model(scene_json: str, horizon: float) -> Model:
 
 def _built(scene: Scene, lanes: int, horizon: float) -> Model:
     """The model of a scene, whose friction must know the forces that it depends on."""
+    notes.begin()
     model = capped(build(scene, lanes, horizon))
     if model.rubbing.size:
         from shoal.mechanics.analysis.joint_reactions import require_unique_friction

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from shoal.mechanics import notes
 from shoal.mechanics.notes import telling
 from shoal.scene import Scene
 from shoal.trajectory import json_text
@@ -48,11 +49,18 @@ def line(text: str) -> None:
 
 
 def compile_for(engine: str, lanes: Iterable[int], *scenes: Scene) -> None:
-    """On all cores, what runs of our own solver will need: one by itself (1), many side by side (2)."""
-    if engine == "gauss":
-        from shoal.mechanics.warm import warm_for
+    """On all cores, what runs of our own solver will need: one by itself (1), many side by side (2).
 
-        warm_for(scenes, lanes, line)
+    It is done when the first of them begins, so that nobody waits to hear of a misprint.
+    """
+    if engine == "gauss":
+
+        def compile_all() -> None:
+            from shoal.mechanics.warm import warm_for
+
+            warm_for(scenes, lanes, line)
+
+        notes.before_models(compile_all)
 
 
 def table(title: str, *headings: str) -> Table:
