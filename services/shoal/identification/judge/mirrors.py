@@ -16,7 +16,7 @@ from itertools import combinations, product
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.rivals import apart
+from shoal.identification.judge.rivals import apart, turn_of_samples
 from shoal.identification.methods.lanes import descend_many, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import poses_at
@@ -25,6 +25,8 @@ from shoal.trajectory import Array
 _MOST = 256
 """Images by each combination of reflections; of machines with more only those of all angles, and of single ones."""
 _SIMULATED, _FOLLOWED = 16, 4
+_TURNS = 3
+"""So many times more, either way, a body may turn between two samples."""
 _ALIKE = 0.05
 """Of the spread of the data: deviation of an image's first channels from those of the answer."""
 _FITS = 0.3
@@ -78,6 +80,7 @@ def _candidates(model: ForwardModel, point: Array) -> Iterator[Array]:
         yield from _reflected(model, point, group)
     for name in recordings:
         yield from poses_at(model, point, name)
+    yield from _aliases(model, point)
     values = model.parameters.to_values(point)
     fields = [path.rpartition(".")[2] for path in model.parameters.paths]
     states = model.parameters.initial
@@ -121,6 +124,18 @@ def _reflected(model: ForwardModel, point: Array, recordings: tuple[str, ...]) -
             if "rate" in parts and kind in (1, 2):
                 image[parts["rate"]] *= -1.0
         yield image
+
+
+def _aliases(model: ForwardModel, point: Array) -> Iterator[Array]:
+    """Rates of the start by which a body turns once more, or once less, and so on, from each sample to the next."""
+    turn = turn_of_samples(model)
+    if turn is None:
+        return
+    for k in (k for k, path in enumerate(model.parameters.paths) if path.endswith(".rate")):
+        for turns in (n * sign for n in range(1, _TURNS + 1) for sign in (1, -1)):
+            alias = point.copy()
+            alias[k] += turns * turn
+            yield alias
 
 
 def _few(count: int) -> list[tuple[int, ...]]:

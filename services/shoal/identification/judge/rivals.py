@@ -9,17 +9,17 @@ from functools import partial
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import damped_step, differentiate_many, kept_apart
+from shoal.identification.methods.lanes import damped_step, differentiate_many, differing, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread.chances import chi_square_above
 from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.identification.spread.value import Value
 from shoal.trajectory import Array
 
+_EVEN, _WHOLE = 1e-3, 0.02
+"""Steps between samples that differ by no more of themselves are even; turns this near to a whole number are whole."""
 _STATIONS, _STEPS = 7, 10
 """Points between two minima, and how many steps they may descend towards the valley's floor."""
-_APART = 1e-3
-"""Of a parameter's range: points that differ by less are the same."""
 
 
 def rivals_of(model: ForwardModel, outcome: Outcome, at: Linearisation) -> list[Array]:
@@ -85,7 +85,15 @@ def _downhill(residual: Array, jacobian: Array, damping: float) -> Array:
 
 def apart(model: ForwardModel, one: Array, other: Array) -> bool:
     """Whether two points are different machines; angles that differ by whole turns are not."""
-    return bool(np.any(_differing(model, one, other)))
+    return bool(np.any(differing(model, one, other)))
+
+
+def turn_of_samples(model: ForwardModel) -> float | None:
+    """The rate [rad/s] at which a body turns once from each sample to the next; None where samples are uneven."""
+    steps = [np.diff(recording.times) for recording in model.measurement.recordings.values()]
+    if any(step.size == 0 or np.ptp(step) > _EVEN * step[0] for step in steps):
+        return None
+    return float(2 * np.pi / max(step[0] for step in steps))
 
 
 def within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -> bool:
@@ -98,20 +106,17 @@ def within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -
 
 def relation(model: ForwardModel, one: Array, other: Array) -> str:
     """What another solution is to the first: a mirror image, another clock or camera, or just different."""
-    differing = np.flatnonzero(_differing(model, one, other))
-    if np.all(model.parameters.initial[differing]):
+    changed = np.flatnonzero(differing(model, one, other))
+    turn = turn_of_samples(model)
+    if turn is not None and all(model.parameters.paths[k].endswith(".rate") for k in changed):
+        turns = (one - other)[changed] / turn
+        if np.all(np.abs(turns - np.round(turns)) < _WHOLE):
+            return "the same at every sample, by whole turns between samples; sample more often"
+    if np.all(model.parameters.initial[changed]):
         return "mirror images: the same marker positions with another pose"
     entries = list(model.parameters.entries.values())
-    if all(entries[k].parameter.of_measurement for k in differing):
+    if all(entries[k].parameter.of_measurement for k in changed):
         return "one machine, recorded in different ways"
-    span = model.upper - model.lower
-    if np.all(np.abs(np.abs(one) - np.abs(other)) <= _APART * span):
+    if not np.any(differing(model, np.abs(one), np.abs(other))):
         return "mirror images: parameters with the opposite sign"
     return "different machines"
-
-
-def _differing(model: ForwardModel, one: Array, other: Array) -> Array:
-    turning, difference = model.parameters.turning, np.abs(one - other)
-    turned = np.abs(difference - 2 * np.pi * np.round(difference / (2 * np.pi)))
-    difference = np.where(turning, turned, difference)
-    return np.asarray(difference / (model.upper - model.lower) > _APART)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.growth import growth, swings
-from shoal.identification.methods.lanes import ENDS_APART, descend_many, differentiate_many, distance, distinct
+from shoal.identification.methods.lanes import descend_many, differentiate_many, differing, distinct
 from shoal.identification.methods.least_squares import PATIENCE, differentiate, from_starts
 from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Outcome
@@ -87,30 +87,31 @@ def _first_that_explains(model: ForwardModel, methods: dict[str, Callable[[], Ou
         reason = f"the fit before left {left.rstrip()}"
     best = min(found, key=lambda outcome: outcome.fitness)
     ends = [(o.point, o.fitness) for o in found if o is not best] + [m for o in found for m in o.minima]
-    apart = [(point, fitness) for point, fitness in ends if distance(model, point, best.point) > ENDS_APART]
+    apart = [(point, fitness) for point, fitness in ends if np.any(differing(model, point, best.point))]
     return replace(best, minima=apart, choice="; then ".join(steps))
 
 
 def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Outcome:
-    """The outcome, or where descents end from other values of what is no initial state.
+    """The outcome, or where descents end from other values, of what is no initial state where the data are explained.
 
     A modulus, a mass or a length that is wrong by a factor leads a fit to a false minimum with every pose, and a small
     motion on a large one hides it in the noise; a centre of mass on either side of a radius of gyration swings alike.
     So they are looked at even where the fit explains the data, all but what the channels follow in proportion.
     """
-    free = ~model.parameters.initial
-    if explained(model, outcome):
-        free = free & ~model.parameters.proportional
+    states, proportional = model.parameters.initial, model.parameters.proportional
+    # Where nothing is explained they may be wrong as well: from the first samples a fast motion looks like a slow one.
+    free = ~states & ~proportional if explained(model, outcome) else np.ones_like(states)
     points, dips = _others(model, outcome.point, np.flatnonzero(free))
     if not len(points):
         return outcome
-    spacing = np.where(model.parameters.logarithmic, 2 * np.log(_FACTOR), model.upper - model.lower) / _ELSEWHERE
+    span = np.where(_wide(model, outcome.point), 2 * np.abs(outcome.point), model.upper - model.lower)
+    spacing = np.where(model.parameters.logarithmic, 2 * np.log(_FACTOR), span) / _ELSEWHERE
     chosen = [outcome.point]
     for point in [*dips[:_DIPS], *points]:
         if len(chosen) <= _DESCENTS and all(np.max((np.abs(point - p) / spacing)[free]) > 1.0 for p in chosen):
             chosen.append(point)
     ends = distinct(model, descend_many(model, np.array(chosen), progress, patience=PATIENCE))
-    rivals = [d for d in ends if d.converged and distance(model, d.point, outcome.point) > ENDS_APART]
+    rivals = [d for d in ends if d.converged and np.any(differing(model, d.point, outcome.point))]
     best = min(ends, key=lambda d: d.fitness, default=None)
     if best is None or best.fitness >= outcome.fitness * (1.0 - _GAINED):
         return replace(outcome, minima=[*outcome.minima, *((d.point, d.fitness) for d in rivals)])
@@ -125,17 +126,24 @@ def _elsewhere(model: ForwardModel, outcome: Outcome, progress: Progress) -> Out
 def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> tuple[Array, Array]:
     """Other values of these parameters within the bounds, and those among them where the fitness dips, the best first.
 
-    Each is varied alone and all together, by factors or, the nearer to the point the closer, from bound to bound.
+    Each is varied alone and all together, by factors or, the nearer to the point the closer, from bound to bound; where
+    bounds are far away beside a value, between multiples of it, too.
     """
     logarithmic = model.parameters.logarithmic
     reach = np.minimum(np.log(_FACTOR), (model.upper - model.lower) / 2)
 
-    def moved(shifts: Array) -> Array:
-        far = np.where(shifts < 0.0, point - model.lower, model.upper - point) * np.abs(shifts) * shifts
-        return np.asarray(np.clip(point + np.where(logarithmic, reach * shifts, far), model.lower, model.upper))
+    def moved(shifts: Array, most: Array | float = np.inf) -> Array:
+        far = np.minimum(np.where(shifts < 0.0, point - model.lower, model.upper - point), most)
+        ways = np.where(logarithmic, reach * shifts, far * np.abs(shifts) * shifts)
+        return np.asarray(np.clip(point + ways, model.lower, model.upper))
 
-    unit = np.eye(len(point))
-    lines = [moved(np.linspace(-1.0, 1.0, _ELSEWHERE)[:, None] * unit[k]) for k in free]
+    unit, shifts = np.eye(len(point)), np.linspace(-1.0, 1.0, _ELSEWHERE)[:, None]
+    wide = _wide(model, point)
+    # Twice as many, in two lines that overlap.
+    closer, between = 0.5 * shifts, np.where(shifts < 0.0, shifts - 1.0, shifts + 1.0) / 2
+    lines = [moved(shifts * unit[k]) for k in free]
+    lines += [moved(part * unit[k], _FACTOR * np.abs(point)) for k in free if wide[k] for part in (closer, between)]
+    lines += [moved(part * unit[k]) for k in free if model.parameters.initial[k] for part in (closer, between)]
     together = np.zeros((len(free) * _ELSEWHERE if len(free) > 1 else 0, len(point)))
     together[:, free] = 2 * scatter(len(together), len(free)) - 1
     points = np.concatenate([*lines, moved(together)]) if lines else together
@@ -144,6 +152,13 @@ def _others(model: ForwardModel, point: Array, free: npt.NDArray[np.intp]) -> tu
     lower = (along[:, 1:-1] < along[:, :-2]) & (along[:, 1:-1] < along[:, 2:])
     dips = np.flatnonzero(lower)
     return points[np.argsort(values, kind="stable")], points[dips[np.argsort(values[dips], kind="stable")]]
+
+
+def _wide(model: ForwardModel, point: Array) -> npt.NDArray[np.bool_]:
+    """Whose bounds are far away beside their values, of those sought as they are."""
+    size = np.abs(point)
+    far = model.upper - model.lower > _FACTOR**2 * size
+    return np.asarray(~model.parameters.logarithmic & far & (size > 0.0))
 
 
 def explained(model: ForwardModel, outcome: Outcome) -> bool:
@@ -177,5 +192,5 @@ def false_minima(model: ForwardModel, point: Array) -> list[tuple[Array, float]]
     return [
         (d.point, d.fitness)
         for d in distinct(model, descents)
-        if d.converged and distance(model, d.point, point) > ENDS_APART
+        if d.converged and np.any(differing(model, d.point, point))
     ]

@@ -31,7 +31,7 @@ _LARGE_DAMPING = 1e12
 _APART = 0.02
 """Two starts are different if a parameter differs by more than this fraction of its range."""
 ENDS_APART = 1e-3
-"""Two minima are different if a parameter differs by more than this fraction of its range."""
+"""Two minima are different if a parameter differs by more than this; see `differing`."""
 _SAME = 1e-4
 """Two points are the same if no parameter differs by more than this fraction of its range."""
 
@@ -165,7 +165,7 @@ def distinct(model: ForwardModel, descents: Sequence[Descent]) -> list[Descent]:
     """The descents, best first, without those that ended where a better one did."""
     finite = [descent for descent in descents if np.isfinite(descent.fitness)]
     best_first = sorted(finite, key=lambda d: d.fitness)
-    return kept_apart(best_first, lambda one, other: distance(model, one.point, other.point) > ENDS_APART)
+    return kept_apart(best_first, lambda one, other: bool(np.any(differing(model, one.point, other.point))))
 
 
 def best_apart(model: ForwardModel, points: Array, values: Array, count: int) -> Array:
@@ -313,3 +313,17 @@ def mean_of(values: Array) -> float:
 def squares(residual: Array) -> float:
     """Sum of the squares of a residual (rows,); inf where the motion failed."""
     return float(residual @ residual) if np.all(np.isfinite(residual)) else float("inf")
+
+
+def differing(model: ForwardModel, one: Array, other: Array) -> Array:
+    """Which parameters of two minima are different, (parameters,).
+
+    By a part of their range, or where that is wide beside them of ten times their size: bounds may be as far away as
+    one likes. Angles that differ by whole turns are the same.
+    """
+    turning, difference = model.parameters.turning, np.abs(one - other)
+    turned = np.abs(difference - 2 * np.pi * np.round(difference / (2 * np.pi)))
+    span = model.upper - model.lower
+    size = np.clip(10 * np.maximum(np.abs(one), np.abs(other)), 1e-3 * span, span)
+    scale = np.where(turning, np.minimum(span, 2 * np.pi), np.where(model.parameters.logarithmic, span, size))
+    return np.asarray(np.where(turning, turned, difference) > ENDS_APART * scale)

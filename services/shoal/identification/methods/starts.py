@@ -27,10 +27,16 @@ _SAME = 1e-3
 
 
 def starting_points(model: ForwardModel) -> Array:
-    """Starting points, best first, (points, parameters): bounds' middle or `start`, initial state from the data."""
-    points = model.parameters.start[None]
+    """Starting points, best first, (points, parameters): bounds' middle or `start`, initial state from the data.
+
+    An initial state that is stated comes last, as it is.
+    """
+    stated = points = model.parameters.start[None]
     for name in model.measurement.recordings:
         points = np.concatenate([_of_recording(model, point, name) for point in points])[:_MOST]
+    entries = zip(model.parameters.initial, model.parameters.entries.values(), strict=True)
+    if any(initial and entry.parameter.start is not None for initial, entry in entries):
+        points = np.concatenate([points, stated])
     return np.asarray(np.clip(points, model.lower, model.upper))
 
 

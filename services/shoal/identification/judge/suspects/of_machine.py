@@ -70,7 +70,9 @@ def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:
         for name in seen:
             path, bounds = f"bodies.further-{name}.mass", (_NOTHING * size.mass, size.mass)
             yield Candidate.single(f"mass at {name}", path, 0.0, bounds, _STEP * size.mass, scene=with_masses)
-    for name, body in scene.bodies.items() if len(scene.bodies) > 1 else ():
+    for name, body in scene.bodies.items():
+        if len(scene.bodies) == 1 and not (isinstance(body, RigidBody) and np.any(body.inertia)):
+            continue  # all forces go with its mass, but for friction, which is a candidate itself
         field = "density" if isinstance(body, Rod) else "mass"
         yield _ratio(f"mass of {name}", f"bodies.{name}.{field}", float(getattr(body, field)))
     for name, body in scene.bodies.items():
