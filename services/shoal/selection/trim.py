@@ -71,11 +71,11 @@ def _start(runs: Runs, yardstick: Yardstick, framed: Sequence[str], tolerance: f
         return None
     if not framed:
         return judged(runs, yardstick, yardstick.base)
-    for frames in ({rod: runs.coarsest[rod] for rod in framed}, _modes(runs, yardstick, framed)):
-        rung = judged(runs, yardstick, yardstick.base | frames)
-        if rung.error <= WITHIN * tolerance:
-            return rung
-    return None
+    rigid = judged(runs, yardstick, yardstick.base | {rod: runs.coarsest[rod] for rod in framed})
+    if rigid.error <= WITHIN * tolerance:
+        return rigid
+    most = judged(runs, yardstick, yardstick.base | _modes(runs, yardstick, framed))
+    return most if most.error <= HOPEFUL * tolerance else None
 
 
 def _modes(runs: Runs, yardstick: Yardstick, framed: Sequence[str]) -> dict[str, Level]:
