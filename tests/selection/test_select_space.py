@@ -60,6 +60,7 @@ def let_go(thickness: float, times: Any) -> Any:
     return found
 
 
+@pytest.mark.slow
 def test_a_flat_rod_vibrates_across_both_axes_within_the_tolerance() -> None:
     tolerance, times = 5e-5, np.linspace(0.02, 0.2, 10)
     found = select(clamped(), tolerance, times)
