@@ -80,10 +80,13 @@ def _start(runs: Runs, yardstick: Yardstick, framed: Sequence[str], tolerance: f
 
 def _modes(runs: Runs, yardstick: Yardstick, framed: Sequence[str]) -> dict[str, Level]:
     """Of these rods as many modes as take the same step, the most with which the model costs less than the base."""
-    ladders = {rod: [one for one in LADDERS[runs.limits[rod]] if one.element in FRAMED] for rod in framed}
     steps = {
-        rod: {one: runs.forecast.step({rod: one}) for one in ladder if runs.knows(rod, one)}
-        for rod, ladder in ladders.items()
+        rod: {
+            one: runs.forecast.step({rod: one})
+            for one in LADDERS[runs.limits[rod]]
+            if one.element in FRAMED and runs.knows(rod, one)
+        }
+        for rod in framed
     }
     frames = dict[str, Level]()
     for shortest in sorted({step for taken in steps.values() for step in taken.values()}):

@@ -12,7 +12,6 @@ from rich.markup import escape
 from rich.table import Table
 
 from shoal.mechanics import notes
-from shoal.mechanics.notes import telling
 from shoal.scene import Scene
 from shoal.trajectory import json_text
 
@@ -32,13 +31,13 @@ def show(data: Mapping[str, Any], as_json: bool, draw: Callable[[], None]) -> No
 def working(what: str) -> Iterator[Callable[[str], None]]:
     """A spinner beside `what`, or what it is told later, on a terminal; a line for every kernel that is compiled."""
     if not err.is_terminal:
-        with telling(line):
+        with notes.telling(line):
             yield lambda _: None
         return
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=err, transient=True) as progress, telling(line):
+    with Progress(*columns, console=err, transient=True) as progress, notes.telling(line):
         task = progress.add_task(what, total=None)
         yield lambda now: progress.update(task, description=now)
 
