@@ -93,7 +93,7 @@ class Bench:
 def bench(
     kinds: list[int], law: Array, numbers: tuple[int, int, int] = NO_TABLE, rows: Any = None, tile: Tile = SINGLE
 ) -> Bench:
-    """One element of each kind on its own six rows unless rows are given; law: (7,) or (7, lanes)."""
+    """One element of each kind on its own six rows unless rows are given; law: (8,) or (8, lanes)."""
     size, width = len(kinds), len(tile)
     if rows is None:
         rows = np.arange(6 * size)
@@ -103,8 +103,8 @@ def bench(
     return Bench(tile, held, np.zeros(size * width))
 
 
-FULL_LAW = np.array([3.0, 0.7, 0.4, 0.2, 1.3, 0.6, 2.5])
-ELASTIC_LAW = np.array([3.0, 0.7, 0.0, 0.2, 0.0, 0.0, 0.0])
+FULL_LAW = np.array([3.0, 0.7, 0.4, 0.2, 1.3, 0.6, 2.5, 0.9])
+ELASTIC_LAW = np.array([3.0, 0.7, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
 KINDS = [DISTANCE, ANGLE, PLACE]
 SHARED = {
     "own": None,
@@ -155,14 +155,14 @@ def test_damping_is_the_slope_of_the_force_in_the_rates(rows: Any) -> None:
 @given(st.integers(0, 2**32 - 1), st.sampled_from(KINDS), st.lists(st.floats(0, 10), min_size=LAW, max_size=LAW))
 def test_power_balance(seed: int, kind: int, law: list[float]) -> None:
     """The power of all forces is what the springs give back, less what is dissipated, plus what is supplied."""
-    law = [*law[:5], law[5] + 0.1, law[6]]
+    law = [*law[:5], law[5] + 0.1, *law[6:]]
     tested = bench([kind], np.array(law), WITH_TABLE)
-    elastic = bench([kind], np.array([law[0], law[1], 0, law[3], 0, 1, 0]), WITH_TABLE)
+    elastic = bench([kind], np.array([law[0], law[1], 0, law[3], 0, 1, 0, 0]), WITH_TABLE)
     z, zdot = state(seed, 6), state(seed + 1, 6)
     force, power = tested.force(z, zdot)
     released = np.sum(elastic.force(z, zdot)[0] * zdot)
     np.testing.assert_allclose(np.sum(force * zdot), released - power[0], rtol=1e-10, atol=1e-10 * (1 + abs(released)))
-    passive = bench([kind], np.array([*law[:6], 0.0]), WITH_TABLE)
+    passive = bench([kind], np.array([*law[:6], 0.0, law[7]]), WITH_TABLE)
     assert passive.force(z, zdot)[1][0] >= 0.0
 
 
@@ -186,7 +186,7 @@ def turn(rows: Array) -> Array:
 
 
 def test_laws_by_hand() -> None:
-    k, k3, c, g0, limit, speed, amplitude = FULL_LAW
+    k, k3, c, g0, limit, speed, amplitude, drag = FULL_LAW
     drive = amplitude * np.cos(2 * 0.7)
     for kind, z, zdot, x, rate in (
         (DISTANCE, [1, 1, 4, 5, 0, 0], [0, 0, 3, 4, 0, 0], 5.0 - g0, 5.0),
@@ -196,7 +196,7 @@ def test_laws_by_hand() -> None:
         state = np.array(z, dtype=float)[:, None]
         rates = np.array(zdot, dtype=float)[:, None]
         force, power = bench([kind], FULL_LAW, (-1, -1, 2)).force(state, rates)
-        resisting = c * rate + limit * np.tanh(rate / speed) - drive
+        resisting = c * rate + drag * abs(rate) * rate + limit * np.tanh(rate / speed) - drive
         assert power[0] == pytest.approx(resisting * rate)
         # The power of F dg/dz is F g', whatever the measure.
         assert np.sum(force * rates) == pytest.approx((-(k * x + k3 * x**3) - resisting) * rate)
@@ -204,7 +204,7 @@ def test_laws_by_hand() -> None:
 
 @pytest.mark.parametrize("natural", [0.0, 0.2])
 def test_a_distance_of_zero_has_no_direction(natural: float) -> None:
-    tested = bench([DISTANCE], np.array([3.0, 0.7, 0.4, natural, 1.3, 0.6, 0.0]))
+    tested = bench([DISTANCE], np.array([3.0, 0.7, 0.4, natural, 1.3, 0.6, 0.0, 0.0]))
     z, zdot = np.ones((6, 1)), state(1, 6)
     force, power = tested.force(z, zdot)
     assert not force.any()
@@ -217,7 +217,7 @@ def test_a_distance_of_zero_has_no_direction(natural: float) -> None:
 
 @pytest.mark.parametrize("start", [0.0, 6 * np.pi, -0.5 - 40 * np.pi])
 def test_an_angle_over_many_turns(start: float) -> None:
-    tested = bench([DISTANCE, ANGLE], np.array([2.0, 0, 0, 0, 0, 0, 0]), rows=[[0, 1, 2, 3, 0, 1]] * 2)
+    tested = bench([DISTANCE, ANGLE], np.array([2.0, 0, 0, 0, 0, 0, 0, 0]), rows=[[0, 1, 2, 3, 0, 1]] * 2)
 
     def place(angle: float) -> Array:
         # Both directions turn, and neither is a unit vector.
@@ -227,7 +227,7 @@ def test_an_angle_over_many_turns(start: float) -> None:
     memory = forces.initial_memory(SINGLE, tested.held, place(start).ravel(), np.array([0.0, start + 0.1]))
     assert memory == pytest.approx([0.0, start], abs=1e-12)
     for angle in start + np.concatenate([np.arange(0.0, 30.0, 2.9), np.arange(30.0, -60.0, -2.9)]):
-        turning = Bench(SINGLE, bench([ANGLE], np.array([2.0, 0, 0, 0, 0, 0, 0])).held, memory[1:])
+        turning = Bench(SINGLE, bench([ANGLE], np.array([2.0, 0, 0, 0, 0, 0, 0, 0])).held, memory[1:])
         z = np.vstack([place(angle), np.ones((2, 1))])
         assert turning.energy(z)[0] == pytest.approx(angle**2, rel=1e-12, abs=1e-10)
         _remember(SINGLE, tested.held, place(angle).ravel(), memory)

@@ -24,6 +24,7 @@ FEATURES = (
     "functions of time",
     "varying distances",
     "dry friction",
+    "quadratic drag",
     "friction by joint forces",
     "nonlinear springs",
     "angles of places",
@@ -35,6 +36,7 @@ FEATURES = (
 )
 _FIELDS = {
     "coulomb": "dry friction",
+    "drag": "quadratic drag",
     "mu": "friction by joint forces",
     "first_to": "angles of places",
     "second_to": "angles of places",

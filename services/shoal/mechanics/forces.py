@@ -1,6 +1,6 @@
 """Springs, dampers, friction and motors: a scalar measure g(z) and a law F(g, g', t), acting as F dg/dz.
 
-With x = g - g0 the law is F = -[k x + k3 x^3 + table(x)] - [c g' + F_c tanh(g'/v_s)] + amplitude drive(t):
+With x = g - g0 the law is F = -[k x + k3 x^3 + table(x)] - [(c + c2 |g'|) g' + F_c tanh(g'/v_s)] + amplitude drive(t):
 elastic, dissipated and supplied. The tanh smooths Coulomb's law (Andersson, Soederberg, Bjoerklund 2007).
 """
 
@@ -21,8 +21,8 @@ DISTANCE, ANGLE, PLACE = 0, 1, 2
 turns (in space: about an axis at right angles to both, d being a turned about it by 90 degrees); where point b lies
 relative to point a along direction d, (b - a).d/|d| [m]."""
 
-STIFFNESS, CUBIC, DAMPING, NATURAL, COULOMB, SPEED, AMPLITUDE = range(7)
-LAW = 7
+STIFFNESS, CUBIC, DAMPING, NATURAL, COULOMB, SPEED, AMPLITUDE, DRAG = range(8)
+LAW = 8
 
 _TURN = 2.0 * np.pi
 
@@ -32,9 +32,9 @@ class Forces(NamedTuple):
 
     space: a tuple as long as vectors are, here d. kind: DISTANCE, ANGLE or PLACE. rows: 3 d an element, of (a, b, d);
     where d is not used, any valid rows. Directions need not be unit vectors. table: function of x, the elastic force
-    [N or N m], and energy, its antiderivative; drive: function of time; -1 for none. law: (7 * elements, lanes), seven
+    [N or N m], and energy, its antiderivative; drive: function of time; -1 for none. law: (8 * elements, lanes), eight
     rows an element: stiffness k, cubic k3, damping c, natural value g0, Coulomb limit F_c, Coulomb speed v_s (matters
-    and must be positive where F_c is not 0), amplitude of the drive.
+    and must be positive where F_c is not 0), amplitude of the drive, drag c2.
     """
 
     space: tuple[int, ...]
@@ -270,7 +270,8 @@ def add_force(
             k, k3 = forces.law[law + STIFFNESS * width + lane], forces.law[law + CUBIC * width + lane]
             elastic = (k + k3 * x * x) * x + evaluate(functions, forces.table[number], x, 0)
             limit, speed = forces.law[law + COULOMB * width + lane], forces.law[law + SPEED * width + lane]
-            resisting = forces.law[law + DAMPING * width + lane] * rate + _friction(limit, speed, rate)[0]
+            viscous = forces.law[law + DAMPING * width + lane] + forces.law[law + DRAG * width + lane] * abs(rate)
+            resisting = viscous * rate + _friction(limit, speed, rate)[0]
             resisting -= forces.law[law + AMPLITUDE * width + lane] * drive
             power[lane] += resisting * rate
             w[elastically + lane] = -elastic - resisting
@@ -384,7 +385,7 @@ def _bend(
 
 @njit(cache=True, error_model="numpy")
 def damping(tile: Tile, forces: Forces, z: Array, zdot: Array, w: Array, out: Array, first: int) -> None:
-    """Damping -dF/dzdot, [c + F_c/v_s sech^2(g'/v_s)] dg/dz dg/dz', in blocks as in `tangent`. Pointers."""
+    """Damping -dF/dzdot, [c + 2 c2 |g'| + F_c/v_s sech^2(g'/v_s)] dg/dz dg/dz', in blocks as in `tangent`. Pointers."""
     width, rows = len(tile), side(forces)
     for number in range(forces.size):
         _gradient(tile, forces, number, z, w)
@@ -393,8 +394,9 @@ def damping(tile: Tile, forces: Forces, z: Array, zdot: Array, w: Array, out: Ar
         start = (first + rows * rows * number) * width
         for lane in range(width):
             limit, speed = forces.law[law + COULOMB * width + lane], forces.law[law + SPEED * width + lane]
-            slope = _friction(limit, speed, w[(value_row(forces) + 1) * width + lane])[1]
-            slope += forces.law[law + DAMPING * width + lane]
+            rate = w[(value_row(forces) + 1) * width + lane]
+            slope = forces.law[law + DAMPING * width + lane] + 2.0 * forces.law[law + DRAG * width + lane] * abs(rate)
+            slope += _friction(limit, speed, rate)[1]
             for i in range(rows):
                 for j in range(rows):
                     product = w[(rows + i) * width + lane] * w[(rows + j) * width + lane]

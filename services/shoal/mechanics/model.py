@@ -19,7 +19,7 @@ from shoal.mechanics import saddle
 from shoal.mechanics.applied import Applied
 from shoal.mechanics.constraints import Constraints
 from shoal.mechanics.derived import Derived
-from shoal.mechanics.forces import Forces
+from shoal.mechanics.forces import LAW, STIFFNESS, Forces
 from shoal.mechanics.frames import Frame, ModalFrame
 from shoal.mechanics.functions import Functions, Piecewise
 from shoal.mechanics.numerics import alike, gate, sparse
@@ -168,7 +168,9 @@ class Model:
     @property
     def elastic(self) -> bool:
         """Whether anything stores elastic energy."""
-        return self.flexible > 0 or bool(np.any(self.forces.law[0::7])) or bool(np.any(self.forces.table >= 0))
+        return (
+            self.flexible > 0 or bool(np.any(self.forces.law[STIFFNESS::LAW])) or bool(np.any(self.forces.table >= 0))
+        )
 
     @cached_property
     def mass_pattern(self) -> tuple[sparse.Pattern, dict[tuple[int, int], int]]:

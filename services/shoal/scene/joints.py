@@ -7,10 +7,13 @@ from fractions import Fraction
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import BeforeValidator, Field, model_validator
 
 from shoal.scene.function import Function
 from shoal.scene.record import Angle, Axis, NonNegative, Positive, Record, Vector, Vector3, kinds
+
+Array = npt.NDArray[np.float64]
 
 GROUND = "ground"
 Z: Vector3 = (0.0, 0.0, 1.0)
@@ -43,21 +46,51 @@ class Tie(Record):
     second: Attachment
 
 
-class Revolute(Tie):
+class Resisted(Tie):
+    """A joint that moves in one way, which resists its rate: an angle's [rad/s] and by a torque, or a way's [m/s].
+
+    friction: viscous [N m s/rad or N s/m]; drag: quadratic, as of air [N m s^2/rad^2 or N s^2/m^2]; coulomb: dry
+    [N m or N], smoothed as tanh(rate / coulomb_speed); mu: coefficient of dry friction by the joint's force, smoothed
+    alike.
+    """
+
+    friction: NonNegative = 0.0
+    drag: NonNegative = 0.0
+    coulomb: NonNegative = 0.0
+    coulomb_speed: Positive = 1e-2
+    mu: NonNegative = 0.0
+
+    @property
+    def share(self) -> float:
+        """Dry friction by mu per force of the joint [m or 1]."""
+        return self.mu
+
+    @property
+    def dry(self) -> bool:
+        """Whether it has dry friction of either kind."""
+        return bool(self.coulomb or self.mu)
+
+    @property
+    def resists(self) -> bool:
+        """Whether it does, in any way."""
+        return any(np.any(size) for size in (self.friction, self.drag, self.coulomb, self.share))
+
+    def resistance(self, rate: Array, force: Array | float = 0.0) -> Array:
+        """Torque [N m] or force [N] against a rate, where the force of the joint [N] is so large."""
+        dry = self.coulomb + self.share * force
+        smoothed = dry * np.tanh(rate / self.coulomb_speed)
+        return np.asarray((self.friction + self.drag * np.abs(rate)) * rate + smoothed)
+
+
+class Revolute(Resisted):
     """Two places stay together; the bodies turn freely but for friction.
 
-    axis: in space, that they turn about, as it points at the start. friction: viscous [N m s/rad]; coulomb: dry
-    friction torque [N m], smoothed as tanh(rate / coulomb_speed); mu: coefficient of dry friction at a pin of this
-    radius [m], whose torque is mu * radius times the force of the joint (in space with what pushes along the axis),
-    smoothed alike.
+    axis: in space, that they turn about, as it points at the start. radius: of the pin [m], at which friction by mu
+    acts: its torque is mu * radius times the force of the joint (in space with what pushes along the axis).
     """
 
     kind: Literal["revolute"] = "revolute"
     turned: ClassVar[tuple[str, ...]] = ()
-    friction: NonNegative = 0.0
-    coulomb: NonNegative = 0.0
-    coulomb_speed: Positive = 1e-2
-    mu: NonNegative = 0.0
     radius: Positive | None = None
     axis: Axis = Z
 
@@ -71,11 +104,6 @@ class Revolute(Tie):
     def share(self) -> float:
         """Torque of the friction by mu per force of the joint [m]."""
         return self.mu * self.radius if self.radius is not None else 0.0
-
-    @property
-    def dry(self) -> bool:
-        """Whether it has dry friction of either kind."""
-        return bool(self.coulomb or self.mu)
 
 
 class Spherical(Tie):
@@ -142,13 +170,12 @@ class Weld(Tie):
     angle: Angle | None = None
 
 
-class Slider(Tie):
+class Slider(Resisted):
     """The second place moves on a line through the first one, fixed to the first body.
 
     direction: angle [rad] of the line in the first body's frame. axis: in space, the line itself, as it points at the
-    start, instead. rotation: whether the second body may turn against the first. friction: viscous [N s/m]; coulomb
-    [N], smoothed as tanh(speed / coulomb_speed); mu: coefficient of dry friction, in proportion to the force across
-    the line, smoothed alike.
+    start, instead. rotation: whether the second body may turn against the first. Friction by mu goes with the force
+    across the line.
     """
 
     kind: Literal["slider"] = "slider"
@@ -156,20 +183,6 @@ class Slider(Tie):
     direction: Angle = 0.0
     axis: Axis | None = None
     rotation: Literal["free", "locked"] = "free"
-    friction: NonNegative = 0.0
-    coulomb: NonNegative = 0.0
-    coulomb_speed: Positive = 1e-2
-    mu: NonNegative = 0.0
-
-    @property
-    def share(self) -> float:
-        """Friction by mu per force of the joint."""
-        return self.mu
-
-    @property
-    def dry(self) -> bool:
-        """Whether it has dry friction of either kind."""
-        return bool(self.coulomb or self.mu)
 
 
 class Distance(Tie):

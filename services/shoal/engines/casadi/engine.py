@@ -51,7 +51,7 @@ class CasadiEngine:
             elements=frozenset({"rigid", "ancf-cable"}),
             joints=frozenset({"revolute"}),
             loads=frozenset({"spring", "torsion-spring", "force", "torque", "distributed-force"}),
-            features=frozenset({"point masses", "dry friction", "tapered flexible rods"}),
+            features=frozenset({"point masses", "dry friction", "quadratic drag", "tapered flexible rods"}),
             lanes=False,
         )
 

@@ -57,18 +57,19 @@ def stored(scene: Scene, tree: Tree) -> Any:
 def dissipation(scene: Scene, tree: Tree, v: Any) -> Any:
     """A function D of the velocities whose gradient is what friction and dampers resist with [W].
 
-    Rayleigh's c w^2 / 2 for viscous friction; F w0 log cosh(w / w0) for Coulomb's, smoothed as F tanh(w / w0).
+    Rayleigh's c w^2 / 2 for viscous friction, c |w|^3 / 3 for drag; F w0 log cosh(w / w0) for Coulomb's, smoothed as
+    F tanh(w / w0).
     """
     total = ca.SX(0)
     for name, joint in scene.joints.items():
         assert isinstance(joint, Revolute)
-        if joint.friction or joint.coulomb:
+        if joint.resists:
             first, second = (_angle(scene, tree, f"joints.{name}", side) for side in (joint.first, joint.second))
             rate = ca.jtimes(second - first, tree.coordinates, v)
             # log cosh without overflow.
             size = ca.fabs(rate) / joint.coulomb_speed
             rub = joint.coulomb * joint.coulomb_speed * (size + ca.log1p(ca.exp(-2 * size)))
-            total += joint.friction / 2 * rate**2 + (rub if joint.coulomb else 0)
+            total += joint.friction / 2 * rate**2 + joint.drag / 3 * ca.fabs(rate) ** 3 + (rub if joint.coulomb else 0)
     for load, x in _springs(scene, tree):
         if load.damping:
             total += load.damping / 2 * ca.jtimes(x, tree.coordinates, v) ** 2

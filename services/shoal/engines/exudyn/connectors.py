@@ -13,7 +13,7 @@ from shoal.engines.exudyn.bodies import System
 from shoal.engines.exudyn.chain import cross
 from shoal.engines.exudyn.ends import Ends
 from shoal.mechanics.fitting import fit_law
-from shoal.scene import Attachment, Function
+from shoal.scene import Attachment, Function, Resisted
 from shoal.trajectory import Array
 
 
@@ -31,19 +31,28 @@ class Exchange(NamedTuple):
 
 @dataclass(frozen=True)
 class Law:
-    """Force [N or N m] of an elongation x [m or rad] and its rate: k x + k3 x^3 + table(x) + c x' + F tanh(x'/v)."""
+    """Force [N or N m] of an elongation x [m or rad] and its rate.
+
+    It is k x + k3 x^3 + table(x) + c x' + c2 |x'| x' + F tanh(x'/v).
+    """
 
     stiffness: float = 0.0
     cubic: float = 0.0
     damping: float = 0.0
+    drag: float = 0.0
     coulomb: float = 0.0
     speed: float = 1.0
     elastic: Function | None = None
 
+    @classmethod
+    def of(cls, joint: Resisted) -> Law:
+        """With which a joint resists its rate."""
+        return cls(damping=joint.friction, drag=joint.drag, coulomb=joint.coulomb, speed=joint.coulomb_speed)
+
     @property
     def linear(self) -> bool:
         """Whether Exudyn's own linear law is enough; it takes no negative stiffness."""
-        return self.stiffness >= 0 and not (self.cubic or self.coulomb or self.elastic)
+        return self.stiffness >= 0 and not (self.cubic or self.drag or self.coulomb or self.elastic)
 
     def stored(self, x: Array) -> Array:
         """Energy [J] of the polynomial part."""

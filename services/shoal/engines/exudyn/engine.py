@@ -43,6 +43,7 @@ FEATURES = frozenset(
         "moving ground points",
         "functions of time",
         "dry friction",
+        "quadratic drag",
         "nonlinear springs",
         "tapered flexible rods",
         "machines in space",

@@ -27,6 +27,7 @@ from shoal.scene import (
     Joint,
     Parallel,
     Perpendicular,
+    Resisted,
     Revolute,
     Slider,
     Weld,
@@ -47,13 +48,12 @@ def add_joint(ends: Ends, name: str, joint: Joint) -> Gap:
 
 def add_friction(ends: Ends, name: str, joint: Joint) -> Exchange | None:
     """Enter the friction of a joint, if it has any. Raises InputError."""
-    viscous, coulomb = getattr(joint, "friction", 0.0), getattr(joint, "coulomb", 0.0)
-    if not (viscous or coulomb):
+    if not (isinstance(joint, Resisted) and joint.resists):
         return None
     where = f"joints.{name}.friction"
     rub = of_kind(FRICTION, joint.kind, where)
     ends.system.enter(where)
-    return rub(ends, where, joint, Law(damping=viscous, coulomb=coulomb, speed=getattr(joint, "coulomb_speed", 1.0)))
+    return rub(ends, where, joint, Law.of(joint))
 
 
 def _add_pin(ends: Ends, where: str, joint: Revolute | Weld) -> None:

@@ -46,7 +46,7 @@ def law_force(law: dict[str, float], elastic: Any, x: Any, rate: Any) -> Any:
 
 def law_resisting(law: dict[str, float], elastic: Any, x: Any, rate: Any) -> Any:
     """Its part beside the polynomial; elastic: a function of x, or None."""
-    force = law["damping"] * rate + law["coulomb"] * np.tanh(rate / law["speed"])
+    force = (law["damping"] + law["drag"] * np.abs(rate)) * rate + law["coulomb"] * np.tanh(rate / law["speed"])
     return force if elastic is None else force + elastic(x)
 
 

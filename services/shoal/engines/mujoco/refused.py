@@ -24,6 +24,8 @@ def require_counterparts(scene: Scene) -> None:
             raise InputError(f"joints.{name}: MJCF has no {joint.kind}")
         if isinstance(joint, Revolute | Slider) and joint.share:
             raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
+        if isinstance(joint, Revolute | Slider) and joint.drag:
+            raise InputError(f"joints.{name}.drag: MJCF has no quadratic drag of a joint")
         if isinstance(joint, Distance) and joint.length is not None and joint.length.number is None:
             raise InputError(f"joints.{name}.length: MJCF has no functions of time")
     for name, load in scene.loads.items():

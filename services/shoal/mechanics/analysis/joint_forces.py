@@ -56,13 +56,11 @@ def friction(
     total = np.zeros(bodies.unknowns)
     each: dict[str, tuple[Array, Array]] = {}
     for name, joint in bodies.scene.joints.items():
-        if isinstance(joint, Revolute | Slider) and (joint.friction or joint.dry):
+        if isinstance(joint, Revolute | Slider) and joint.resists:
             gradient, force, torque = rubbing(bodies, joint, at)
-            speed = float(gradient @ rate)
-            dry = joint.coulomb + joint.share * held.get(name, 0.0)
-            drag = -joint.friction * speed - dry * float(np.tanh(speed / joint.coulomb_speed))
-            total += drag * gradient
-            each[name] = drag * force, drag * torque
+            against = -float(joint.resistance(gradient @ rate, held.get(name, 0.0)))
+            total += against * gradient
+            each[name] = against * force, against * torque
     return total, each
 
 

@@ -207,7 +207,7 @@ class _Balance:
     def friction(self, held: Mapping[str, Array]) -> Iterator[_Part]:
         """What rubs in every joint; held: as `held` found it, where it is known."""
         for name, joint in self._bodies.scene.joints.items():
-            if not isinstance(joint, Revolute | Slider) or not (joint.friction or joint.dry):
+            if not isinstance(joint, Revolute | Slider) or not joint.resists:
                 continue
             placement, scene = self._bodies.placement, self._bodies.scene
             if isinstance(joint, Revolute):
@@ -220,9 +220,8 @@ class _Balance:
                 carried = self._turning(joint.first)[:, None] * quarter(way)
                 speed = dot(line, moving - carried)
                 unit = self._pair(name, joint.first, joint.second, self._place(joint.second), line)
-            dry = joint.coulomb + joint.share * held.get(name, np.zeros(1))
-            drag = -joint.friction * speed - dry * np.tanh(speed / joint.coulomb_speed)
-            yield _Part(name, drag[:, None] * unit.wrench, drag[:, None] * unit.force, drag * unit.torque)
+            against = -joint.resistance(speed, held.get(name, 0.0))
+            yield _Part(name, against[:, None] * unit.wrench, against[:, None] * unit.force, against * unit.torque)
 
 
 def _unit(vectors: Array) -> Array:

@@ -72,9 +72,7 @@ class Loads:
         self.turning: list[tuple[list[int], int]] = []
         self.twisting: list[tuple[list[int], int]] = []
         for name, joint in scene.joints.items():
-            if isinstance(joint, Revolute | Slider) and any(
-                np.any(size) for size in (joint.friction, joint.coulomb, joint.share)
-            ):
+            if isinstance(joint, Revolute | Slider) and joint.resists:
                 self._friction(name, joint)
         for name, frame in placement.frames.items():
             if isinstance(frame, ModalFrame):
@@ -85,7 +83,7 @@ class Loads:
             LOADS[type(load)](self, name, load)
 
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
-        law = [0.0, 0.0, joint.friction, 0.0, joint.coulomb, joint.coulomb_speed, 0.0]
+        law = [0.0, 0.0, joint.friction, 0.0, joint.coulomb, joint.coulomb_speed, 0.0, joint.drag]
         if np.any(joint.share):
             self.rubbing.append((name, len(self.kinds), joint.share))
         if isinstance(joint, Revolute):
@@ -108,7 +106,7 @@ class Loads:
                 both = [np.sum(part[i], axis=0) if i == j else -part[i, j] for part in (stiffness, damping)]
                 if any(np.any(part) for part in both):
                     base, natural = (nowhere, rest) if i == j else (other, rest - other_rest)
-                    law = [both[0], 0.0, both[1], natural, 0.0, 1.0, 0.0]
+                    law = [both[0], 0.0, both[1], natural, 0.0, 1.0, 0.0, 0.0]
                     self._measure(name, PLACE, [base, one, frame.directors[0]], law, 0.0)
 
     def _torsion_spring(self, name: str, load: TorsionSpring) -> None:
@@ -118,7 +116,7 @@ class Loads:
         rest = start if load.angle is None else load.angle
         if places:  # which tell no whole turns: straight is pi on either side
             start = start + 2 * np.pi * np.round((rest - start) / (2 * np.pi))
-        law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0]
+        law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0, 0.0]
         if places:
             self._measure(name, ANGLE, ways, law, start, elastic=load.elastic)
         else:
@@ -155,7 +153,7 @@ class Loads:
         if isinstance(self.placement, SpatialPlacement):
             self._turn_body(name, load, self.placement)
             return
-        law = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]
+        law = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0]
         base = load.reaction or Attachment(body=GROUND, point=(0.0, 0.0))
         self._angle(name, base, load.at, law, load.axis, drive=load.torque)
 
@@ -254,7 +252,7 @@ class Loads:
         if rest is None:
             first, second = (self.placement.start_of(end)[0] for end in ends)
             rest = np.sqrt(sum((second - first) ** 2))
-        law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0]
+        law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0, 0.0]
         self._measure(name, DISTANCE, ends, law, 0.0, elastic=load.elastic)
 
     def _force(self, name: str, load: Force) -> None:

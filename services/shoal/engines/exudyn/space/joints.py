@@ -33,10 +33,10 @@ def add_joint(exu: Any, ends: SpatialEnds, name: str, joint: Joint) -> list[Gap]
 
 def add_friction(ends: SpatialEnds, name: str, joint: Joint) -> Exchange | None:
     """Enter the friction of a joint, if it has any. Raises InputError."""
-    if not isinstance(joint, Revolute | Slider) or not (joint.friction or joint.coulomb):
+    if not isinstance(joint, Revolute | Slider) or not joint.resists:
         return None
     ends.system.enter(f"joints.{name}.friction")
-    law = Law(damping=joint.friction, coulomb=joint.coulomb, speed=joint.coulomb_speed)
+    law = Law.of(joint)
     if isinstance(joint, Revolute):
         return add_twist(ends, f"joints.{name}.friction", joint.first, joint.second, joint.axis, law, None)
     return _add_rail(ends, f"joints.{name}.friction", joint, law)

@@ -24,7 +24,7 @@ _ALONG = 0.9
 def make_axes(scene: Scene, result: SpatialPlacement) -> None:
     """The axes of sections that friction, torsion springs and motors will want, as vectors. Raises InputError."""
     for name, joint in scene.joints.items():
-        if isinstance(joint, Revolute) and any(np.any(one) for one in (joint.friction, joint.coulomb, joint.share)):
+        if isinstance(joint, Revolute) and joint.resists:
             turning(scene, name, result, joint.first, joint.second, joint.axis)
     for name, load in scene.loads.items():
         if isinstance(load, TorsionSpring) and load.first_to is None and load.second_to is None:
