@@ -111,6 +111,7 @@ def conclude(
     unknown = combinations(model, point, at) if known else []
     if possible:
         judgement = judge(model, found, seen, at, tests, values, unknown)
+        values = intervals.with_refits(values, judgement.refits)
     else:
         why = f" ({model.failure})" if model.failure else ""
         message = f"no parameter set could be simulated{why}; look at the bounds and the scene"
@@ -155,7 +156,12 @@ def conclude(
         advice=judgement.advice + beyond * any(one.inside is False for one in foretold),
         choice=outcome.choice,
         parameters=values,
-        quantities=intervals.spanning([intervals.quantities(model, end, at, correction, curved) for end in ends]),
+        quantities=intervals.spanning(
+            [
+                *(intervals.quantities(model, end, at, correction, curved) for end in ends),
+                *(refit.quantities() for refit in judgement.refits),
+            ]
+        ),
         combinations=unknown,
         fitness=outcome.fitness,
         rms=float(np.sqrt(outcome.fitness / model.rows.things)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -11,13 +11,14 @@ import numpy as np
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
+from shoal.identification.judge.other_laws import other_laws, sentences
 from shoal.identification.judge.residual_tests import ResidualTests
 from shoal.identification.judge.rivals import relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
 from shoal.identification.judge.suspects import Findings, Suspect, suspects
 from shoal.identification.methods.lanes import Descent
 from shoal.identification.methods.outcome import Outcome
-from shoal.identification.spread.intervals import few
+from shoal.identification.spread.intervals import Refit, few, with_refits
 from shoal.identification.spread.sensitivity import Sensitivity
 from shoal.identification.spread.uncertainty import Linearisation
 from shoal.identification.spread.value import Value
@@ -51,6 +52,7 @@ class Verdict(StrEnum):
 class Judgement:
     """The verdict, why, what to do next, and what would explain a misfit.
 
+    refits: fits with what would explain a misfit that is not held against the model; the intervals hold them too
     better: a minimum that fits better, if the search for suspects met one: go on from there
     """
 
@@ -58,6 +60,7 @@ class Judgement:
     message: str = ""
     advice: list[str] = field(default_factory=list)
     suspects: list[Suspect] = field(default_factory=list)
+    refits: list[Refit] = field(default_factory=list)
     better: Descent | None = None
 
 
@@ -67,7 +70,7 @@ def judge(
     seen: Sensitivity,
     at: Linearisation,
     tests: ResidualTests,
-    parameters: Mapping[str, Value],
+    parameters: dict[str, Value],
     unknown: list[str],
 ) -> Judgement:
     """The verdict on an outcome: failures first, then the minimum, the model, rivals, and what is identifiable."""
@@ -86,7 +89,7 @@ def judge(
     if looked.better is not None:
         reason = f"a better minimum was met, of fitness {looked.better.fitness:.3g} instead of {outcome.fitness:.3g}"
         advice = ["look for another minimum (--method multi-start)"]
-        return Judgement(Verdict.FAILED, reason, advice, looked.suspects, looked.better)
+        return Judgement(Verdict.FAILED, reason, advice, looked.suspects, better=looked.better)
     found = looked.suspects
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
@@ -99,7 +102,13 @@ def judge(
         message = f"{1 + len(rivals)} parameter sets fit equally well ({', '.join(sorted(kinds))})"
         advice = ["measure another marker or a longer motion, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
-    return _identifiable(seen, tests, parameters, unknown, found)
+    laws = other_laws(model, outcome.point, seen)
+    # Where there is a misfit, what it may be due to is in the intervals; else it is said.
+    refits = looked.refits + [law.refit for law in laws if tests.limited and law.fits]
+    parameters = with_refits(parameters, refits)
+    judged = _identifiable(seen, tests, parameters, unknown, found)
+    said = [judged.message, *sentences(laws, parameters)]
+    return replace(judged, message="; ".join(part for part in said if part), refits=refits)
 
 
 def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
@@ -169,7 +178,7 @@ def _identifiable(
         share = 100 * tests.excess / tests.signal
         size = f"{tests.sized(tests.excess)} ({share:.2g} % of the signal)"
         notes.append(f"a systematic residual of {size} widens the intervals: the model, not the noise, limits them")
-        notes += [str(found[0])] if found else []
+        notes += [f"{found[0]}; the intervals hold the answer with it too"] if found else []
     elif tests.too_large:
         notes.append(f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found")
     verdict = Verdict.COMBINATION if reasons else Verdict.IDENTIFIED

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
 from shoal.identification.problem import RESERVED
 from shoal.identification.recording.units import unit
+from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.model_error import Corrections
-from shoal.identification.spread.uncertainty import Linearisation, Spread, spread
+from shoal.identification.spread.uncertainty import Linearisation, Spread, linearise, spread
 from shoal.identification.spread.value import Value
 from shoal.scene import expression
 from shoal.trajectory import Array
@@ -62,6 +64,36 @@ def spanning(ends: list[dict[str, Value]]) -> dict[str, Value]:
     lower = {name: min(end[name].lower for end in ends) for name in first}
     upper = {name: max(end[name].upper for end in ends) for name in first}
     return {name: replace(value, lower=lower[name], upper=upper[name]) for name, value in first.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A fit with something freed that was taken as known: model, point, residuals and Jacobian there."""
+
+    model: ForwardModel
+    point: Array
+    residual: Array
+    jacobian: Array
+
+    def values(self) -> dict[str, Value]:
+        """Of every parameter, what was freed among them."""
+        return parameters(self.model, self.point, self._at, Corrections(None, None))
+
+    def quantities(self) -> dict[str, Value]:
+        """Of every quantity."""
+        return quantities(self.model, self.point, self._at, Corrections(None, None), [])
+
+    @cached_property
+    def _at(self) -> Linearisation:
+        blocks = blocks_of(self.model, len(self.residual))
+        return linearise(self.jacobian, self.residual, self.model.sizes(self.point), blocks)
+
+
+def with_refits(values: dict[str, Value], refits: list[Refit]) -> dict[str, Value]:
+    """Values whose intervals span those of refits too; what a refit leaves open is not identifiable."""
+    ends = [values, *(refit.values() for refit in refits)]
+    told = {name: all(end[name].identifiable for end in ends) for name in values}
+    return {name: replace(value, identifiable=told[name]) for name, value in spanning(ends).items()}
 
 
 def covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:

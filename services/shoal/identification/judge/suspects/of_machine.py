@@ -14,11 +14,15 @@ from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.size import Size, size_of
 from shoal.mechanics.start.start import is_direct
 from shoal.scene import PointMass, RigidBody, Rod, Scene
-from shoal.scene.joints import GROUND, Attachment, Revolute, Slider, places
+from shoal.scene.joints import GROUND, Attachment, Resisted, Revolute, Slider, places
 
+RESISTING = {"friction": "friction", "drag": "quadratic drag", "coulomb": "dry friction"}
+"""Fields of joints that resist a motion by laws of their own, and what suspects call them."""
 _FACTORS = 2.0
 _STEP = 1e-3
 """Of the largest value that is looked for: the change by which an effect is measured."""
+_SLIGHT = 1e-6
+"""As _STEP, of friction: its laws are so alike that the curvature of a larger change hides what tells them apart."""
 _SHIFT = 0.2
 """Of the size of the machine, how far off a pivot is looked for."""
 _NOTHING = 1e-6
@@ -37,21 +41,22 @@ def of_machine(model: ForwardModel) -> Iterator[Candidate]:
 
 
 def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
-    """Viscous and dry, of each joint that has a place for them."""
-    force = size.mass * size.gravity
+    """By every law, of each joint that has a place for it."""
     for name, joint in scene.joints.items():
-        if not isinstance(joint, Revolute | Slider):
-            continue
-        turning = isinstance(joint, Revolute)
-        most = {
-            "friction": force * size.length / size.rate if turning else force / (size.rate * size.length),
-            "coulomb": 0.5 * force * (size.length if turning else 1.0),
-        }
-        for field, upper in most.items():
-            stated = float(getattr(joint, field))
-            words = "friction" if field == "friction" else "dry friction"
-            path, bounds = f"joints.{name}.{field}", (0.0, max(upper, 4 * stated))
-            yield Candidate.single(f"{words} of {name}", path, stated, bounds, stated + _STEP * upper)
+        if isinstance(joint, Resisted):
+            for field in RESISTING:
+                yield resisting(name, joint, field, size)
+
+
+def resisting(name: str, joint: Resisted, field: str, size: Size) -> Candidate:
+    """What a joint by name resists with by one of RESISTING."""
+    turning = isinstance(joint, Revolute)
+    force = size.mass * size.gravity * (size.length if turning else 1.0)
+    rate = size.rate * (1.0 if turning else size.length)
+    upper = {"friction": force / rate, "drag": force / rate**2, "coulomb": 0.5 * force}[field]
+    stated, path = float(getattr(joint, field)), f"joints.{name}.{field}"
+    bounds = (0.0, max(upper, 4 * stated))
+    return Candidate.single(f"{RESISTING[field]} of {name}", path, stated, bounds, stated + _SLIGHT * upper)
 
 
 def _masses(scene: Scene, size: Size) -> Iterator[Candidate]:

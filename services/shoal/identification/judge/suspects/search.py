@@ -27,6 +27,7 @@ from shoal.identification.judge.suspects.suspect import Suspect, explains, penal
 from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.starts import starting_points
 from shoal.identification.recording.units import of_channels
+from shoal.identification.spread.intervals import Refit
 from shoal.trajectory import Array
 
 _FITTED = 8
@@ -63,9 +64,13 @@ _SMALL = 3.0
 
 @dataclass(frozen=True)
 class Findings:
-    """The suspects, those that explain most first; better: a minimum of the model itself that fits better, if met."""
+    """The suspects, those that explain most first, and the fits with each of them that is a number of the model.
+
+    better: a minimum of the model itself that fits better, if met
+    """
 
     suspects: list[Suspect] = field(default_factory=list)
+    refits: list[Refit] = field(default_factory=list)
     better: Descent | None = None
 
 
@@ -100,7 +105,8 @@ def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array
     told = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.rows.signal)
     found = sorted(told, key=lambda s: (float(f"{s.cost(rows):.2e}"), s.name))
     listed = [suspect for suspect in found if suspect.after <= _FAR * found[0].after]
-    return Findings([replace(s, alike=search.alike(s.name)) for s in listed], search.better)
+    refits = [search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits]
+    return Findings([replace(s, alike=search.alike(s.name)) for s in listed], refits, search.better)
 
 
 class _Search:
@@ -115,6 +121,7 @@ class _Search:
         self.basis = left[:, seen]
         self.inverse = (right[seen].T / singular[seen]) @ left[:, seen].T
         self.found: list[Suspect] = []
+        self.refits: dict[tuple[str, str], Refit] = {}
         self.effects: dict[str, Array] = {}
         self.ends: list[tuple[float, Array]] = []
         self.unfinished: list[tuple[float, Candidate, Array]] = []
@@ -272,6 +279,7 @@ class _Search:
         rivals = [other for other in self.found if other.name == suspect.name and other.kind == suspect.kind]
         if all(suspect.after < other.after for other in rivals):
             self.found = [*(other for other in self.found if other not in rivals), suspect]
+            self.refits[suspect.name, suspect.kind] = Refit(free, end.point, end.residual, end.jacobian)
 
     def _read(self) -> None:
         """Fit the readings that begin best, each from its own starts; misfits count against the spread of the data."""

@@ -1,0 +1,94 @@
+"""Friction of a law that the model leaves out: recordings by scipy's pendulum, of which one resists by two laws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from shoal.engines import get_engine
+from shoal.identification import Estimate, Measurement, Problem
+from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.forward import ForwardModel
+from shoal.identification.methods import get_method
+from shoal.scene import Scene
+
+LENGTH, MASS, VISCOUS, START = 0.8, 0.5, 0.02, -0.7
+INERTIA = MASS * LENGTH**2 / 3
+LAWS: dict[str, Callable[[float], float]] = {
+    "none": lambda rate: 0.0,
+    "quadratic drag": lambda rate: 0.004 * rate * abs(rate),
+    "dry friction": lambda rate: 0.006 * float(np.tanh(rate / 0.01)),
+}
+
+
+def identified(law: str, noise: float, seed: int, share: float = 1.0, *more: str) -> Estimate:
+    """From 6 s of the angle: start, viscous friction and more of joint O, which has a share of another law too."""
+
+    def motion(_: float, state: Any) -> list[float]:
+        angle, rate = state
+        weight = MASS * 9.81 * LENGTH / 2 * np.cos(angle)
+        return [rate, -(weight + VISCOUS * rate + share * LAWS[law](rate)) / INERTIA]
+
+    times = np.linspace(0.0, 6.0, 121)[1:]
+    seen = solve_ivp(motion, (0.0, 6.0), [START, 0.0], "LSODA", times, rtol=1e-10, atol=1e-12, max_step=0.01).y[0]
+    seen += noise * np.random.default_rng(seed).standard_normal(len(seen))
+    density = MASS / (LENGTH * 0.02 * 0.04)
+    scene = Scene.parse({
+        "name": "pendulum",
+        "bodies": {"OA": {"kind": "rod", "length": LENGTH, "height": 0.02, "width": 0.04, "density": density}},
+        "joints": {"O": {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "OA"}}},
+        "markers": {"A": {"body": "OA", "point": "end"}},
+        "initial": {"OA": {"angle": START}},
+    })  # fmt: skip
+    problem = Problem.parse({
+        "name": "swing", "scene": "pendulum", "channels": [{"marker": "A", "quantity": "angle"}],
+        "parameters": {"start": {"path": "initial.OA.angle", "lower": -3.0, "upper": 3.0},
+                       "friction": {"path": "joints.O.friction", "lower": 0.0, "upper": 1.0},
+                       **{field: {"path": f"joints.O.{field}", "lower": 0.0, "upper": 1.0} for field in more}},
+        "source": {"kind": "engine", "stop": 6.0, "count": 120}, "quantities": {"ratio": f"friction / {INERTIA}"},
+    }, "swing")  # fmt: skip
+    measurement = Measurement.single(times, tuple(problem.channels), seen[:, None], "scipy")
+    model = ForwardModel(problem, scene, get_engine("gauss"), measurement)
+    outcome = get_method("least-squares")(model, np.random.default_rng(seed), lambda *_: None)
+    return conclude(model, outcome, "least-squares", seed, 0.0, [], NOTHING)
+
+
+@pytest.mark.parametrize(("law", "share"), [("quadratic drag", 0.3), ("dry friction", 0.5)])
+def test_intervals_hold_the_friction_where_another_law_leaves_a_misfit(law: str, share: float) -> None:
+    """Of eight draws with 95 % each all but two at least, and of a fault that is far beyond the noise."""
+    held = []
+    for seed in range(8):
+        estimate = identified(law, 3e-4, seed, share)
+        assert estimate.verdict.trusted, estimate.message
+        assert estimate.suspects[0].name == f"{law} of O"
+        assert "the intervals hold the answer with it too" in estimate.message
+        friction, ratio = estimate.parameters["friction"], estimate.quantities["ratio"]
+        assert friction.value - VISCOUS > 4 * friction.std
+        assert friction.upper < 2 * VISCOUS
+        assert ratio.lower == pytest.approx(friction.lower / INERTIA)
+        held.append(friction.lower < VISCOUS < friction.upper)
+    assert sum(held) >= 6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_law_that_would_not_show_is_told_and_widens_nothing(seed: int) -> None:
+    """With as much noise the misfit is gone; the number is off by more than its interval, which the sentence tells."""
+    estimate, right = (identified(law, 3e-3, seed, 0.15) for law in ("dry friction", "none"))
+    for one in (estimate, right):
+        assert one.verdict.trusted
+        assert not one.suspects
+        said = "should O have quadratic drag or dry friction as well, which may not show here, friction is known to +-"
+        told = float(one.message.partition(said)[2].split(" only")[0])
+        friction = one.parameters["friction"]
+        assert friction.upper - friction.lower < 4.5 * friction.std < told
+        assert abs(friction.value - VISCOUS) < told
+
+
+def test_laws_that_are_sought_are_no_other_laws() -> None:
+    estimate = identified("dry friction", 3e-4, 0, 0.1, "drag", "coulomb")
+    assert "as well, which may not show" not in estimate.message
+    for name, true in (("friction", VISCOUS), ("drag", 0.0), ("coulomb", 0.0006)):
+        assert estimate.parameters[name].lower <= true <= estimate.parameters[name].upper
