@@ -35,6 +35,35 @@ def test_comments_are_no_rows_and_may_hold_the_header(tmp_path: Path, text: str)
     np.testing.assert_array_equal(seen(tmp_path / "run.csv", text).values[:, 0], [1, 2, 4, 3])
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t x\n0.0 1.0\n0.1 2.0\n0.2 4.0\n0.3 3.0\n",
+        "# a rig of 1994\n# t x\n 0.0   1.0\n 0.1   2.0 \n 0.2   4.0\n 0.3   3.0",
+        "t  x\r\n0.0  1.0\r\n0.1  2.0  \r\n0.2  4.0\r\n0.3  3.0\r\n",
+        "t x\ns mm\n0 1e3\n0.1 2e3\n0.2 4e3\n0.3 3e3\n",
+        "t\tx\n0,0\t1,0\n0,1\t2,0\n0,2\t4,0\n0,3\t3,0\n",
+        "t,x\r0.0,1.0\r0.1,2.0\r0.2,4.0\r0.3,3.0\r",
+    ],
+    ids=["blanks", "comments", "windows", "units", "tabs and decimal commas", "returns"],
+)
+def test_other_ways_to_part_cells_and_lines(tmp_path: Path, text: str) -> None:
+    found = seen(tmp_path / "run.txt", text)
+    np.testing.assert_allclose(found.times, [0.0, 0.1, 0.2, 0.3])
+    np.testing.assert_allclose(found.values[:, 0], [1, 2, 4, 3])
+
+
+def test_what_numpy_writes_by_default_is_read(tmp_path: Path) -> None:
+    rows = np.array([[0.0, 1.0, -3.0], [0.1, 2.0, np.nan], [0.2, -4.0e-9, 5.0]])
+    np.savetxt(tmp_path / "named.txt", rows, header="t x y")
+    np.testing.assert_array_equal(read(FileSource(path=str(tmp_path / "named.txt")), X).values[:, 0], rows[:, 1])
+    np.savetxt(tmp_path / "plain.txt", rows)
+    source = FileSource(path=str(tmp_path / "plain.txt"), columns=["t", "x", "y"])
+    np.testing.assert_array_equal(read(source, X).values[:, 0], rows[:, 1])
+    with pytest.raises(InputError, match="no header line; name its columns with `columns`"):
+        read(FileSource(path=str(tmp_path / "plain.txt")), X)
+
+
 def test_comments_are_no_frames_and_blank_lines_are(tmp_path: Path) -> None:
     found = seen(tmp_path / "run.csv", "x\n1\n# lamp off\n2\n\n4\n", rate=10.0)
     np.testing.assert_allclose(found.times, [0.0, 0.1, 0.3])

@@ -25,6 +25,7 @@ LARGEST = 200_000_000
 """Bytes of a table, unpacked; more are refused."""
 _MOST_COLUMNS = 2000
 _COMMENT = re.compile(rb"^[ \t]*[#%][^\r\n]*", re.MULTILINE)
+_CELLS = re.compile(r"[,;\t]")
 _MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 """First bytes of a text by its encoding."""
 _EMPTY = ("", "nan", "na", "n/a", "null", "none", "<na>", "nat")
@@ -92,6 +93,8 @@ def load_table(path: Path, columns: list[str] | None = None, *, largest: int | N
                 data = packed.read(largest + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"data: {path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
     if len(data) > largest:
         raise InputError(f"data: {path} holds more than {largest / 1e6:.0f} MB; cut the part to fit on out of it")
     if data.startswith(b"PAR1"):
@@ -139,10 +142,10 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     import pandas
 
     try:
-        head = _units(_header(data, columns is not None))
+        head = _units(_header(_tabbed(data), columns is not None))
         first, skipped, comments = head.first, head.skipped, head.comments
         separator = next((mark for mark in (";", "\t") if mark in first), ",")
-        decimal = "," if separator == ";" else "."
+        decimal = "," if separator == ";" or (separator == "\t" and re.search(rb"\d,\d", head.data)) else "."
         if first.count(separator) >= _MOST_COLUMNS or len(columns or ()) > _MOST_COLUMNS:
             raise InputError(f"data: {path} has more than {_MOST_COLUMNS} columns; leave out what is not fitted on")
         header = [name.strip() for name in next(csv.reader([first], delimiter=separator), [])]
@@ -176,6 +179,24 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     cells = next(csv.reader([head.units], delimiter=separator), [])
     units = of_columns(path, head.unit_row, names, cells) if head.units else None
     return Table(path, frame[filled], rows[filled], decimal, comments, units)
+
+
+def _tabbed(data: bytes) -> bytes:
+    """With tabs for blanks between cells, where the first line of numbers has nothing else, as by `numpy.savetxt`."""
+    for line in io.BytesIO(data):
+        text = line.decode().strip()
+        if not text or text[0] in "#%":
+            continue
+        words = text.split()
+        if _CELLS.search(text) or (len(words) == 1 and _is_number(text)):
+            return data
+        if all(map(_is_number, words)):
+            return re.sub(rb"(?<=[^ \r\n]) +(?=[^ \r\n])", b"\t", re.sub(rb"(?m)^ +| +(?=\r?$)", b"", data))
+    return data
+
+
+def _is_number(word: str) -> bool:
+    return bool(np.isfinite(_float(word, ".")))
 
 
 class _Head(NamedTuple):
