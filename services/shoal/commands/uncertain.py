@@ -142,11 +142,13 @@ def uncertain(
     from shoal.pictures import files
     from shoal.response import uncertain
     from shoal.response.read import correlations, parameters, prices
+    from shoal.response.worst import require_case
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
     known, correlated = parameters(vary, wanted), correlations(pairs)
+    require_case(worst_of, limits, wanted)
     with screen.working(f"{wanted.name}: uncertain response") as tell:
         screen.compile_for(engine, [1, 2], wanted)
         response = uncertain(

@@ -37,6 +37,7 @@ from shoal.response.inputs import Correlations, Inputs, Parameter
 from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
 from shoal.response.limits import Judged, judge, limit
+from shoal.response.limits.choice import get_way
 from shoal.response.limits.judge import Reach, require, watched
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.quantities import of_section
@@ -104,6 +105,7 @@ def uncertain(
     wanted = load_scene(scene) if isinstance(scene, str) else scene
     wanted = wanted.with_values(values) if values else wanted
     inputs = Inputs(parameters(vary, wanted), correlations)
+    get_way(limit_method)
     if allocate and len(limits) != 1:
         raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")
     when, asked = sampling_times(wanted, times), [limit(text, wanted) for text in limits]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from shoal.engines import get_engine
 from shoal.errors import InputError
-from shoal.response.limits import Shown
+from shoal.response.limits import Shown, limit
 from shoal.response.limits.judge import show
 from shoal.response.limits.limit import Limit
 from shoal.response.result import Response
@@ -50,6 +51,21 @@ def worst(found: Response, of: str = "") -> list[Worst]:
     return [_case(found, text, shown) for text, shown in cases.items()]
 
 
+def require_case(of: str, limits: Sequence[str], scene: Scene) -> None:
+    """Raises InputError for what can be no case of a study of a scene with limits, before it is made."""
+    limits = [limit(text, scene).text for text in limits]
+    marker, side = of.rpartition(".")[0].rpartition(".")[0], of.rpartition(".")[2]
+    if of and of not in limits and (side not in SIDES or marker not in scene.markers):
+        raise _no_case(of, limits)
+
+
+def _no_case(of: str, limits: Iterable[str]) -> InputError:
+    return InputError(
+        f"worst: {of!r} is neither a limit of the study ({', '.join(limits) or 'there are none'}) nor, of intervals, "
+        "MARKER.QUANTITY.lower or .upper"
+    )
+
+
 def _case(found: Response, of: str, shown: Shown) -> Worst:
     if shown.status != "ok":
         raise InputError(f"worst: the run of {of} is not borne out: {shown.message}")
@@ -76,17 +92,13 @@ def _bound(found: Response, of: str) -> tuple[str, Shown]:
     marker, _, rest = of.rpartition(".")[0].rpartition(".")
     side = of.rpartition(".")[2]
     if found.bounds is None or side not in SIDES or marker not in found.markers or rest not in found.quantities:
-        limits = ", ".join(one.limit.text for one in found.limits)
-        raise InputError(
-            f"worst: {of!r} is neither a limit of the study ({limits or 'there are none'}) nor, of intervals, "
-            "MARKER.QUANTITY.lower or .upper"
-        )
+        raise _no_case(of, (one.limit.text for one in found.limits))
     above = side == "upper"
     bound = found.column(marker, rest, getattr(found.bounds, side))
     arguments = found.column(marker, rest, (found.bounds.at_upper if above else found.bounds.at_lower).T).T
     instant = int(np.argmax(bound) if above else np.argmin(bound))
     # The margin to a bound of zero is the quantity itself, with its sign.
-    limit = Limit(of, marker, rest, above, 0.0)
-    shown = show(limit, found.stated, found.times, get_engine(found.engine), found.inputs, arguments[instant])
+    passed = Limit(of, marker, rest, above, 0.0)
+    shown = show(passed, found.stated, found.times, get_engine(found.engine), found.inputs, arguments[instant])
     value = -shown.margin if above else shown.margin
     return of, Shown(**{**vars(shown), "margin": value})
