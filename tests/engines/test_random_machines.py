@@ -17,13 +17,14 @@ from shoal.scene import Rod, Scene
 from shoal.trajectory import Trajectory
 
 Random = np.random.Generator
-FEW, MANY, DAMPED = 3, 60, 100
+FEW, MANY, DAMPED, DRAGGED = 3, 60, 100, 140
 
 
 def machine(seed: int) -> Scene:
     """A chain of one to three rods or a four-bar linkage, driven or not, with springs, dampers and friction or not.
 
-    From the seed DAMPED on, flexible rods may lose energy in themselves, and joints to dry friction.
+    From the seed DAMPED on, flexible rods may lose energy in themselves, and joints to dry friction; from DRAGGED on
+    to quadratic drag as well.
     """
     rng = np.random.default_rng(seed)
     loop = rng.random() < 0.3
@@ -71,6 +72,10 @@ def machine(seed: int) -> Scene:
                     "coulomb_speed": float(10 ** rng.uniform(-2, -0.5)),
                 }
                 joints[joint] |= dry
+    if seed >= DRAGGED:
+        for joint in ("O", "ab"):
+            if joint in joints:
+                joints[joint]["drag"] = float(10 ** rng.uniform(-3, -0.5))
     return Scene.parse(
         {
             "name": f"machine-{seed}",
@@ -141,6 +146,6 @@ def test_the_verdict_on_a_few_machines_is_right(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [*range(FEW, MANY), *range(DAMPED, DAMPED + 40)])
+@pytest.mark.parametrize("seed", [*range(FEW, MANY), *range(DAMPED, DRAGGED + 20)])
 def test_the_verdict_on_many_machines_is_right(seed: int) -> None:
     assert fault(seed) == ""
