@@ -22,7 +22,7 @@ from shoal.mechanics.assembly.build import build as build_model
 from shoal.mechanics.assembly.loads import LOADS
 from shoal.mechanics.integrators import INTEGRATORS, facts
 from shoal.mechanics.joints import CONDITIONS, SPATIAL
-from shoal.scene import JOINT_KINDS, LOAD_KINDS, Attachment, Scene, load_scene
+from shoal.scene import JOINT_KINDS, LOAD_KINDS, Attachment, Resisted, Scene, load_scene
 from shoal.scene.bodies import Element
 from shoal.scene.dimensions import SPATIAL_KINDS
 from shoal.scene.joints import sides
@@ -35,7 +35,7 @@ CABLES = load_scene("flexible-double-pendulum")
 OTHERS = [name for name in ENGINES if name != "gauss"]
 
 
-class Joint(Record):
+class Joint(Resisted):
     """Like no other."""
 
     kind: Literal["invented"] = "invented"
@@ -43,8 +43,6 @@ class Joint(Record):
     first: Attachment = Attachment(body="ground", point=(0.0, 0.0))
     second: Attachment = Attachment(body="OA")
     friction: float = 1.0
-    coulomb: float = 1.0
-    coulomb_speed: float = 1.0
 
 
 class Load(Record):

@@ -237,7 +237,7 @@ CASES = [
     Case(
         pendulum(
             "coulomb",
-            joints={"O": joint(GROUND, at("A"), coulomb=1.0, coulomb_speed=0.2, friction=0.1)},
+            joints={"O": joint(GROUND, at("A"), coulomb=1.0, coulomb_speed=0.2, friction=0.1, drag=0.02)},
             start={"rate": 8.0},
         ),
         RIGID,

@@ -250,6 +250,7 @@ def beside_beams(rod: dict[str, Any], duration: float, foot: dict[str, Any] | No
     return float(np.max(np.abs(limits[0] - limits[1])))
 
 
+@pytest.mark.slow
 def test_geometrically_exact_beams_bend_and_twist_as_director_rods_do() -> None:
     """A curved and twisted rod with a body off its axis."""
     assert beside_beams(CURVED, 0.02, bodies={"H": HEAD}, joints={"T": TIP}) < 2e-5

@@ -43,6 +43,7 @@ def status(client: Any, run_id: str) -> str:
     return str(client.get_run(run_id).info.status)
 
 
+@pytest.mark.slow
 def test_a_run_whose_process_was_killed_is_ended_and_one_that_lives_is_not(client: Any) -> None:
     with ExitStack() as stack:
         (killed, left), (living, run_id) = (stack.enter_context(another(RUN)) for _ in range(2))

@@ -14,7 +14,13 @@ LANES = 11
 """Two groups of eight, the second of which repeats its last lane."""
 
 
-@pytest.mark.parametrize("name", ["andrews-squeezer", "bricard", "equal-slider-crank", "n-four-bar-2", "parallelogram"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *["andrews-squeezer", "equal-slider-crank", "n-four-bar-2", "parallelogram"],
+        pytest.param("bricard", marks=pytest.mark.slow),
+    ],
+)
 def test_lanes_move_as_they_would_alone(name: str) -> None:
     """With steps of their own, which lanes share otherwise; Bricard's mechanism has a condition too many."""
     scene = load_scene(name)

@@ -17,7 +17,11 @@ from shoal.scene import load_scene
 
 
 @pytest.mark.parametrize(
-    "name", ["flexible-double-pendulum", "swinging-strip", "bricard", "flexible-slider-crank", "ibm-double-pendulum"]
+    "name",
+    [
+        *["flexible-double-pendulum", "bricard", "flexible-slider-crank", "ibm-double-pendulum"],
+        pytest.param("swinging-strip", marks=pytest.mark.slow),
+    ],
 )
 def test_two_frames_are_the_start_and_the_equilibrium(name: str) -> None:
     """The first is that of the time loop, the second has its markers where statics finds them."""

@@ -44,6 +44,7 @@ def margins(scene: Scene, limits: list[str], path: str, ends: tuple[float, float
     return [one.margin for one in found.limits]
 
 
+@pytest.mark.slow
 def test_a_cantilever_under_its_weight() -> None:
     """The heaviest decides: shear q (L - s), moment q (L - s)^2 / 2, of which the upper side is stretched."""
     load = 1100.0 * AREA * G

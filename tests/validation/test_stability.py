@@ -45,7 +45,7 @@ FEW: dict[str, tuple[tuple[str, ...], tuple[Any, ...], tuple[Any, ...]]] = {
 }
 """Methods, x and y of the fast tests; among them cells at which a single run says `ok` and is wrong."""
 
-LONG = ("step-stiffness", "step-slenderness", "tolerance-machine", "space-slenderness", "space-twist")
+LONG = ("step-stiffness", "step-slenderness", "tolerance-machine", "space-step", "space-slenderness", "space-twist")
 
 
 def _few(name: str) -> StabilityMap:

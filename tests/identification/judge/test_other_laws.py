@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -56,11 +56,14 @@ def identified(law: str, noise: float, seed: int, share: float = 1.0, *more: str
     return conclude(model, outcome, "least-squares", seed, 0.0, [], NOTHING)
 
 
+@pytest.mark.parametrize("draws", [[1, 2], pytest.param(range(3, 15), marks=pytest.mark.slow)], ids=["few", "many"])
 @pytest.mark.parametrize(("law", "share"), [("quadratic drag", 0.3), ("dry friction", 0.5)])
-def test_intervals_hold_the_friction_where_another_law_leaves_a_misfit(law: str, share: float) -> None:
-    """Of eight draws with 95 % each all but two at least, and of a fault that is far beyond the noise."""
+def test_intervals_hold_the_friction_where_another_law_leaves_a_misfit(
+    law: str, share: float, draws: Sequence[int]
+) -> None:
+    """Of twelve draws with 95 % each all but two at least; the fault is far beyond the noise."""
     held = []
-    for seed in range(8):
+    for seed in draws:
         estimate = identified(law, 3e-4, seed, share)
         assert estimate.verdict.trusted, estimate.message
         assert estimate.suspects[0].name == f"{law} of O"
@@ -70,7 +73,7 @@ def test_intervals_hold_the_friction_where_another_law_leaves_a_misfit(law: str,
         assert friction.upper < 2 * VISCOUS
         assert ratio.lower == pytest.approx(friction.lower / INERTIA)
         held.append(friction.lower < VISCOUS < friction.upper)
-    assert sum(held) >= 6
+    assert held.count(False) <= len(held) // 6
 
 
 @pytest.mark.parametrize("seed", range(3))

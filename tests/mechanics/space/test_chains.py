@@ -62,6 +62,7 @@ def room(count: int, **solver: Any) -> int:
     return Workspace(scene.solver, model, chosen, SINGLE, slice(0, 1), np.array([1e-3]), none).size
 
 
+@pytest.mark.slow
 def test_the_room_of_a_march_grows_with_the_number_of_bodies() -> None:
     explicit = {"solver.integrator": "rk4"}
     assert room(80, **explicit) / room(40, **explicit) == pytest.approx(2.0, rel=0.05)

@@ -55,7 +55,14 @@ def rims(angle: Array, ratio: float) -> tuple[Array, Array]:
     return one, two
 
 
-@pytest.mark.parametrize("integrator", [name for name in INTEGRATORS if name != "auto"])
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in ("radau5", "implicit-gauss")))
+        for name in INTEGRATORS
+        if name != "auto"
+    ],
+)
 def test_bevel_gears_turn_by_their_teeth_and_with_the_inertia_of_both(integrator: str) -> None:
     """phi_1 = t^2/2 T/(I_1 + r^2 I_2), phi_2 = r phi_1, each about its axis."""
     ratio = -17 / 40
