@@ -8,7 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from shoal.identification.deadline import TimeIsUp
+from shoal.identification.deadline import TimeIsUp, unless_late
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
 from shoal.identification.judge.other_laws import other_laws, sentences
@@ -102,7 +102,7 @@ def judge(
         message = f"{1 + len(rivals)} parameter sets fit equally well ({', '.join(sorted(kinds))})"
         advice = ["measure another marker or a longer motion, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
-    laws = other_laws(model, outcome.point, seen)
+    laws = unless_late(lambda: other_laws(model, outcome.point, seen), [])
     # Where there is a misfit, what it may be due to is in the intervals; else it is said.
     refits = looked.refits + [law.refit for law in laws if tests.limited and law.fits]
     parameters = with_refits(parameters, refits)
