@@ -12,6 +12,7 @@ from shoal.identification.carried import fitted, joint
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.other_laws import OtherLaw, other_laws, sentences
 from shoal.identification.judge.remarks import remarks
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.judge.rivals import valley
@@ -99,8 +100,12 @@ def conclude(
     found, beside = outcome, list[Array]()
     if known:
         found, beside = unless_late(lambda: valley(model, outcome, at), (found, beside))
-    ends = [point, *beside]
-    values = intervals.spanning([intervals.parameters(model, end, at, correction) for end in ends])
+    laws = unless_late(lambda: other_laws(model, point, seen), list[OtherLaw]()) if known else []
+    # Where there is a misfit, what it may be due to is in the intervals; else it is said.
+    ends = [point, *beside, *(law.end for law in laws if law.fits and tests.limited)]
+    values = intervals.possible(
+        model, intervals.spanning([intervals.parameters(model, end, at, correction) for end in ends])
+    )
     if looked is None:
         values = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in values.items()}
     curved = _curved(model, outcome, at, seen, tests) if known else []
@@ -136,6 +141,8 @@ def conclude(
     if wishes.sample and minimum:
         drawn = unless_late(lambda: posterior(model, point, at, blocks, square, wishes.sample, seed), None)
     notes = [judgement.message or outcome.message]
+    if judgement.verdict.trusted:
+        notes += sentences(laws, values, lambda law: intervals.parameters(model, law.end, at, correction)[law.sought])
     notes += remarks(values, profiled, names, tests, mesh if limits else None, theory)
     if drawn is not None:
         alone = judgement.verdict is Verdict.AMBIGUOUS

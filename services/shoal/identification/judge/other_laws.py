@@ -6,6 +6,7 @@ out moves the sought number far beyond an interval that knows of none, and leave
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,37 +16,30 @@ from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.fits import Together
 from shoal.identification.judge.suspects.of_machine import RESISTING, resisting
 from shoal.identification.judge.suspects.size import size_of
-from shoal.identification.spread.intervals import Refit
+from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.sensitivity import Sensitivity
+from shoal.identification.spread.uncertainty import RANK_TOLERANCE, linearise, spread
 from shoal.identification.spread.value import Value
 from shoal.scene.joints import Resisted
 from shoal.trajectory import Array
 
 _FAR = 2.0
-"""Times the interval: a friction that is so much less certain with another law beside it is told."""
+"""Times the interval: a friction that may be so much farther off with another law beside it is told."""
 
 
 @dataclass(frozen=True)
 class OtherLaw:
-    """A friction that is sought, by its name, and the fit with another law of its joint freed, to first order.
+    """Another law by which the joint of a friction that is sought may resist, and how much of it the data allow.
 
-    field: one of RESISTING, which is sought nowhere and was left out of the joint
+    sought: the friction's name; field: one of RESISTING, sought nowhere and left out of the joint
+    fits: whether some of it fits better than none; end: the fit, to first order, with as much of it as may be, (p,)
     """
 
     sought: str
     joint: str
     field: str
-    refit: Refit
-
-    @property
-    def fits(self) -> bool:
-        """Whether some of the law fits better than none."""
-        return bool(self.refit.point[-1] > 0.0)
-
-    @property
-    def value(self) -> Value:
-        """Of the sought friction with the other law beside it."""
-        return self.refit.values()[self.sought]
+    fits: bool
+    end: Array
 
 
 def other_laws(model: ForwardModel, point: Array, seen: Sensitivity) -> list[OtherLaw]:
@@ -60,35 +54,49 @@ def other_laws(model: ForwardModel, point: Array, seen: Sensitivity) -> list[Oth
         for other in RESISTING:
             if f"{where}.{other}" not in taken and not getattr(joint, other):
                 candidate = resisting(joint_name, joint, other, size_of(model.scene))
-                if (refit := _refit(model, point, seen, candidate)) is not None:
-                    found.append(OtherLaw(name, joint_name, other, refit))
+                if (most := _most(model, point, seen, candidate)) is not None:
+                    found.append(OtherLaw(name, joint_name, other, *most))
     return found
 
 
-def sentences(laws: list[OtherLaw], values: dict[str, Value]) -> list[str]:
-    """One for each friction that is known much less well if its joint resists by another law too."""
-    wide: dict[tuple[str, str], list[tuple[str, float]]] = {}
+def sentences(laws: list[OtherLaw], values: dict[str, Value], there: Callable[[OtherLaw], Value]) -> list[str]:
+    """One for each friction that is known much less well if its joint resists by another law too.
+
+    there: the sought friction at the end of a law
+    """
+    wide: dict[tuple[str, str], list[tuple[str, Value]]] = {}
     for law in laws:
-        width = law.value.upper - law.value.lower
-        if width > _FAR * (values[law.sought].upper - values[law.sought].lower):
-            wide.setdefault((law.sought, law.joint), []).append((RESISTING[law.field], width))
+        known, other = values[law.sought], there(law)
+        if abs(other.value - known.value) > _FAR * (known.upper - known.lower) / 2:
+            wide.setdefault((law.sought, law.joint), []).append((RESISTING[law.field], other))
     return [
         f"should {joint} have {' or '.join(name for name, _ in others)} as well, which may not show here, {sought} is "
-        f"known to +-{max(width for _, width in others) / 2:.2g} only"
+        f"only known to be from {min(other.lower for _, other in others):.3g} to {values[sought].upper:.3g}"
         for (sought, joint), others in wide.items()
     ]
 
 
-def _refit(model: ForwardModel, point: Array, seen: Sensitivity, candidate: Candidate) -> Refit | None:
-    """With a law freed that was left out, of which there is none if less would fit; None where it has no effect."""
+def _most(model: ForwardModel, point: Array, seen: Sensitivity, candidate: Candidate) -> tuple[bool, Array] | None:
+    """Whether a law that was left out fits, and the fit with the most of it that may be; None where it has no effect.
+
+    The most is the upper end of its interval, or less where a parameter comes to its bound.
+    """
     probe = candidate.probes[0, 0]
     effect = Together(model, [candidate]).residuals([0], [np.append(point, candidate.vector(probe))])[0] - seen.residual
     if not (np.all(np.isfinite(effect)) and np.any(effect)):
         return None
-    jacobian = np.column_stack([seen.jacobian, effect / probe[0]])
-    scale = np.append(model.sizes(point), probe)
-    change = scale * np.linalg.lstsq(jacobian * scale, -seen.residual)[0]
-    if change[-1] < 0.0:
-        change *= 0.0
-    there = np.append(np.clip(point + change[:-1], model.lower, model.upper), change[-1])
-    return Refit(candidate.freed(model), there, seen.residual + jacobian @ change, jacobian)
+    known, column = model.sizes(point), effect / probe[0]
+    scaled = seen.jacobian * known
+    slope = -known * (np.linalg.pinv(scaled, rcond=RANK_TOLERANCE) @ column)
+    # By a size of the law that changes the motion as much as the parameters do, so that it counts among them.
+    size = float(np.linalg.norm(scaled, axis=0).max() / np.linalg.norm(column))
+    freed, scale = np.column_stack([seen.jacobian, column]), np.append(known, size)
+    change = -scale * (np.linalg.pinv(freed * scale, rcond=RANK_TOLERANCE) @ seen.residual)
+    amount = float(change[-1])
+    left = seen.residual + freed @ change if amount > 0.0 else seen.residual
+    at = linearise(freed, left, scale, blocks_of(model, len(left)))
+    most = max(0.0, amount + spread(lambda p: float(p[-1]), np.append(point, 0.0), at).half)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        room = np.where(slope < 0.0, model.lower - point, model.upper - point) / slope
+    most = min([most, *room[slope != 0.0]])
+    return amount > 0.0, point + most * slope

@@ -8,10 +8,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from shoal.identification.deadline import TimeIsUp, unless_late
+from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
-from shoal.identification.judge.other_laws import other_laws, sentences
 from shoal.identification.judge.residual_tests import ResidualTests
 from shoal.identification.judge.rivals import relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
@@ -102,13 +101,8 @@ def judge(
         message = f"{1 + len(rivals)} parameter sets fit equally well ({', '.join(sorted(kinds))})"
         advice = ["measure another marker or a longer motion, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
-    laws = unless_late(lambda: other_laws(model, outcome.point, seen), [])
-    # Where there is a misfit, what it may be due to is in the intervals; else it is said.
-    refits = looked.refits + [law.refit for law in laws if tests.limited and law.fits]
-    parameters = with_refits(parameters, refits)
-    judged = _identifiable(seen, tests, parameters, unknown, found)
-    said = [judged.message, *sentences(laws, parameters)]
-    return replace(judged, message="; ".join(part for part in said if part), refits=refits)
+    judged = _identifiable(seen, tests, with_refits(parameters, looked.refits), unknown, found)
+    return replace(judged, refits=looked.refits)
 
 
 def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:

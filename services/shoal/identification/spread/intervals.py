@@ -32,10 +32,8 @@ def parameters(model: ForwardModel, point: Array, at: Linearisation, correction:
         told = about.fixed and not at_bound and about.std < span and not few(model)
         known = _value(float(point[k]), about, told, shift, at_bound)
         known = known.exponential() if model.parameters.logarithmic[k] else known
-        path = model.parameters.paths[k]
-        told = known.identifiable and _possible(model, path, known)
-        found[name] = replace(known, unit=unit(path), identifiable=told)
-    return found
+        found[name] = replace(known, unit=unit(model.parameters.paths[k]))
+    return possible(model, found)
 
 
 def quantities(
@@ -107,8 +105,16 @@ def few(model: ForwardModel) -> bool:
     return model.rows.noise is None and len(model.rows.time) < len(model.names) + _FEWEST
 
 
+def possible(model: ForwardModel, values: dict[str, Value]) -> dict[str, Value]:
+    """Parameters; those whose intervals reach values that cannot be, such as a mass below zero, are not known."""
+    told = {
+        name: _possible(model, path, values[name])
+        for name, path in zip(model.names, model.parameters.paths, strict=True)
+    }
+    return {name: replace(value, identifiable=value.identifiable and told[name]) for name, value in values.items()}
+
+
 def _possible(model: ForwardModel, path: str, known: Value) -> bool:
-    """Whether an interval ends at values that can be: a mass whose interval reaches below zero is not known."""
     head, _, name = path.partition(".")
     if head == RESERVED:
         return known.lower > 0.0 or name not in ("clock", "scale")
