@@ -19,7 +19,7 @@ from shoal.identification.measure import Windows
 from shoal.pictures.answer import Answer
 from shoal.response import Response, uncertain
 from shoal.response.stated import load_study
-from shoal.response.worst import Worst, worst
+from shoal.response.worst import Worst, require_case, worst
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array, Trajectory
 
@@ -119,7 +119,9 @@ def compared(scene: str, engines: Sequence[str] | None, values: Mapping[str, Any
 def responded(study: str, values: Mapping[str, Any]) -> tuple[Response, list[Worst]]:
     """A study of uncertain parameters with its worst cases, if any. Raises InputError, ComputationError."""
     stated = load_study(study)
-    found = uncertain(stated.machine().with_values(values), **stated.asked())
+    machine = stated.machine().with_values(values)
+    require_case(stated.worst_of, stated.limit, machine)
+    found = uncertain(machine, **stated.asked())
     try:
         return found, worst(found, stated.worst_of)
     except InputError:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from shoal.engines.sweep import Sweep
@@ -8,6 +10,14 @@ from shoal.pictures.signals import residuals
 from shoal_flows import jobs
 from shoal_flows.flows.tables import of_motion
 from shoal_flows.jobs import Fit
+
+STUDY = """uncertain:
+  scene: single-pendulum
+  vary: {{initial.OA.angle: "-0.1:0.1"}}
+  at: [0.5]
+  limit: A.y > 0.5
+  worst-of: {worst}
+"""
 
 
 def test_fit_carries_the_motion_of_what_it_found(fits: list[Fit]) -> None:
@@ -37,3 +47,13 @@ def test_sweep_covers_the_grid(sweep: Sweep) -> None:
 def test_unknown_names_are_refused_in_one_line() -> None:
     with pytest.raises(InputError, match="no such scene"):
         jobs.simulated("nowhere", "gauss", {})
+
+
+@pytest.mark.parametrize("worst", ["B.y.upper", "A.y.most", "A.y > 0.6"])
+def test_a_worst_case_that_there_is_not_is_told_before_the_study(
+    worst: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jobs, "uncertain", lambda *_, **__: pytest.fail("the study was made first"))
+    (tmp_path / "study.yaml").write_text(STUDY.format(worst=worst))
+    with pytest.raises(InputError, match=r"worst: .* is neither a limit of the study \(A.y > 0.5\) nor"):
+        jobs.responded(str(tmp_path / "study.yaml"), {})

@@ -67,7 +67,7 @@ def sentences(laws: list[OtherLaw], values: dict[str, Value], there: Callable[[O
     wide: dict[tuple[str, str], list[tuple[str, Value]]] = {}
     for law in laws:
         known, other = values[law.sought], there(law)
-        if abs(other.value - known.value) > _FAR * (known.upper - known.lower) / 2:
+        if known.identifiable and abs(other.value - known.value) > _FAR * (known.upper - known.lower) / 2:
             wide.setdefault((law.sought, law.joint), []).append((RESISTING[law.field], other))
     return [
         f"should {joint} have {' or '.join(name for name, _ in others)} as well, which may not show here, {sought} is "
