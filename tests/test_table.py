@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shoal import table
 from shoal.errors import InputError
 from shoal.identification import Recording
 from shoal.identification.recording import reading
@@ -62,6 +63,19 @@ def test_what_numpy_writes_by_default_is_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(source, X).values[:, 0], rows[:, 1])
     with pytest.raises(InputError, match="no header line; name its columns with `columns`"):
         read(FileSource(path=str(tmp_path / "plain.txt")), X)
+
+
+def test_a_comma_beside_points_is_no_decimal_mark(tmp_path: Path) -> None:
+    """A thousand and two hundred millimetres are not 1.2."""
+    with pytest.raises(InputError, match=r"row 2, column 'x': '1,200' is not a number"):
+        seen(tmp_path / "run.txt", "t\tx\n0.0\t1,200\n0.1\t1,300\n0.2\t1,400\n")
+
+
+def test_a_binary_table_without_a_line_feed_stays_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = b"PAR1\r\r\rPAR1"
+    monkeypatch.setattr(table, "_parquet", lambda path, found, largest: found)
+    (tmp_path / "run.parquet").write_bytes(data)
+    assert table.load_table(tmp_path / "run.parquet") == data
 
 
 def test_comments_are_no_frames_and_blank_lines_are(tmp_path: Path) -> None:

@@ -93,8 +93,6 @@ def load_table(path: Path, columns: list[str] | None = None, *, largest: int | N
                 data = packed.read(largest + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"data: {path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if b"\n" not in data:
-        data = data.replace(b"\r", b"\n")
     if len(data) > largest:
         raise InputError(f"data: {path} holds more than {largest / 1e6:.0f} MB; cut the part to fit on out of it")
     if data.startswith(b"PAR1"):
@@ -141,11 +139,13 @@ def _parquet(path: Path, data: bytes, largest: int) -> Table:
 def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     import pandas
 
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
     try:
         head = _units(_header(_tabbed(data), columns is not None))
         first, skipped, comments = head.first, head.skipped, head.comments
         separator = next((mark for mark in (";", "\t") if mark in first), ",")
-        decimal = "," if separator == ";" or (separator == "\t" and re.search(rb"\d,\d", head.data)) else "."
+        decimal = "," if separator == ";" or (separator == "\t" and _has_decimal_commas(head.data)) else "."
         if first.count(separator) >= _MOST_COLUMNS or len(columns or ()) > _MOST_COLUMNS:
             raise InputError(f"data: {path} has more than {_MOST_COLUMNS} columns; leave out what is not fitted on")
         header = [name.strip() for name in next(csv.reader([first], delimiter=separator), [])]
@@ -179,6 +179,11 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     cells = next(csv.reader([head.units], delimiter=separator), [])
     units = of_columns(path, head.unit_row, names, cells) if head.units else None
     return Table(path, frame[filled], rows[filled], decimal, comments, units)
+
+
+def _has_decimal_commas(data: bytes) -> bool:
+    """Whether numbers have commas and none has a point: beside points, commas part thousands."""
+    return bool(re.search(rb"\d,\d", data)) and not re.search(rb"\d\.\d", data)
 
 
 def _tabbed(data: bytes) -> bytes:

@@ -54,9 +54,16 @@ def worst(found: Response, of: str = "") -> list[Worst]:
 def require_case(of: str, limits: Sequence[str], scene: Scene) -> None:
     """Raises InputError for what can be no case of a study of a scene with limits, before it is made."""
     limits = [limit(text, scene).text for text in limits]
-    marker, side = of.rpartition(".")[0].rpartition(".")[0], of.rpartition(".")[2]
+    marker, _, side = _parts(of)
     if of and of not in limits and (side not in SIDES or marker not in scene.markers):
         raise _no_case(of, limits)
+
+
+def _parts(of: str) -> tuple[str, str, str]:
+    """Marker, quantity and side of a bound; a marker's name may have dots."""
+    place, _, side = of.rpartition(".")
+    marker, _, quantity = place.rpartition(".")
+    return marker, quantity, side
 
 
 def _no_case(of: str, limits: Iterable[str]) -> InputError:
@@ -89,8 +96,7 @@ def _widest(found: Response) -> str:
 
 def _bound(found: Response, of: str) -> tuple[str, Shown]:
     """The run that attains a bound, where that lies farthest out."""
-    marker, _, rest = of.rpartition(".")[0].rpartition(".")
-    side = of.rpartition(".")[2]
+    marker, rest, side = _parts(of)
     if found.bounds is None or side not in SIDES or marker not in found.markers or rest not in found.quantities:
         raise _no_case(of, (one.limit.text for one in found.limits))
     above = side == "upper"
