@@ -65,6 +65,26 @@ def test_what_numpy_writes_by_default_is_read(tmp_path: Path) -> None:
         read(FileSource(path=str(tmp_path / "plain.txt")), X)
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_tables_drawn_at_random_hold_what_was_written(seed: int, tmp_path: Path) -> None:
+    """Any way to part cells and lines and to name the columns, with gaps in the first row too."""
+    rng = np.random.default_rng(seed)
+    values = rng.normal(size=(6, 3)) * 10.0 ** rng.integers(-9, 6, size=(1, 3))
+    values[rng.random((6, 3)) < 0.15] = np.nan
+    values[0, 0] = 1.0
+    cell, ending = str(rng.choice(["%.18e", "%.6f", "%g", "%8.3f"])), str(rng.choice(["\n", "\r\n", "\r"]))
+    separator, names = str(rng.choice([" ", "  ", "\t", ",", ";"])), ["a", "b", "c"]
+    commas = separator in ";\t" and rng.random() < 0.5
+    head = [separator.join(names) + ending, f"# {separator.join(names)}{ending}", ""][int(rng.integers(3))]
+    text = ending.join(separator.join(cell % x for x in row) for row in values)
+    path = tmp_path / "table.txt"
+    path.write_bytes((head + (text.replace(".", ",") if commas else text)).encode())
+    read_back = table.load_table(path, None if head else names)
+    found = np.column_stack([read_back.numbers(name) for name in names])
+    written = np.array([[float(cell % x) for x in row] for row in values])
+    np.testing.assert_array_equal(found, written[~np.all(np.isnan(written), axis=1)])
+
+
 def test_a_comma_beside_points_is_no_decimal_mark(tmp_path: Path) -> None:
     """A thousand and two hundred millimetres are not 1.2."""
     with pytest.raises(InputError, match=r"row 2, column 'x': '1,200' is not a number"):

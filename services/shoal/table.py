@@ -8,6 +8,7 @@ import io
 import re
 import warnings
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -144,7 +145,7 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     try:
         head = _units(_header(_tabbed(data), columns is not None))
         first, skipped, comments = head.first, head.skipped, head.comments
-        separator = next((mark for mark in (";", "\t") if mark in first), ",")
+        separator = _separator(first)
         decimal = "," if separator == ";" or (separator == "\t" and _has_decimal_commas(head.data)) else "."
         if first.count(separator) >= _MOST_COLUMNS or len(columns or ()) > _MOST_COLUMNS:
             raise InputError(f"data: {path} has more than {_MOST_COLUMNS} columns; leave out what is not fitted on")
@@ -153,7 +154,7 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
         if not header:
             raise InputError(f"data: {path} is not CSV: its first line is empty")
         twice = [name for name in names if names.count(name) > 1]
-        if columns is None and all(np.isfinite(_float(name, decimal)) for name in header):
+        if columns is None and _are_numbers(header):
             raise InputError(f"{path}: no header line; name its columns with `columns`")
         if twice:
             raise InputError(f"{path}: row 1: column {twice[0]!r} stands twice")
@@ -181,6 +182,11 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
     return Table(path, frame[filled], rows[filled], decimal, comments, units)
 
 
+def _separator(line: str) -> str:
+    """What stands between the cells of a line; beside others a comma is a decimal mark."""
+    return next((mark for mark in (";", "\t") if mark in line), ",")
+
+
 def _has_decimal_commas(data: bytes) -> bool:
     """Whether numbers have commas and none has a point: beside points, commas part thousands."""
     return bool(re.search(rb"\d,\d", data)) and not re.search(rb"\d\.\d", data)
@@ -193,15 +199,17 @@ def _tabbed(data: bytes) -> bytes:
         if not text or text[0] in "#%":
             continue
         words = text.split()
-        if _CELLS.search(text) or (len(words) == 1 and _is_number(text)):
+        if _CELLS.search(text) or (len(words) == 1 and _are_numbers(words)):
             return data
-        if all(map(_is_number, words)):
+        if _are_numbers(words):
             return re.sub(rb"(?<=[^ \r\n]) +(?=[^ \r\n])", b"\t", re.sub(rb"(?m)^ +| +(?=\r?$)", b"", data))
     return data
 
 
-def _is_number(word: str) -> bool:
-    return bool(np.isfinite(_float(word, ".")))
+def _are_numbers(cells: Sequence[str]) -> bool:
+    """Whether cells, with either decimal mark, are numbers or gaps, and not all gaps."""
+    filled = [cell for cell in cells if cell.strip().lower() not in _EMPTY]
+    return bool(filled) and all(np.isfinite([_float(cell, "," if "," in cell else ".") for cell in filled]))
 
 
 class _Head(NamedTuple):
@@ -256,11 +264,11 @@ def _header(data: bytes, named: bool) -> _Head:
     first = lines[begin - 1].decode()
     if named:
         return _Head(first, begin - 1, data, comments)
-    cells = re.split(r"[,;\t]", first)
+    cells = first.split(_separator(first))
     above = [k for k in comments if k < begin]
-    if above and all(np.isfinite(_float(cell.strip(), "," if ";" in first else ".")) for cell in cells):
+    if above and _are_numbers(cells):
         words = [(k, lines[k - 1].decode().lstrip(" \t#%")) for k in above[-2:]]
-        fitting = [(k, text) for k, text in words if len(re.split(r"[,;\t]", text)) == len(cells)]
+        fitting = [(k, text) for k, text in words if len(text.split(_separator(text))) == len(cells)]
         row, last = fitting[-1] if fitting else (0, "")
         if len(fitting) == 2 and is_unit_line(re.split(r"[,;\t]", last)):
             return _Head(fitting[0][1], begin - 1, data, comments, last, int(row))
