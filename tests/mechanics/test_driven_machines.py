@@ -82,11 +82,37 @@ def test_a_drive_may_be_as_fast_as_it_likes(unit: float, dimensions: int) -> Non
         return 0.5 * np.sin(rate * t), 0.5 * rate * np.cos(rate * t), -0.5 * rate**2 * np.sin(rate * t)
 
     wanted = swung(drive, 0.1, 0.12, start, times, 1e-3 * unit)
-    scene = hanging(f"0.5*sin({rate}*t)", 0.1, 0.12, start, duration=unit)
-    if dimensions == 3:
-        data = scene.model_dump(mode="json", exclude_unset=True)
-        data |= {"dimensions": 3, "gravity": [0.0, -9.81, 0.0]}
-        scene = Scene.parse(data)
-    run = simulate(scene, times)
+    run = simulate(placed(hanging(f"0.5*sin({rate}*t)", 0.1, 0.12, start, duration=unit), dimensions), times)
     assert run.ok, run.message
     np.testing.assert_allclose(run.marker("e")[:, :2], wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_drive_may_begin_where_it_has_a_limit_only(dimensions: int) -> None:
+    """It was refused: "joint D starts nan m apart"."""
+
+    def drive(t: float) -> tuple[float, float, float]:
+        # Where t is small the terms cancel; the series leaves out t**8.
+        if t < 0.1:
+            square = t * t
+            return (
+                1 - square / 6 * (1 - square / 20 * (1 - square / 42)),
+                -t / 3 * (1 - square / 10 * (1 - square / 28)),
+                -1 / 3 + square / 10 * (1 - 5 * square / 84),
+            )
+        s, c = np.sin(t) / t, np.cos(t)
+        return s, (c - s) / t, -s - 2 * (c - s) / t**2
+
+    start, times = {"angle": 0.7, "rate": 0.0}, np.array([0.5, 1.0, 2.0])
+    wanted = swung(drive, 0.1, 0.12, start, times, 0.01)
+    run = simulate(placed(hanging("sin(t)/t", 0.1, 0.12, start, duration=2.0), dimensions), times)
+    assert run.ok, run.message
+    np.testing.assert_allclose(run.marker("e")[:, :2], wanted, atol=1e-6)
+
+
+def placed(scene: Scene, dimensions: int) -> Scene:
+    """The scene as it is, or in space with the same weight."""
+    if dimensions == 2:
+        return scene
+    data = scene.model_dump(mode="json", exclude_unset=True)
+    return Scene.parse(data | {"dimensions": 3, "gravity": [0.0, -9.81, 0.0]})

@@ -313,6 +313,13 @@ def ended(law: Piecewise) -> Piecewise:
     return Piecewise(breaks, np.concatenate([none, law.coefficients, none]), law.kinks)
 
 
+def start_value(function: Function | Composed) -> float:
+    """A function of time at t = 0, or its limit from the right there. Raises InputError."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = float(function(np.zeros(1))[0])
+    return found if np.isfinite(found) else value(fit(function, _BEGINNING, function.knots), 0.0)  # such as sin(t)/t
+
+
 def start_slope(function: Function | Composed) -> float:
     """The derivative of a function of time at t = 0, on its right side. Raises InputError."""
     stated, operations = (function.function, function.operations) if isinstance(function, Composed) else (function, ())
@@ -328,7 +335,7 @@ def start_slope(function: Function | Composed) -> float:
     slope = float(low[1, 0] + high[1, 0]) / 2
     if np.isfinite(slope):
         return slope
-    return value(fit(function, _BEGINNING, function.knots), 0.0, 1)  # such as sin(t)/t
+    return value(fit(function, _BEGINNING, function.knots), 0.0, 1)
 
 
 def require_no_jump(function: Function, horizon: float) -> None:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from shoal.mechanics.fitting import start_slope
+from shoal.mechanics.fitting import start_slope, start_value
 from shoal.mechanics.joints import Along, Apart, Condition, Geared, Meet, Sum, Turned, conditions, unknown
 from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array, Index, Number
@@ -264,7 +264,7 @@ def lead(scene: Scene, at: Attachment) -> Number:
 
 def value_of(f: Function) -> float:
     """A function of time at the start."""
-    return float(f(np.zeros(1))[0])
+    return start_value(f)
 
 
 def rate_of(f: Function) -> float:

@@ -16,6 +16,7 @@ from shoal.engines.exudyn.space.rows import Row, Toothed, add_rows, add_teeth, h
 from shoal.errors import InputError
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.assembly.space.sections import ALIGNED
+from shoal.mechanics.fitting import start_value
 from shoal.mechanics.joints import Aligned, Along, Apart, Geared, Hinged, InPlane, Meet, Square, Turned, conditions
 from shoal.scene import JOINT_KINDS, Attachment, Joint, Revolute, Slider
 from shoal.trajectory import Array
@@ -280,7 +281,7 @@ def _meshed(exu: Any, ends: SpatialEnds, where: str, one: Geared) -> Gap:
 
 
 def _distant(exu: Any, ends: SpatialEnds, where: str, one: Apart) -> Gap:
-    length = ends.start_distance(one.first, one.second) if one.length is None else float(one.length(np.zeros(1))[0])
+    length = ends.start_distance(one.first, one.second) if one.length is None else start_value(one.length)
     markers = [ends.hold(one.first), ends.hold(one.second)]
     ends.system.add("ObjectConnectorDistance", markerNumbers=markers, distance=length)
     return lambda q, v: np.asarray(np.abs(_apart(ends, one, q, v) - length))

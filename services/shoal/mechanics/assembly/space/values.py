@@ -8,7 +8,7 @@ import numpy as np
 
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.terms import Mesh, Term
-from shoal.mechanics.fitting import start_slope
+from shoal.mechanics.fitting import start_slope, start_value
 from shoal.mechanics.numerics.tile import Array
 
 
@@ -54,14 +54,14 @@ def _along(vector: Affine, direction: Array, lane: int) -> Iterator[tuple[int, f
 def values_of(term: Term, q: Array) -> Array:
     """A constraint at time zero in all lanes, (lanes,)."""
     u, w = everywhere(term.u, q), everywhere(term.w, q)
-    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
+    drive = 0.0 if term.drive is None else start_value(term.drive)
     return np.atleast_1d(np.sum(u * (term.form @ w), axis=0) + term.constant + drive)
 
 
 def value_of(term: Term, q: Array, lane: int) -> float:
     """A constraint at time zero at the coordinates (unknowns,) of a lane."""
     constant = np.atleast_1d(term.constant)
-    drive = 0.0 if term.drive is None else float(term.drive(np.zeros(1))[0])
+    drive = 0.0 if term.drive is None else start_value(term.drive)
     u, w = at(term.u, q, lane), at(term.w, q, lane)
     return float(u @ term.form @ w + constant[min(lane, constant.size - 1)] + drive)
 
