@@ -44,7 +44,8 @@ class OtherLaw:
 
 def other_laws(model: ForwardModel, point: Array, seen: Sensitivity) -> list[OtherLaw]:
     """Each friction that is sought, with each other law that its joint may have. Runs are not counted."""
-    taken, found = {*model.parameters.paths, *model.problem.ties}, []
+    taken = {*model.parameters.paths, *model.problem.ties}
+    asked, beside = list[tuple[str, str, str]](), dict[tuple[str, str], Candidate]()
     for name, path in zip(model.names, model.parameters.paths, strict=True):
         where, _, field = path.rpartition(".")
         joint_name = where.removeprefix("joints.")
@@ -53,10 +54,17 @@ def other_laws(model: ForwardModel, point: Array, seen: Sensitivity) -> list[Oth
             continue
         for other in RESISTING:
             if f"{where}.{other}" not in taken and not getattr(joint, other):
-                candidate = resisting(joint_name, joint, other, size_of(model.scene))
-                if (most := _most(model, point, seen, candidate)) is not None:
-                    found.append(OtherLaw(name, joint_name, other, *most))
-    return found
+                asked.append((name, joint_name, other))
+                beside[joint_name, other] = resisting(joint_name, joint, other, size_of(model.scene))
+    if not beside:
+        return []
+    candidates = list(beside.values())
+    probes = [candidate.probes[0, 0] for candidate in candidates]
+    points = [np.append(point, candidate.vector(probe)) for candidate, probe in zip(candidates, probes, strict=True)]
+    effects = Together(model, candidates).residuals(range(len(candidates)), points) - seen.residual
+    most = [_most(model, point, seen, effect / probe[0]) for effect, probe in zip(effects, probes, strict=True)]
+    ends = dict(zip(beside, most, strict=True))
+    return [OtherLaw(name, joint, law, *end) for name, joint, law in asked if (end := ends[joint, law]) is not None]
 
 
 def sentences(laws: list[OtherLaw], values: dict[str, Value], there: Callable[[OtherLaw], Value]) -> list[str]:
@@ -76,16 +84,15 @@ def sentences(laws: list[OtherLaw], values: dict[str, Value], there: Callable[[O
     ]
 
 
-def _most(model: ForwardModel, point: Array, seen: Sensitivity, candidate: Candidate) -> tuple[bool, Array] | None:
+def _most(model: ForwardModel, point: Array, seen: Sensitivity, column: Array) -> tuple[bool, Array] | None:
     """Whether a law that was left out fits, and the fit with the most of it that may be; None where it has no effect.
 
-    The most is the upper end of its interval, or less where a parameter comes to its bound.
+    column: its effect on the residuals, for each unit of it. The most is the upper end of its interval, or less where
+    a parameter comes to its bound.
     """
-    probe = candidate.probes[0, 0]
-    effect = Together(model, [candidate]).residuals([0], [np.append(point, candidate.vector(probe))])[0] - seen.residual
-    if not (np.all(np.isfinite(effect)) and np.any(effect)):
+    if not (np.all(np.isfinite(column)) and np.any(column)):
         return None
-    known, column = model.sizes(point), effect / probe[0]
+    known = model.sizes(point)
     scaled = seen.jacobian * known
     slope = -known * (np.linalg.pinv(scaled, rcond=RANK_TOLERANCE) @ column)
     # By a size of the law that changes the motion as much as the parameters do, so that it counts among them.
