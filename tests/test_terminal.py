@@ -234,6 +234,8 @@ MISTAKES = {
     "report other.json": "--out FILE.json",
     f"sweep {PENDULUM} --vary initial.OA.angle=0:1": "such as initial.OA.angle=0:1.5:31",
     f"reactions {PENDULUM}": "--at",
+    f"sweep {PENDULUM} --vary bodies.OA.mass=1:2:3 --at=-1": "must start at or after 0 s, found -1",
+    f"sweep {PENDULUM} --vary bodies.OA.mass=1:2:3 --at=nan": "finite times in s, found [nan]",
     f"uncertain {PENDULUM} --vary bodies.OA.mass=1:2 --limit A.x>2 --limit-method foo": "there are auto, form",
     f"uncertain {PENDULUM} --vary bodies.OA.mass=1:2 --worst w.yaml --worst-of B.x.upper": "MARKER.QUANTITY.lower",
     "design paper-case-1 --noise 1e-3 --rate 0": "rate: needed, and positive",

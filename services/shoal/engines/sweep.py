@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.engines.contract import Engine
+from shoal.engines.contract import Engine, sampling_times
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory, plain
@@ -95,7 +95,7 @@ class Sweep:
 
 def sweep(scene: Scene, vary: Mapping[str, Array], engine: Engine, time: float | None = None) -> Sweep:
     """Simulate the full grid of the values in `vary` (path -> values). Raises InputError."""
-    instant = scene.solver.duration if time is None else time
+    (instant,) = sampling_times(scene, [scene.solver.duration if time is None else time]).tolist()
     axes = np.meshgrid(*vary.values(), indexing="ij")
     grid = {path: axis.ravel() for path, axis in zip(vary, axes, strict=True)}
     # Time zero as a second instant gives the start, from which displacements count.
