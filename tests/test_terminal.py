@@ -238,6 +238,7 @@ MISTAKES = {
     f"sweep {PENDULUM} --vary bodies.OA.mass=1:2:3 --at=nan": "finite times in s, found [nan]",
     f"uncertain {PENDULUM} --vary bodies.OA.mass=1:2 --limit A.x>2 --limit-method foo": "there are auto, form",
     f"uncertain {PENDULUM} --vary bodies.OA.mass=1:2 --worst w.yaml --worst-of B.x.upper": "MARKER.QUANTITY.lower",
+    "design paper-case-1 --noise 1e-3 --parameter foo": "there are theta1, theta2",
     "design paper-case-1 --noise 1e-3 --rate 0": "rate: needed, and positive",
     "scenes missing": "missing: no such scene or problem; see `shoal scenes`",
 }

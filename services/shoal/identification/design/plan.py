@@ -130,9 +130,7 @@ def design(
     channels = (*present, *(channel for sensor in sensors for channel in sensor.channels))
     size = np.array([noise_in(channel, sizes) for channel in channels])
     model = _model(problem, scene, channels, size, grid(duration, rate))
-    aim = Aim(model.names, model.upper - model.lower, parameter)
-    if parameter is not None and parameter not in aim.names:
-        raise InputError(f"parameter: no parameter {parameter!r}; there are {', '.join(aim.names)}")
+    aim = _aim(model, parameter)
     point = _point(model, at)
     seen = sensitivity(model, point)
     if not np.all(np.isfinite(seen.residual)):
@@ -169,6 +167,13 @@ def design(
         course=np.array([[aim.score(bundle.precision(columns[c], end)) for end in course] for c, _ in ranked]),
         doubt=seen.doubt,
     )
+
+
+def _aim(model: ForwardModel, parameter: str | None) -> Aim:
+    """What is to be known better. Raises InputError."""
+    if parameter is not None and parameter not in model.names:
+        raise InputError(f"parameter: no parameter {parameter!r}; there are {', '.join(model.names)}")
+    return Aim(model.names, model.upper - model.lower, parameter)
 
 
 def _of_best_tilt(found: list[tuple[Sensor, Precision]]) -> list[tuple[Sensor, Precision]]:
@@ -222,7 +227,9 @@ def about_answer(
     measurement = None if computed else measure(problem, problem.load_scene(), data)
     # What is asked for is looked at first, as an identification may take long.
     stated_noise(problem, *(options.get(name) for name in ("noise", "angle_noise", "sensor_noise")))
-    grid(*today_of(sources[0], measurement, options.get("duration"), options.get("rate")))
+    times = grid(*today_of(sources[0], measurement, options.get("duration"), options.get("rate")))
+    channels = problem.channels_of(sources[0])
+    _aim(_model(problem, problem.load_scene(values), channels, np.ones(len(channels)), times), options.get("parameter"))
     found = identify(problem, data=data, values=values, measurement=measurement)
     if not found.verdict.trusted:
         raise ComputationError(
