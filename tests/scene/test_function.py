@@ -73,7 +73,7 @@ def test_knots() -> None:
         pytest.param({"expression": "t", "table": ROWS}, "drive", "found expression and table", id="two"),
         pytest.param({}, "drive", "found none", id="none"),
         pytest.param({"expression": "t", "smooth": True}, "drive", "smooth: belongs to a table", id="smooth"),
-        pytest.param({"expression": "t", "colour": 1}, "drive.colour", "Extra", id="extra"),
+        pytest.param({"expression": "t", "colour": 1}, "drive.colour", "no such field, found 1", id="extra"),
         pytest.param(np.inf, "drive.number", "finite", id="infinite-number"),
         pytest.param(True, "drive", "a function of time is", id="boolean"),
         pytest.param(None, "drive", "a function of time is", id="nothing"),

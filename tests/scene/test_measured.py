@@ -91,7 +91,11 @@ def test_a_signal_does_not_lead_out_of_a_library(path: str, tmp_path: Path, monk
     [
         ({"column": "angel", "time": "ms"}, None, "joints.motor.angle: .*no column 'angel'; there are ms, angle"),
         ({"column": "angle"}, None, "joints.motor.angle: .*no column 't'"),
-        ({"column": "angle", "colour": 1}, None, "joints.motor.angle: colour: Extra inputs"),
+        (
+            {"column": "angle", "colour": 1},
+            None,
+            "joints.motor.angle: colour: no such field, found 1; did you mean column",
+        ),
         ({"column": "angle"}, "t,angle\n0,0\n1,x\n", "row 3, column 'angle': 'x' is not a number"),
         ({"column": "angle"}, "t,angle\n0,0\n0,1\n", "joints.motor.angle.table: times must increase"),
         ({"column": "angle"}, "t,angle\ns,mm\n0,0\n1,1\n", "row 2, column 'angle': 'mm' is no unit of an angle; state"),

@@ -43,10 +43,13 @@ GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": 
         pytest.param(("bodies.OA.length", 0.0), "bodies.OA.length", "greater than 0", id="zero-length"),
         pytest.param(("bodies.OA.height", 1.5), "bodies.OA", "height 1.5 m is larger than the length 1 m", id="thick"),
         pytest.param(("bodies.AB.width", 2.5), "bodies.AB", "width 2.5 m is larger than the length 2 m", id="wide"),
-        pytest.param(("bodies.OA.colour", "red"), "bodies.OA.colour", "Extra inputs", id="unknown-body-field"),
-        pytest.param(("colour", "red"), "colour", "Extra inputs", id="unknown-scene-field"),
-        pytest.param(("solver.speed", 1), "solver.speed", "Extra inputs", id="unknown-solver-field"),
-        pytest.param(("joints.A.damping", 1), "joints.A.damping", "Extra inputs", id="unknown-joint-field"),
+        pytest.param(
+            ("bodies.OA.colour", "red"), "bodies.OA.colour", "found 'red'; there are kind", id="unknown-body-field"
+        ),
+        pytest.param(("colour", "red"), "colour", "there are name, .*loads", id="unknown-scene-field"),
+        pytest.param(("solver.stepp", 1), "solver.stepp", "did you mean step", id="unknown-solver-field"),
+        pytest.param(("joints.A.damping", 1), "joints.A.damping", "there are .*friction", id="unknown-joint-field"),
+        pytest.param(("bodies.OA", {"kind": "rod", "lenght": 1.0}), "bodies.OA.lenght", "mean length", id="misspelt"),
         pytest.param(("bodies.OA.length", math.nan), "bodies.OA.length", "finite", id="nan"),
         pytest.param(("gravity", [0.0, math.inf]), "gravity.1", "finite", id="infinite-gravity"),
         pytest.param(("gravity", [0.0]), "gravity", "at least 2 items", id="one-component-of-gravity"),

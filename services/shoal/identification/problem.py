@@ -247,7 +247,7 @@ class Problem(Record):
         try:
             return cls.model_validate(data)
         except ValidationError as error:
-            raise one_line(error, source) from None
+            raise one_line(error, source, cls) from None
 
 
 def problem_library() -> Traversable:

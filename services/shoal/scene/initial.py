@@ -67,7 +67,7 @@ def end_of(stated: Any) -> End:
     try:
         return End.model_validate(dict(stated) if isinstance(stated, Mapping) else stated)
     except ValidationError as error:
-        raise ValueError(str(one_line(error, "initial.from"))) from None
+        raise ValueError(str(one_line(error, "initial.from", End))) from None
 
 
 def guessed(start: Any, quantities: tuple[Quantity, ...] = POSES) -> Any:

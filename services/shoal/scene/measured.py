@@ -90,7 +90,7 @@ def with_signals(data: Any, folder: Path, source: str) -> Any:
         try:
             field[path[-1]] = Signal.model_validate(stated).table(folder, path[-1])
         except ValidationError as error:
-            raise one_line(error, f"{source}: {'.'.join(path)}") from None
+            raise one_line(error, f"{source}: {'.'.join(path)}", Signal) from None
         except InputError as error:
             raise InputError(f"{source}: {'.'.join(path)}: {error}") from None
     return data

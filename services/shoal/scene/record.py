@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -53,9 +54,7 @@ Axis = Annotated[Vector3, BeforeValidator(_letter), AfterValidator(_pointing)]
 
 def kinds(annotation: Any) -> tuple[str, ...]:
     """The kinds of the records that a type is made of, in their order."""
-    if isinstance(annotation, type) and issubclass(annotation, Record):
-        return (annotation.model_fields["kind"].default,) if "kind" in annotation.model_fields else ()
-    return tuple(kind for part in get_args(annotation) for kind in kinds(part))
+    return tuple(one.model_fields["kind"].default for one in records(annotation) if "kind" in one.model_fields)
 
 
 _MEMBER = re.compile(r"constrained-|tuple\[|float$|str$|function-")
@@ -79,12 +78,25 @@ _TOLD = ("missing", "value_error", "union_tag_invalid")
 """Errors whose message holds the value, or that have none."""
 
 
+def records(annotation: Any) -> tuple[type[Record], ...]:
+    """The records that a type is made of, in their order."""
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        return (annotation,)
+    return tuple(record for part in get_args(annotation) for record in records(part))
+
+
 def one_line(error: ValidationError, what: str, model: type[Record] | None = None) -> InputError:
     """Turn pydantic's report on a model into one line that names the field, the value and what is right."""
     first = error.errors()[0]
+    if first["type"] == "missing":
+        # A field that is written wrongly is missing; its name as it is written tells more.
+        beside = (one for one in error.errors() if one["loc"][:-1] == first["loc"][:-1])
+        first = next((one for one in beside if one["type"] == "extra_forbidden"), first)
     path, message = _path(first, model), first["msg"].removeprefix("Value error, ")
     found = "" if first["type"] in _TOLD and not _lacks(first) else f", found {_short(first['input'])}"
-    if _lacks(first):
+    if first["type"] == "extra_forbidden":
+        message, found = f"no such field{found}{_there_are(first['loc'], model)}", ""
+    elif _lacks(first):
         message = "has too few numbers"
     elif first["type"] in _WORDS:
         field = model.model_fields.get(str(first["loc"][0])) if model and first["loc"] else None
@@ -100,6 +112,20 @@ def one_line(error: ValidationError, what: str, model: type[Record] | None = Non
 def _lacks(error: Any) -> bool:
     """Whether a list is too short."""
     return error["type"] == "missing" and isinstance(error["loc"][-1], int)
+
+
+def _there_are(path: tuple[int | str, ...], model: type[Record] | None) -> str:
+    """The fields that there are in the place of one that there is not; empty where that is not known."""
+    here = [model] if model else []
+    for part in map(str, path[:-1]):
+        if fields := [record.model_fields[part] for record in here if part in record.model_fields]:
+            here = [record for field in fields for record in records(field.annotation)]
+        elif of_kind := [record for record in here if kinds(record) == (part,)]:
+            here = of_kind
+    names = list(dict.fromkeys(field.alias or name for record in here for name, field in record.model_fields.items()))
+    if near := get_close_matches(str(path[-1]), names, 1):
+        return f"; did you mean {near[0]}?"
+    return f"; there are {', '.join(names)}" if names else ""
 
 
 def _path(error: Any, model: type[Record] | None) -> str:

@@ -160,7 +160,7 @@ class SpatialChain(Record):
         try:
             return cls.model_validate(data)
         except ValidationError as error:
-            raise one_line(error, source) from None
+            raise one_line(error, source, cls) from None
         except RecursionError:
             raise InputError(f"{source}: nested too deeply") from None
 

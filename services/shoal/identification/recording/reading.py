@@ -54,7 +54,7 @@ def described(fields: Mapping[str, Any], path: Path) -> dict[str, Any]:
     try:
         source = FileSource.model_validate(own)
     except ValidationError as error:
-        raise one_line(error, str(path)) from None
+        raise one_line(error, str(path), FileSource) from None
     if source.path is None or Path(source.path).suffix in YAML:
         raise InputError(f"{path}: path: the table of the recording (CSV or Parquet), found {source.path!r}")
     return {**fields, **own, "path": str(path.parent / source.path)}
