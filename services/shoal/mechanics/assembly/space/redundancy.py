@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -32,9 +33,14 @@ def redundant(scene: Scene, q: Array) -> tuple[str, ...]:
         return ()
     rows = _rows(scene, terms, q)
     share = _shares(rows, len(q))
-    guilty = {name for (name, _), part in zip(rows, share, strict=True) if part > SHARE}
+    return joints_of(scene, {name for (name, _), part in zip(rows, share, strict=True) if part > SHARE})
+
+
+def joints_of(scene: Scene, names: Collection[str]) -> tuple[str, ...]:
+    """The joints that rows are of, by the names of joints, or of bodies, which their joints hold."""
+    held = {*names}
     return tuple(
-        name for name, joint in scene.joints.items() if name in guilty or guilty & {side.body for side in places(joint)}
+        name for name, joint in scene.joints.items() if name in held or held & {side.body for side in places(joint)}
     )
 
 

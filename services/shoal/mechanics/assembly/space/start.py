@@ -17,8 +17,17 @@ from shoal.mechanics import reach
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
+from shoal.mechanics.assembly.space.locking import require_unlocked
 from shoal.mechanics.assembly.space.placement import place_in_space
-from shoal.mechanics.assembly.space.values import at, drive_rate, everywhere, of_lane, slopes, value_of, values_of
+from shoal.mechanics.assembly.space.values import (
+    at,
+    drive_rate,
+    everywhere,
+    of_lane,
+    slopes,
+    value_of,
+    values_of,
+)
 from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
@@ -125,6 +134,8 @@ class _Closing:
         for lane in range(self.lanes):
             if off[min(lane, len(off) - 1)] > CLOSED or not self._keeps(lane):
                 failed[lane] |= not self._close(lane)
+        if self.lanes == 1 and len(self.scene.joints) > len(self.scene.bodies):  # there are loops
+            require_unlocked(self.scene, self.terms, self.q[:, 0])
         heavy = lanes_of(self.scene.bodies)
         # The least kinetic energy depends on masses.
         if heavy > self.lanes and not failed[0] and not self._moves(0, self._rates(0)):
@@ -346,21 +357,29 @@ class _Closing:
         left = rows @ v - right
         worst = int(np.argmax(np.abs(left))) if left.size else 0
         if left.size and abs(left[worst]) > ROUNDING * pace:
-            if self.lanes > 1:
-                return False
-            if worst < len(terms) and not stated:
+            if self.lanes == 1 and worst < len(terms) and not stated:
                 raise InputError(f"joints.{terms[worst].name}: cannot begin to move as it is driven")
-            off = np.abs(left[len(terms) : len(terms) + len(stated)])
-            guilty = stated[int(np.argmax(off))]
-            raise InputError(
-                f"initial.{guilty.body}.{guilty.quantity}: contradicts the joints and the other rates, by "
-                f"{off.max():.3g}; leave it out and it follows from the rest"
-            )
+            return self._kept(stated, v, 0.0)
         if left.size and abs(left[worst]) > 1e-9 * pace:  # digits of stated rates: the joints come first
             slope_root = np.linalg.solve(root, slope.T).T
             v = v - np.linalg.solve(root.T, np.linalg.lstsq(slope_root, slope @ v + driven, DEPENDENT)[0])
+            if not self._kept(stated, v, pace):
+                return False
         self.v[:, lane] = v
         return True
+
+    def _kept(self, stated: list[_Stated], v: Array, pace: float) -> bool:
+        """Whether rates are the stated ones but for rounding. Raises InputError of a single scene if they are not."""
+        off = [abs(one.off(v)) for one in stated]
+        if max(off, default=0.0) <= ROUNDING * pace:
+            return True
+        if self.lanes > 1:
+            return False
+        guilty = stated[int(np.argmax(off))]
+        raise InputError(
+            f"initial.{guilty.body}.{guilty.quantity}: contradicts the joints and the other rates, by "
+            f"{max(off):.3g}; leave it out and it follows from the rest"
+        )
 
     def _mass(self, lane: int) -> Array:
         from shoal.mechanics.assembly.masses import Masses

@@ -45,6 +45,15 @@ def slopes(term: Term | Mesh, q: Array, lane: int) -> Iterator[tuple[int, float]
         yield from _along(vector, other, lane)
 
 
+def uncancelled(term: Term, q: Array) -> float:
+    """The length that the row of a constraint would have in the first lane if nothing in it were at right angles."""
+    u, w = (at(vector, q, 0) for vector in (term.u, term.w))
+    squares = 0.0
+    for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
+        squares += float(np.sum(vector.by_lane[1][0] ** 2) * (other @ other))
+    return float(np.sqrt(squares)) + 1e-300
+
+
 def _along(vector: Affine, direction: Array, lane: int) -> Iterator[tuple[int, float]]:
     """Unknowns of a vector, and what each of them moves it along a direction (3,)."""
     unknowns, coefficients, _ = vector.by_lane

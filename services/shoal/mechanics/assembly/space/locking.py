@@ -1,0 +1,89 @@
+"""Joints in space that lock a machine by the rounding of their numbers: exact ones would let it move.
+
+Axes that are to be parallel and differ in the sixth digit leave a linkage no freedom. What holds it is a row of the
+constraints that nearly depends on others. It does so near a singular position as well; but there the dependence ends a
+short way on, while a rounded machine keeps it wherever it would go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.mechanics.assembly.space.redundancy import SHARE, joints_of
+from shoal.mechanics.assembly.space.values import slopes, uncancelled, value_of
+from shoal.mechanics.assembly.terms import Term
+from shoal.mechanics.numerics.tile import Array
+from shoal.scene import Scene
+
+LEAST, MOST = 1e-10, 1e-3
+"""Singular values of the rows that are between those of round-off and those of a machine."""
+LARGEST = 500
+"""With so many unknowns or more, as of flexible rods, rows are not looked at: it would take too long."""
+_WAY = 0.05
+"""How far the machine is taken along the motion that is nearly free; a director has unit length."""
+_SAME = 10.0
+"""The joints may gape there by so many times what they do to first order."""
+_ITERATIONS = 20
+
+
+def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
+    """Raises InputError where constraints forbid a motion at the coordinates q, (unknowns,), by rounding only."""
+    if not terms or len(q) >= LARGEST:
+        return
+    length = np.array([uncancelled(term, q) for term in terms])
+
+    def gap(q: Array) -> Array:
+        return np.asarray([value_of(term, q, 0) for term in terms] / length)
+
+    def slope(q: Array) -> Array:
+        found = np.zeros((len(terms), len(q)))
+        for row, term in zip(found, terms, strict=True):
+            for unknown, part in slopes(term, q, 0):
+                row[unknown] += part
+        return np.asarray(found / length[:, None])
+
+    if (found := lock(gap, slope, q)) is not None:
+        first, *others = joints_of(scene, [terms[row].name for row in found.rows])
+        beside = f"with {', '.join(others)} it" if others else "it"
+        raise InputError(
+            f"joints.{first}: {beside} forbids a motion by {found.off:.1g} rad, as rounded axes, rotations or places "
+            "do; state them with more digits"
+        )
+
+
+class Lock(NamedTuple):
+    """What locks a machine: numbers of the rows, and how far they are from a dependence."""
+
+    rows: list[int]
+    off: float
+
+
+def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Array) -> Lock | None:
+    """What locks a machine at the coordinates q, (unknowns,).
+
+    gap: (rows,), and slope: (rows, unknowns), of constraints in units in which a row that nothing cancels has about
+    unit length
+    """
+    left, sizes, right = np.linalg.svd(slope(q), full_matrices=False)
+    for k in np.flatnonzero((sizes > LEAST) & (sizes < MOST)):
+        there = _followed(gap, slope, q + _WAY * right[k])
+        gapes = float(np.max(np.abs(gap(there))))
+        depends = np.any(np.linalg.svd(slope(there), compute_uv=False) < _SAME * sizes[k])
+        moved = float(np.linalg.norm(there - q))
+        if gapes < _SAME * sizes[k] * _WAY and depends and moved > _WAY / 2:
+            return Lock(np.flatnonzero(np.abs(left[:, k]) > np.sqrt(SHARE)).tolist(), float(sizes[k]))
+    return None
+
+
+def _followed(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Array) -> Array:
+    """Near q, where all closes but what nearly depends on the rest (Gauss and Newton's method)."""
+    for _ in range(_ITERATIONS):
+        move = np.linalg.lstsq(slope(q), -gap(q), MOST)[0]
+        q = q + move
+        if float(np.max(np.abs(move))) < LEAST:
+            break
+    return q
