@@ -50,7 +50,7 @@ class ForwardModel:
 
     Points are vectors as `Parametrization` has them. `residuals` is wrapped by one counter, which every method shares.
     Fitness is the mean over the samples of the sum of squared residuals (for a tip: the mean squared distance [m^2]).
-    Where channels have different noise they are weighted by it, relative to its geometric mean.
+    Where channels have different noise or units they are weighted (`Rows.weight`).
 
     deadline: after which simulations raise TimeIsUp; memory: of evaluations made earlier
     whole: of a model of a part of the recordings, the model of all, which counts its evaluations too
@@ -112,7 +112,7 @@ class ForwardModel:
     @cached_property
     def rows(self) -> Rows:
         """What the rows of the residuals are, but for those of priors at their end."""
-        return Rows.of(self.measurement)
+        return Rows.of(self.measurement, (self.whole or self).measurement)
 
     def until(self, end: float) -> ForwardModel:
         """The model of the samples up to a time [s]; its evaluations count here too."""

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.recording.noise import noise_of
 from shoal.identification.recording.units import of_channels
 from shoal.identification.spread.chances import above_chi_square
 from shoal.identification.spread.covariance import Block, Noise
@@ -202,10 +201,10 @@ def ljung_box(signal: Array, lags: int = 10) -> float:
 
 def _without_model(model: ForwardModel) -> float:
     """The noise that the data show, and at least what is beyond the digits of the solver."""
-    recordings = model.measurement.recordings.values()
-    sizes = [np.maximum(noise_of(r), _DIGITS * np.max(np.abs(np.nan_to_num(r.values)), axis=0)) for r in recordings]
-    squares = [sizes[r][c] ** 2 for r, c in zip(model.rows.recording, model.rows.channel, strict=True)]
-    return float(np.sqrt(np.mean(squares * model.rows.weight**2)))
+    rows = model.rows
+    largest = [np.max(np.abs(np.nan_to_num(r.values)), axis=0) for r in model.measurement.recordings.values()]
+    digits = np.array([_DIGITS * largest[r][c] for r, c in zip(rows.recording, rows.channel, strict=True)])
+    return float(np.sqrt(np.mean((np.maximum(rows.estimated, digits) * rows.weight) ** 2)))
 
 
 def _digits(number: float, digits: int) -> str:

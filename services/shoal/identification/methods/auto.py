@@ -17,7 +17,6 @@ from shoal.identification.methods.multiple_shooting import multiple_shooting
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.progressive import extend
 from shoal.identification.methods.starts import scatter, starting_points
-from shoal.identification.recording.noise import noise_of
 from shoal.identification.recording.units import of_channels
 from shoal.trajectory import Array
 
@@ -167,7 +166,7 @@ def explained(model: ForwardModel, outcome: Outcome) -> bool:
     left = np.sqrt(outcome.fitness * model.rows.samples / rows)
     if model.rows.noise is not None:
         return bool(left <= _NOISES * model.rows.noise)
-    noise = max(float(np.max(np.nan_to_num(noise_of(r)))) for r in model.measurement.recordings.values())
+    noise = float(np.max(np.nan_to_num(model.rows.estimated * model.rows.weight)))
     return bool(left <= max(_UNEXPLAINED * model.rows.signal, _NOISES * noise))
 
 

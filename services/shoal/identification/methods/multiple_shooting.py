@@ -211,8 +211,8 @@ class Segments:
     @property
     def _weights(self) -> Array:
         """Weight of each channel, (channels,)."""
-        noise = self.model.rows.noise
-        return np.ones(len(self.recording.channels)) if noise is None else noise / self.recording.noise
+        rows = self.model.rows
+        return np.array([rows.weight[rows.channel == k][0] for k in range(len(self.recording.channels))])
 
 
 def cut(model: ForwardModel) -> Segments:

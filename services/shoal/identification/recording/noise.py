@@ -23,11 +23,15 @@ def noise_of(recording: Recording) -> Array:
 
 
 def differences(signal: Array) -> float:
-    """Standard deviation of white noise on a smooth signal, from the median of its fourth differences."""
+    """Standard deviation of white noise on a smooth signal, from the median of its fourth differences.
+
+    At least that of rounding, which a signal that moves by less than its last digit between samples does not show.
+    """
     known = signal[np.isfinite(signal)]
     if len(known) < _ORDER + 2:
         return float("nan")
     jumps = np.diff(known, _ORDER)
     # Of white noise of variance one: the sum of the squared binomial coefficients 1 4 6 4 1.
     size = float(np.median(np.abs(jumps)) / _QUARTILE / np.sqrt(70.0))
-    return max(size, 1e-12 * float(np.ptp(known)), 1e-300)
+    digit = float(np.diff(np.unique(known)).min(initial=np.inf)) if np.ptp(known) else 0.0
+    return max(size, digit / float(np.sqrt(12.0)), 1e-12 * float(np.ptp(known)), 1e-300)

@@ -7,9 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from shoal.identification.recording.measurement import Measurement
+from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.noise import noise_of
+from shoal.identification.recording.source import Channel
+from shoal.identification.recording.units import of_channels
 from shoal.trajectory import Array
+
+_LEAST = 1e-6
+"""Of the spread of a channel: no sensor is so good, whatever its samples show."""
 
 
 @dataclass(frozen=True)
@@ -17,21 +22,25 @@ class Rows:
     """The rows of a measurement; those of priors, at the end of a residual vector, are not among them.
 
     recording, time, channel: number of the recording, time by its clock [s] and number of the channel, (rows,) each
+    whole: the measurement of which this is a part, or itself; it tells the noise that nobody stated
     """
 
     measurement: Measurement
     recording: Array
     time: Array
     channel: Array
+    whole: Measurement
 
     @classmethod
-    def of(cls, measurement: Measurement) -> Rows:
+    def of(cls, measurement: Measurement, whole: Measurement | None = None) -> Rows:
         """The rows in the order of recordings, samples and channels, without gaps."""
         parts = []
         for number, recording in enumerate(measurement.recordings.values()):
             sample, channel = np.nonzero(np.isfinite(recording.values))
             parts.append((np.full(len(sample), number), recording.times[sample], channel))
-        return cls(measurement, *(np.concatenate(column) for column in zip(*parts, strict=True)))
+        recordings, times, channels = (np.concatenate(column) for column in zip(*parts, strict=True))
+        is_part = whole is not None and _channels_of(measurement) == _channels_of(whole)
+        return cls(measurement, recordings, times, channels, whole if whole and is_part else measurement)
 
     @cached_property
     def _stated(self) -> Array:
@@ -47,13 +56,25 @@ class Rows:
 
     @cached_property
     def weight(self) -> Array:
-        """What a deviation is multiplied by, (rows,): channels count by their noise, if it is stated."""
-        return np.ones(len(self.time)) if self.noise is None else self.noise / self._stated
+        """What a deviation is multiplied by, (rows,): channels count by their noise, relative to its geometric mean.
+
+        Where it is not stated all count alike, but for channels of different units, of which a metre and a radian are
+        not alike: these count by the noise that the data show.
+        """
+        if self.noise is not None:
+            return np.asarray(self.noise / self._stated)
+        if of_channels(self.whole):
+            return np.ones(len(self.time))
+        noise = self._each([_beside(recording) for recording in self.whole.recordings.values()])
+        return np.asarray(np.exp(np.mean(np.log(noise))) / noise)
 
     @cached_property
     def estimated(self) -> Array:
         """Noise of each row, (rows,): as stated, else as the recording tells it without any model."""
-        sizes = [noise_of(recording) for recording in self.measurement.recordings.values()]
+        return self._each([noise_of(recording) for recording in self.whole.recordings.values()])
+
+    def _each(self, sizes: list[Array]) -> Array:
+        """A number of each channel of each recording, for each row."""
         return np.array([sizes[r][c] for r, c in zip(self.recording, self.channel, strict=True)])
 
     @cached_property
@@ -76,3 +97,18 @@ class Rows:
         """How many positions and angles an instant shows, on average."""
         runs = self.measurement.recordings.values()
         return sum(r.things * len(r.times) for r in runs) / sum(len(r.times) for r in runs)
+
+
+def _channels_of(measurement: Measurement) -> list[tuple[Channel, ...]]:
+    return [recording.channels for recording in measurement.recordings.values()]
+
+
+def _beside(recording: Recording) -> Array:
+    """Noise of each channel, (channels,), by which it counts beside others: stated, else estimated, but never nothing.
+
+    Of a signal that is free of noise, or does not move, differences tell none.
+    """
+    spread = np.nanstd(recording.values, axis=0)
+    largest = np.nanmax(np.abs(recording.values), axis=0)
+    size = np.where(spread > 0.0, spread, np.where(largest > 0.0, largest, 1.0))
+    return np.asarray(np.fmax(noise_of(recording), _LEAST * size))
