@@ -92,6 +92,9 @@ def judge(
     found = looked.suspects
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
         return _rejected(model, tests, found)
+    if looked.cut:
+        reason = f"no time was left to see what a misfit of {tests.sized(tests.size)} is due to"
+        return Judgement(Verdict.FAILED, reason, ["allow more time"], found)
     if not outcome.converged:
         advice = ["start from a better place, or look for another minimum (--method multi-start)"]
         return Judgement(Verdict.FAILED, outcome.message or "the search did not converge", advice, found)

@@ -1,4 +1,4 @@
-"""What a scene states or leaves out of a machine: friction, masses, lengths, pivots, rates at the start."""
+"""What a scene states or leaves out of a machine: friction, springs, masses, lengths, pivots, rates at the start."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.size import Size, size_of
+from shoal.identification.judge.suspects.springs import springs
 from shoal.mechanics.start.start import is_direct
 from shoal.scene import PointMass, RigidBody, Rod, Scene
 from shoal.scene.joints import GROUND, Attachment, Resisted, Revolute, Slider, places
@@ -34,6 +35,7 @@ def of_machine(model: ForwardModel) -> Iterator[Candidate]:
     scene = model.scene
     size = size_of(scene)
     yield from _friction(scene, size)
+    yield from springs(scene, size)
     yield from _masses(scene, size)
     yield from _lengths(scene)
     yield from _pivots(scene, size)

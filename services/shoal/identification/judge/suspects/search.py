@@ -66,12 +66,13 @@ _SMALL = 3.0
 class Findings:
     """The suspects, those that explain most first, and the fits with each of them that is a number of the model.
 
-    better: a minimum of the model itself that fits better, if met
+    better: a minimum of the model itself that fits better, if met; cut: whether time was up before all were tried
     """
 
     suspects: list[Suspect] = field(default_factory=list)
     refits: list[Refit] = field(default_factory=list)
     better: Descent | None = None
+    cut: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,15 +99,17 @@ def suspects(model: ForwardModel, point: Array, residual: Array, jacobian: Array
     noise: what no explanation can go below [RMS]. Past the model's deadline it ends with what was found until then.
     """
     search = _Search(model, point, residual, jacobian, noise)
+    cut = True
     with suppress(TimeIsUp):
         search.run()
+        cut = False
     rows = len(residual)
     # Clock and gravity explain a free swing equally well: the order of equals is that of their names.
     told = (suspect for suspect in search.found if suspect.after < _CONSTANT * model.rows.signal)
     found = sorted(told, key=lambda s: (float(f"{s.cost(rows):.2e}"), s.name))
     listed = [suspect for suspect in found if suspect.after <= _FAR * found[0].after]
     refits = [search.refits[s.name, s.kind] for s in listed if (s.name, s.kind) in search.refits]
-    return Findings([replace(s, alike=search.alike(s.name)) for s in listed], refits, search.better)
+    return Findings([replace(s, alike=search.alike(s.name)) for s in listed], refits, search.better, cut)
 
 
 class _Search:
