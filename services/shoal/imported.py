@@ -112,8 +112,9 @@ class _Reading:
                 bodies[self.names[body]] = {"kind": "point-mass", "mass": bodies[self.names[body]]["mass"]}
                 start.pop("rotation")
                 start.pop("spin", None)
+                self._friction(self._own(body), {"kind": "point-mass"}, loads)
                 continue
-            self._hang(body, joints, loads, initial)
+            self._hang(body, joints, loads)
         self._tendons(joints, loads)
         self._equalities(joints)
         self._actuators(loads)
@@ -153,20 +154,33 @@ class _Reading:
         local = self.data.xmat[owner].reshape(3, 3).T @ (place - self.data.xpos[owner])
         return {"body": self.names[owner], "point": _numbers(local)}
 
-    def _hang(self, body: int, joints: dict[str, Any], loads: dict[str, Any], initial: dict[str, Any]) -> None:
+    def _own(self, body: int) -> list[int]:
+        """The joints of MuJoCo's by which a body hangs on its parent."""
+        first = self.model.body_jntadr[body]
+        return list(range(first, first + self.model.body_jntnum[body]))
+
+    def _hang(self, body: int, joints: dict[str, Any], loads: dict[str, Any]) -> None:
         """How a body hangs on its parent. Raises InputError for several joints that no single one stands for."""
-        model, kinds = self.model, self.mujoco.mjtJoint
-        first, count = model.body_jntadr[body], model.body_jntnum[body]
-        own = list(range(first, first + count))
-        found = [kinds(model.jnt_type[one]) for one in own]
-        parent, name = model.body_parentid[body], self.names[body]
-        if found == [kinds.mjJNT_FREE]:
+        kinds, own = self.mujoco.mjtJoint, self._own(body)
+        found = [kinds(self.model.jnt_type[one]) for one in own]
+        parent, name = self.model.body_parentid[body], self.names[body]
+        hinge, slide, ball = kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE, kinds.mjJNT_BALL
+        sliding = [one for one, kind in zip(own, found, strict=True) if kind == slide]
+        turning, turns = [one for one in own if one not in sliding], [kind for kind in found if kind != slide]
+        anywhere = len(sliding) == 3 and self._span(sliding)
+        anyhow = turns == [ball] or (turns == [hinge] * 3 and self._meet(turning) and self._span(turning))
+        if found == [kinds.mjJNT_FREE] or (anywhere and anyhow):
+            self._friction(own, {"kind": "free"}, loads)
             return
-        place = self.data.xanchor[own[0]] if own else self.data.xpos[body]
+        if anywhere and not turning and self.owners[parent] == 0:
+            joints |= self._upright(body)
+            self._friction(own, {"kind": "coupling"}, loads)
+            return
+        # Where a slide is drawn does not matter.
+        place = self.data.xanchor[turning[0]] if turning else self.data.xpos[body]
         made: dict[str, Any] = {"first": self._at(parent, place), "second": self._at(body, place)}
         axes = [self.data.xaxis[one] for one in own]
-        hinge, slide, ball = kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE, kinds.mjJNT_BALL
-        if found in ([hinge, slide], [ball, slide], [hinge, slide, slide], [ball, slide, slide]) and self._meet(own):
+        if found in ([hinge, slide], [ball, slide], [hinge, slide, slide], [ball, slide, slide]):
             # The line or plane is fixed to the body, not to its parent.
             made = {"first": made["second"], "second": made["first"]}
             found, axes = found[::-1], axes[::-1]
@@ -176,50 +190,64 @@ class _Reading:
             made |= {"kind": "revolute", "axis": _numbers(axes[0])}
         elif found == [slide]:
             made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "locked"}
-        elif found == [kinds.mjJNT_BALL] or (found == [hinge] * 3 and self._meet(own)):
+        elif anyhow and not sliding:
             made |= {"kind": "spherical"}
         elif found == [hinge] * 2 and self._meet(own) and abs(axes[0] @ axes[1]) < SQUARE:
             made |= {"kind": "universal", "axis": _numbers(axes[0]), "second_axis": _numbers(axes[1])}
         elif len(found) == 2 and {*found} == {hinge, slide} and np.linalg.norm(np.cross(*axes)) < SQUARE:
             made |= {"kind": "cylindrical", "axis": _numbers(axes[0])}
-        elif found == [slide, hinge] and self._meet(own) and abs(axes[0] @ axes[1]) < SQUARE:
+        elif found == [slide, hinge] and abs(axes[0] @ axes[1]) < SQUARE:
             flat = {**made, "kind": "planar", "axis": _numbers(axes[1]), "rotation": "axis"}
             joints[f"{self.joint_names[own[0]]}-plane"] = flat
             made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "free"}
-        elif found == [slide, ball] and self._meet(own):
+        elif found == [slide, ball]:
             made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "free"}
-        elif found[:2] == [slide] * 2 and self._is_plane(found[2:], axes) and self._meet(own):
+        elif found[:2] == [slide] * 2 and self._is_plane(found[2:], axes):
             rotation = "locked" if len(found) == 2 else "axis" if found[2] == hinge else "free"
             made |= {"kind": "planar", "axis": _numbers(np.cross(axes[0], axes[1])), "rotation": rotation}
         else:
             raise InputError(f"{name}: no joint of a scene stands for its {len(own)} joints; put bodies between them")
-        self._friction(body, own, made, loads)
+        self._friction(own, made, loads)
         joints[self.joint_names[own[0]] if own else f"{name}-weld"] = made
+
+    def _upright(self, body: int) -> dict[str, Any]:
+        """Joints that keep a body from turning: of arms along the ground's axes, each stays at its height."""
+        foot, held = self.data.xpos[body], {}
+        for arm, axis, along in zip(np.eye(3), "xyz", "yzx", strict=True):
+            base = {"at": self._at(body, foot), "axis": along, "factor": -1.0}
+            tip = {"at": self._at(body, foot + arm), "axis": along}
+            held[f"{self.names[body]}-{axis}{along}"] = {"kind": "coupling", "terms": [base, tip]}
+        return held
 
     def _is_plane(self, turns: list[Any], axes: list[Array]) -> bool:
         """Whether two slides, and a hinge or a ball after them, leave a plane and turns about its normal, or all."""
-        normal = np.cross(axes[0], axes[1])
-        if np.linalg.norm(normal) < SQUARE or len(turns) > 1:
+        kinds, normal = self.mujoco.mjtJoint, np.cross(axes[0], axes[1])
+        if np.linalg.norm(normal) < SQUARE or turns not in ([], [kinds.mjJNT_HINGE], [kinds.mjJNT_BALL]):
             return False
-        hinged = [self.mujoco.mjtJoint.mjJNT_HINGE]
-        return turns != hinged or bool(np.linalg.norm(np.cross(normal, axes[2])) < SQUARE * np.linalg.norm(normal))
+        square = turns == [kinds.mjJNT_HINGE] and np.linalg.norm(np.cross(normal, axes[2]))
+        return bool(square < SQUARE * np.linalg.norm(normal))
+
+    def _span(self, own: list[int]) -> bool:
+        """Whether the axes of three joints are those of a space."""
+        return bool(abs(np.linalg.det(self.data.xaxis[own])) > SQUARE)
 
     def _slides(self, body: int) -> bool:
         """Whether its joints leave the place of a body free."""
-        first, kinds = self.model.body_jntadr[body], self.mujoco.mjtJoint
-        own = self.model.jnt_type[first : first + self.model.body_jntnum[body]]
-        return bool(np.any((own == int(kinds.mjJNT_SLIDE)) | (own == int(kinds.mjJNT_FREE))))
+        kinds = self.mujoco.mjtJoint
+        return bool(np.any(np.isin(self.model.jnt_type[self._own(body)], [kinds.mjJNT_SLIDE, kinds.mjJNT_FREE])))
 
     def _is_mass(self, body: int) -> bool:
-        """Whether a body only slides against the ground, each way, with nothing on it: what a point mass does."""
-        model = self.model
-        first, count = model.body_jntadr[body], model.body_jntnum[body]
-        if count != 3 or self.owners[model.body_parentid[body]] != 0 or np.any(model.body_ipos[body]):
+        """Whether a body only slides against the ground, each way, and is held and seen at its centre: a point mass."""
+        model, own = self.model, self._own(body)
+        slides = len(own) == 3 and np.all(model.jnt_type[own] == int(self.mujoco.mjtJoint.mjJNT_SLIDE))
+        if not slides or not self._span(own) or self.owners[model.body_parentid[body]] != 0:
             return False
-        slides = all(model.jnt_type[first : first + 3] == self.mujoco.mjtJoint.mjJNT_SLIDE)
-        alone = not np.any(model.body_parentid == body)
-        free = abs(np.linalg.det(self.data.xaxis[first : first + 3])) > SQUARE
-        return bool(slides and alone and free and not np.any(model.dof_damping[model.body_dofadr[body] :][:3]))
+        held = np.any(
+            (model.eq_objtype == int(self.mujoco.mjtObj.mjOBJ_BODY))
+            & ((model.eq_obj1id == body) | (model.eq_obj2id == body))
+        )
+        off = np.any(model.body_ipos[body]) or np.any(model.site_pos[model.site_bodyid == body])
+        return not (held or off or np.any(model.body_parentid == body))
 
     def _tendons(self, joints: dict[str, Any], loads: dict[str, Any]) -> None:
         """Straight tendons between two sites: springs, and distances where an equality keeps their length."""
@@ -302,7 +330,7 @@ class _Reading:
         """Whether joints are in one place."""
         return all(np.allclose(self.data.xanchor[one], self.data.xanchor[own[0]], atol=1e-9) for one in own)
 
-    def _friction(self, body: int, own: list[int], made: dict[str, Any], loads: dict[str, Any]) -> None:
+    def _friction(self, own: list[int], made: dict[str, Any], loads: dict[str, Any]) -> None:
         """Damping, dry friction and springs of joints, and lines for what is left out of them."""
         model = self.model
         for one in own:
@@ -316,14 +344,14 @@ class _Reading:
                 if value and simple:
                     made[word] = value
                 elif value:
-                    self.left_out.append(f"joint {name}: {what} {value:g}; a {made['kind']} joint has none")
+                    self.left_out.append(f"joint {name}: {what} {value:g}; only a revolute joint or a slider has it")
             stiffness = float(np.ravel(model.jnt_stiffness[one])[0])
             address = model.jnt_qposadr[one]
             away = float(model.qpos_spring[address] - model.qpos0[address])
             if stiffness and made["kind"] == "revolute":
                 if away:
                     # As much as a spring at rest at the start and a torque that does not change.
-                    at, reaction = self._at(body, self.data.xanchor[one]), made["first"]
+                    at, reaction = made["second"], made["first"]
                     held = {} if reaction["body"] == GROUND else {"reaction": reaction}
                     torque = {"kind": "torque", "at": at, "torque": stiffness * away, "axis": made["axis"], **held}
                     loads[f"{name}-preload"] = torque
@@ -335,7 +363,7 @@ class _Reading:
                     "axis": made["axis"],
                 }
             elif stiffness:
-                self.left_out.append(f"joint {name}: its spring of {stiffness:g}; a {made['kind']} joint has none")
+                self.left_out.append(f"joint {name}: its spring of {stiffness:g}; only a revolute joint has one")
             if model.jnt_limited[one]:
                 low, high = model.jnt_range[one]
                 self.left_out.append(f"joint {name}: its limits {low:g} to {high:g}")

@@ -1,0 +1,130 @@
+"""Small MJCF machines, one for each attribute: they move as in MuJoCo, or a line tells what is left out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from shoal.errors import InputError
+from shoal.imported import read
+from shoal.mechanics.simulate import simulate
+from shoal.scene import Scene
+
+mujoco: Any = pytest.importorskip("mujoco")
+FINE = {"solver.integrator": "dop853", "solver.relative_tolerance": 1e-10, "solver.absolute_tolerance": 1e-11}
+TIME = 0.4
+
+SLIDES = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>'
+CHILD = """<body name="p" pos=".2 0 0"><joint name="pin" axis="0 1 0"/><site name="ptip" pos=".6 0 0"/>
+<inertial pos=".3 0 0" mass="1" diaginertia=".01 .02 .02"/></body>"""
+OFF = '<inertial pos=".3 .1 .05" mass="2" diaginertia=".1 .12 .05"/>'
+CENTRED = '<inertial pos="0 0 0" mass="2" diaginertia=".1 .12 .05"/>'
+
+
+def machine(
+    joints: str,
+    inertial: str = OFF,
+    *,
+    inside: str = "",
+    flag: str = "",
+    more: str = "",
+    pose: str = "",
+    beside: str = "",
+) -> str:
+    """A body with joints on the ground; inside: what else it has; more: sections; beside: of the ground."""
+    return f"""<mujoco><compiler angle="radian"/><option gravity="1 2 -9.81"><flag contact="disable" {flag}/></option>
+      <worldbody>{beside}<body name="b" pos="0 0 1" {pose}>{joints}{inertial}<site name="tip" pos=".6 0 .1"/>{inside}
+      </body></worldbody>{more}</mujoco>"""
+
+
+def written(text: str, folder: Path) -> Path:
+    path = folder / "machine.xml"
+    path.write_text(text)
+    return path
+
+
+def apart(path: Path, scene: dict[str, Any]) -> float:
+    """How far the markers are from where MuJoCo has them in the end, at most [m]."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    model.opt.timestep, model.opt.integrator = 4e-4, mujoco.mjtIntegrator.mjINT_RK4
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    while data.time < TIME - 1e-9:
+        mujoco.mj_step(model, data)
+    mujoco.mj_kinematics(model, data)
+    found = simulate(Scene.parse(scene).with_values(FINE), np.array([TIME]))
+    assert found.ok, found.message
+    bodies = {model.body(number).name for number in range(model.nbody)}
+    theirs = {name: (data.body if name in bodies else data.site)(name).xpos for name in scene["markers"]}
+    return max(float(np.max(np.abs(found.marker(name)[0] - place))) for name, place in theirs.items())
+
+
+SAME = {
+    "gantry": machine(SLIDES, CENTRED, inside=CHILD),
+    "gantry-turned": machine(SLIDES, inside=CHILD, pose='euler=".3 .5 1"'),
+    "gantry-oblique": machine(SLIDES.replace("1 0 0", "1 .5 .2")),
+    "mass-with-a-site-off-its-centre": machine(SLIDES, CENTRED),
+    "free-by-slides-and-ball": machine(SLIDES + '<joint type="ball" pos=".1 0 0"/>', inside=CHILD),
+    "free-by-slides-and-hinges": machine(
+        SLIDES + '<joint axis="0 0 1"/><joint axis="1 0 0"/><joint axis="0 1 0"/>', inside=CHILD
+    ),
+    "slide-drawn-elsewhere": machine('<joint type="slide" axis="0 0 1"/><joint pos=".2 0 .1" axis="0 0 1"/>'),
+    "slide-drawn-elsewhere-than-a-ball": machine('<joint type="slide"/><joint type="ball" pos=".2 0 .1"/>'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_moves_as_in_mujoco_with_nothing_left_out(name: str, tmp_path: Path) -> None:
+    path = written(SAME[name], tmp_path)
+    found = read(path)
+    assert found.left_out == ()
+    assert apart(path, found.scene) < 1e-8
+
+
+ONLY = "only a revolute joint or a slider has it"
+TOLD: dict[str, tuple[str, tuple[str, ...]]] = {
+    "free-resisted": (
+        machine('<joint name="f" type="free" damping="3" frictionloss="1" armature="2" stiffness="30"/>'),
+        (f"joint f: damping 3; {ONLY}", f"joint f: frictionloss 1; {ONLY}", "joint f: its spring of 30",
+         "joint f: its armature 2"),
+    ),
+    "mass-resisted": (
+        machine(SLIDES.replace('1 0 0"', '1 0 0" name="x" damping="3" frictionloss="1" armature="2" stiffness="30" '
+                               'range="-.1 .1"'), CENTRED).replace("tip", "centre").replace(".6 0 .1", "0 0 0"),
+        (f"joint x: damping 3; {ONLY}", f"joint x: frictionloss 1; {ONLY}", "joint x: its spring of 30",
+         "joint x: its limits -0.1 to 0.1", "joint x: its armature 2"),
+    ),
+    "gantry-resisted": (
+        machine(SLIDES.replace('1 0 0"', '1 0 0" name="x" damping="3"')), (f"joint x: damping 3; {ONLY}",),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_what_is_left_out_is_told_in_a_line_each(name: str, tmp_path: Path) -> None:
+    text, lines = TOLD[name]
+    left_out = read(written(text, tmp_path)).left_out
+    assert len(left_out) == len(lines)
+    for told, line in zip(left_out, lines, strict=True):
+        assert told.startswith(line)
+
+
+def test_a_mass_alone_stays_a_point_mass(tmp_path: Path) -> None:
+    text = machine(SLIDES, CENTRED).replace(".6 0 .1", "0 0 0")
+    assert read(written(text, tmp_path)).scene["bodies"]["b"] == {"kind": "point-mass", "mass": 2.0}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        machine('<joint axis="0 0 1"/><joint axis="1 0 0"/><joint axis="0 0 1" armature="1"/>'),
+        machine("<freejoint/>", inside=f'<body name="c">{SLIDES}{OFF}</body>'),
+    ],
+    ids=["hinges-of-two-axes", "slides-on-a-body-that-moves"],
+)
+def test_joints_that_no_scene_has_are_refused(text: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no joint of a scene stands for its 3 joints"):
+        read(written(text, tmp_path))
