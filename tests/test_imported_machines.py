@@ -205,6 +205,40 @@ def test_joints_that_no_scene_has_are_refused(text: str, tmp_path: Path) -> None
         read(written(text, tmp_path))
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("slide-.267261 .534522 .801784", "hinge-.894427 -.447214 0"),
+        ("hinge-.894427 -.447214 0", "slide-.267261 .534522 .801784"),
+        ("slide-.267261 .534522 .801784", "hinge--.267262 -.534522 -.801784"),
+        ("hinge-.267261 .534522 .801784", "hinge-.894427 -.447214 0"),
+    ],
+)
+def test_axes_with_the_digits_of_a_file_are_parallel_or_square(first: str, second: str, tmp_path: Path) -> None:
+    joints = "".join('<joint type="{}" axis="{}"/>'.format(*joint.split("-", 1)) for joint in (first, second))
+    path = written(machine(joints), tmp_path)
+    assert apart(path, read(path).scene) < 1e-6
+
+
+FOUR_BAR = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
+  <body name="a"><joint axis="0 1 0"/><inertial pos="0 0 .25" mass="1" diaginertia=".02 .02 .001"/>
+    <body name="b" pos="0 0 .5" euler="1.5708 0 0"><joint axis="0 0 -1"/>
+      <inertial pos=".5 0 0" mass="1" diaginertia=".001 .08 .08"/><site name="middle" pos=".5 0 0"/></body></body>
+  <body name="c" pos="1 0 0"><joint axis="0 1 0"/><inertial pos="0 0 .3" mass="1" diaginertia=".02 .02 .001"/></body>
+</worldbody><equality><connect body1="b" body2="c" anchor="1 0 0" solref="0.002 1"/></equality>
+<keyframe><key name="start" qpos="0 0 0" qvel="2 -2 2"/></keyframe></mujoco>"""
+
+
+def test_a_loop_with_the_digits_of_a_file_does_not_lock(tmp_path: Path) -> None:
+    path = written(FOUR_BAR, tmp_path)
+    assert apart(path, read(path).scene) < 1e-4
+
+
+def test_axes_of_a_chain_are_as_in_its_file(tmp_path: Path) -> None:
+    path = written(FOUR_BAR.replace("<equality>", "<!--").replace("</equality>", "-->"), tmp_path)
+    assert apart(path, read(path).scene) < 1e-8
+
+
 @pytest.mark.parametrize(("word", "kind"), [('torquescale="0"', "spherical"), ('torquescale="2"', "weld")])
 def test_a_weld_without_torque_is_a_ball(word: str, kind: str, tmp_path: Path) -> None:
     path = written(machine(hinge(), beside=SECOND, more=held(f'weld anchor=".1 .2 0" {word}')), tmp_path)

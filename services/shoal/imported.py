@@ -18,8 +18,6 @@ from shoal.scene import GROUND, Scene
 Array = npt.NDArray[np.float64]
 ROUNDED = 1e-5
 """Of an angle [rad] or a length [m] as a file's rounding may leave it: 3.1416 is 7e-6 off half a turn."""
-SQUARE = 1e-6
-"""Cosine below which two axes are at a right angle."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +68,8 @@ class _Reading:
     """Equalities that joints stand for already."""
     away: dict[str, float] = field(default_factory=dict)
     """Of torsion springs that do not rest at the start, the angle [rad] from there to where they do."""
+    axes: list[Array] = field(default_factory=list)
+    """Those of joints so far that others should agree with, of parallel ones the first."""
 
     def __post_init__(self) -> None:
         self._switch_off()
@@ -223,7 +223,9 @@ class _Reading:
         # Where a slide is drawn does not matter.
         place = self.data.xanchor[turning[0]] if turning else self.data.xpos[body]
         made: dict[str, Any] = {"first": self._at(parent, place), "second": self._at(body, place)}
-        axes = [self.data.xaxis[one] for one in own]
+        if not np.any(self.model.eq_active0):  # no loop, in which axes of several bodies have to agree
+            self.axes.clear()
+        axes = [self._trued(self.data.xaxis[one]) for one in own if self.model.jnt_type[one] != int(ball)]
         if found in ([hinge, slide], [ball, slide], [hinge, slide, slide], [ball, slide, slide]):
             # The line or plane is fixed to the body, not to its parent.
             made = {"first": made["second"], "second": made["first"]}
@@ -236,11 +238,11 @@ class _Reading:
             made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "locked"}
         elif anyhow and not sliding:
             made |= {"kind": "spherical"}
-        elif found == [hinge] * 2 and self._meet(own) and abs(axes[0] @ axes[1]) < SQUARE:
+        elif found == [hinge] * 2 and self._meet(own) and abs(axes[0] @ axes[1]) < ROUNDED:
             made |= {"kind": "universal", "axis": _numbers(axes[0]), "second_axis": _numbers(axes[1])}
-        elif len(found) == 2 and {*found} == {hinge, slide} and np.linalg.norm(np.cross(*axes)) < SQUARE:
+        elif len(found) == 2 and {*found} == {hinge, slide} and np.linalg.norm(np.cross(axes[0], axes[1])) < ROUNDED:
             made |= {"kind": "cylindrical", "axis": _numbers(axes[0])}
-        elif found == [slide, hinge] and abs(axes[0] @ axes[1]) < SQUARE:
+        elif found == [slide, hinge] and abs(axes[0] @ axes[1]) < ROUNDED:
             flat = {**made, "kind": "planar", "axis": _numbers(axes[1]), "rotation": "axis"}
             joints[f"{self.joint_names[own[0]]}-plane"] = flat
             made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "free"}
@@ -254,6 +256,20 @@ class _Reading:
         self._friction(own, made, loads)
         joints[self.joint_names[own[0]] if own else f"{name}-weld"] = made
 
+    def _trued(self, axis: Array) -> Array:
+        """An axis, exactly parallel or square to those so far to which it is so but for the rounding of a file.
+
+        Joints of one body or of a loop would else contradict each other by as little, and lock.
+        """
+        for known in self.axes:
+            if np.linalg.norm(np.cross(known, axis)) < ROUNDED:
+                return known * np.sign(known @ axis)
+        square = np.array([known for known in self.axes if abs(known @ axis) < ROUNDED])
+        if square.size:
+            axis = axis - np.linalg.pinv(square, rcond=np.sqrt(ROUNDED)) @ (square @ axis)
+        self.axes.append(axis / np.linalg.norm(axis))
+        return self.axes[-1]
+
     def _upright(self, body: int) -> dict[str, Any]:
         """Joints that keep a body from turning: of arms along the ground's axes, each stays at its height."""
         foot, held = self.data.xpos[body], {}
@@ -266,14 +282,14 @@ class _Reading:
     def _is_plane(self, turns: list[Any], axes: list[Array]) -> bool:
         """Whether two slides, and a hinge or a ball after them, leave a plane and turns about its normal, or all."""
         kinds, normal = self.mujoco.mjtJoint, np.cross(axes[0], axes[1])
-        if np.linalg.norm(normal) < SQUARE or turns not in ([], [kinds.mjJNT_HINGE], [kinds.mjJNT_BALL]):
+        if np.linalg.norm(normal) < ROUNDED or turns not in ([], [kinds.mjJNT_HINGE], [kinds.mjJNT_BALL]):
             return False
         square = turns == [kinds.mjJNT_HINGE] and np.linalg.norm(np.cross(normal, axes[2]))
-        return bool(square < SQUARE * np.linalg.norm(normal))
+        return bool(square < ROUNDED * np.linalg.norm(normal))
 
     def _span(self, own: list[int]) -> bool:
         """Whether the axes of three joints are those of a space."""
-        return bool(abs(np.linalg.det(self.data.xaxis[own])) > SQUARE)
+        return bool(abs(np.linalg.det(self.data.xaxis[own])) > ROUNDED)
 
     def _slides(self, body: int) -> bool:
         """Whether its joints leave the place of a body free."""
