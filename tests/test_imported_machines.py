@@ -252,6 +252,7 @@ def test_springs_that_rest_off_the_start_have_a_potential(tmp_path: Path) -> Non
     """So that there are places of rest: MuJoCo's forces vanish there."""
     path = written(SAME["springs-off-the-start"], tmp_path)
     scene = Scene.parse(read(path).scene)
+    assert {load.kind for load in scene.loads.values()} == {"torsion-spring"}
     found = statics(scene)
     assert found.ok, found.message
     model = mujoco.MjModel.from_xml_path(str(path))

@@ -426,18 +426,16 @@ class _Reading:
                     self.left_out.append(f"joint {name}: {what} {value:g}; only a revolute joint or a slider has it")
             if cubic:
                 self.left_out.append(f"joint {name}: cubic damping {cubic:g}")
-            if law := self._law(model.jnt_stiffness[one], model.jnt_stiffnesspoly[one]):
-                if simple and made["kind"] == "slider" and "elastic" in law:
-                    self.left_out.append(f"joint {name}: the part {law.pop('elastic')} of its spring")
-                if simple:
-                    loads[f"{name}-spring"] = self._spring(one, made) | law
-                else:
-                    told = " and ".join(f"{word} {value}" for word, value in law.items())
-                    self.left_out.append(
-                        f"joint {name}: its spring ({told}); only a revolute joint or a slider has one"
-                    )
-                if yielding := float(model.jnt_springyield[one]):
-                    self.left_out.append(f"joint {name}: that its spring yields at {yielding:g}")
+            law = self._law(model.jnt_stiffness[one], model.jnt_stiffnesspoly[one])
+            if "elastic" in law and made["kind"] == "slider":
+                self.left_out.append(f"joint {name}: the part {law.pop('elastic')} of its spring")
+            if law and simple:
+                loads[f"{name}-spring"] = self._spring(one, made) | law
+            elif law:
+                told = " and ".join(f"{word} {value}" for word, value in law.items())
+                self.left_out.append(f"joint {name}: its spring ({told}); only a revolute joint or a slider has one")
+            if law and (yielding := float(model.jnt_springyield[one])):
+                self.left_out.append(f"joint {name}: that its spring yields at {yielding:g}")
             if model.jnt_limited[one]:
                 low, high = model.jnt_range[one]
                 self.left_out.append(f"joint {name}: its limits {low:g} to {high:g}")
