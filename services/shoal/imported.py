@@ -16,8 +16,8 @@ from shoal.errors import InputError
 from shoal.scene import GROUND, Scene
 
 Array = npt.NDArray[np.float64]
-SQUARE = 1e-6
-"""Cosine below which two axes are at a right angle."""
+ROUNDED = 1e-5
+"""Of an angle [rad] or a length [m] as a file's rounding may leave it: 3.1416 is 7e-6 off half a turn."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,21 @@ def read(file: Path) -> Imported:
         raise InputError(f"{file}: {' '.join(str(error).split())}") from None
     reading = _Reading(mujoco, model)
     scene = reading.scene(re.sub(r"[^A-Za-z0-9_-]", "-", file.stem))
-    Scene.parse(scene, str(file))
+    _rest(scene, Scene.parse(scene, str(file)), reading.away)
     return Imported(scene, tuple(reading.left_out))
+
+
+def _rest(data: dict[str, Any], scene: Scene, away: dict[str, float]) -> None:
+    """States the angles [rad], as the mechanics counts them, of torsion springs that rest so far from the start."""
+    from shoal.mechanics.assembly.loads import Loads
+    from shoal.mechanics.assembly.placement import place
+    from shoal.mechanics.assembly.rows import Rows
+
+    if away:
+        loads = Loads(scene, place(scene), Rows(0), 0.0)
+        start = dict(zip(loads.names, loads.angles, strict=True))
+        for name, angle in away.items():
+            data["loads"][name]["angle"] = float(np.ravel(start[name])[0]) + angle
 
 
 @dataclass
@@ -53,8 +66,13 @@ class _Reading:
     left_out: list[str] = field(default_factory=list)
     kept: set[int] = field(default_factory=set)
     """Equalities that joints stand for already."""
+    away: dict[str, float] = field(default_factory=dict)
+    """Of torsion springs that do not rest at the start, the angle [rad] from there to where they do."""
+    axes: list[Array] = field(default_factory=list)
+    """Those of joints so far that others should agree with, of parallel ones the first."""
 
     def __post_init__(self) -> None:
+        self._switch_off()
         self.data = self.mujoco.MjData(self.model)
         self.key = self._start()
         self.mujoco.mj_forward(self.model, self.data)
@@ -65,6 +83,32 @@ class _Reading:
             # A frame without mass that is fixed to its parent is a place on it.
             alias = self.model.body_mass[body] == 0 and self.model.body_jntnum[body] == 0
             self.owners.append(self.owners[self.model.body_parentid[body]] if alias else body)
+
+    def _switch_off(self) -> None:
+        """Takes out of the model what its flags disable."""
+        model, bits = self.model, self.mujoco.mjtDisableBit
+        constraints = {
+            bits.mjDSBL_EQUALITY: ["eq_active0"],
+            bits.mjDSBL_FRICTIONLOSS: ["dof_frictionloss", "tendon_frictionloss"],
+            bits.mjDSBL_LIMIT: ["jnt_limited", "tendon_limited"],
+            bits.mjDSBL_CONTACT: ["geom_contype", "geom_conaffinity"],
+        }
+        stiff = ["jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "tendon_stiffnesspoly"]
+        damped = ["dof_damping", "dof_dampingpoly", "tendon_damping", "tendon_dampingpoly"]
+        every = {
+            bits.mjDSBL_SPRING: stiff,
+            bits.mjDSBL_DAMPER: damped,
+            bits.mjDSBL_CONSTRAINT: [name for names in constraints.values() for name in names],
+            **constraints,
+        }
+        for bit, names in every.items():
+            for name in names if self._disables(bit) else []:
+                getattr(model, name)[:] = 0
+        if self._disables(bits.mjDSBL_GRAVITY):
+            model.opt.gravity[:] = 0
+
+    def _disables(self, bit: Any) -> bool:
+        return bool(self.model.opt.disableflags & int(bit))
 
     def _start(self) -> int | None:
         """The keyframe `start`, if it has the rates of a machine that stands as the file draws it."""
@@ -112,8 +156,9 @@ class _Reading:
                 bodies[self.names[body]] = {"kind": "point-mass", "mass": bodies[self.names[body]]["mass"]}
                 start.pop("rotation")
                 start.pop("spin", None)
+                self._friction(self._own(body), {"kind": "point-mass"}, loads)
                 continue
-            self._hang(body, joints, loads, initial)
+            self._hang(body, joints, loads)
         self._tendons(joints, loads)
         self._equalities(joints)
         self._actuators(loads)
@@ -153,20 +198,35 @@ class _Reading:
         local = self.data.xmat[owner].reshape(3, 3).T @ (place - self.data.xpos[owner])
         return {"body": self.names[owner], "point": _numbers(local)}
 
-    def _hang(self, body: int, joints: dict[str, Any], loads: dict[str, Any], initial: dict[str, Any]) -> None:
+    def _own(self, body: int) -> list[int]:
+        """The joints of MuJoCo's by which a body hangs on its parent."""
+        first = self.model.body_jntadr[body]
+        return list(range(first, first + self.model.body_jntnum[body]))
+
+    def _hang(self, body: int, joints: dict[str, Any], loads: dict[str, Any]) -> None:
         """How a body hangs on its parent. Raises InputError for several joints that no single one stands for."""
-        model, kinds = self.model, self.mujoco.mjtJoint
-        first, count = model.body_jntadr[body], model.body_jntnum[body]
-        own = list(range(first, first + count))
-        found = [kinds(model.jnt_type[one]) for one in own]
-        parent, name = model.body_parentid[body], self.names[body]
-        if found == [kinds.mjJNT_FREE]:
-            return
-        place = self.data.xanchor[own[0]] if own else self.data.xpos[body]
-        made: dict[str, Any] = {"first": self._at(parent, place), "second": self._at(body, place)}
-        axes = [self.data.xaxis[one] for one in own]
+        kinds, own = self.mujoco.mjtJoint, self._own(body)
+        found = [kinds(self.model.jnt_type[one]) for one in own]
+        parent, name = self.model.body_parentid[body], self.names[body]
         hinge, slide, ball = kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE, kinds.mjJNT_BALL
-        if found in ([hinge, slide], [ball, slide], [hinge, slide, slide], [ball, slide, slide]) and self._meet(own):
+        sliding = [one for one, kind in zip(own, found, strict=True) if kind == slide]
+        turning, turns = [one for one in own if one not in sliding], [kind for kind in found if kind != slide]
+        anywhere = len(sliding) == 3 and self._span(sliding)
+        anyhow = turns == [ball] or (turns == [hinge] * 3 and self._meet(turning) and self._span(turning))
+        if found == [kinds.mjJNT_FREE] or (anywhere and anyhow):
+            self._friction(own, {"kind": "free"}, loads)
+            return
+        if anywhere and not turning and self.owners[parent] == 0:
+            joints |= self._upright(body)
+            self._friction(own, {"kind": "coupling"}, loads)
+            return
+        # Where a slide is drawn does not matter.
+        place = self.data.xanchor[turning[0]] if turning else self.data.xpos[body]
+        made: dict[str, Any] = {"first": self._at(parent, place), "second": self._at(body, place)}
+        if not np.any(self.model.eq_active0):  # no loop, in which axes of several bodies have to agree
+            self.axes.clear()
+        axes = [self._trued(self.data.xaxis[one]) for one in own if self.model.jnt_type[one] != int(ball)]
+        if found in ([hinge, slide], [ball, slide], [hinge, slide, slide], [ball, slide, slide]):
             # The line or plane is fixed to the body, not to its parent.
             made = {"first": made["second"], "second": made["first"]}
             found, axes = found[::-1], axes[::-1]
@@ -176,50 +236,78 @@ class _Reading:
             made |= {"kind": "revolute", "axis": _numbers(axes[0])}
         elif found == [slide]:
             made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "locked"}
-        elif found == [kinds.mjJNT_BALL] or (found == [hinge] * 3 and self._meet(own)):
+        elif anyhow and not sliding:
             made |= {"kind": "spherical"}
-        elif found == [hinge] * 2 and self._meet(own) and abs(axes[0] @ axes[1]) < SQUARE:
+        elif found == [hinge] * 2 and self._meet(own) and abs(axes[0] @ axes[1]) < ROUNDED:
             made |= {"kind": "universal", "axis": _numbers(axes[0]), "second_axis": _numbers(axes[1])}
-        elif len(found) == 2 and {*found} == {hinge, slide} and np.linalg.norm(np.cross(*axes)) < SQUARE:
+        elif len(found) == 2 and {*found} == {hinge, slide} and np.linalg.norm(np.cross(axes[0], axes[1])) < ROUNDED:
             made |= {"kind": "cylindrical", "axis": _numbers(axes[0])}
-        elif found == [slide, hinge] and self._meet(own) and abs(axes[0] @ axes[1]) < SQUARE:
+        elif found == [slide, hinge] and abs(axes[0] @ axes[1]) < ROUNDED:
             flat = {**made, "kind": "planar", "axis": _numbers(axes[1]), "rotation": "axis"}
             joints[f"{self.joint_names[own[0]]}-plane"] = flat
             made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "free"}
-        elif found == [slide, ball] and self._meet(own):
+        elif found == [slide, ball]:
             made |= {"kind": "slider", "axis": _numbers(axes[0]), "rotation": "free"}
-        elif found[:2] == [slide] * 2 and self._is_plane(found[2:], axes) and self._meet(own):
+        elif found[:2] == [slide] * 2 and self._is_plane(found[2:], axes):
             rotation = "locked" if len(found) == 2 else "axis" if found[2] == hinge else "free"
             made |= {"kind": "planar", "axis": _numbers(np.cross(axes[0], axes[1])), "rotation": rotation}
         else:
             raise InputError(f"{name}: no joint of a scene stands for its {len(own)} joints; put bodies between them")
-        self._friction(body, own, made, loads)
+        self._friction(own, made, loads)
         joints[self.joint_names[own[0]] if own else f"{name}-weld"] = made
+
+    def _trued(self, axis: Array) -> Array:
+        """An axis, exactly parallel or square to those so far to which it is so but for the rounding of a file.
+
+        Joints of one body or of a loop would else contradict each other by as little, and lock.
+        """
+        for known in self.axes:
+            if np.linalg.norm(np.cross(known, axis)) < ROUNDED:
+                return known * np.sign(known @ axis)
+        square = np.array([known for known in self.axes if abs(known @ axis) < ROUNDED])
+        if square.size:
+            axis = axis - np.linalg.pinv(square, rcond=np.sqrt(ROUNDED)) @ (square @ axis)
+        self.axes.append(axis / np.linalg.norm(axis))
+        return self.axes[-1]
+
+    def _upright(self, body: int) -> dict[str, Any]:
+        """Joints that keep a body from turning: of arms along the ground's axes, each stays at its height."""
+        foot, held = self.data.xpos[body], {}
+        for arm, axis, along in zip(np.eye(3), "xyz", "yzx", strict=True):
+            base = {"at": self._at(body, foot), "axis": along, "factor": -1.0}
+            tip = {"at": self._at(body, foot + arm), "axis": along}
+            held[f"{self.names[body]}-{axis}{along}"] = {"kind": "coupling", "terms": [base, tip]}
+        return held
 
     def _is_plane(self, turns: list[Any], axes: list[Array]) -> bool:
         """Whether two slides, and a hinge or a ball after them, leave a plane and turns about its normal, or all."""
-        normal = np.cross(axes[0], axes[1])
-        if np.linalg.norm(normal) < SQUARE or len(turns) > 1:
+        kinds, normal = self.mujoco.mjtJoint, np.cross(axes[0], axes[1])
+        if np.linalg.norm(normal) < ROUNDED or turns not in ([], [kinds.mjJNT_HINGE], [kinds.mjJNT_BALL]):
             return False
-        hinged = [self.mujoco.mjtJoint.mjJNT_HINGE]
-        return turns != hinged or bool(np.linalg.norm(np.cross(normal, axes[2])) < SQUARE * np.linalg.norm(normal))
+        square = turns == [kinds.mjJNT_HINGE] and np.linalg.norm(np.cross(normal, axes[2]))
+        return bool(square < ROUNDED * np.linalg.norm(normal))
+
+    def _span(self, own: list[int]) -> bool:
+        """Whether the axes of three joints are those of a space."""
+        return bool(abs(np.linalg.det(self.data.xaxis[own])) > ROUNDED)
 
     def _slides(self, body: int) -> bool:
         """Whether its joints leave the place of a body free."""
-        first, kinds = self.model.body_jntadr[body], self.mujoco.mjtJoint
-        own = self.model.jnt_type[first : first + self.model.body_jntnum[body]]
-        return bool(np.any((own == int(kinds.mjJNT_SLIDE)) | (own == int(kinds.mjJNT_FREE))))
+        kinds = self.mujoco.mjtJoint
+        return bool(np.any(np.isin(self.model.jnt_type[self._own(body)], [kinds.mjJNT_SLIDE, kinds.mjJNT_FREE])))
 
     def _is_mass(self, body: int) -> bool:
-        """Whether a body only slides against the ground, each way, with nothing on it: what a point mass does."""
-        model = self.model
-        first, count = model.body_jntadr[body], model.body_jntnum[body]
-        if count != 3 or self.owners[model.body_parentid[body]] != 0 or np.any(model.body_ipos[body]):
+        """Whether a body only slides against the ground, each way, and is held and seen at its centre: a point mass."""
+        model, own = self.model, self._own(body)
+        slides = len(own) == 3 and np.all(model.jnt_type[own] == int(self.mujoco.mjtJoint.mjJNT_SLIDE))
+        if not slides or not self._span(own) or self.owners[model.body_parentid[body]] != 0:
             return False
-        slides = all(model.jnt_type[first : first + 3] == self.mujoco.mjtJoint.mjJNT_SLIDE)
-        alone = not np.any(model.body_parentid == body)
-        free = abs(np.linalg.det(self.data.xaxis[first : first + 3])) > SQUARE
-        return bool(slides and alone and free and not np.any(model.dof_damping[model.body_dofadr[body] :][:3]))
+        held = np.any(
+            (model.eq_objtype == int(self.mujoco.mjtObj.mjOBJ_BODY))
+            & ((model.eq_obj1id == body) | (model.eq_obj2id == body))
+        )
+        off = np.any(model.body_ipos[body]) or np.any(model.site_pos[model.site_bodyid == body])
+        return not (held or off or np.any(model.body_parentid == body))
 
     def _tendons(self, joints: dict[str, Any], loads: dict[str, Any]) -> None:
         """Straight tendons between two sites: springs, and distances where an equality keeps their length."""
@@ -236,20 +324,35 @@ class _Reading:
             ends = model.wrap_objid[first : first + count]
             straight = all(model.wrap_type[first : first + count] == self.mujoco.mjtWrap.mjWRAP_SITE) and count == 2
             low, high = model.tendon_lengthspring[number]
-            plain = low == high and not (model.tendon_limited[number] or model.tendon_frictionloss[number])
-            if not (straight and plain):
+            if not straight or low != high:
                 self.left_out.append(f"tendon {name}: more than a spring between two sites")
                 continue
+            for values, what in (
+                (model.tendon_limited, "limits"),
+                (model.tendon_frictionloss, "frictionloss"),
+                (model.tendon_armature, "armature"),
+                (model.tendon_springyield, "springyield"),
+                (model.tendon_dampingpoly, "damping that is not linear"),
+            ):
+                if np.any(values[number]):
+                    self.left_out.append(f"tendon {name}: its {what}")
             one, other = (self._at(model.site_bodyid[end], self.data.site_xpos[end]) for end in ends)
             made = {"first": one, "second": other}
             if number in kept:
                 self.kept.add(kept[number])
                 joints[name if name not in joints else f"{name}-length"] = {"kind": "distance", **made}
-            stiffness = float(np.ravel(model.tendon_stiffness[number])[0])
-            damping = float(np.ravel(model.tendon_damping[number])[0])
-            if stiffness or damping:
-                values = {"stiffness": stiffness, "damping": damping, "length": float(low)}
-                loads[name if name not in loads else f"{name}-tendon"] = {"kind": "spring", **made, **values}
+            law = self._law(model.tendon_stiffness[number], model.tendon_stiffnesspoly[number])
+            if damping := float(model.tendon_damping[number]):
+                law["damping"] = damping
+            if law:
+                load = {"kind": "spring", **made, **law, "length": float(low)}
+                loads[name if name not in loads else f"{name}-tendon"] = load
+
+    def _law(self, stiffness: float, further: Array) -> dict[str, Any]:
+        """Of a spring whose force is a polynomial: the coefficient of x, and those of x^2 and x^3."""
+        square, cubic = map(float, further)
+        law = {"stiffness": float(stiffness), "cubic": cubic, "elastic": f"{square!r} * t**2" if square else 0}
+        return {word: value for word, value in law.items() if value}
 
     def _actuators(self, loads: dict[str, Any]) -> None:
         """Constant forces and torques: actuators at sites that nothing controls."""
@@ -274,6 +377,8 @@ class _Reading:
             and not model.actuator_gainprm[number][0]
             and not np.any(model.actuator_biasprm[number][1:])
             and not model.actuator_forcelimited[number]
+            and not self._disables(self.mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+            and not model.opt.disableactuator >> int(model.actuator_group[number]) & 1
         )
         site, other = model.actuator_trnid[number]
         size, gear = float(model.actuator_biasprm[number][0]), model.actuator_gear[number]
@@ -302,66 +407,95 @@ class _Reading:
         """Whether joints are in one place."""
         return all(np.allclose(self.data.xanchor[one], self.data.xanchor[own[0]], atol=1e-9) for one in own)
 
-    def _friction(self, body: int, own: list[int], made: dict[str, Any], loads: dict[str, Any]) -> None:
+    def _friction(self, own: list[int], made: dict[str, Any], loads: dict[str, Any]) -> None:
         """Damping, dry friction and springs of joints, and lines for what is left out of them."""
         model = self.model
         for one in own:
             name, dof = self.joint_names[one], model.jnt_dofadr[one]
             words = {"revolute": self.mujoco.mjtJoint.mjJNT_HINGE, "slider": self.mujoco.mjtJoint.mjJNT_SLIDE}
             simple = words.get(made["kind"]) == self.mujoco.mjtJoint(model.jnt_type[one])
+            square, cubic = map(float, model.dof_dampingpoly[dof])
             for what, value, word in (
                 ("damping", float(model.dof_damping[dof]), "friction"),
+                ("quadratic damping", square, "drag"),
                 ("frictionloss", float(model.dof_frictionloss[dof]), "coulomb"),
             ):
                 if value and simple:
                     made[word] = value
                 elif value:
-                    self.left_out.append(f"joint {name}: {what} {value:g}; a {made['kind']} joint has none")
-            stiffness = float(np.ravel(model.jnt_stiffness[one])[0])
-            address = model.jnt_qposadr[one]
-            away = float(model.qpos_spring[address] - model.qpos0[address])
-            if stiffness and made["kind"] == "revolute":
-                if away:
-                    # As much as a spring at rest at the start and a torque that does not change.
-                    at, reaction = self._at(body, self.data.xanchor[one]), made["first"]
-                    held = {} if reaction["body"] == GROUND else {"reaction": reaction}
-                    torque = {"kind": "torque", "at": at, "torque": stiffness * away, "axis": made["axis"], **held}
-                    loads[f"{name}-preload"] = torque
-                sides = {side: made[side] for side in ("first", "second")}
-                loads[f"{name}-spring"] = {
-                    "kind": "torsion-spring",
-                    **sides,
-                    "stiffness": stiffness,
-                    "axis": made["axis"],
-                }
-            elif stiffness:
-                self.left_out.append(f"joint {name}: its spring of {stiffness:g}; a {made['kind']} joint has none")
+                    self.left_out.append(f"joint {name}: {what} {value:g}; only a revolute joint or a slider has it")
+            if cubic:
+                self.left_out.append(f"joint {name}: cubic damping {cubic:g}")
+            law = self._law(model.jnt_stiffness[one], model.jnt_stiffnesspoly[one])
+            if "elastic" in law and made["kind"] == "slider":
+                self.left_out.append(f"joint {name}: the part {law.pop('elastic')} of its spring")
+            if law and simple:
+                loads[f"{name}-spring"] = self._spring(one, made) | law
+            elif law:
+                told = " and ".join(f"{word} {value}" for word, value in law.items())
+                self.left_out.append(f"joint {name}: its spring ({told}); only a revolute joint or a slider has one")
+            if law and (yielding := float(model.jnt_springyield[one])):
+                self.left_out.append(f"joint {name}: that its spring yields at {yielding:g}")
             if model.jnt_limited[one]:
                 low, high = model.jnt_range[one]
                 self.left_out.append(f"joint {name}: its limits {low:g} to {high:g}")
             if model.dof_armature[dof]:
                 self.left_out.append(f"joint {name}: its armature {model.dof_armature[dof]:g}")
 
+    def _spring(self, one: int, made: dict[str, Any]) -> dict[str, Any]:
+        """What acts between the sides of a revolute joint or a slider, at rest where the file says."""
+        address = self.model.jnt_qposadr[one]
+        away = float(self.model.qpos_spring[address] - self.model.qpos0[address])
+        sides = {side: made[side] for side in ("first", "second")}
+        if made["kind"] == "revolute":
+            if away:
+                self.away[f"{self.joint_names[one]}-spring"] = away
+            return {"kind": "torsion-spring", **sides, "axis": made["axis"]}
+        # Without length it pulls back by the whole way to the place of rest, on both sides of it.
+        body, (side, place) = self.model.jnt_bodyid[one], made["first"].values()
+        holder, sign = (body, -1) if side == self.names[body] else (self.owners[self.model.body_parentid[body]], 1)
+        rest = place + self.data.xmat[holder].reshape(3, 3).T @ made["axis"] * sign * away
+        return {"kind": "spring", **sides, "first": {"body": side, "point": _numbers(rest)}, "length": 0.0}
+
     def _equalities(self, joints: dict[str, Any]) -> None:
         """Loops that close, by `connect` and `weld` of bodies."""
         model, kinds = self.model, self.mujoco.mjtEq
         for number, name in enumerate(self._names(self.mujoco.mjtObj.mjOBJ_EQUALITY, model.neq, "loop")):
-            kind, of_bodies = model.eq_type[number], model.eq_objtype[number] == self.mujoco.mjtObj.mjOBJ_BODY
             if number in self.kept:
                 continue
-            word = {kinds.mjEQ_CONNECT: "spherical", kinds.mjEQ_WELD: "weld"}.get(kinds(kind))
-            if word is None or not of_bodies or not model.eq_active0[number]:
-                self.left_out.append(f"equality {name}: {kinds(kind).name.removeprefix('mjEQ_').lower()}")
+            kind = kinds(model.eq_type[number])
+            what = f"equality {name}: {kind.name.removeprefix('mjEQ_').lower()}"
+            of_bodies = model.eq_objtype[number] == self.mujoco.mjtObj.mjOBJ_BODY
+            if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) or not of_bodies:
+                self.left_out.append(what)
                 continue
-            one, other = model.eq_obj1id[number], model.eq_obj2id[number]
-            # The anchor of a weld lies in the second body, that of a connection in the first.
-            holder = other if word == "weld" else one
-            place = self.data.xpos[holder] + self.data.xmat[holder].reshape(3, 3) @ model.eq_data[number][:3]
+            if not model.eq_active0[number]:
+                self.left_out.append(f"{what}, not active")
+                continue
+            one, other, data = model.eq_obj1id[number], model.eq_obj2id[number], model.eq_data[number]
+            # The anchor of a weld lies in the second body, that of a connection in the first; then follows the other's.
+            near, far = (data[3:6], data[:3]) if kind == kinds.mjEQ_WELD else (data[:3], data[3:6])
+            place, gap = self._place(one, near), self._place(one, near) - self._place(other, far)
+            rigid = kind == kinds.mjEQ_WELD and data[10] != 0
+            if np.linalg.norm(gap) > ROUNDED or (rigid and self._turned(one, other, data[6:10]) > ROUNDED):
+                self.left_out.append(f"{what} in another pose than that of the start")
+                continue
             joints[name if name not in joints else f"loop-{name}"] = {
-                "kind": word,
+                "kind": "weld" if rigid else "spherical",
                 "first": self._at(one, place),
                 "second": self._at(other, place),
             }
+
+    def _place(self, body: int, local: Array) -> Array:
+        """A place of a body's axes [m] in those of the ground."""
+        place: Array = self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ local
+        return place
+
+    def _turned(self, one: int, other: int, relative: Array) -> float:
+        """The angle [rad] by which the second body's rotation against the first is off a relative one."""
+        first, second = (Rotation.from_quat(self.data.xquat[body], scalar_first=True) for body in (one, other))
+        off = (first * Rotation.from_quat(relative, scalar_first=True)).inv() * second
+        return float(off.magnitude())
 
     def _counted(self) -> Iterator[str]:
         """Lines for what a scene has not at all."""
@@ -379,6 +513,10 @@ class _Reading:
                 yield f"{what}s: {number}" if what != "flexible body" else f"flexible bodies: {number}"
         if model.opt.density or model.opt.viscosity:
             yield f"the medium: density {model.opt.density:g}, viscosity {model.opt.viscosity:g}"
+        if model.npair and not self._disables(self.mujoco.mjtDisableBit.mjDSBL_CONTACT):
+            yield f"contact pairs: {model.npair}"
+        if model.nplugin:
+            yield f"plugins: {model.nplugin}"
         if np.any(model.body_gravcomp):
             yield "gravity compensation of bodies"
 
