@@ -236,9 +236,12 @@ class Model:
         mass = pack(self.mass_values, lanes, tile)
         factor = mass.copy()
         _factor_mass(tile, pattern, factor)
-        inverse = factor[: self.unknowns * len(tile)]
-        if not np.all((inverse > 0) & np.isfinite(inverse)):
-            raise InputError(f"{self.scene.name}: the mass matrix is singular; some coordinate moves no mass")
+        inverse, whole = (part[: self.unknowns * len(tile)] for part in (factor, mass))
+        if not np.all((inverse > 0) & (inverse * whole < _SINGULAR)):
+            raise InputError(
+                f"{self.scene.name}: the mass matrix is singular; some coordinate moves no mass, as in a body that is "
+                "flat to the last digit of its inertia"
+            )
         forces = self.elements, self.forces, self.applied, self.functions, self.constraints, self._saddle, self.rubbing
         nobody = np.zeros(len(self.elements), dtype=np.int64)
         return Arrays(
@@ -265,6 +268,8 @@ class Model:
         )
 
 
+_SINGULAR = 1e14
+"""Mass that a coordinate moves over what others do not move already: beyond it is round-off."""
 _DEPENDENT = 1e-7
 """Smallest singular value of the constraints' unit rows below which some depend on others."""
 _EMPTY, _ = sparse.analyse(0, [])
