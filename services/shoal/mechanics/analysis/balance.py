@@ -16,7 +16,7 @@ import scipy.sparse
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
-from shoal.mechanics.analysis.small_motions import ROUND, Spectrum, Tangent, spectrum
+from shoal.mechanics.analysis.small_motions import ROUND, Spectrum, Tangent, parts_of, spectrum
 from shoal.mechanics.numerics.tile import Array
 
 CLOSE = 1e-11
@@ -117,7 +117,12 @@ class Balance:
 
     def spectrum(self, q: Array, view: View, load: float = 1.0) -> Spectrum:
         """The squared frequencies of small motions, where the loads have a potential."""
-        return spectrum(self.tangent(q, view, load), view.freedom.basis)
+        return self.spectrum_of(self.tangent(q, view, load), view)
+
+    def spectrum_of(self, stiffness: Tangent, view: View) -> Spectrum:
+        """That of a symmetric stiffness."""
+        parts = parts_of(self.evaluator.mass, view.evaluation.jacobian)
+        return spectrum(stiffness, view.freedom.basis, self.evaluator.mass, parts)
 
     def residual(self, view: View) -> float:
         """Unbalanced force over the elastic and the applied force, all in the metric of M^-1.

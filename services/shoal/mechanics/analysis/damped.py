@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from shoal.mechanics.analysis.balance import Balance, View
-from shoal.mechanics.analysis.small_motions import ROUND, Spectrum, Tangent, spectrum
+from shoal.mechanics.analysis.small_motions import ROUND, TENSION, Spectrum, Tangent
 from shoal.mechanics.numerics.tile import Array
 
 Complex = npt.NDArray[np.complex128]
@@ -52,10 +52,10 @@ def small(balance: Balance, q: Array, view: View) -> Roots:
     """The roots of small motions about a state q at rest, seen as `view`."""
     stiffness, friction, follows = balance.at_rest(q, view), balance.evaluator.damping(q), balance.evaluator.follows
     symmetric = stiffness._replace(matrix=(stiffness.matrix + stiffness.matrix.T) / 2) if follows else stiffness
-    found = spectrum(symmetric, view.freedom.basis)
+    found = balance.spectrum_of(symmetric, view)
     if not follows and not np.any(friction.data):
         return undamped(found)
-    return roots(stiffness, Tangent(friction, ROUND * abs(friction)), found, follows=follows)
+    return roots(stiffness, Tangent(friction, ROUND * abs(friction.copy())), found, follows=follows)
 
 
 def undamped(found: Spectrum) -> Roots:
@@ -123,7 +123,7 @@ def _coupled(
     x, z = shapes @ y, shapes @ w
     slope = np.maximum(np.abs(2 * a * values + b), 1e-300)
     rub = np.abs(values) * damping.worth(z, x)
-    pull = stiffness.worth(z, x)
+    pull = np.maximum(stiffness.worth(z, x), TENSION * np.max(size, initial=0.0) if follows else 0.0)
     double = np.sqrt((pull + rub) / np.maximum(np.abs(a), 1e-8))
     levels = np.where(lost, np.abs(begun), np.minimum((pull + rub) / slope, double))
     growth = levels if follows else np.where(lost, levels, np.minimum(rub / slope, double))

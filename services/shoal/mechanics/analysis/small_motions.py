@@ -3,7 +3,8 @@
 An eigenproblem solved at one stroke knows all its eigenvalues to round-off of the largest one, so that a rod beside it
 hides a pendulum. Here what is slow is taken out and solved again by itself, down to the slowest (Rayleigh and Ritz):
 an error e of a shape is worth e^2 of the stiff motions only. What is left is the round-off of the stiffness that the
-shape itself feels, |x|' B |x| with the bound B of its entries (Higham, Accuracy and Stability, ch. 3).
+shape itself feels, |x|' B |x| with the bound B of its entries (Higham, Accuracy and Stability, ch. 3), and what rounded
+places make of the stiffest motion of the part of the machine that the shape moves.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
+import scipy.sparse.csgraph
 
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -20,11 +22,13 @@ from shoal.scene import Scene
 
 ROUND = 16.0 * float(np.finfo(float).eps)
 """Round-off of an entry of a matrix, over the sum of the sizes of what it is made of."""
+TENSION = 2.0 * ROUND
+"""What rounded places may be worth in a squared frequency, over the largest of the part of the machine."""
 LOW = 1e-6
 """Motions whose squared frequencies are below this part of the largest are solved for by themselves."""
 LEAST = 1e-13
 """Squared frequencies below this [rad^2/s^2], of a period of 200 days, are zero."""
-HIDES = 1e-2
+HIDES = 0.1
 """Round-off above this part of the slowest frequency that is told may hide one that matters."""
 
 
@@ -52,11 +56,28 @@ class Spectrum(NamedTuple):
     levels: Array
 
 
-def spectrum(stiffness: Tangent, basis: Array) -> Spectrum:
-    """The spectrum of a symmetric stiffness in a basis Z with Z' M Z = I, (unknowns, n)."""
+def spectrum(stiffness: Tangent, basis: Array, mass: Any = None, parts: Array | None = None) -> Spectrum:
+    """The spectrum of a symmetric stiffness in a basis Z with Z' M Z = I, (unknowns, n).
+
+    mass, parts: M and of each unknown the number of the part of the machine that it belongs to, (unknowns,): places
+    are rounded too, which a slow motion of a thin wire feels by the tension that this makes in its own part
+    """
     values, modes = _graded(stiffness.matrix, basis)
     shapes = basis @ modes
-    return Spectrum(values, modes, shapes, np.maximum(LEAST, stiffness.worth(shapes, shapes)))
+    levels = np.maximum(LEAST, stiffness.worth(shapes, shapes))
+    if parts is not None:
+        shares = (parts == np.arange(np.max(parts, initial=-1) + 1)[:, None]) @ (shapes * (mass @ shapes))
+        stiffest = np.max(np.abs(values) * shares, axis=1, initial=0.0)
+        levels = np.maximum(levels, TENSION * (stiffest @ shares))
+    return Spectrum(values, modes, shapes, levels)
+
+
+def parts_of(mass: Any, jacobian: Any) -> Array:
+    """The number of the part that each unknown belongs to, (unknowns,); of a mass with the pattern of the stiffness."""
+    # Copies, as the index arrays are the model's own, which SciPy may sort.
+    pattern, rows = mass.copy(), jacobian.copy()
+    pattern.data[:], rows.data[:] = 1.0, 1.0
+    return np.asarray(scipy.sparse.csgraph.connected_components(pattern + rows.T @ rows, directed=False)[1])
 
 
 def _graded(stiffness: Any, basis: Array) -> tuple[Array, Array]:

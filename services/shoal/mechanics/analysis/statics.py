@@ -22,7 +22,7 @@ from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.idle_spins import idle_spins
 from shoal.mechanics.analysis.joint_reactions import reactions_of
-from shoal.mechanics.analysis.small_motions import LEAST, ROUND, hides, pull, spectrum
+from shoal.mechanics.analysis.small_motions import LEAST, ROUND, TENSION, hides, pull
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.placement import place
@@ -283,13 +283,14 @@ class _Search:
         if not basis.shape[1]:
             return np.zeros(0), np.zeros(0), np.zeros_like(q)
         if not self.evaluator.follows:
-            own = spectrum(tangent, basis)
+            own = self.balance.spectrum_of(tangent, view)
             return own.values, own.levels, own.shapes[:, 0]
         found, left, right = scipy.linalg.eig(basis.T @ (tangent.matrix @ basis), left=True)
         along, w, x = np.sum(np.conj(left) * right, axis=0), basis @ np.conj(left), basis @ right
         simple = np.abs(along) > np.sqrt(ROUND)
         found = np.where(simple, np.sum(w * (tangent.matrix @ x), axis=0) / np.where(simple, along, 1.0), found)
         levels = np.maximum(LEAST, tangent.worth(w, x) / np.maximum(np.abs(along), np.sqrt(ROUND)))
+        levels = np.maximum(levels, TENSION * np.max(np.abs(found)))
         order = np.argsort(found.real)
         found, levels, lowest = found[order], levels[order], np.real(x[:, order[0]])
         return found if np.any(found.imag) else found.real, levels, lowest
