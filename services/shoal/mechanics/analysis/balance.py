@@ -16,14 +16,13 @@ import scipy.sparse
 
 from shoal.mechanics.analysis.evaluate import Evaluation, Evaluator
 from shoal.mechanics.analysis.freedom import Freedom, Metric
+from shoal.mechanics.analysis.small_motions import ROUND, Spectrum, Tangent, parts_of, spectrum
 from shoal.mechanics.numerics.tile import Array
 
 CLOSE = 1e-11
 """Converged: a correction of the bodies [rms displacement / size of the machine] below this,"""
 STALLED = 1e-7
 """or one below this that round-off keeps from getting smaller."""
-ZERO = 1e-13
-"""Squared frequencies below this times the largest one (at least 1 rad^2/s^2) are zero."""
 LONGEST = 0.2
 """Longest step of the descent, as a fraction of the machine's size,"""
 WIDEST = 1.5
@@ -34,6 +33,10 @@ STRAINED = 1e-9
 """Forces that strain the machine by less than this count for nothing."""
 SEEN = 1e-9
 """Unbalanced forces below this fraction of all forces are round-off."""
+BALANCED = 1e-5
+"""Forces of which a smaller part than this is left are in balance."""
+OFF = 16.0
+"""So many times what is left of the forces may be off by, over the machine's size, is the stiffness off."""
 
 
 class View(NamedTuple):
@@ -98,6 +101,29 @@ class Balance:
         basis = view.freedom.basis
         return np.asarray(basis.T @ (full @ basis))
 
+    def tangent(self, q: Array, view: View, load: float = 1.0) -> Tangent:
+        """The stiffness K + sum lambda_k C_k,qq in all coordinates."""
+        loose = self.evaluator.stiffness(q, self.t, load=load)
+        full = self.evaluator.stiffness(q, self.t, multipliers=view.multipliers, load=load)
+        return Tangent(full, ROUND * (abs(loose) + abs(full - loose)))
+
+    def at_rest(self, q: Array, view: View) -> Tangent:
+        """The same; where the forces balance, what is left of them is round-off that displacements turn."""
+        found, evaluation = self.tangent(q, view), view.evaluation
+        if self.residual(view) > BALANCED:
+            return found
+        left = np.abs(evaluation.force - evaluation.jacobian.T @ view.multipliers) / self.size
+        return Tangent(found.matrix, found.bound + OFF * scipy.sparse.diags_array(left))
+
+    def spectrum(self, q: Array, view: View, load: float = 1.0) -> Spectrum:
+        """The squared frequencies of small motions, where the loads have a potential."""
+        return self.spectrum_of(self.tangent(q, view, load), view)
+
+    def spectrum_of(self, stiffness: Tangent, view: View) -> Spectrum:
+        """That of a symmetric stiffness."""
+        parts = parts_of(self.evaluator.mass, view.evaluation.jacobian)
+        return spectrum(stiffness, view.freedom.basis, self.evaluator.mass, parts)
+
     def residual(self, view: View) -> float:
         """Unbalanced force over the elastic and the applied force, all in the metric of M^-1.
 
@@ -160,9 +186,8 @@ class Balance:
         begin, shift, correction = q, 0.0, np.inf
         view = self.look(q)
         for iteration in range(1, most + 1):
-            curvature, modes = scipy.linalg.eigh(self.hessian(q, view))
+            curvature, modes, _, zero = self.spectrum(q, view)
             pull = modes.T @ view.unbalanced
-            zero = zero_level(curvature)
             # What nothing pulls and nothing holds stays where it is.
             idle = (np.abs(curvature) <= zero) & (np.abs(pull) <= SEEN * self._scale(view))
             pull[idle] = 0.0
@@ -216,8 +241,3 @@ class Balance:
             if float(np.linalg.norm(y)) < 1e-6 * self.unit:
                 break
         return q, gap
-
-
-def zero_level(curvature: Array) -> float:
-    """Below this a squared frequency [rad^2/s^2] is zero to working accuracy."""
-    return ZERO * max(1.0, float(np.max(np.abs(curvature), initial=0.0)))

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from shoal.mechanics.analysis.balance import zero_level
 from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Rod, Scene
@@ -21,6 +20,7 @@ class Held(StrEnum):
     OK = "ok"
     UNSTABLE = "unstable"
     UNHELD = "nothing-holds"
+    UNTOLD = "cannot-be-told"
     FAILED = "failed"
 
 
@@ -35,7 +35,8 @@ class Equilibrium:
     energy: strain, gravity, applied [J]; strain_energy: of every flexible body [J]. residual: unbalanced force
     relative to all forces; gap: worst violation of a joint; correction: the last one, relative to the machine's size.
     eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
-    stable. steps: load steps. reactions: in the joints. turns: what angle forces have counted [rad].
+    stable, but where forces follow the motion; levels: below these each is zero to working accuracy. steps: load steps.
+    reactions: in the joints. turns: what angle forces have counted [rad].
     mesh_error: how far the markers are from the limit of ever finer meshes [m], None where it is not known.
     """
 
@@ -55,6 +56,7 @@ class Equilibrium:
     gap: float
     correction: float
     eigenvalues: Array
+    levels: Array
     iterations: int
     steps: int
     reactions: Reactions | None
@@ -69,7 +71,7 @@ class Equilibrium:
     @property
     def stable(self) -> bool:
         """Whether every small displacement is pulled back."""
-        return bool(np.all(np.real(self.eigenvalues) > zero_level(self.eigenvalues)))
+        return self.status is not Held.UNSTABLE and bool(np.all(np.real(self.eigenvalues) > self.levels))
 
     def marker(self, name: str) -> Array:
         """Position of a marker [m], (d,)."""

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import scipy.linalg
 
-from shoal.mechanics.analysis.balance import Balance, zero_level
+from shoal.mechanics.analysis.balance import Balance
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.numerics.tile import Array
@@ -30,8 +29,8 @@ def idle_spins(balance: Balance, placement: Placement, q: Array) -> tuple[Array,
     if not directors:
         return none, []
     view = balance.look(q, 0.0)
-    stiffness, modes = scipy.linalg.eigh(balance.hessian(q, view, 0.0))
-    free = view.freedom.basis @ modes[:, np.abs(stiffness) <= zero_level(stiffness)]
+    found = balance.spectrum(q, view, 0.0)
+    free = found.shapes[:, np.abs(found.values) <= found.levels]
     if not free.size:
         return none, []
     turning = np.zeros(len(q), dtype=bool)

@@ -20,6 +20,7 @@ from shoal.mechanics.analysis.evaluate import Evaluator
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.freedom import Metric
 from shoal.mechanics.analysis.joint_forces import Component, friction, place
+from shoal.mechanics.analysis.singular import SHARE, beside
 from shoal.mechanics.model import Model
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -29,8 +30,6 @@ from shoal.scene.joints import places
 from shoal.trajectory import plain
 
 RANK = 1e-9
-SHARE = 1e-6
-"""A component that takes part in a self-stress (of unit size) by less than this is unique."""
 BALANCED = 1e-6
 
 
@@ -194,15 +193,8 @@ def _sharing(evaluator: Evaluator, q: Array, t: float) -> Array:
     freedom = metric.freedom(evaluator.at(q, t=t).jacobian)
     if freedom.dependent.shape[1] == 0:
         return none
-    if freedom.basis.shape[1]:
-        # A fixed combination of all free directions, long enough to leave a singular position.
-        step = freedom.basis @ np.cos(1.0 + np.arange(freedom.basis.shape[1]))
-        q = q + 0.05 * step / np.max(np.abs(step))
-        for _ in range(20):
-            evaluation = evaluator.at(q, t=t)
-            q = q + metric.freedom(evaluation.jacobian).shift(-evaluation.gap)
-        freedom = metric.freedom(evaluator.at(q, t=t).jacobian)
-    return np.asarray(np.max(np.abs(freedom.dependent), axis=1, initial=0.0))
+    near = beside(evaluator, metric, freedom, q, t)
+    return np.asarray(np.max(np.abs(near.dependent), axis=1, initial=0.0))
 
 
 def _second(joint: Any) -> Attachment:

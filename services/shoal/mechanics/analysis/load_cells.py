@@ -16,7 +16,8 @@ from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.analysis.felt import Felt, dot, quarter
 from shoal.mechanics.analysis.free_bodies import FreeBodies
-from shoal.mechanics.analysis.joint_reactions import RANK, SHARE
+from shoal.mechanics.analysis.joint_reactions import RANK
+from shoal.mechanics.analysis.singular import SHARE
 from shoal.mechanics.frames import RigidFrame
 from shoal.mechanics.joints import Along, Apart, Geared, Meet, Sum, Turned
 from shoal.mechanics.numerics.tile import Array

@@ -60,5 +60,10 @@ def of_modes(found: Modes, scene: Scene) -> Modes:
     if not second.ok or len(second.modes) < len(found.modes):
         return found
     pairs = zip(found.modes, second.modes, strict=False)
-    gaps = (float(abs(one.eigenvalue - other.eigenvalue)) / (abs(other.eigenvalue) or 1.0) for one, other in pairs)
+    gaps = (_apart(one.eigenvalue, other.eigenvalue) for one, other in pairs)
     return replace(found, mesh_errors=tuple(gap + beyond(gap) for gap in gaps))
+
+
+def _apart(one: complex, other: complex) -> float:
+    """How far two eigenvalues are apart, relative."""
+    return abs(one - other) / (abs(other) or abs(one) or 1.0)

@@ -7,17 +7,20 @@ equilibrium these are the motions relative to its fall. Dry friction is left out
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 
 from shoal.errors import ComputationError
-from shoal.mechanics.analysis.balance import Balance, zero_level
+from shoal.mechanics.analysis import left_out
+from shoal.mechanics.analysis.balance import BALANCED, Balance
+from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.evaluate import Evaluator, points
+from shoal.mechanics.analysis.singular import crossing
+from shoal.mechanics.analysis.small_motions import hides, pull
 from shoal.mechanics.analysis.statics import statics
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.numerics.tile import Array
@@ -26,8 +29,8 @@ from shoal.scene import Scene
 from shoal.trajectory import plain
 
 Complex = npt.NDArray[np.complex128]
-DAMPED_AT_MOST = 400
-"""So many undamped modes are coupled by damping at most, the lowest ones."""
+COARSE = 0.5
+"""An eigenvalue whose mesh error is above this part of it is not known."""
 
 
 @dataclass(frozen=True)
@@ -36,13 +39,15 @@ class Mode:
 
     eigenvalue [1/s]: imaginary part the frequency of the oscillation [rad/s], real part its growth. shape: displacement
     of the coordinates, real and with shape' M shape = 1 where nothing is damped, (unknowns,). points: displacement
-    of the markers, (markers, d); angles: their turns, (markers,).
+    of the markers, (markers, d); angles: their turns, (markers,). hidden: whether the eigenvalue is 0 only as far as
+    round-off lets tell, which a motion that matters may hide behind.
     """
 
     eigenvalue: complex
     shape: Complex
     points: Complex
     angles: Complex
+    hidden: bool = False
 
     @property
     def angular_frequency(self) -> float:
@@ -66,11 +71,11 @@ class Mode:
 
     @property
     def kind(self) -> str:
-        """Oscillating, creeping back, free (nothing pulls back) or unstable."""
+        """Oscillating, creeping back, free (nothing pulls back), untold (free or slower than can be told), unstable."""
         if self.eigenvalue.real > 1e-9 * abs(self.eigenvalue):
             return "unstable"
         if not self.eigenvalue:
-            return "free"
+            return "untold" if self.hidden else "free"
         return "oscillating" if self.eigenvalue.imag > 0 else "creeping"
 
 
@@ -78,7 +83,8 @@ class Mode:
 class Modes:
     """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
 
-    mesh_errors: how far each eigenvalue is from the limit of ever finer meshes, relative; empty if not known
+    mesh_errors: how far each eigenvalue is from the limit of ever finer meshes, relative; empty if not known. moving:
+    which motion of the machine is left out
     """
 
     scene: Scene
@@ -89,11 +95,33 @@ class Modes:
     markers: tuple[str, ...]
     modes: tuple[Mode, ...]
     mesh_errors: tuple[float, ...] = ()
+    moving: str = ""
 
     @property
     def ok(self) -> bool:
-        """Whether the state is an equilibrium, or was asked for as it is, and no mode grows."""
-        return (self.balanced or self.about == "start") and all(mode.kind != "unstable" for mode in self.modes)
+        """Whether the modes may be believed, and none grows."""
+        return self.verdict[0] == "ok"
+
+    @property
+    def verdict(self) -> tuple[str, str]:
+        """The status (ok, unbalanced, moving, unstable, cannot-be-told or coarse-mesh), and why it is not ok."""
+        kinds = [mode.kind for mode in self.modes]
+        coarse = [number for number, error in enumerate(self.mesh_errors, 1) if error > COARSE]
+        if not self.balanced and self.about != "start":
+            return "unbalanced", "the forces do not balance"
+        if self.moving:
+            return "moving", self.moving
+        if "unstable" in kinds:
+            return "unstable", "it does not stay there: a motion grows"
+        if "untold" in kinds:
+            numbers = [number for number, kind in enumerate(kinds, 1) if kind == "untold"]
+            return "cannot-be-told", f"round-off hides whether anything holds {_named(numbers)}"
+        if coarse:
+            return (
+                "coarse-mesh",
+                f"the mesh is too coarse for {_named(coarse)}; take more elements or a smaller --count",
+            )
+        return "ok", ""
 
     @property
     def frequencies(self) -> Array:
@@ -102,9 +130,10 @@ class Modes:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, which `shoal modes --json` prints."""
+        status, why = self.verdict
         return {
-            "status": "ok" if self.ok else "unstable",
-            "message": self.message,
+            "status": status,
+            "message": self.message if why in self.message else "; ".join(filter(None, (self.message, why))),
             "about": self.about,
             "balanced": self.balanced,
             "modes": [
@@ -139,7 +168,7 @@ def modes(
 ) -> Modes:
     """The lowest modes about the static equilibrium, or about the start of the scene, with drives at time [s].
 
-    Raises InputError if the scene cannot be modelled, ComputationError if there is no equilibrium.
+    Raises InputError if the scene cannot be modelled, ComputationError if there is no equilibrium or it is singular.
     """
     if about == "equilibrium":
         equilibrium = statics(scene, time, leave_unstable=leave_unstable)
@@ -150,11 +179,12 @@ def modes(
     q, gap = _balance(scene, evaluator, time).restore(evaluator.model.q0[:, 0].copy())
     if gap > 1e-9:
         raise ComputationError(f"{scene.name}: the joints cannot be closed at the start; they gape by {gap:.2g}")
-    return _modes(scene, evaluator, q, time, count, "start", "")
+    found = _modes(scene, evaluator, q, time, count, "start", left_out.friction(scene, None))
+    return replace(found, moving=found.moving or left_out.moving(evaluator.model.v0[:, 0]))
 
 
 def modes_about(equilibrium: Equilibrium, *, count: int = 10) -> Modes:
-    """The `count` lowest modes about an equilibrium."""
+    """The `count` lowest modes about an equilibrium. Raises ComputationError where it is singular."""
     scene, time = equilibrium.scene, equilibrium.time
     evaluator = Evaluator.of(scene, horizon=time)
     evaluator.turns = equilibrium.turns
@@ -169,53 +199,32 @@ def _balance(scene: Scene, evaluator: Evaluator, time: float) -> Balance:
 def _modes(scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int, about: str, message: str) -> Modes:
     balance = _balance(scene, evaluator, time)
     view = balance.look(q)
-    basis = view.freedom.basis
-    stiffness = balance.hessian(q, view)
-    damping = np.asarray(basis.T @ (evaluator.damping(q) @ basis))
-    values, shapes = _eigen(stiffness, damping, evaluator.follows)
-    keep = slice(0, count)
+    if names := crossing(evaluator, balance.metric, view.freedom, q, time):
+        why = f"there {', '.join(names)} may move in more ways than beside it"
+        raise ComputationError(f"{scene.name}: no small motions about a singular place: {why}")
+    roots = small(balance, q, view)
+    squares = np.abs(roots.values) ** 2
+    hidden = [
+        not value and hides(level**2, squares, pull(scene))
+        for value, level in zip(roots.values, roots.levels, strict=True)
+    ]
     placement, unknowns = place(scene), evaluator.model.unknowns
     at = points([placement.point(scene, side) for side in scene.markers.values()], unknowns).matrix
     lines = points([placement.direction(scene, side) for side in scene.markers.values()], unknowns)
     turning = lines.turning(q)
-    found = []
-    for value, y in zip(values[keep], shapes.T[keep], strict=True):
-        shape = basis @ y
-        found.append(Mode(complex(value), shape, at @ shape, turning @ shape))
-    balanced = balance.residual(view) < 1e-5
-    return Modes(scene, about, balanced, message, q, tuple(scene.markers), tuple(found))
+    told = tuple(
+        Mode(complex(value), shape, at @ shape, turning @ shape, unknown)
+        for value, shape, unknown in list(zip(roots.values, roots.shapes.T, hidden, strict=True))[:count]
+    )
+    balanced = balance.residual(view) <= BALANCED
+    return Modes(
+        scene, about, balanced, message, q, tuple(scene.markers), told, moving=left_out.driven(evaluator, q, time)
+    )
 
 
-def _eigen(stiffness: Array, damping: Array, follows: bool) -> tuple[Complex, Complex]:
-    """Eigenvalues with their columns of shapes, one of each conjugate pair; those that grow first, then by size."""
-    if not len(stiffness):
-        return np.zeros(0, dtype=complex), np.zeros((0, 0), dtype=complex)
-    damped = bool(np.max(np.abs(damping)) > 0)
-    if not follows:
-        squares, undamped = scipy.linalg.eigh(stiffness)
-        squares = np.where(np.abs(squares) <= zero_level(squares), 0.0, squares)
-        if not damped:
-            values = np.where(squares < 0, np.sqrt(np.abs(squares)) + 0j, 1j * np.sqrt(np.abs(squares)))
-            return _sorted(values, undamped.astype(complex))
-        undamped = undamped[:, :DAMPED_AT_MOST]
-        stiffness, damping = np.diag(squares[:DAMPED_AT_MOST]), undamped.T @ damping @ undamped
-    else:
-        undamped = np.eye(len(stiffness))
-    n = len(stiffness)
-    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
-    values, shapes = scipy.linalg.eig(matrix)
-    scale = float(np.max(np.abs(values)))
-    values = np.where(np.abs(values) <= 1e-8 * scale, 0.0, values)
-    values = np.where(np.abs(values.imag) <= 1e-9 * np.abs(values), values.real + 0j, values)
-    values = np.where(np.abs(values.real) <= 1e-13 * scale, 1j * values.imag, values)
-    keep = values.imag >= 0
-    return _sorted(values[keep], undamped @ shapes[:n, keep])
-
-
-def _sorted(values: Complex, shapes: Complex) -> tuple[Complex, Complex]:
-    grows = values.real > 1e-9 * np.abs(values)
-    order = np.lexsort([np.abs(values), ~grows])
-    return values[order], shapes[:, order]
+def _named(numbers: list[int]) -> str:
+    """Modes by number."""
+    return f"mode{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
 
 
 def _two(value: complex) -> Any:

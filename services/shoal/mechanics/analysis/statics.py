@@ -15,11 +15,14 @@ import scipy.linalg
 
 from shoal.errors import InputError
 from shoal.mechanics import plane
-from shoal.mechanics.analysis.balance import Balance, Found, zero_level
+from shoal.mechanics.analysis import left_out
+from shoal.mechanics.analysis.balance import BALANCED, Balance, Found, View
+from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.idle_spins import idle_spins
 from shoal.mechanics.analysis.joint_reactions import reactions_of
+from shoal.mechanics.analysis.small_motions import LEAST, ROUND, TENSION, hides, pull
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.placement import place
@@ -50,7 +53,8 @@ def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True) -> 
     """The equilibrium that a machine reaches from the start of its scene, with drives as they are at `time` [s].
 
     leave_unstable: go on from an unstable equilibrium (a column beyond its buckling load) to a stable one, where the
-    loads have a potential. Raises InputError if the scene cannot be modelled.
+    loads have a potential. With loads that have none the place is stable where no small motion grows, with the damping
+    of the machine. The message tells what is left out. Raises InputError if the scene cannot be modelled.
     """
     if not (np.isfinite(time) and time >= 0):
         raise InputError(f"time: needs a time of at least 0 s, found {time:g}")
@@ -101,9 +105,8 @@ class _Search:
         for attempt in range(4):
             if not found.converged:
                 break
-            eigenvalues, _ = self._eigen(found.q)
-            zero = zero_level(eigenvalues)
-            if not (leave_unstable and has_potential) or not np.any(np.real(eigenvalues) < -zero):
+            eigenvalues, levels, _ = self._eigen(found.q)
+            if not (leave_unstable and has_potential) or not np.any(np.real(eigenvalues) < -levels):
                 break
             message = "left an unstable equilibrium; "
             found = self._descended(found.q + KICK * (1 + attempt) * self._soft(found.q)[0])
@@ -145,8 +148,7 @@ class _Search:
         return float(plane.angle(along))
 
     def _judge(self, found: Found, message: str) -> Equilibrium:
-        eigenvalues, lowest = self._eigen(found.q)
-        zero = zero_level(eigenvalues)
+        eigenvalues, levels, lowest = self._eigen(found.q)
         view = self.balance.look(found.q)
         residual = self.balance.residual(view)
         if not found.converged:
@@ -154,15 +156,25 @@ class _Search:
                 moved = found.q - self.evaluator.model.q0[:, 0]
                 return self._ending(found.q, Held.UNHELD, f"nothing holds {self._movers(moved)}; it falls without end")
             return self._ending(found.q, Held.FAILED, message + found.message, found)
-        if residual > 1e-5:
+        if residual > BALANCED:
             text = f"{message}the forces do not balance, {residual:.1g} of them is left"
             return self._ending(found.q, Held.FAILED, text, found)
-        if len(eigenvalues) and np.any(np.abs(np.imag(eigenvalues)) > 1e-9 * np.abs(eigenvalues) + zero):
+        growth = self._growth(found.q, view) if self.evaluator.follows else None
+        if growth is not None and growth > 0:
+            text = f"forces that follow the motion make it grow with exp(t * {growth:.4g}/s)"
+            return self._ending(found.q, Held.UNSTABLE, text, found)
+        complex_pair = np.any(np.abs(np.imag(eigenvalues)) > 1e-9 * np.abs(eigenvalues) + levels)
+        if growth is None and complex_pair:
             return self._ending(found.q, Held.UNSTABLE, "forces that follow the motion make it flutter", found)
-        if len(eigenvalues) and np.real(eigenvalues[0]) < -zero:
+        if len(eigenvalues) and np.real(eigenvalues[0]) < -levels[0]:
             text = f"unstable: it leaves with exp(t * {np.sqrt(-np.real(eigenvalues[0])):.4g}/s); moves first: "
             return self._ending(found.q, Held.UNSTABLE, message + text + self._movers(lowest), found)
-        if len(eigenvalues) and np.real(eigenvalues[0]) <= zero:
+        loose = np.real(eigenvalues) <= levels
+        if np.any(loose) and hides(levels[loose], eigenvalues, pull(self.scene)):
+            least = float(np.sqrt(np.max(levels[loose])))
+            text = f"{message}round-off hides whether {self._movers(lowest)} is held, by less than {least:.1g} rad/s"
+            return self._ending(found.q, Held.UNTOLD, text, found)
+        if np.any(loose):
             text = f"{message}nothing holds {self._movers(lowest)}; it may rest in other places as well"
             return self._ending(found.q, Held.UNHELD, text, found)
         if self.spinning:
@@ -175,11 +187,14 @@ class _Search:
         at = self.marker_points.at(q)
         balanced = status is not Held.FAILED and found is not None
         rest = np.zeros_like(q)
+        eigenvalues, levels, _ = self._eigen(q)
+        reactions = reactions_of(self.evaluator, q, rest, rest, self.time) if balanced else None
+        notes = message, left_out.friction(self.scene, reactions), left_out.driven(self.evaluator, q, self.time)
         return Equilibrium(
             scene=self.stated,
             time=self.time,
             status=status,
-            message=message,
+            message="; ".join(note for note in notes if note),
             balanced=balanced,
             q=q,
             multipliers=view.multipliers,
@@ -191,10 +206,11 @@ class _Search:
             residual=self.balance.residual(view),
             gap=float(np.max(np.abs(e.gap), initial=0.0)),
             correction=found.correction if found else float("inf"),
-            eigenvalues=self._eigen(q)[0],
+            eigenvalues=eigenvalues,
+            levels=levels,
             iterations=self.iterations,
             steps=self.steps,
-            reactions=reactions_of(self.evaluator, q, rest, rest, self.time) if balanced else None,
+            reactions=reactions,
             turns=self.evaluator.turns,
         )
 
@@ -252,26 +268,38 @@ class _Search:
 
     def _firm(self, q: Array, load: float) -> bool:
         """Whether the reduced stiffness pulls every displacement back."""
-        view = self.balance.look(q, load)
-        matrix = self.balance.hessian(q, view, load)
         if self.evaluator.follows and load > 0:
             return True
-        values = np.asarray(scipy.linalg.eigvalsh(matrix), dtype=float)
-        return bool(np.all(values > zero_level(values)))
+        found = self.balance.spectrum(q, self.balance.look(q, load), load)
+        return bool(np.all(found.values > found.levels))
 
-    def _eigen(self, q: Array) -> tuple[Array, Array]:
-        """Eigenvalues of the reduced stiffness (complex with loads that follow), and the displacement of the lowest."""
+    def _eigen(self, q: Array) -> tuple[Array, Array, Array]:
+        """Eigenvalues of the reduced stiffness (complex with loads that follow), their levels, the lowest one's shape.
+
+        With loads that follow an eigenvalue is the quotient w' K x / w' M x of its left and its right shape.
+        """
         view = self.balance.look(q)
-        matrix = self.balance.hessian(q, view)
-        if not len(matrix):
-            return np.zeros(0), np.zeros_like(q)
+        tangent, basis = self.balance.at_rest(q, view), view.freedom.basis
+        if not basis.shape[1]:
+            return np.zeros(0), np.zeros(0), np.zeros_like(q)
         if not self.evaluator.follows:
-            values, modes = scipy.linalg.eigh(matrix)
-            return values, view.freedom.basis @ modes[:, 0]
-        found, shapes = scipy.linalg.eig(matrix)
+            own = self.balance.spectrum_of(tangent, view)
+            return own.values, own.levels, own.shapes[:, 0]
+        found, left, right = scipy.linalg.eig(basis.T @ (tangent.matrix @ basis), left=True)
+        along, w, x = np.sum(np.conj(left) * right, axis=0), basis @ np.conj(left), basis @ right
+        simple = np.abs(along) > np.sqrt(ROUND)
+        found = np.where(simple, np.sum(w * (tangent.matrix @ x), axis=0) / np.where(simple, along, 1.0), found)
+        levels = np.maximum(LEAST, tangent.worth(w, x) / np.maximum(np.abs(along), np.sqrt(ROUND)))
+        levels = np.maximum(levels, TENSION * np.max(np.abs(found)))
         order = np.argsort(found.real)
-        lowest = view.freedom.basis @ np.real(shapes[:, order[0]])
-        return (found if np.any(found.imag) else found.real)[order], lowest
+        found, levels, lowest = found[order], levels[order], np.real(x[:, order[0]])
+        return found if np.any(found.imag) else found.real, levels, lowest
+
+    def _growth(self, q: Array, view: View) -> float | None:
+        """The largest real part [1/s] of small motions with the damping of the machine; None where it has none."""
+        if not np.any(self.evaluator.damping(q).data):
+            return None
+        return float(np.max(small(self.balance, q, view).values.real, initial=0.0))
 
     def _count(self, found: Found) -> Found:
         self.iterations += found.iterations

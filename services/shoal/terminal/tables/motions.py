@@ -180,6 +180,8 @@ def modes_table(modes: Modes) -> None:
         numbers = (mode.frequency, mode.angular_frequency, mode.damping_ratio, mode.eigenvalue.real)
         table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind)
     screen.out.print(table)
+    if modes.message:
+        screen.say(modes.message)
     if modes.mesh_errors:
         screen.say(f"estimated mesh error of the eigenvalues: {max(modes.mesh_errors):.1e} of their size, at most")
     if not modes.balanced:

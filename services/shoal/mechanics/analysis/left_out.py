@@ -1,0 +1,40 @@
+"""What the balance of a machine at rest leaves out: dry friction, at which it may stick, and motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.joint_reactions import Reactions
+from shoal.mechanics.numerics.tile import Array
+from shoal.scene import Revolute, Scene, Slider
+
+STILL = 1e-9
+"""Rates below this [m/s or rad/s] are none."""
+
+
+def friction(scene: Scene, reactions: Reactions | None) -> str:
+    """Which joints have dry friction, and by how much each may be off for it [N or N m]; empty where none has."""
+    told = []
+    for name, joint in scene.joints.items():
+        if not (isinstance(joint, Revolute | Slider) and joint.dry):
+            continue
+        pressed = 0.0 if reactions is None else float(np.linalg.norm(reactions.joints[name].force))
+        size = joint.coulomb + joint.share * pressed
+        unit = "N" if isinstance(joint, Slider) else "N m"
+        told.append(name if reactions is None else f"{name}: {size:.3g} {unit}")
+    if not told:
+        return ""
+    return f"dry friction is left out ({', '.join(told)}): it may stick at other places, too"
+
+
+def driven(evaluator: Evaluator, q: Array, t: float) -> str:
+    """Which drives move at time t [s]; empty where none does."""
+    rates = zip(evaluator.model.constraint_names, evaluator.at(q, t=t).rate, strict=False)
+    names = dict.fromkeys(name for name, rate in rates if abs(rate) > STILL)
+    return f"the motion of {', '.join(names)} at t = {t:g} s is left out" if names else ""
+
+
+def moving(rates: Array) -> str:
+    """Whether a start has rates, (unknowns,); empty where it is at rest."""
+    return "the motion of the start is left out" if np.max(np.abs(rates), initial=0.0) > STILL else ""

@@ -1,0 +1,51 @@
+"""Singular places: where a machine has more small motions than beside, as where two branches of its motion cross.
+
+The rank of the constraints falls there. A machine that holds itself more than it needs to lacks rank as well, but
+beside the place, too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shoal.mechanics.analysis.evaluate import Evaluator
+from shoal.mechanics.analysis.freedom import Freedom, Metric
+from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.reach import span
+
+STEPS = (0.05, 0.005, 0.0005)
+"""How far beside [of a unit vector, or m; of the size of a smaller machine], less where joints do not close there."""
+CLOSED = 1e-9
+"""Joints that gape by less are closed."""
+SHARE = 1e-6
+"""A constraint whose part in what depends on others (of unit size) is less does not."""
+
+
+def beside(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t: float) -> Freedom:
+    """The tangent space at a state near q, in which it is `freedom`; q itself where nothing can move."""
+    if not freedom.basis.shape[1]:
+        return freedom
+    # A fixed combination of all free directions, long enough to leave a singular position.
+    step = freedom.basis @ np.cos(1.0 + np.arange(freedom.basis.shape[1]))
+    step *= min(1.0, span(evaluator.model.scene)) / np.max(np.abs(step))
+    for length in STEPS:
+        near = q + length * step
+        for _ in range(20):
+            evaluation = evaluator.at(near, t=t)
+            near = near + metric.freedom(evaluation.jacobian).shift(-evaluation.gap)
+        evaluation = evaluator.at(near, t=t)
+        if np.max(np.abs(evaluation.gap)) < CLOSED:
+            break
+    return metric.freedom(evaluation.jacobian)
+
+
+def crossing(evaluator: Evaluator, metric: Metric, freedom: Freedom, q: Array, t: float) -> tuple[str, ...]:
+    """The constraints that depend on others at q and not beside it, by name; none where q is not singular."""
+    if not freedom.dependent.shape[1]:
+        return ()
+    near = beside(evaluator, metric, freedom, q, t)
+    if near.dependent.shape[1] >= freedom.dependent.shape[1]:
+        return ()
+    parts = np.max(np.abs(freedom.dependent), axis=1)
+    names = zip(evaluator.model.constraint_names, parts, strict=False)
+    return tuple(dict.fromkeys(name for name, part in names if part > SHARE))
