@@ -58,6 +58,8 @@ NEGLIGIBLE = 0.01
 """An error below this share of what the runs differ by rejects none of them."""
 UNRESOLVED = 1e-8
 """Runs that differ by less than this share of a limit's quantity differ by the errors of their steps."""
+REFUSED = "failed-runs", "model-rejected", "beyond-horizon"
+"""Where the answer is not believed, nor is that a limit is kept, as runs show only that one is passed."""
 NAMED = 3
 """Of what missed the gap asked for, in the message."""
 
@@ -157,6 +159,8 @@ def uncertain(
     finally:
         keep.close()
     status, message = _status(answer, gap, rejected, judged)
+    if status in REFUSED:
+        judged = [replace(told, kept=None) if told.kept else told for told in judged]
     if keep.over:
         missing = [one.text for one in asked[len(judged) :]]
         status, message = (
@@ -193,6 +197,7 @@ def uncertain(
         allocation=allocation,
         boxes=answer.boxes,
         finer=finer,
+        controls=answer.runs.controls,
     )
     if status == "gap-not-reached" and bounds is not None and gap is not None:
         response = replace(response, message=message + _named(response.missed(gap)))

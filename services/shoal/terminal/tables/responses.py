@@ -67,6 +67,11 @@ def response_table(response: Response) -> None:
         known = f"outer ones lie {gap:.1e} of the width off; they hold until {response.horizon:g} s"
         unknown = "how much farther other values go is not known"
         screen.say(f"bounds are attained by runs; {unknown if np.isnan(gap) else known}")
+        if response.unseen is not None:
+            screen.say(
+                f"{response.controls} of the runs lie all over the box: what is told may be otherwise in "
+                f"{100 * response.unseen:.2g} % of it at most, with 95 % confidence"
+            )
     if response.boxes is not None:
         screen.say(
             f"statistics lie between these values, whatever the intervals are; they are known to "
