@@ -38,6 +38,7 @@ from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
 from shoal.response.limits import Judged, judge, limit
 from shoal.response.limits.choice import get_way
+from shoal.response.limits.crosschecked import allowing, crosschecked
 from shoal.response.limits.judge import Reach, require, watched
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.quantities import of_section
@@ -151,14 +152,21 @@ def uncertain(
             if inputs.mixed:
                 judged.append(between(passed, machine, inputs, **how))
             else:
-                judged.append(judge(passed, machine, inputs, _reach(inputs, when, gap, seed, most), **how))
+                found = judge(passed, machine, inputs, _reach(inputs, when, gap, seed, most), **how)
+                judged.append(crosschecked(found, machine, answer))
         if allocate:
             allocation = _allocated(judged[0], machine, costs or {}, target, most, how)
     except TimeIsUpError:
         pass
     finally:
         keep.close()
+    statistics, lacks = answer.statistics, list[str]()
+    for told in judged:
+        if statistics is not None and told.passing is not None and not told.doubt:
+            statistics, lack = allowing(statistics, machine, told.limit, told.passing.estimate)
+            lacks += [lack] if lack else []
     status, message = _status(answer, gap, rejected, judged)
+    message = "; ".join([message] * bool(message) + lacks)
     if status in REFUSED:
         judged = [replace(told, kept=None) if told.kept else told for told in judged]
     if keep.over:
@@ -188,7 +196,7 @@ def uncertain(
         wall_s=time.perf_counter() - begin,
         horizon=min(answer.horizon, float(when[-1])),
         bounds=bounds,
-        statistics=answer.statistics,
+        statistics=statistics,
         mesh_error=mesh,
         step_error=step,
         stated=wanted,
