@@ -41,7 +41,7 @@ FOR_POINTS = 0.2
 """Share of the runs that design points may take."""
 COARSE = 0.15
 """Coefficient of variation above which the estimate is told to be coarse."""
-PLAIN = 0.2
+PLAIN = 0.1
 """Share of the runs that are drawn from the distributions: design points are where a search looks, these are not."""
 DISAGREE = 4.0
 """Standard deviations by which it may say more than importance sampling and it still be chance."""
