@@ -44,7 +44,7 @@ def test_waves_of_six_parameters_are_bounded_by_few_runs(seed: int) -> None:
     width = float((upper - lower).max())
     assert found is not None
     assert math.isinf(found.horizon)
-    assert answer.runs.evaluations <= 300
+    assert answer.runs.own <= 300
     assert np.all(found.lower - lower <= 1e-4 * width)
     assert np.all(upper - found.upper <= 1e-4 * width)
     assert np.all(found.lower_outer <= lower + 1e-9)

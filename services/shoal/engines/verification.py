@@ -333,12 +333,15 @@ def _able(scene: Scene, step: float) -> Iterator[Scene]:
 
 
 def _scale(trajectory: Trajectory, scene: Scene) -> float:
-    """How far the markers get from the nearest ground joint [m]; without one, the extent of their paths."""
+    """How far the markers get from the nearest ground joint [m]; without one, the extent of their paths, and of the
+    machine where a single instant is looked at.
+    """
     points = trajectory.points[..., 0]
     sides = (side for joint in scene.joints.values() for side in places(joint))
     anchors = [scene.location(side) for side in sides if side.body == GROUND]
     least = _NO_PATH * span(scene)
     if not anchors:
-        return max(float(np.max(np.ptp(points, axis=0))), least)
+        # One instant is no path.
+        return max(float(np.max(np.ptp(points, axis=0))), least) if len(points) > 1 else span(scene)
     away = np.min([np.linalg.norm(points - np.array(anchor), axis=2) for anchor in anchors], axis=0)
     return max(float(np.max(away)), least)

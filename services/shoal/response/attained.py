@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
+from shoal.response import control
 from shoal.response.enclosure import enclosure, foretold
 from shoal.response.extremes import Extremes, Surrogate, extremes
 from shoal.response.result import Bounds
+from shoal.response.runs import TooManyRunsError
 from shoal.response.study import Enclosure, Found, Study
 from shoal.trajectory import Array
 
@@ -36,6 +39,8 @@ def bounds_of(study: Study, found: Found) -> Bounds:
             error = _confirmed(study, surrogate, named)
         elif found.foretold:
             error = _tested(study, surrogate, named, error)
+        if error is not None and not runs.controls:
+            error = _controlled(study, surrogate, error)
     values, germs = runs.values, runs.germs
     at_lower, at_upper = germs[values.argmin(axis=0)], germs[values.argmax(axis=0)]
     lower, upper = values.min(axis=0), values.max(axis=0)
@@ -99,6 +104,14 @@ def _confirmed(study: Study, surrogate: Surrogate, foretold: Extremes) -> Array 
         return None
     missed = np.abs(surrogate(runs.germs[made:]) - runs.values[made:]).max(axis=0, initial=0.0)
     return np.asarray(np.maximum(missed, getattr(surrogate, "left_out", 0.0)))
+
+
+def _controlled(study: Study, surrogate: Surrogate, error: Array) -> Array:
+    """The error of a surrogate, or what it misses of runs all over the box that contradict it."""
+    with suppress(TooManyRunsError):
+        missed = control.missed(study, surrogate)
+        return np.where(control.contradict(study, missed, error), missed, error)
+    return error
 
 
 def _tested(study: Study, surrogate: Surrogate, named: Extremes, error: Array) -> Array:

@@ -151,11 +151,27 @@ def _parameter(name: str, known: Any, scene: Scene) -> Parameter:
     if isinstance(marginal, Interval):
         low, high = marginal.low, marginal.high
     for end in (low, high):
-        scene.with_values({path: float(end) * factor for path, factor in factors.items()})
+        try:
+            scene.with_values({path: float(end) * factor for path, factor in factors.items()})
+        except InputError as error:
+            raise InputError(_reaching(name, marginal, low, high, error)) from None
     return Parameter(name, marginal, factors)
 
 
+def _reaching(name: str, marginal: Marginal, low: float, high: float, error: InputError) -> str:
+    """Why a scene refuses an end: a distribution reaches further than its numbers tell."""
+    if not marginal.random:
+        return str(error)
+    below = "; truncated-normal(MEAN,SD,LOW,HIGH) and lognormal(MEAN,SD) stay above zero" if low < 0 < high else ""
+    return f"vary: {name}~{marginal.text}: reaches from {low:.4g} to {high:.4g}{below}: {error}"
+
+
 def _nominal(path: str, scene: Scene) -> float:
+    if path.startswith("solver."):
+        raise InputError(
+            f"vary: {path} is a setting of the solver, whose error is no uncertainty of the machine; what may vary are "
+            "numbers of gravity, bodies, joints, loads and initial"
+        )
     value = scene.value(path)
     if value is None and path.startswith("initial."):
         return 0.0
@@ -163,7 +179,7 @@ def _nominal(path: str, scene: Scene) -> float:
         value = value.number if value.number is not None else "a function of time"
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"vary: {path} is {value!r}, which is no number")
-    if isinstance(value, int) and path.split(".")[-1] in ("elements", "samples", "max_steps"):
+    if isinstance(value, int) and path.split(".")[-1] in ("elements", "modes", "axial_modes"):
         raise InputError(f"vary: {path} is a whole number, which cannot vary continuously")
     return float(value)
 
@@ -180,7 +196,9 @@ def _marginal(name: str, known: Any, nominal: float) -> Marginal:
     if isinstance(known, Sequence) and len(known) == 2:
         low, high = (_number(name, end, nominal) for end in known)
         if not low < high:
-            raise InputError(f"vary: {name}={low:g}:{high:g}: LOW must be below HIGH")
+            raise InputError(
+                f"vary: {name}={low:g}:{high:g}: LOW must be below HIGH; state what is known with --set PATH=VALUE"
+            )
         return Interval(low, high, f"{low:g}:{high:g}")
     raise InputError(f"vary: {name}: {known!r} is neither (low, high) nor a distribution")
 

@@ -11,6 +11,7 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.response.allocation import Allocation
 from shoal.response.boxes import Boxes
+from shoal.response.control import unseen
 from shoal.response.finer import Finer
 from shoal.response.inputs import Inputs
 from shoal.response.limits import Judged
@@ -58,7 +59,7 @@ class Response:
     mesh_error, step_error: of extremal runs [m], None where not estimated; stated: the scene with its model in the
     middle; engine: its name; limits: of what must not happen;
     allocation: tolerances that keep the limit, where they were asked for; finer: which bounds a finer mesh moves, where
-    a model was asked for
+    a model was asked for; controls: runs all over the box of intervals that test what was foretold
     """
 
     status: str
@@ -86,11 +87,19 @@ class Response:
     allocation: Allocation | None = None
     boxes: Boxes | None = None
     finer: Finer | None = None
+    controls: int = 0
 
     @property
     def ok(self) -> bool:
         """Whether the answer can be believed as it stands."""
         return self.status == "ok"
+
+    @property
+    def unseen(self) -> float | None:
+        """A larger share of the box of intervals would have been seen by the runs of control with 95 % confidence, were
+        something else there than is told; None where there are no such runs.
+        """
+        return unseen(self.controls) if self.controls else None
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -221,6 +230,8 @@ class Response:
                     put(f"{index}_upper", sides[1], "random")
         about = {"scene": self.scene, "status": self.status, "method": self.method, "why": self.why}
         numbers = {"horizon": self.horizon, "evaluations": self.evaluations, "seed": self.seed}
+        if self.unseen is not None:
+            numbers["unseen"] = self.unseen
         return xr.Dataset(variables, coordinates, {**about, **numbers})
 
     def to_json(self) -> dict[str, Any]:
@@ -234,6 +245,8 @@ class Response:
             "evaluations": self.evaluations,
             "repeated": self.repeated,
             "failed": self.failed,
+            "controls": self.controls,
+            "unseen": self.unseen,
             "seed": self.seed,
             "wall_s": self.wall_s,
             "horizon": plain(self.horizon),

@@ -39,7 +39,8 @@ class TooManyRunsError(Exception):
 class Runs:
     """A model with a memory: call it with germs.
 
-    most: runs that it may make; progress: is told after every call how many there are
+    most: runs that it may make; progress: is told after every call how many there are; controls: runs all over the box
+    that test a surrogate
     """
 
     model: Model
@@ -51,6 +52,7 @@ class Runs:
     _germs: list[Array] = field(default_factory=list)
     _values: list[Array] = field(default_factory=list)
     _good: list[BoolArray] = field(default_factory=list)
+    controls: int = 0
 
     def __call__(self, germs: Array) -> int:
         """Make the runs at these germs that have not been made; how many they are.
@@ -110,6 +112,11 @@ class Runs:
     def evaluations(self) -> int:
         """Runs made, those that failed among them."""
         return sum(map(len, self._germs))
+
+    @property
+    def own(self) -> int:
+        """Runs made but for those of control."""
+        return self.evaluations - self.controls
 
     @property
     def failed(self) -> int:

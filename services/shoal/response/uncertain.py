@@ -7,7 +7,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
 from shoal.engines.spot_checks import larger
-from shoal.engines.verification import verified
+from shoal.engines.verification import WRONG, verified
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import reach
 from shoal.memory import Memory
@@ -38,6 +38,7 @@ from shoal.response.kept import Keep, TimeIsUpError
 from shoal.response.limits import MOST as LIMIT_RUNS
 from shoal.response.limits import Judged, judge, limit
 from shoal.response.limits.choice import get_way
+from shoal.response.limits.crosschecked import allowing, crosschecked
 from shoal.response.limits.judge import Reach, require, watched
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.quantities import of_section
@@ -54,8 +55,12 @@ CHECKED = 6
 """Extremal runs, or drawn ones, that are looked at by more careful runs."""
 LEFT = 0.25
 """Share of a mesh error that twice as many elements leave, where it falls with the square of their size or faster."""
+NEGLIGIBLE = 0.01
+"""An error below this share of what the runs differ by rejects none of them."""
 UNRESOLVED = 1e-8
 """Runs that differ by less than this share of a limit's quantity differ by the errors of their steps."""
+REFUSED = "failed-runs", "model-rejected", "beyond-horizon"
+"""Where the answer is not believed, nor is that a limit is kept, as runs show only that one is passed."""
 NAMED = 3
 """Of what missed the gap asked for, in the message."""
 
@@ -147,14 +152,23 @@ def uncertain(
             if inputs.mixed:
                 judged.append(between(passed, machine, inputs, **how))
             else:
-                judged.append(judge(passed, machine, inputs, _reach(inputs, when, gap, seed, most), **how))
+                found = judge(passed, machine, inputs, _reach(inputs, when, gap, seed, most), **how)
+                judged.append(crosschecked(found, machine, answer))
         if allocate:
             allocation = _allocated(judged[0], machine, costs or {}, target, most, how)
     except TimeIsUpError:
         pass
     finally:
         keep.close()
+    statistics, lacks = answer.statistics, list[str]()
+    for told in judged:
+        if statistics is not None and told.passing is not None and not told.doubt:
+            statistics, lack = allowing(statistics, machine, told.limit, told.passing.estimate)
+            lacks += [lack] if lack else []
     status, message = _status(answer, gap, rejected, judged)
+    message = "; ".join([message] * bool(message) + lacks)
+    if status in REFUSED:
+        judged = [replace(told, kept=None) if told.kept else told for told in judged]
     if keep.over:
         missing = [one.text for one in asked[len(judged) :]]
         status, message = (
@@ -182,7 +196,7 @@ def uncertain(
         wall_s=time.perf_counter() - begin,
         horizon=min(answer.horizon, float(when[-1])),
         bounds=bounds,
-        statistics=answer.statistics,
+        statistics=statistics,
         mesh_error=mesh,
         step_error=step,
         stated=wanted,
@@ -191,6 +205,7 @@ def uncertain(
         allocation=allocation,
         boxes=answer.boxes,
         finer=finer,
+        controls=answer.runs.controls,
     )
     if status == "gap-not-reached" and bounds is not None and gap is not None:
         response = replace(response, message=message + _named(response.missed(gap)))
@@ -235,12 +250,44 @@ def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, 
         careful, _ = stable(
             machine.scene.with_values(given), lambda scene: verified(machine.engine, scene, machine.times)
         )
-        if not careful.ok:
-            return _whole(mesh), step, f"a more careful run does not bear one out: {careful.message}"
         estimated = careful.model.get("verification", {})
+        if not careful.ok and not (nothing := _nothing(machine, runs.values))(estimated):
+            return _whole(mesh), step, f"a more careful run does not bear one out: {careful.message}{nothing}"
         mesh = larger(mesh, estimated.get("mesh_error"))
         step = larger(step, estimated.get("time_error"))
     return _whole(mesh), step, ""
+
+
+@dataclass(frozen=True)
+class _Nothing:
+    """Up to which errors of single runs are nothing beside what the runs differ by; in words what that is.
+
+    length [m], angle [rad]; name: of the widest coordinate
+    """
+
+    length: float
+    angle: float
+    name: str
+
+    def __call__(self, estimated: Mapping[str, Any]) -> bool:
+        """Whether these errors are nothing; empty where the run has failed."""
+        if not estimated or estimated["rejected"]:
+            return False
+        errors = (estimated[name] or 0.0 for name in ("time_error", "mesh_error", "bending_error"))
+        return max(errors) <= self.length and (estimated["angle_error"] or 0.0) <= self.angle
+
+    def __str__(self) -> str:
+        return f"; {self.length:.2g} m, {100 * NEGLIGIBLE:g} % of the width of {self.name}, would be nothing"
+
+
+def _nothing(machine: Machine, values: Array) -> _Nothing:
+    """values: of all runs, (runs, columns)."""
+    widths = np.ptp(values, axis=0).reshape(machine.columns).max(axis=0)
+    coordinates = [k for k, name in enumerate(machine.quantities) if name in "xyz"]
+    marker, axis = divmod(int(widths[:, coordinates].argmax()), len(coordinates))
+    name = f"{list(machine.scene.markers)[marker]}.{machine.quantities[axis]}"
+    angle = max(WRONG, NEGLIGIBLE * float(widths[:, -1].max()))
+    return _Nothing(NEGLIGIBLE * float(widths[marker, axis]), angle, name)
 
 
 def _whole(apart: float | None) -> float | None:

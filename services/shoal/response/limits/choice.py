@@ -10,6 +10,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.response.kept import TimeIsUpError
+from shoal.response.limits.counted import contradiction
 from shoal.response.limits.estimate import Estimate, weighted
 from shoal.response.limits.form import DesignPoint, design_points, distinct
 from shoal.response.limits.importance import Sample, adapted, around, sample
@@ -40,18 +41,23 @@ FOR_POINTS = 0.2
 """Share of the runs that design points may take."""
 COARSE = 0.15
 """Coefficient of variation above which the estimate is told to be coarse."""
+PLAIN = 0.1
+"""Share of the runs that are drawn from the distributions: design points are where a search looks, these are not."""
 DISAGREE = 4.0
 """Standard deviations by which it may say more than importance sampling and it still be chance."""
 
 
 @dataclass(frozen=True)
 class Passing:
-    """The answer of a method. doubt: why it should not be believed, empty if it may be."""
+    """The answer of a method. doubt: why it should not be believed, empty if it may be; plain: runs that were drawn
+    from the distributions to see whether they contradict it
+    """
 
     estimate: Estimate
     points: list[DesignPoint]
     why: str
     doubt: str = ""
+    plain: int = 0
 
 
 def form(margins: Margins, seed: int) -> Passing:
@@ -111,18 +117,22 @@ def auto(margins: Margins, seed: int) -> Passing:
     proposal = around(points)
     if len(pilot.places):
         proposal = adapted(points, Sample(pilot.places, pilot.margins, np.ones(len(pilot.places))))
+    plain = np.random.default_rng(seed + 4).standard_normal((int(PLAIN * margins.left), len(margins.inputs)))
+    rows = margins(plain)
     first = sample(margins, proposal, int(FIRST * margins.left), seed + 2)
     estimate = sample(margins, adapted(points, first), margins.left, seed + 3).estimate
+    if doubt := contradiction(estimate, rows):
+        return Passing(estimate, points, estimate.why, doubt, len(rows))
     why = f"{estimate.why} around {_told(points)}"
     if not len(pilot.places) or not estimate.probability:
-        return Passing(estimate, points, why, _coarse(estimate))
+        return Passing(estimate, points, why, _coarse(estimate), len(rows))
     # Subset simulation may lose a place as well, but it finds none that is not there.
     missing = math.log(rough.probability / estimate.probability)
     if missing > DISAGREE * math.hypot(max(rough.coefficient, LEAST), estimate.coefficient):
         doubt = f"importance sampling says {estimate.probability:.1e} and subset simulation {rough.probability:.1e}"
-        return Passing(estimate, points, why, doubt)
+        return Passing(estimate, points, why, doubt, len(rows))
     agrees = f"; {rough.why} says {rough.probability:.1e}"
-    return Passing(estimate, points, why + agrees, _coarse(estimate))
+    return Passing(estimate, points, why + agrees, _coarse(estimate), len(rows))
 
 
 def _sought(margins: Margins, pilot: Levels, seed: int) -> list[DesignPoint]:

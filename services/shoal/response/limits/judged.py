@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 from scipy import special
 
+from shoal.response.control import unseen
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import Passing
 from shoal.response.limits.estimate import Estimate
 from shoal.response.limits.limit import Limit
 from shoal.trajectory import Array, plain
 
+NEARLY_SURE = 0.99
+"""A limit that is passed with a higher probability may have been stated the other way round."""
 MOST_BEYOND = 0.25
 """Reliability index by which interval values that were not looked at may lie beyond, and no more."""
 
@@ -133,6 +136,13 @@ class Judged:
         return [one.passing.estimate for one in every if one.passing is not None]
 
     @property
+    def note(self) -> str:
+        """What else a user should know, empty if nothing."""
+        if not self.estimates or not min(one.probability for one in self.estimates) > NEARLY_SURE:
+            return ""
+        return f"{self.limit.text} states what must not happen, and nearly always does: is it what is required instead?"
+
+    @property
     def doubt(self) -> str:
         """Why it should not be believed, empty if it may be."""
         found = self.reason_to_doubt
@@ -161,7 +171,7 @@ class Judged:
             found |= self._probability(self.passing)
         else:
             found |= {"kept": self.kept, "margin": self.margin, "margin_outer": self.outer}
-        found |= {"evaluations": self.evaluations, "failed": self.failed, "doubt": self.doubt}
+        found |= {"evaluations": self.evaluations, "failed": self.failed, "doubt": self.doubt, "note": self.note}
         return dict(plain({**found, "shown_by": None if self.shown is None else self.shown.to_json()}))
 
     def _probability(self, passing: Passing) -> dict[str, Any]:
@@ -184,6 +194,7 @@ class Judged:
             "upper": upper[-1],
             "confidence": 0.95,
             "coefficient_of_variation": estimate.coefficient,
+            "unseen": unseen(passing.plain) if passing.plain else None,
             "between_instants": estimate.between,
             "beta": float(-special.ndtri(estimate.probability)),
             "why": passing.why,

@@ -7,10 +7,12 @@ says is its error. The degree grows until the foretold bounds and the attained o
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shoal.response import control
 from shoal.response.design import box_design
 from shoal.response.enclosure import enclosure, looked_at
 from shoal.response.expansion import Expansion, fit
@@ -70,19 +72,30 @@ def bounds(study: Study) -> Found:
     runs(np.vstack([np.zeros((1, parameters)), unit, -unit]))
     plan = screened(study)
     _run_signs(plan, _foretold(plan, 1))
-    here, degree, again = _round(plan, 1), 1, 0
-    try:
+    here, degree = _grown(plan, _round(plan, 1), 1)
+    with suppress(TooManyRunsError):
+        missed = control.missed(study, here.surrogate)
+        surprising = control.contradict(study, missed, here.error) & (study.instants < horizon(study, here.gap))
+        here = replace(here, looked=control.entered(study, here.looked))
+        if surprising.any():
+            here = replace(here, error=study.beside(np.maximum(here.error, missed)), looked=None)
+            here, _ = _grown(plan, _round(plan, degree, here.decay), degree)
+    top = int(here.surrogate.terms.sum(axis=1).max())
+    kind = "regularised " if len(here.surrogate.terms) > len(runs.germs) / SHARE else ""
+    why = f"{kind}polynomials of total degree {top}; their extremal points are run and entered into the fit{plan.why}"
+    return Found(why, here.surrogate, here.error, looked=here.looked)
+
+
+def _grown(plan: Screened, here: Round, degree: int) -> tuple[Round, int]:
+    """Until outer and attained bounds meet, or no more runs help; and the degree."""
+    again = 0
+    with suppress(TooManyRunsError):
         while not _done(plan, here):
             # New extremal points teach more than a higher degree, once.
             again = 0 if again or here.found <= FEW else 1
             degree = degree if again else _next(plan, degree)
             here = _round(plan, degree, here.decay)
-    except TooManyRunsError:
-        pass
-    top = int(here.surrogate.terms.sum(axis=1).max())
-    kind = "regularised " if len(here.surrogate.terms) > len(runs.germs) / SHARE else ""
-    why = f"{kind}polynomials of total degree {top}; their extremal points are run and entered into the fit{plan.why}"
-    return Found(why, here.surrogate, here.error, looked=here.looked)
+    return here, degree
 
 
 def _next(plan: Screened, degree: int) -> int:
@@ -92,7 +105,7 @@ def _next(plan: Screened, degree: int) -> int:
     wanted = degree + 1
     while SHARE * plan.size(wanted + 1) <= made and wanted - degree < 3:
         wanted += 1
-    if wanted >= HIGHEST or study.runs.evaluations > MORE * plan.fair:
+    if wanted >= HIGHEST or study.runs.own > MORE * plan.fair:
         raise TooManyRunsError
     missing = math.ceil(SHARE * plan.size(wanted)) - made
     if made < plan.fair:
@@ -204,8 +217,8 @@ def _promising(plan: Screened, surrogate: Expansion, found: Extremes) -> Array:
     places = np.concatenate([found.at_lower, found.at_upper])
     told = surrogate(places)
     most = max(2, plan.fair // ROUNDS)
-    if runs.evaluations < plan.fair:
-        most = min(most, plan.fair - runs.evaluations)
+    if runs.own < plan.fair:
+        most = min(most, plan.fair - runs.own)
     names, varies = np.unique(study.groups), width > 0
     member = np.tile(study.groups, 2) == names[:, None]
     turns = dict.fromkeys(range(len(names)), 0)
@@ -237,12 +250,12 @@ def _enough(plan: Screened) -> float:
     study = plan.study
     if study.gap is not None:
         return study.gap
-    return FINE_GAP if study.runs.evaluations < plan.fair else HOPELESS
+    return FINE_GAP if study.runs.own < plan.fair else HOPELESS
 
 
 def _late(plan: Screened) -> bool:
     """Whether enough runs are made to look for the horizon."""
-    return plan.study.runs.evaluations >= ENOUGH * plan.fair
+    return plan.study.runs.own >= ENOUGH * plan.fair
 
 
 def _done(plan: Screened, here: Round) -> bool:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.response import control
 from shoal.response.course import UnsuitableError, Watch, refuse_without_course, watch
 from shoal.response.design import box_design
 from shoal.response.extremes import Surrogate
@@ -81,23 +83,41 @@ def _grown(study: Study, make: Callable[[Watch], LongTime], seen: Watch) -> Foun
             seen.follow(box_design(study.inputs, germs, beyond, parameters + 1, study.seed + degree))
             missed = np.abs(surrogate(study.runs.germs[made:]) - study.runs.values[made:]).max(axis=0)
             error = study.largest(missed, study.runs.values)
-            width = study.widths(study.runs.values)
-            share = float(np.divide(2 * SAFETY * error, width, out=np.zeros_like(width), where=width > 0).max())
+            share = _share(study, error)
             why = f"{kind.name} of degree {degree}, fitted to {made} of {study.runs.evaluations} runs"
             worse = 0 if found is None or share < HELPS * found.share else worse + 1
             if found is None or share < found.share:
                 found = Found(why, surrogate, error, foretold=True, share=share)
-            if share <= wanted or study.degree or worse == 2 or study.runs.evaluations > 2 * study.fair:
+            if share <= wanted or study.degree or worse == 2 or study.runs.own > 2 * study.fair:
                 break
             degree += 1
             while _carried(parameters, degree + 1, len(seen.germs)):
                 degree += 1
+        if found is not None:
+            found = _controlled(study, found)
     except TooManyRunsError:
         pass
     if found is None or found.share > max(wanted, OFF):
         off = "too few runs" if found is None else f"its error is {found.share:.1g} of the width"
         raise UnsuitableError(f"{kind.name} does not foretell new runs: {off}")
     return found
+
+
+def _controlled(study: Study, found: Found) -> Found:
+    """With what runs all over the box say of its error. Raises TooManyRunsError."""
+    assert found.surrogate is not None
+    assert found.error is not None
+    missed = control.missed(study, found.surrogate)
+    if not control.contradict(study, missed, found.error).any():
+        return found
+    error = np.maximum(found.error, study.largest(missed, study.runs.values))
+    return replace(found, error=error, share=_share(study, error))
+
+
+def _share(study: Study, error: Array) -> float:
+    """What an error leaves between both sides of a bound, as a share of the width: the largest."""
+    width = study.widths(study.runs.values)
+    return float(np.divide(2 * SAFETY * error, width, out=np.zeros_like(width), where=width > 0).max())
 
 
 def _carried(parameters: int, degree: int, runs: int) -> bool:

@@ -26,8 +26,8 @@ from shoal.trajectory import Array
 
 SHARE = 1.6
 """Runs for every term, at least."""
-FIRST = 24
-"""Runs to begin with; they are doubled."""
+FIRST = 64
+"""Runs to begin with, see `control`; they are doubled."""
 RUNS = 300
 """That are made unless the expansion is coarse by then."""
 COARSE, MORE = 1e-2, 6

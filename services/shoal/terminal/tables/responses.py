@@ -62,11 +62,18 @@ def response_table(response: Response) -> None:
             )
     if response.repeated or response.failed:
         screen.say(f"{response.repeated} runs were repeated with smaller steps, {response.failed} failed all the same")
+    if response.ok and response.statistics is not None and response.message:
+        screen.say(response.message)
     if response.bounds is not None:
         gap = response.bounds.gap
         known = f"outer ones lie {gap:.1e} of the width off; they hold until {response.horizon:g} s"
         unknown = "how much farther other values go is not known"
         screen.say(f"bounds are attained by runs; {unknown if np.isnan(gap) else known}")
+        if response.unseen is not None:
+            screen.say(
+                f"{response.controls} of the runs lie all over the box: what is told may be otherwise in "
+                f"{100 * response.unseen:.2g} % of it at most, with 95 % confidence"
+            )
     if response.boxes is not None:
         screen.say(
             f"statistics lie between these values, whatever the intervals are; they are known to "
@@ -102,6 +109,8 @@ def _limit(judged: Judged) -> None:
         says = {True: "is kept for all values", False: "is passed", None: "is kept by all runs, which proves nothing"}
         screen.say(f"{title}: {says[judged.kept]}", style="bold")
         how = "passed with" if judged.kept is False else "nearest with"
+    if judged.note:
+        screen.say(f"  {judged.note}")
     if shown is not None:
         known = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
         screen.say(f"  {how} {known}: margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s")

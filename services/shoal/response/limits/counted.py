@@ -1,0 +1,42 @@
+"""Whether runs that are drawn from the distributions, which tell a probability without bias, contradict it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy import stats
+
+from shoal.response.limits.estimate import Estimate
+from shoal.trajectory import Array
+
+CHANCE = 1e-3
+"""Counts that are less likely than this contradict a probability."""
+ROUGH = 2.0
+"""A probability without an interval may be off by this factor."""
+
+
+def contradiction(estimate: Estimate, margins: Array, share: float = 1.0) -> str:
+    """In words, empty where the number of runs that pass is a likely one (binomial tests of both ends, one-sided).
+
+    margins: of runs drawn from the distributions, (runs, instants); share: of them that counts as independent
+    """
+    lower, upper = ends(estimate)
+    passed, made = int(np.any(margins < 0, axis=1).sum()), len(margins)
+    count = int(share * made)
+    few = stats.binom.cdf(math.ceil(share * passed), count, lower)
+    many = stats.binom.sf(math.floor(share * passed) - 1, count, upper)
+    if min(few, many) >= CHANCE:
+        return ""
+    said = f"{estimate.why} says {estimate.probability:.1e}"
+    return f"{said}, but of {made} plain runs {passed} pass it, a share of {passed / made:.1e}"
+
+
+def ends(estimate: Estimate) -> tuple[float, float]:
+    """Of the interval of 95 % confidence, or about a probability that has none."""
+    lower, upper = (float(end[-1]) for end in estimate.interval)
+    if not math.isnan(lower) and not math.isnan(upper):
+        return lower, upper
+    if math.isnan(estimate.probability):
+        return 0.0, 1.0
+    return estimate.probability / ROUGH, min(ROUGH * estimate.probability, 1.0)

@@ -1,0 +1,83 @@
+"""What a study says of a limit and of the motion, held against each other.
+
+The runs that are drawn from the distributions tell a probability without bias, if roughly; and a deviation cannot be
+smaller than what lies beyond a limit makes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shoal.response.inputs import IntArray
+from shoal.response.limits.counted import contradiction, ends
+from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.judged import Judged
+from shoal.response.limits.limit import Limit
+from shoal.response.machine import Machine
+from shoal.response.statistics import Statistics
+from shoal.trajectory import Array
+
+if TYPE_CHECKING:
+    from shoal.response.respond import Answer
+
+
+def crosschecked(judged: Judged, machine: Machine, answer: Answer) -> Judged:
+    """With the runs that have told mean and deviation, where these tell the limit's quantity."""
+    columns = _columns(machine, judged.limit)
+    if judged.passing is None or columns is None:
+        return judged
+    indices, parameters = answer.found.indices, len(judged.inputs)
+    # Runs that tell indices share their parameters with others.
+    share = 1.0 if indices is None else 2 / (parameters + 2)
+    margins = judged.limit.margin(answer.runs.values[:, columns])
+    doubt = judged.passing.doubt or contradiction(judged.passing.estimate, margins, share)
+    return replace(judged, passing=replace(judged.passing, doubt=doubt))
+
+
+def allowing(told: Statistics, machine: Machine, limit: Limit, estimate: Estimate) -> tuple[Statistics, str]:
+    """Statistics whose errors allow for the probability of a limit; in words what they have missed, if anything."""
+    columns = _columns(machine, limit)
+    if columns is None:
+        return told, ""
+    mean, least = shifts(limit, told.mean[columns], told.error[columns], estimate)
+    lacks = least > told.std[columns] + np.nan_to_num(told.std_error[columns])
+    if not lacks.any():
+        return told, ""
+    error, std_error = told.error.copy(), told.std_error.copy()
+    error[columns] = np.where(lacks, np.fmax(error[columns], mean), error[columns])
+    std_error[columns] = np.where(lacks, least - told.std[columns], std_error[columns])
+    k = int(np.where(lacks, least, 0.0).argmax())
+    missed = (
+        f"the deviation of {limit.place}.{limit.quantity} at {machine.times[k]:g} s is told as "
+        f"{told.std[columns][k]:.1e}, and what passes {limit.text} makes it {least[k]:.1e} at least, "
+        "so that the errors of mean and deviation are told larger"
+    )
+    return replace(told, error=error, std_error=std_error), missed
+
+
+def shifts(limit: Limit, mean: Array, error: Array, estimate: Estimate) -> tuple[Array, Array]:
+    """By how much what lies beyond a limit moves the mean, and the deviation that it makes at least, (instants,) each.
+
+    With probability p beyond a bound at distance d from the mean that is p d and, by Cantelli's inequality,
+    d sqrt(p / (1 - p)); on both sides by Chebyshev's d sqrt(p). mean: told, to within `error`
+    """
+    lower, _ = ends(estimate)
+    # To be passed for the first time is no more probable than to be beyond.
+    first = np.diff(estimate.passed, prepend=0.0)
+    p = np.clip(first * lower / estimate.probability, 0.0, 0.5) if estimate.probability > 0 else np.zeros(len(first))
+    distance = np.maximum(limit.margin(mean) - np.nan_to_num(error), 0.0)
+    if limit.absolute and limit.above:
+        return np.zeros(len(p)), distance * np.sqrt(p)
+    return p * distance, distance * np.sqrt(p / (1 - p))
+
+
+def _columns(machine: Machine, limit: Limit) -> IntArray | None:
+    """Those of a study that tell the quantity of a limit, (instants,); None where none do."""
+    if limit.quantity not in machine.quantities or limit.place not in machine.scene.markers:
+        return None
+    _, markers, quantities = machine.columns
+    first = list(machine.scene.markers).index(limit.place) * quantities + machine.quantities.index(limit.quantity)
+    return np.arange(len(machine.times)) * markers * quantities + first
