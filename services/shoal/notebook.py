@@ -262,14 +262,17 @@ def export(
     return found
 
 
-def reactions(scene: Scene | str, times: Times, *, values: Values | None = None) -> list[Reactions]:
+def reactions(
+    scene: Scene | str, times: Times, *, values: Values | None = None, verify: bool = True
+) -> list[Reactions]:
     """Forces and torques in the joints of a scene at times [s] of its motion. Raises InputError, ComputationError.
 
-    values: fields of the scene to set, by dotted path
+    values: fields of the scene to set, by dotted path; verify: estimate their errors by runs with other steps
     """
     from shoal.mechanics.analysis.reactions import reactions
+    from shoal.mechanics.analysis.reactions_verified import verified
 
-    return reactions(_scene(scene, values), [float(t) for t in times])
+    return (verified if verify else reactions)(_scene(scene, values), [float(t) for t in times])
 
 
 def identify(
