@@ -335,16 +335,15 @@ def design(
     its data; parameter: to be sharpened, else the weakest. Raises InputError, ComputationError where no answer can be
     trusted.
     """
-    from shoal.identification.design import about_answer, design, has_data
+    from shoal.identification.design import about_answer, about_start, has_data
 
     (stated, carried), wanted = _values(values), _problem(problem)
     if carried is not None:
         wanted, stated, _ = carried.into(wanted)
     how = dict[str, Any](noise=noise, angle_noise=angle_noise, sensor_noise=sensor_noise, duration=duration, rate=rate)
-    if about == "answer" or (about is None and (data is not None or has_data(wanted))):
-        with _files(data) as files:
-            return about_answer(wanted, data=files, values=stated, parameter=parameter, **how)
-    return design(wanted, values=stated, parameter=parameter, **how)
+    answered = about == "answer" or (about is None and (data is not None or has_data(wanted)))
+    with _files(data) as files:
+        return (about_answer if answered else about_start)(wanted, files, stated, parameter=parameter, **how)
 
 
 def plot(result: Scene | Trajectory | Equilibrium | Estimate | Sweep | Comparison) -> Picture:
