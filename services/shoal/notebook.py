@@ -262,14 +262,17 @@ def export(
     return found
 
 
-def reactions(scene: Scene | str, times: Times, *, values: Values | None = None) -> list[Reactions]:
+def reactions(
+    scene: Scene | str, times: Times, *, values: Values | None = None, verify: bool = True
+) -> list[Reactions]:
     """Forces and torques in the joints of a scene at times [s] of its motion. Raises InputError, ComputationError.
 
-    values: fields of the scene to set, by dotted path
+    values: fields of the scene to set, by dotted path; verify: estimate their errors by runs with other steps
     """
     from shoal.mechanics.analysis.reactions import reactions
+    from shoal.mechanics.analysis.reactions_verified import verified
 
-    return reactions(_scene(scene, values), [float(t) for t in times])
+    return (verified if verify else reactions)(_scene(scene, values), [float(t) for t in times])
 
 
 def identify(
@@ -332,16 +335,15 @@ def design(
     its data; parameter: to be sharpened, else the weakest. Raises InputError, ComputationError where no answer can be
     trusted.
     """
-    from shoal.identification.design import about_answer, design, has_data
+    from shoal.identification.design import about_answer, about_start, has_data
 
     (stated, carried), wanted = _values(values), _problem(problem)
     if carried is not None:
         wanted, stated, _ = carried.into(wanted)
     how = dict[str, Any](noise=noise, angle_noise=angle_noise, sensor_noise=sensor_noise, duration=duration, rate=rate)
-    if about == "answer" or (about is None and (data is not None or has_data(wanted))):
-        with _files(data) as files:
-            return about_answer(wanted, data=files, values=stated, parameter=parameter, **how)
-    return design(wanted, values=stated, parameter=parameter, **how)
+    answered = about == "answer" or (about is None and (data is not None or has_data(wanted)))
+    with _files(data) as files:
+        return (about_answer if answered else about_start)(wanted, files, stated, parameter=parameter, **how)
 
 
 def plot(result: Scene | Trajectory | Equilibrium | Estimate | Sweep | Comparison) -> Picture:

@@ -42,8 +42,8 @@ class Trajectory:
     angles: direction of the body (of a cable: of its tangent) at each marker [rad],
         continuous in time, (samples, markers, lanes)
     status: one per lane; message: why the first lane that is not ok is not
-    energy_drift: largest |E(t) + dissipated - E(0)| relative to the largest kinetic plus
-        elastic energy, (lanes,)
+    energy_drift: largest |E(t) + dissipated - E(0)| relative to the largest kinetic energy plus
+        the size of the elastic one, (lanes,)
     constraint_drift: largest violation of a position constraint, relative to the machine's size, (lanes,)
     steps: time steps taken by each lane; wall_s: wall-clock time of the whole call [s]
     model: what was computed, for the record (unknowns, elements, integrator, step, ...)

@@ -143,6 +143,16 @@ def test_sensors_that_are_mounted_otherwise_share_a_motion() -> None:
         np.testing.assert_allclose(one, wanted, atol=1e-8)
 
 
+def test_a_strain_gauge_beside_a_camera_shows_the_same_to_lanes_that_share_a_motion() -> None:
+    """A time limit makes two such lanes ready before its clock begins."""
+    channels = (Channel(marker="gauge", quantity="strain"), Channel(marker="tip", quantity="y"))
+    scene, heights = cantilever(), np.array([0.0, 0.1])
+    motion = get_engine("gauss").simulate(equipped(scene, channels), np.array([0.0, 2e-3]))
+    found = observe(motion, channels, Camera(y=heights), scene)
+    alone = np.concatenate([observe(motion, channels, Camera(y=y), scene) for y in heights.tolist()])
+    np.testing.assert_array_equal(found, alone)
+
+
 def test_an_accelerometer_at_rest_shows_gravity_upwards() -> None:
     block = {"kind": "rigid-body", "mass": 2.0, "inertia": 0.1}
     weld = {"kind": "weld", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "rod"}}

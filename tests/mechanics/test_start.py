@@ -527,3 +527,17 @@ def test_a_contradiction_names_the_mechanism_that_gapes(monkeypatch: pytest.Monk
     text, count = looked(monkeypatch, Scene.parse(scene(bodies, joints) | {"initial": start}))
     assert text.startswith("initial.a5.angle: 3 rad cannot be kept: joint C5 would stay ")
     assert count < 900
+
+
+@pytest.mark.parametrize("digits", [4, 6, 9])
+def test_rounded_places_of_a_machine_that_holds_itself_twice_are_said_to_be_rounded(digits: int) -> None:
+    """Three cranks in a row under one bar, which without its angle would turn over: none is told to be left out."""
+    rng, lead = np.random.default_rng(3), np.round(np.exp(0.7j) * np.arange(3), digits)
+    feet = {f"o{k}": pin("ground", [float(z.real), float(z.imag)], f"k{k}") for k, z in enumerate(lead)}
+    heads = {f"p{k}": pin(f"k{k}", "end", "bar", [float(k), 0.0]) for k in range(3)}  # type: ignore[arg-type]
+    bodies = {**{f"k{k}": bar(0.3, rng) for k in range(3)}, "bar": bar(2.0, rng)}
+    start = {**{f"k{k}": {"angle": 0.2} for k in range(3)}, "bar": {"angle": 0.7}}
+    with pytest.raises(
+        InputError, match=r"p\d would stay .* m apart, as rounded places or lengths do; state them with"
+    ):
+        complete(Scene.parse(scene(bodies, {**feet, **heads}) | {"initial": start}))

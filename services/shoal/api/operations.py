@@ -204,9 +204,10 @@ class Modes(AtRest):
 
 
 class Reactions(OfScene):
-    """Forces and torques in the joints at `times` [s] of the motion."""
+    """Forces and torques in the joints at `times` [s] of the motion. verify: estimate their errors by more runs."""
 
     times: Some
+    verify: bool = True
 
 
 class Export(OfScene):

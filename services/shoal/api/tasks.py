@@ -23,6 +23,7 @@ from shoal.engines.verification import verified
 from shoal.errors import InputError
 from shoal.identification.methods import get_method
 from shoal.identification.recording.source import FileSource
+from shoal.mechanics.analysis.joint_reactions import told as told_reactions
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory, plain
 from shoal.wire import packed
@@ -114,8 +115,7 @@ def _computed(bench: Bench, name: str, arguments: dict[str, Any], request: Reque
 def told(found: Any) -> Any:
     """A result as the command line prints it with --json."""
     if isinstance(found, list):
-        ok = all(one.ok for one in found)
-        return {"status": "ok" if ok else "unbalanced", "reactions": [one.to_json() for one in found]}
+        return told_reactions(found)
     trajectory = getattr(found, "trajectory", None)
     return found.to_json() if trajectory is None else {**trajectory.to_json(), "selection": found.to_json()}
 

@@ -65,17 +65,18 @@ def modes(
     "--at", "times", required=True, metavar="T,T,...", callback=options.times_list, help="Times of the motion [s]."
 )
 @options.values
+@options.verify
 @options.as_json
-def reactions(scene: str, times: list[float], values: Values, as_json: bool) -> None:
+def reactions(scene: str, times: list[float], values: Values, verify: bool, as_json: bool) -> None:
     """Forces [N] and torques [N m] in the joints of SCENE while it moves, as they act on the second body."""
-    from shoal.mechanics.analysis.reactions import reactions
+    from shoal.mechanics.analysis.joint_reactions import told
+    from shoal.notebook import reactions
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"reactions of {wanted.name}"):
-        found = reactions(wanted, times)
-    ok = all(one.ok for one in found)
-    report = {"status": "ok" if ok else "unbalanced", "reactions": [one.to_json() for one in found]}
+        found = reactions(wanted, times, verify=verify)
+    report = told(found)
     screen.show(report, as_json, lambda: tables.reactions_table(found))
-    check_trusted(ok, "the bodies are not in balance")
+    check_trusted(report["status"] == "ok", report["message"])

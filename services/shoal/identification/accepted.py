@@ -6,18 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shoal.errors import InputError
+from shoal.identification.bounds import accepts
 from shoal.identification.problem import Parameter
 from shoal.scene import Scene
-
-
-def accepts(scene: Scene, path: str, value: float) -> bool:
-    """Whether a scene may have a value at a path."""
-    try:
-        scene.with_values({path: value})
-    except InputError:
-        return False
-    return True
 
 
 class Accepted:

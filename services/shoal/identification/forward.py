@@ -14,7 +14,8 @@ import numpy.typing as npt
 from shoal.engines import get_engine
 from shoal.engines.contract import Engine
 from shoal.errors import InputError
-from shoal.identification.accepted import Accepted, accepts
+from shoal.identification.accepted import Accepted
+from shoal.identification.bounds import accepts
 from shoal.identification.deadline import Deadline, TimeIsUp
 from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
+from shoal.identification.bounds import possible_bound
 from shoal.identification.recording.sensor_checks import check_felt
 from shoal.identification.recording.source import IN_SPACE, Channel, EngineSource, FileSource, Source
 from shoal.scene import Scene, expression, load_scene
@@ -210,11 +211,14 @@ class Problem(Record):
         except InputError:
             free = set()
         for name, (path, *ends) in bounds.items():
-            for bound in ends if name not in free else ():
+            for end, bound in zip(("lower", "upper"), ends, strict=True) if name not in free else ():
                 try:
                     scene.with_values({path: bound})
                 except InputError as error:
-                    raise InputError(f"{self.name}: parameters.{name}: {error}") from None
+                    nearest = possible_bound(scene, path, bound)
+                    told = "" if nearest is None else f"; with the rest of {scene.name} as it is {nearest:g} can be"
+                    where = f"{self.name}: parameters.{name}.{end}"
+                    raise InputError(f"{where}: {bound:g} cannot be: {error}{told}") from None
 
     def check_channels(self, channels: tuple[Channel, ...], scene: Scene, where: str) -> None:
         """Whether a recording can be compared with the scene. Raises InputError."""

@@ -32,8 +32,9 @@ class Work(NamedTuple):
     z, zdot, a: coordinates, rates and accelerations, (rows, lanes). before: z, zdot and a at the
     beginning of the step. stage: room of four states for integrators. element: room of 64 rows or more. memory: the
     continuous angle of every force element, (forces, lanes). power: dissipated minus supplied power
-    [W], (lanes,). energy: kinetic, elastic, potential [J], (3, lanes). until: the last instant [s] before
-    functions of time may jump, (1,); what is asked for later, is asked for then. rubbing: of friction by joint forces.
+    [W], (lanes,). energy: kinetic, elastic, potential, elastic of the bodies alone [J], (4, lanes). until: the last
+    instant [s] before functions of time may jump, (1,); what is asked for later, is asked for then. rubbing: of
+    friction by joint forces.
     """
 
     home: Array
@@ -64,7 +65,7 @@ def work_space(tile: Tile, m: Arrays) -> Work:
         max(ELEMENT_ROWS * width, ELEMENT_ROOM),
         m.forces.size * width,
         width,
-        3 * width,
+        4 * width,
     )
     z, zdot, a, before, stage, element, memory, power, energy = (np.zeros(size) for size in sizes)
     return Work(
@@ -235,7 +236,7 @@ def remember(tile: Tile, m: Arrays, w: Work) -> None:
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def energies(tile: Tile, m: Arrays, w: Work) -> None:
-    """Kinetic, elastic and gravitational energy [J] of the state, into w.energy; uses w.stage."""
+    """Energies [J] of the state, into w.energy; uses w.stage."""
     width = len(tile)
     multiply_mass(tile, m, w.zdot, w.stage)
     moving = simd.spread(tile, 0.0)
@@ -252,4 +253,5 @@ def energies(tile: Tile, m: Arrays, w: Work) -> None:
         kind += 1
         if family.size > 0:
             gate.call(m.gates.energy[kind], (tile, family, w.z, w.element, w.energy, 1))
+    simd.store(w.energy, 3 * width, simd.load(tile, w.energy, width))
     forces.add_energy(tile, m.forces, m.functions, w.z, w.memory, w.element, w.energy, 1)

@@ -306,11 +306,15 @@ def _count_turns(tile: Tile, m: Arrays, w: Work, k: LoopRoom, marker_rows: Index
 
 @njit(cache=True, error_model="numpy")
 def _energy(tile: Tile, m: Arrays, w: Work, total: Array, scale: Array) -> None:
-    """Energy of the state [J], and the largest kinetic and elastic one so far."""
+    """Energy of the state [J], and the largest kinetic and elastic one so far.
+
+    The potential of springs may be negative, such as that of a constant force: its size counts.
+    """
     width = len(tile)
     gates.energies(tile, m, w)
     for lane in range(width):
-        moving = w.energy[lane] + w.energy[width + lane]
-        total[lane] = moving + w.energy[2 * width + lane]
+        kinetic, elastic, bodies = w.energy[lane], w.energy[width + lane], w.energy[3 * width + lane]
+        total[lane] = kinetic + elastic + w.energy[2 * width + lane]
+        moving = kinetic + bodies + abs(elastic - bodies)
         if not moving <= scale[lane]:
             scale[lane] = moving

@@ -20,9 +20,9 @@ TURN = 2.0 * np.pi
 class Marched(NamedTuple):
     """What a march leaves behind. samples: (times * markers * sampled(d), lanes), see `sampled`; the rest: (lanes,).
 
-    energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest kinetic + elastic energy [J];
-    drift: largest violation of a constraint by its power of a length, (POWERS * lanes,);
-    begin: coordinates and rates at the start, made consistent, (2 * unknowns, lanes).
+    energy_error: largest |E + dissipated - E(0)| [J]; energy_scale: largest energy in motion [J], kinetic, of
+    bent bodies and the size of that of springs; drift: largest violation of a constraint by its power of a length,
+    (POWERS * lanes,); begin: coordinates and rates at the start, made consistent, (2 * unknowns, lanes).
     Common to the lanes of a tile: steps taken, evaluations of the forces, the time reached [s].
     """
 
@@ -162,7 +162,7 @@ def frame_type(frame: Frame) -> Any:
 
 FARTHEST, ENERGY_DRIFT, CONSTRAINT_DRIFT, ENERGY_SCALE, STEPS, EVALUATIONS, REACHED = range(7)
 """Rows of the numbers that a run is judged by: the largest distance of a marker from its nearest anchor [m]; the energy
-error over the largest kinetic + elastic energy; the largest violation of a constraint, relative to the machine's size;
+error over the largest energy in motion; the largest violation of a constraint, relative to the machine's size;
 and as `Marched` has them."""
 NUMBERS = 7
 

@@ -58,7 +58,7 @@ class Limits:
     def energy_floor(self, end: float) -> float:
         """The energy [J] that the energy error of a run up to `end` [s] is compared with at least.
 
-        That error is relative to the largest kinetic + elastic energy. A machine that never moves has none: then its
+        That error is relative to the largest energy in motion. A machine that never moves has none: then its
         weight lifted by its span and the energy of stretching its rods set the scale, as far as round-off goes. Nor is
         it an error if the weight sinks at a rate that the tolerance of rates allows: between two bars in one line,
         which hold it to the second order only, it does until they feel it.

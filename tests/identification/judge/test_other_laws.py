@@ -13,7 +13,9 @@ from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem
 from shoal.identification.conclude import NOTHING, conclude
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.other_laws import OtherLaw, sentences
 from shoal.identification.methods import get_method
+from shoal.identification.spread.value import Value
 from shoal.scene import Scene
 
 LENGTH, MASS, VISCOUS, START = 0.8, 0.5, 0.02, -0.7
@@ -91,6 +93,35 @@ def test_a_law_that_would_not_show_is_told_and_widens_nothing(seed: int) -> None
         assert float(told[1]) < VISCOUS < float(told[2])
         assert float(told[2]) - float(told[1]) > 2 * (friction.upper - friction.lower)
     assert not estimate.parameters["friction"].lower < VISCOUS
+
+
+@pytest.mark.parametrize(
+    ("others", "told"),
+    [
+        (
+            [("drag", 0.3, 0.2)],
+            "drag as well, which may not show here, c is only known to be from 0.1 to 1.1",
+        ),
+        (
+            [("drag", 2.0, 0.2)],
+            "drag as well, which may not show here, c is only known to be from 0.9 to 2.2",
+        ),
+        ([("drag", 0.3, 0.2), ("coulomb", 3.0, 0.5)], "from 0.1 to 3.5"),
+        ([("drag", 1.1, 0.1)], ""),
+    ],
+    ids=["less", "more", "both", "near"],
+)
+def test_an_interval_goes_from_the_lowest_to_the_highest(others: list[tuple[str, float, float]], told: str) -> None:
+    """Another law may make of a sought friction less or more."""
+
+    def value(centre: float, half: float) -> Value:
+        return Value(centre, half / 2, centre - half, centre + half, True)
+
+    there = {field: value(centre, half) for field, centre, half in others}
+    laws = [OtherLaw("c", "O", field, False, np.zeros(1)) for field in there]
+    found = sentences(laws, {"c": value(1.0, 0.1)}, lambda law: there[law.field])
+    assert "".join(found).endswith(told)
+    assert bool(found) == bool(told)
 
 
 def test_laws_that_are_sought_are_no_other_laws() -> None:

@@ -196,11 +196,11 @@ def _check(model: CasadiModel, scene: Scene, states: Array, wanted: npt.NDArray[
 
 
 def _energy_drift(model: CasadiModel, states: Array) -> float:
-    """Largest |E + dissipated - E(0)| relative to the largest kinetic plus elastic energy."""
+    """Largest |E + dissipated - E(0)| relative to the largest kinetic plus |elastic| energy."""
     energies = model.energies(states).full()
     balance = energies.sum(axis=0) + states[-1]
     # A machine at rest has no such energy; round-off of the potential energy must not look like drift.
-    scale = max(energies[:2].sum(axis=0).max(), 1e-9 * model.weight * float(model.reach.max()))
+    scale = max(np.abs(energies[:2]).sum(axis=0).max(), 1e-9 * model.weight * float(model.reach.max()))
     return float(np.max(np.abs(balance - balance[0])) / scale) if scale > 0 else 0.0
 
 

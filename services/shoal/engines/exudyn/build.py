@@ -100,15 +100,18 @@ class Machine:
         return max((float(np.max(gap(q, v))) for gap in self.gaps), default=0.0)
 
     def energy(self, t: Array, q: Array, v: Array, rows: Indices) -> tuple[Array, Array]:
-        """Total energy and its kinetic plus elastic share [J] at `rows` of times t [s], (rows,) each."""
+        """Total energy and that in motion [J] at `rows` of times t [s], (rows,) each.
+
+        In motion: kinetic, elastic of bodies, and the size of that of springs.
+        """
         shares = [part.energy(q[rows], v[rows]) for part in self.parts.values()]
         moving = np.sum([share.kinetic + share.elastic for share in shares], axis=0)
         # A torsion spring counts its turns along all times.
         stored = (exchange.stored(t, q, v)[rows] for exchange in self.exchanges if exchange.stored is not None)
-        moving = moving + sum(stored, np.zeros(len(rows)))
+        springs = sum(stored, np.zeros(len(rows)))
         gravity = padded(self.scene.gravity, self.scene.dimensions)
         height = np.sum([share.moment for share in shares], axis=0) @ np.array(gravity)
-        return moving - height, moving
+        return moving + springs - height, moving + np.abs(springs)
 
     def crossed(self, q: Array, v: Array) -> Array:
         """The largest fraction of a narrow part of a force law that each step crosses, (rows - 1,)."""

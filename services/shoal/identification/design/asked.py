@@ -78,11 +78,15 @@ def noise_in(channel: Channel, noise: Mapping[str, float]) -> float:
 
 def today_of(
     source: Any, measurement: Measurement | None, duration: float | None, rate: float | None
-) -> tuple[float, float]:
-    """Duration [s] and samples per second, as given, else of the measurement, else as the source says."""
-    if measurement is not None:
-        times = measurement.first.times
-        found = (float(times[-1]), len(times) / float(times[-1]))
+) -> tuple[float, float, float | None]:
+    """Duration [s] and samples per second, as given, else of the measurement, else as the source says.
+
+    And the first instant of the measurement [s], None without one. Raises InputError.
+    """
+    first = None
+    if measurement is not None and len(times := measurement.first.times) > 1:
+        first = float(times[0])
+        found = (float(times[-1]), (len(times) - 1) / float(times[-1] - times[0]))
     elif isinstance(source, EngineSource):
         found = (source.stop, source.count / source.stop)
     else:
@@ -91,14 +95,17 @@ def today_of(
     for what, size, unit in (("duration", duration, "s"), ("rate", rate, "samples per second")):
         if not (np.isfinite(size) and size > 0):
             raise InputError(f"{what}: needed, and positive [{unit}]; without a recording it cannot be guessed")
-    return duration, rate
+    return duration, rate, first
 
 
-def grid(duration: float, rate: float) -> Array:
-    """Instants until twice the duration at twice the rate. Raises InputError."""
-    count = round(4 * duration * rate)
+def grid(duration: float, rate: float, first: float | None = None) -> Array:
+    """Instants until twice the duration at twice the rate. Raises InputError.
+
+    first [s]: of them, else half a sampling interval
+    """
+    count = round(4 * duration * rate) if first is None else int((2 * duration - first) * 2 * rate + 1e-6) + 1
     if not 8 <= count <= _MOST:
         raise InputError(
             f"rate: {rate:g} samples per second over {duration:g} s; at most {_MOST // 4} in all, and at least 2"
         )
-    return np.arange(1, count + 1) / (2 * rate)
+    return np.arange(1, count + 1) / (2 * rate) if first is None else first + np.arange(count) / (2 * rate)

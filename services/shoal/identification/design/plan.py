@@ -122,24 +122,23 @@ def design(
     """
     source = next(iter(problem.sources.values()))
     sizes = stated_noise(problem, noise, angle_noise, sensor_noise)
-    duration, rate = today_of(source, measurement, duration, rate)
+    own = None if measurement is None or duration is not None or rate is not None else measurement.first.times
+    duration, rate, first = today_of(source, measurement, duration, rate)
     stated = problem.load_scene(values)
     scene, sensors = sensors_of(stated, sizes)
     present = problem.channels_of(source)
     sensors = _possible(problem, scene, sensors, at)
     channels = (*present, *(channel for sensor in sensors for channel in sensor.channels))
     size = np.array([noise_in(channel, sizes) for channel in channels])
-    model = _model(problem, scene, channels, size, grid(duration, rate))
+    model = _model(problem, scene, channels, size, grid(duration, rate, first))
     aim = _aim(model, parameter)
     point = _point(model, at)
-    seen = sensitivity(model, point)
-    if not np.all(np.isfinite(seen.residual)):
-        reason = model.refusal or "it fails"
-        raise InputError(f"{problem.name}: the motion about these values cannot be simulated: {reason}")
-    assert model.rows.noise is not None
-    over_noise = np.stack([seen.jacobian, seen.error], axis=1) / model.rows.noise
-    bundle = Bundle.of(model.measurement.first.times, over_noise, len(channels), aim.span, len(present))
+    bundle, doubt = _bundle(model, point, aim, len(present), first is not None)
     now = bundle.precision(range(bundle.present), duration)
+    if own is not None:
+        # What was measured is known by its own instants, which may be uneven.
+        measured = _model(problem, scene, present, size[: len(present)], own)
+        now = _bundle(measured, point, aim, len(present), True)[0].precision(range(len(present)), duration, 1)
 
     def order(pair: tuple[Sensor, Precision]) -> tuple[float, int, float]:
         return aim.score(pair[1]), pair[1].unknown, pair[1].a
@@ -165,8 +164,21 @@ def design(
         table=np.array([[aim.score(bundle.precision(best, end, step)) for step in steps] for end in durations]),
         times=course,
         course=np.array([[aim.score(bundle.precision(columns[c], end)) for end in course] for c, _ in ranked]),
-        doubt=seen.doubt,
+        doubt=doubt,
     )
+
+
+def _bundle(model: ForwardModel, point: Array, aim: Aim, present: int, begins: bool) -> tuple[Bundle, float]:
+    """Sensitivities over the noise, and the relative difference of two steps. Raises InputError."""
+    seen = sensitivity(model, point)
+    if not np.all(np.isfinite(seen.residual)):
+        reason = model.refusal or "it fails"
+        raise InputError(f"{model.problem.name}: the motion about these values cannot be simulated: {reason}")
+    assert model.rows.noise is not None
+    over_noise = np.stack([seen.jacobian, seen.error], axis=1) / model.rows.noise
+    recording = model.measurement.first
+    channels = len(recording.channels)
+    return Bundle.of(recording.times, over_noise, channels, aim.span, present, begins), seen.doubt
 
 
 def _aim(model: ForwardModel, parameter: str | None) -> Aim:
@@ -237,6 +249,23 @@ def about_answer(
         )
     at = {name: value.value for name, value in found.parameters.items()}
     return design(problem, at=at, values=values, measurement=found.measurement, **options)
+
+
+def about_start(
+    problem: Problem,
+    data: str | Mapping[str, str] | None = None,
+    values: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> Design:
+    """A design about the starts of the parameters; the sample times are those of the data, if there are any.
+
+    options: of `design`. Raises InputError.
+    """
+    computed = any(isinstance(source, EngineSource) for source in problem.sources.values())
+    asked = options.get("duration") is None or options.get("rate") is None
+    read = asked and not computed and (data is not None or has_data(problem))
+    measurement = measure(problem, problem.load_scene(), data) if read else None
+    return design(problem, values=values, measurement=measurement, **options)
 
 
 def _point(model: ForwardModel, at: Mapping[str, float] | None) -> Array:

@@ -30,6 +30,7 @@ class Bundle:
     """Sensitivities over the noise, (times, channels, parameters): `present` channels of today, then the sensors'.
 
     error: by how much they may be off, likewise; prior: the rows of priors, (priors, parameters)
+    begins: whether the first instant is a sample at every rate, else the first sample is an interval after time zero
     """
 
     times: Array
@@ -38,21 +39,24 @@ class Bundle:
     prior: Array
     span: Array
     present: int
+    begins: bool = False
 
     @classmethod
-    def of(cls, times: Array, jacobian: Array, channels: int, span: Array, present: int) -> Bundle:
+    def of(
+        cls, times: Array, jacobian: Array, channels: int, span: Array, present: int, begins: bool = False
+    ) -> Bundle:
         """From a Jacobian over the noise and its error, (rows and priors, 2, parameters), of channels at all times."""
         rows = len(times) * channels
         table, error = np.moveaxis(jacobian[:rows].reshape(len(times), channels, 2, -1), 2, 0)
-        return cls(times, table, error, jacobian[rows:, 0], span, present)
+        return cls(times, table, error, jacobian[rows:, 0], span, present, begins)
 
     def precision(self, columns: Sequence[int], end: float, every: int = 2) -> Precision:
         """By some of the channels until a time [s], every so many instants."""
         # The grid is twice as fine as today's sampling.
-        keep = (self.times <= end * (1 + 1e-9))[every - 1 :: every]
+        sampled = slice(0 if self.begins else every - 1, None, every)
+        keep = (self.times <= end * (1 + 1e-9))[sampled]
         rows, error = (
-            part[every - 1 :: every][keep][:, list(columns)].reshape(-1, len(self.span))
-            for part in (self.table, self.error)
+            part[sampled][keep][:, list(columns)].reshape(-1, len(self.span)) for part in (self.table, self.error)
         )
         return precision(np.concatenate([rows, self.prior]), self.span, error)
 

@@ -72,16 +72,21 @@ def sentences(laws: list[OtherLaw], values: dict[str, Value], there: Callable[[O
 
     there: the sought friction at the end of a law
     """
-    wide: dict[tuple[str, str], list[tuple[str, Value]]] = {}
+    wide: dict[tuple[str, str], dict[str, Value]] = {}
     for law in laws:
         known, other = values[law.sought], there(law)
         if known.identifiable and abs(other.value - known.value) > _FAR * (known.upper - known.lower) / 2:
-            wide.setdefault((law.sought, law.joint), []).append((RESISTING[law.field], other))
+            wide.setdefault((law.sought, law.joint), {})[RESISTING[law.field]] = other
     return [
-        f"should {joint} have {' or '.join(name for name, _ in others)} as well, which may not show here, {sought} is "
-        f"only known to be from {min(other.lower for _, other in others):.3g} to {values[sought].upper:.3g}"
+        f"should {joint} have {' or '.join(others)} as well, which may not show here, {sought} is only known to be "
+        "from {:.3g} to {:.3g}".format(*_whole([values[sought], *others.values()]))
         for (sought, joint), others in wide.items()
     ]
+
+
+def _whole(found: list[Value]) -> tuple[float, float]:
+    """From the lowest to the highest of the ends of intervals."""
+    return min(one.lower for one in found), max(one.upper for one in found)
 
 
 def _most(model: ForwardModel, point: Array, seen: Sensitivity, column: Array) -> tuple[bool, Array] | None:

@@ -91,4 +91,5 @@ def observe(
             columns.append((c * x + s * y if channel.quantity == "x" else c * y - s * x) / seen_by.scale)
         else:
             raise NotImplementedError(f"channels: {channel.quantity} is not observed")
-    return np.moveaxis(np.stack(columns, axis=1), -1, 0)
+    # Lanes that differ by their camera alone share a motion, of which some channels show each the same.
+    return np.moveaxis(np.stack(np.broadcast_arrays(*columns), axis=1), -1, 0)

@@ -145,7 +145,7 @@ class Evaluator:
         entries = np.zeros(len(held.column))
         kernels.look(SINGLE, arrays, room, t, gap, rate, bias, entries)
         force = room.a[:n].copy()
-        kinetic, strain, gravity = (float(part) for part in room.energy)
+        kinetic, strain, gravity = (float(part) for part in room.energy[:3])
         applied = self._applied(arrays, t)
         kernels.elastic(SINGLE, arrays, room)
         jacobian = Sparse((entries, held.column, held.entry), shape=(held.size, n))

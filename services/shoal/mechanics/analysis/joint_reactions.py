@@ -39,7 +39,8 @@ class JointReaction:
 
     at: where [m]; force [N] and torque [N m] (counter-clockwise, in space a vector), friction included; components:
     each unknown of the joint by name (fx, fy, torque, normal, axial, coupled, ...) with its value; unique: whether none
-    of them could be different with the same motion.
+    of them could be different with the same motion. force_error [N], torque_error [N m]: how far another run is away
+    (`reactions_verified`), None where there was none.
     """
 
     joint: str
@@ -49,6 +50,8 @@ class JointReaction:
     torque: float | tuple[float, ...]
     components: dict[str, float]
     unique: bool
+    force_error: float | None = None
+    torque_error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,9 @@ class Reactions:
     """Reactions at one state.
 
     redundancy: how many self-stresses are possible. constraints: those of the model that depend on others, at a
-    neighbouring state as well. unbalanced: what no joint can balance, relative to all forces.
+    neighbouring state as well. unbalanced: what no joint can balance, relative to all forces. scale: size of all forces
+    on the bodies [N], torques by the machine's size. settled: whether the forces agree with those of another run, as
+    far as there was one (`reactions_verified`); message: what of that is to be known.
     """
 
     time: float
@@ -64,11 +69,21 @@ class Reactions:
     redundancy: int
     constraints: tuple[str, ...]
     unbalanced: float
+    scale: float = 0.0
+    settled: bool = True
+    message: str = ""
 
     @property
     def ok(self) -> bool:
-        """Whether all bodies are balanced."""
-        return self.unbalanced < BALANCED
+        """Whether all bodies are balanced, by forces that do not depend on the steps."""
+        return self.status == "ok"
+
+    @property
+    def status(self) -> str:
+        """ok, unbalanced, or inaccurate: the forces depend on the steps."""
+        if not self.unbalanced < BALANCED:
+            return "unbalanced"
+        return "ok" if self.settled else "inaccurate"
 
     @property
     def not_unique(self) -> tuple[str, ...]:
@@ -85,6 +100,13 @@ class Reactions:
             "redundant_constraints": list(self.constraints),
             "unbalanced": plain(self.unbalanced),
         }
+
+
+def told(found: list[Reactions]) -> dict[str, Any]:
+    """Plain data of reactions at some times, with the first status that is not ok."""
+    worst = next((one for one in found if not one.ok), found[0])
+    message = "the bodies are not in balance" if worst.status == "unbalanced" else worst.message
+    return {"status": worst.status, "message": message, "reactions": [one.to_json() for one in found]}
 
 
 def reactions_of(
@@ -151,7 +173,7 @@ def reactions_of(
             bool(np.all(free_play[mine] < SHARE)),
         )
     names = redundant_constraints(evaluator, q, t) if naming else ()
-    return Reactions(t, found, count - rank, names, rest / scale if scale > 0 else 0.0)
+    return Reactions(t, found, count - rank, names, rest / scale if scale > 0 else 0.0, scale)
 
 
 def _pressed(scene: Scene, unknown: list[Component], solution: Array) -> dict[str, float]:

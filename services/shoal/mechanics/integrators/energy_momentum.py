@@ -82,7 +82,7 @@ def mean_force(tile: Tile, scheme: EnergyMomentum, m: Arrays, w: Work, t: float,
             square += w.stage[i] * change[i]
         after = w.energy[width + lane]
         excess = after - scheme.elastic[lane] + work
-        noise = ROUND_OFF * (after + scheme.elastic[lane])
+        noise = ROUND_OFF * (abs(after) + abs(scheme.elastic[lane]))
         factor = excess / square if abs(excess) > noise and square > 0 else 0.0
         for i in range(lane, end, width):
             f[i] -= factor * w.stage[i]

@@ -31,6 +31,8 @@ _EFFORT = 8_000
 """Gaps (`Assembly.effort`) after which no fewer statements are sought that contradict each other."""
 _SLACK = 1e-3
 """Part of the largest pull on a statement below which one is not pulled."""
+_ROUNDED = 1e-4
+"""Gaps below this, of the machine's size or rad, are those of rounded numbers."""
 ROUND_OFF = 1e-9
 """Changes below this, relative to the value, 1 rad, the size or the speed of the machine, are not spoken of."""
 _UNITS: dict[Quantity, str] = {
@@ -132,11 +134,15 @@ def _pose_refused(assembly: Assembly) -> InputError:
     """Which of the stated poses contradict each other, or which joint cannot be closed at all."""
     none = np.zeros_like(assembly.guess, dtype=bool)
     if not assembly.seek(none, np.zeros_like(assembly.guess)).ok[0]:
-        name, gap = _gape(assembly, [])
+        name, gap, _ = _gape(assembly, [])
         return InputError(f"joints.{name}: cannot be assembled; its places stay {gap} apart at best")
     guilty, fewest = _narrowed(assembly, [one for one in assembly.statements if one.firm])
-    name, gap = _gape(assembly, guilty)
-    return _contradiction(guilty, f"joint {name} would stay {gap} apart", fewest)
+    name, gap, small = _gape(assembly, guilty)
+    why = f"joint {name} would stay {gap} apart"
+    if small:
+        # Of a machine that holds itself more than it needs to: no statement is at fault.
+        return InputError(f"{_stated(guilty[-1])}: {why}, as rounded places or lengths do; state them with more digits")
+    return _contradiction(guilty, why, fewest)
 
 
 def _narrowed(assembly: Assembly, guilty: list[Statement]) -> tuple[list[Statement], bool]:
@@ -185,8 +191,11 @@ def _pulled(assembly: Assembly, chosen: list[Statement]) -> list[Statement]:
     return [one for one, size in zip(chosen, largest, strict=True) if size > _SLACK * max(largest)]
 
 
-def _gape(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str]:
-    """The joint that closes a loop, or the first of those that gape, and by how much, with these statements held."""
+def _gape(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str, bool]:
+    """The joint that closes a loop, or the first of those that gape, and by how much, with these statements held.
+
+    And whether that is as little as rounded numbers may leave.
+    """
     rows = _held_open(assembly, chosen)[1]
     near = _connected(assembly.scene, [one.body for one in chosen])
     size = np.abs(rows.gap[0]) * np.isin(rows.names, near)
@@ -194,7 +203,8 @@ def _gape(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str]:
     name = rows.names[worst]
     total = float(np.linalg.norm([g for g, n, a in zip(size, rows.names, rows.angular, strict=True)
                                   if n == name and a == rows.angular[worst]]))  # fmt: skip
-    return name, f"{total:.3g} {'rad' if rows.angular[worst] else 'm'}"
+    small = total < _ROUNDED * (1.0 if rows.angular[worst] else assembly.size)
+    return name, f"{total:.3g} {'rad' if rows.angular[worst] else 'm'}", small
 
 
 def _connected(scene: Scene, bodies: list[str]) -> list[str]:
@@ -231,13 +241,17 @@ def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputErro
 def _contradiction(guilty: list[Statement], why: str, fewest: bool = True) -> InputError:
     """One line that names the last of the statements and those that it contradicts. fewest: whether all of them do."""
     *others, last = guilty
-    value = f"{last.path}: {_written(last.values[0])} {_UNITS[last.quantity]}"
     if not others:
-        return InputError(f"{value} cannot be kept: {why}; leave it out and it follows from the joints")
+        return InputError(f"{_stated(last)}: {why}; leave it out and it follows from the joints")
+    value = f"{last.path}: {_written(last.values[0])} {_UNITS[last.quantity]}"
     listed = ", ".join(f"{one.path} = {_written(one.values[0])}" for one in others[:3])
     more = f" and {len(others) - 3} more" if len(others) > 3 else ""
     out = "one of them out and it follows" if fewest else "some of them out and they follow"
     return InputError(f"{value} contradicts {listed}{more}: {why}; leave {out} from the rest")
+
+
+def _stated(one: Statement) -> str:
+    return f"{one.path}: {_written(one.values[0])} {_UNITS[one.quantity]} cannot be kept"
 
 
 def _written(values: Array) -> str:

@@ -151,24 +151,31 @@ def reactions_table(found: list[Reactions]) -> None:
         rounding = _NOTHING * float(np.max(np.abs(np.hstack([forces, torques])), initial=0.0))
         forces[abs(forces) < rounding], torques[abs(torques) < rounding] = 0.0, 0.0
         if torques.shape[-1] == 3:
-            _exerted(f"joint forces {when}", ["fx [N]", "fy [N]", "fz [N]"], reactions, forces)
-            _exerted(f"joint torques {when}", ["mx [N m]", "my [N m]", "mz [N m]"], reactions, torques)
+            _exerted(f"joint forces {when}", ["fx [N]", "fy [N]", "fz [N]"], reactions, forces, ["force"])
+            _exerted(f"joint torques {when}", ["mx [N m]", "my [N m]", "mz [N m]"], reactions, torques, ["torque"])
         else:
             both = np.hstack([forces, torques])
-            _exerted(f"joint forces {when}", ["fx [N]", "fy [N]", "torque [N m]"], reactions, both)
+            _exerted(f"joint forces {when}", ["fx [N]", "fy [N]", "torque [N m]"], reactions, both, list(_ERRORS))
         if reactions.redundancy:
             # Constraints of bodies, such as the unit length of a director, are no joints to a user.
             among = ", ".join(dict.fromkeys(name for name in reactions.constraints if name in joints))
             told = f"; among {among}" if among else ""
             told = told if reactions.constraints else "; none away from this position"
             screen.say(f"{reactions.redundancy} more than needed: least forces are shown{told}")
+    screen.say(*dict.fromkeys(one.message for one in found if one.ok and one.message))
 
 
-def _exerted(title: str, headings: list[str], reactions: Reactions, values: Array) -> None:
-    """A row for every joint; `values` in the order of the joints."""
-    table = screen.table(title, "joint", "kind", *headings, "unique")
+_ERRORS = {"force": "error [N]", "torque": "error [N m]"}
+
+
+def _exerted(title: str, headings: list[str], reactions: Reactions, values: Array, parts: list[str]) -> None:
+    """A row for every joint; `values` in the order of the joints, with the errors of these parts if they are known."""
+    known = all(joint.force_error is not None for joint in reactions.joints.values())
+    parts = parts if known else []
+    table = screen.table(title, "joint", "kind", *headings, *(_ERRORS[part] for part in parts), "unique")
     for (name, joint), row in zip(reactions.joints.items(), values, strict=True):
-        table.add_row(name, joint.kind, *(f"{value:.6g}" for value in row), "yes" if joint.unique else "no")
+        errors = (f"{getattr(joint, f'{part}_error'):.1e}" for part in parts)
+        table.add_row(name, joint.kind, *(f"{value:.6g}" for value in row), *errors, "yes" if joint.unique else "no")
     screen.out.print(table)
 
 

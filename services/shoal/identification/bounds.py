@@ -1,0 +1,40 @@
+"""Whether a scene may have a value, and up to where, for the bounds of parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.scene import Scene
+
+_HALVINGS = 60
+"""Until no number lies between what can be and what cannot."""
+
+
+def accepts(scene: Scene, path: str, value: float) -> bool:
+    """Whether a scene may have a value at a path."""
+    try:
+        scene.with_values({path: value})
+    except InputError:
+        return False
+    return True
+
+
+def possible_bound(scene: Scene, path: str, bound: float) -> float | None:
+    """The number nearest to a bound that a scene accepts at a path, to three digits on the side of its own value.
+
+    None where the scene has no number there, or where none of three digits lies between.
+    """
+    try:
+        inside, outside = float(scene.value(path)), bound
+    except (InputError, TypeError, ValueError):
+        return None
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (middle, outside) if accepts(scene, path, middle) else (inside, middle)
+    if abs(inside) < 1e-12 * abs(bound):
+        return None
+    digit = 10.0 ** (np.floor(np.log10(abs(inside))) - 2)
+    inwards = np.ceil if bound < inside else np.floor
+    nearest = float(f"{inwards(inside / digit) * digit:.3g}")
+    return nearest if accepts(scene, path, nearest) else None

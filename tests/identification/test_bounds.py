@@ -1,0 +1,42 @@
+"""Bounds that a scene cannot have: named, with the nearest that it can have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from shoal.errors import InputError
+from shoal.identification import Problem
+
+
+def _problem(folder: Path, lower: float, upper: float) -> Problem:
+    """The second principal moment of a body in space whose others are 3 and 5 kg m^2: it is from 2 to 8."""
+    scene: dict[str, Any] = {
+        "name": "top", "dimensions": 3, "gravity": [0.0, 0.0, 0.0], "joints": {}, "markers": {"m": {"body": "b"}},
+        "bodies": {"b": {"kind": "rigid-body", "mass": 1.0, "inertia": [3.0, 4.0, 5.0]}},
+        "initial": {"b": {"position": [0.0, 0.0, 0.0]}},
+    }  # fmt: skip
+    (folder / "top.yaml").write_text(yaml.safe_dump(scene))
+    return Problem.parse({
+        "name": "spin", "scene": str(folder / "top.yaml"),
+        "channels": [{"marker": "m", "quantity": "x", "column": "x"}],
+        "parameters": {"I2": {"path": "bodies.b.inertia.1", "lower": lower, "upper": upper}},
+        "source": {"kind": "file"},
+    }, "spin")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "side", "nearest"), [(0.4, 6.0, "lower: 0.4", "2"), (3.0, 40.0, "upper: 40", "8")]
+)
+def test_the_bound_of_a_principal_moment_obeys_the_triangle(
+    lower: float, upper: float, side: str, nearest: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError) as refusal:
+        _problem(tmp_path, lower, upper).load_scene()
+    text = str(refusal.value)
+    assert text.startswith(f"spin: parameters.I2.{side} cannot be: ")
+    assert text.endswith(f"; with the rest of top as it is {nearest} can be")
+    assert "\n" not in text
+    _problem(tmp_path, max(lower, 2.0), min(upper, 8.0)).load_scene()
