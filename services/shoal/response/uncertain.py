@@ -153,7 +153,8 @@ def uncertain(
                 judged.append(between(passed, machine, inputs, **how))
             else:
                 found = judge(passed, machine, inputs, _reach(inputs, when, gap, seed, most), **how)
-                judged.append(crosschecked(found, machine, answer))
+                shared = answer.found.indices is not None
+                judged.append(crosschecked(found, machine, answer.runs.values, shared=shared))
         if allocate:
             allocation = _allocated(judged[0], machine, costs or {}, target, most, how)
     except TimeIsUpError:

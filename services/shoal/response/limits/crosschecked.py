@@ -7,7 +7,6 @@ smaller than what lies beyond a limit makes it.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,19 +19,17 @@ from shoal.response.machine import Machine
 from shoal.response.statistics import Statistics
 from shoal.trajectory import Array
 
-if TYPE_CHECKING:
-    from shoal.response.respond import Answer
 
+def crosschecked(judged: Judged, machine: Machine, values: Array, *, shared: bool) -> Judged:
+    """With the runs that have told mean and deviation, where these tell the limit's quantity.
 
-def crosschecked(judged: Judged, machine: Machine, answer: Answer) -> Judged:
-    """With the runs that have told mean and deviation, where these tell the limit's quantity."""
+    values: (runs, columns); shared: whether runs share parameters with others, as those that tell indices do
+    """
     columns = _columns(machine, judged.limit)
     if judged.passing is None or columns is None:
         return judged
-    indices, parameters = answer.found.indices, len(judged.inputs)
-    # Runs that tell indices share their parameters with others.
-    share = 1.0 if indices is None else 2 / (parameters + 2)
-    margins = judged.limit.margin(answer.runs.values[:, columns])
+    share = 2 / (len(judged.inputs) + 2) if shared else 1.0
+    margins = judged.limit.margin(values[:, columns])
     doubt = judged.passing.doubt or contradiction(judged.passing.estimate, margins, share)
     return replace(judged, passing=replace(judged.passing, doubt=doubt))
 
