@@ -10,7 +10,9 @@ from scipy.integrate import solve_ivp
 from shoal.engines import get_engine
 from shoal.identification import Estimate, Measurement, Problem, Verdict
 from shoal.identification.conclude import NOTHING, conclude
+from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.suspects import search
 from shoal.identification.methods import get_method
 from shoal.identification.recording.noise import differences
 from shoal.scene import Scene
@@ -93,7 +95,7 @@ def test_what_one_sensor_contradicts_is_seen(seed: int) -> None:
     assert "tilt" in found.message
 
 
-@pytest.mark.parametrize("spring", [0.4, 0.8])
+@pytest.mark.parametrize("spring", [0.4, pytest.param(0.8, marks=pytest.mark.slow)])
 def test_a_spring_that_was_left_out_is_a_suspect(spring: float) -> None:
     """The inertia takes most of it, and was trusted at half or a quarter of the truth."""
     found = identified(ENCODER_AND_IMU, 2, spring=spring)
@@ -102,6 +104,18 @@ def test_a_spring_that_was_left_out_is_a_suspect(spring: float) -> None:
     (suspect,) = (one for one in found.suspects if one.name == "torsion spring in O")
     assert suspect.value == pytest.approx(spring, rel=0.1)
     assert "at rest at -1.5" in suspect.change
+
+
+def test_a_search_for_the_cause_that_is_cut_ends_the_trust(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it would have found would have widened the intervals."""
+
+    def late(_: Any) -> None:
+        raise TimeIsUp
+
+    monkeypatch.setattr(search._Search, "run", late)
+    found = identified(ENCODER_AND_IMU, 2, spring=0.4)
+    assert found.verdict is Verdict.FAILED
+    assert "no time was left to see what a misfit of" in found.message
 
 
 def test_rounded_samples_show_the_noise_of_rounding() -> None:
