@@ -155,6 +155,7 @@ def test_another_engine_tells_no_section_forces() -> None:
     assert limit("B.normal > 3", scene).unit == "N"
 
 
+@pytest.mark.slow
 def test_a_model_that_is_chosen_for_a_limit_tells_it() -> None:
     """The tolerance would let the rod be rigid, whose sections tell no moment: rho g A L^2 / 2 at the root."""
     densities = (900.0, 1100.0)

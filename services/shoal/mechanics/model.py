@@ -237,7 +237,8 @@ class Model:
         factor = mass.copy()
         _factor_mass(tile, pattern, factor)
         inverse, whole = (part[: self.unknowns * len(tile)] for part in (factor, mass))
-        if not np.all((inverse > 0) & (inverse * whole < _SINGULAR)):
+        known = bool(np.all((inverse > 0) & np.isfinite(inverse)))
+        if not known or np.any(inverse * whole >= _SINGULAR):
             raise InputError(
                 f"{self.scene.name}: the mass matrix is singular; some coordinate moves no mass, as in a body that is "
                 "flat to the last digit of its inertia"

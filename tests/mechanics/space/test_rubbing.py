@@ -21,7 +21,7 @@ def machine(bodies: dict[str, Any], joints: dict[str, Any], markers: dict[str, A
     return Scene.parse({"name": "dry", "dimensions": 3, "bodies": bodies, "joints": joints, "markers": markers} | more)
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "radau5", "rk4", "leapfrog"])
+@pytest.mark.parametrize("integrator", ["dop853", pytest.param("radau5", marks=pytest.mark.slow), "rk4", "leapfrog"])
 def test_a_block_slides_down_an_oblique_rail(integrator: str) -> None:
     """s'' = g (sin a - mu cos a) on a rail that falls by the angle a."""
     mu, rail = 0.3, np.array([1.0, 0.5, -0.9])
