@@ -1,0 +1,22 @@
+"""What is made: a scene as it grows, and what is left out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass
+class Parts:
+    """Bodies, starts, joints and loads by their names, as a scene's data has them."""
+
+    bodies: dict[str, Any] = field(default_factory=dict)
+    initial: dict[str, Any] = field(default_factory=dict)
+    joints: dict[str, Any] = field(default_factory=dict)
+    loads: dict[str, Any] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
+    """A line for everything that has no counterpart."""
+    kept: set[int] = field(default_factory=set)
+    """Equalities that joints stand for already, as MuJoCo counts them."""
+    away: dict[str, float] = field(default_factory=dict)
+    """Of torsion springs that do not rest at the start, the angle [rad] from there to where they do."""

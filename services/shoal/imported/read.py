@@ -1,0 +1,113 @@
+"""A file, read as a scene."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.imported.absent import absent
+from shoal.imported.actuators import add_actuators
+from shoal.imported.axes import Axes
+from shoal.imported.bodies import initial, is_mass, mass, rigid
+from shoal.imported.equalities import add_equalities
+from shoal.imported.hanging import hang
+from shoal.imported.parts import Parts
+from shoal.imported.rounding import numbers
+from shoal.imported.source import Source
+from shoal.imported.springs import add_resistance
+from shoal.imported.switches import switch_off
+from shoal.imported.tendons import add_tendons
+from shoal.scene import GROUND, Scene
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A scene as data, and a line for everything of its file that is not in it."""
+
+    scene: dict[str, Any]
+    left_out: tuple[str, ...]
+
+
+def read(file: Path) -> Imported:
+    """The scene of a URDF or MJCF file at its own start, in metres, kilograms, seconds and radians.
+
+    Raises InputError if there is no such file, if MuJoCo refuses it, or if it has bodies or joints that no scene has,
+    and ModuleNotFoundError without MuJoCo.
+    """
+    import mujoco
+
+    if not file.is_file():
+        raise InputError(f"{file}: no such file")
+    try:
+        model = mujoco.MjSpec.from_file(str(file)).compile()
+    except ValueError as error:
+        raise InputError(f"{file}: {' '.join(str(error).split())}") from None
+    switch_off(mujoco, model)
+    source = Source.of(mujoco, model)
+    parts = _parts(source)
+    scene = _scene(source, parts, re.sub(r"[^A-Za-z0-9_-]", "-", file.stem))
+    _rest(scene, Scene.parse(scene, str(file)), parts.away)
+    return Imported(scene, tuple(parts.left_out))
+
+
+def _parts(source: Source) -> Parts:
+    model, parts = source.model, Parts()
+    # In a loop, axes of several bodies have to agree.
+    loops, shared = np.any(model.eq_active0), Axes()
+    for body in range(1, model.nbody):
+        if source.owners[body] != body:
+            continue
+        name, alone = source.names[body], is_mass(source, body)
+        parts.bodies[name] = mass(source, body) if alone else rigid(source, body)
+        parts.initial[name] = initial(source, body, turns=not alone)
+        if alone:
+            add_resistance(source, source.own(body), {"kind": "point-mass"}, parts)
+        else:
+            hang(source, body, shared if loops else Axes(), parts)
+    add_tendons(source, parts)
+    add_equalities(source, parts)
+    add_actuators(source, parts)
+    parts.left_out += absent(source)
+    return parts
+
+
+def _scene(source: Source, parts: Parts, name: str) -> dict[str, Any]:
+    """The whole, as a scene's data."""
+    return {
+        "name": name if name[:1].isalpha() else f"scene-{name}",
+        "dimensions": 3,
+        "gravity": numbers(source.model.opt.gravity),
+        "bodies": parts.bodies,
+        "joints": parts.joints,
+        **({"loads": parts.loads} if parts.loads else {}),
+        "markers": _markers(source, parts),
+        "initial": parts.initial,
+    }
+
+
+def _markers(source: Source, parts: Parts) -> dict[str, Any]:
+    """One at the origin of every body, and one at every site that moves."""
+    markers: dict[str, Any] = {name: {"body": name} for name in parts.bodies}
+    for site, marker in enumerate(source.called(source.mujoco.mjtObj.mjOBJ_SITE, source.model.nsite, "site")):
+        at = source.at_site(site)
+        if at["body"] != GROUND:
+            markers[marker if marker not in markers else f"site-{marker}"] = at
+    return markers
+
+
+def _rest(data: dict[str, Any], scene: Scene, away: dict[str, float]) -> None:
+    """States the angles [rad], as the mechanics counts them, of torsion springs that rest so far from the start."""
+    from shoal.mechanics.assembly.loads import Loads
+    from shoal.mechanics.assembly.placement import place
+    from shoal.mechanics.assembly.rows import Rows
+
+    if away:
+        loads = Loads(scene, place(scene), Rows(0), 0.0)
+        start = dict(zip(loads.names, loads.angles, strict=True))
+        for name, angle in away.items():
+            data["loads"][name]["angle"] = float(np.ravel(start[name])[0]) + angle

@@ -1,0 +1,100 @@
+"""What acts in joints: damping, dry friction and springs, and the laws of springs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from shoal.imported.parts import Parts
+from shoal.imported.rounding import numbers
+from shoal.imported.source import Array, Source
+
+
+def law(stiffness: float, further: Array) -> dict[str, Any]:
+    """Of a spring whose force is a polynomial: the coefficient of x, and those of x^2 and x^3.
+
+    In N/m, N/m^2 and N/m^3 along a line, in N m/rad and so on about an axis; what is zero is not there.
+    """
+    square, cubic = map(float, further)
+    found = {"stiffness": float(stiffness), "cubic": cubic, "elastic": f"{square!r} * t**2" if square else 0}
+    return {word: value for word, value in found.items() if value}
+
+
+def add_resistance(source: Source, own: list[int], made: dict[str, Any], parts: Parts) -> None:
+    """Adds damping and friction of joints to the one made for them, and their springs to the loads; lines for the rest.
+
+    made: a joint of a scene, or its kind alone where nothing can act in it. own: the joints that it stands for.
+    """
+    for one in own:
+        _add_friction(source, one, made, parts)
+        _add_spring(source, one, made, parts)
+        _tell_rest(source, one, parts)
+
+
+def _is_simple(source: Source, one: int, made: dict[str, Any]) -> bool:
+    """Whether a joint of a scene has the one coordinate of one of MuJoCo's."""
+    kinds = source.mujoco.mjtJoint
+    words = {"revolute": kinds.mjJNT_HINGE, "slider": kinds.mjJNT_SLIDE}
+    return bool(words.get(made["kind"]) == kinds(source.model.jnt_type[one]))
+
+
+def _add_friction(source: Source, one: int, made: dict[str, Any], parts: Parts) -> None:
+    """Damping and dry friction."""
+    model, name, dof = source.model, source.joint_names[one], source.model.jnt_dofadr[one]
+    simple = _is_simple(source, one, made)
+    square, cubic = map(float, model.dof_dampingpoly[dof])
+    for what, value, word in (
+        ("damping", float(model.dof_damping[dof]), "friction"),
+        ("quadratic damping", square, "drag"),
+        ("frictionloss", float(model.dof_frictionloss[dof]), "coulomb"),
+    ):
+        if value and simple:
+            made[word] = value
+        elif value:
+            parts.left_out.append(f"joint {name}: {what} {value:g}; only a revolute joint or a slider has it")
+    if cubic:
+        parts.left_out.append(f"joint {name}: cubic damping {cubic:g}")
+
+
+def _add_spring(source: Source, one: int, made: dict[str, Any], parts: Parts) -> None:
+    """Springs."""
+    model, name = source.model, source.joint_names[one]
+    found = law(model.jnt_stiffness[one], model.jnt_stiffnesspoly[one])
+    if "elastic" in found and made["kind"] == "slider":
+        parts.left_out.append(f"joint {name}: the part {found.pop('elastic')} of its spring")
+    if found and _is_simple(source, one, made):
+        parts.loads[f"{name}-spring"] = _spring(source, one, made, parts.away) | found
+    elif found:
+        told = " and ".join(f"{word} {value}" for word, value in found.items())
+        parts.left_out.append(f"joint {name}: its spring ({told}); only a revolute joint or a slider has one")
+    if found and (yielding := float(model.jnt_springyield[one])):
+        parts.left_out.append(f"joint {name}: that its spring yields at {yielding:g}")
+
+
+def _tell_rest(source: Source, one: int, parts: Parts) -> None:
+    """Lines for what no joint of a scene has."""
+    model, name, dof = source.model, source.joint_names[one], source.model.jnt_dofadr[one]
+    if model.jnt_limited[one]:
+        low, high = model.jnt_range[one]
+        parts.left_out.append(f"joint {name}: its limits {low:g} to {high:g}")
+    if model.dof_armature[dof]:
+        parts.left_out.append(f"joint {name}: its armature {model.dof_armature[dof]:g}")
+
+
+def _spring(source: Source, one: int, made: dict[str, Any], turned: dict[str, float]) -> dict[str, Any]:
+    """What acts between the sides of a revolute joint or a slider, at rest where the file says.
+
+    turned: of torsion springs, the angles [rad] from the start to there; that of this one is added.
+    """
+    model = source.model
+    address = model.jnt_qposadr[one]
+    away = float(model.qpos_spring[address] - model.qpos0[address])
+    sides = {side: made[side] for side in ("first", "second")}
+    if made["kind"] == "revolute":
+        if away:
+            turned[f"{source.joint_names[one]}-spring"] = away
+        return {"kind": "torsion-spring", **sides, "axis": made["axis"]}
+    # Without length it pulls back by the whole way to the place of rest, on both sides of it.
+    body, (side, place) = model.jnt_bodyid[one], made["first"].values()
+    holder, sign = (body, -1) if side == source.names[body] else (source.owners[model.body_parentid[body]], 1)
+    point = place + source.axes(holder).T @ made["axis"] * sign * away
+    return {"kind": "spring", **sides, "first": {"body": side, "point": numbers(point)}, "length": 0.0}

@@ -1,0 +1,70 @@
+"""Tendons: straight ones, as springs and distances."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from shoal.imported.parts import Parts
+from shoal.imported.source import Source
+from shoal.imported.springs import law
+
+
+def add_tendons(source: Source, parts: Parts) -> None:
+    """Adds tendons between two sites: springs, and distances where an equality keeps their length; lines for others."""
+    names = source.called(source.mujoco.mjtObj.mjOBJ_TENDON, source.model.ntendon, "tendon")
+    lengths = _lengths(source)
+    for number, name in enumerate(names):
+        low, high = source.model.tendon_lengthspring[number]
+        if not _is_straight(source, number) or low != high:
+            parts.left_out.append(f"tendon {name}: more than a spring between two sites")
+            continue
+        parts.left_out += [f"tendon {name}: its {what}" for what in _further(source, number)]
+        first = source.model.tendon_adr[number]
+        one, other = (source.at_site(end) for end in source.model.wrap_objid[first : first + 2])
+        sides = {"first": one, "second": other}
+        if number in lengths:
+            parts.kept.add(lengths[number])
+            parts.joints[name if name not in parts.joints else f"{name}-length"] = {"kind": "distance", **sides}
+        if acts := _law(source, number):
+            load = {"kind": "spring", **sides, **acts, "length": float(low)}
+            parts.loads[name if name not in parts.loads else f"{name}-tendon"] = load
+
+
+def _lengths(source: Source) -> dict[int, int]:
+    """Of tendons whose length stays that of the start, the equality that keeps it."""
+    model, kinds = source.model, source.mujoco.mjtEq
+    return {
+        int(model.eq_obj1id[number]): number
+        for number in range(model.neq)
+        if model.eq_type[number] == kinds.mjEQ_TENDON and model.eq_obj2id[number] < 0 and model.eq_active0[number]
+        and not np.any(model.eq_data[number][:5] - [0, 1, 0, 0, 0])
+    }  # fmt: skip
+
+
+def _is_straight(source: Source, number: int) -> bool:
+    first, count = source.model.tendon_adr[number], source.model.tendon_num[number]
+    wraps = source.model.wrap_type[first : first + count]
+    return bool(count == 2 and all(wraps == source.mujoco.mjtWrap.mjWRAP_SITE))
+
+
+def _further(source: Source, number: int) -> list[str]:
+    """What a tendon has and a spring has not."""
+    model = source.model
+    every = (
+        (model.tendon_limited, "limits"),
+        (model.tendon_frictionloss, "frictionloss"),
+        (model.tendon_armature, "armature"),
+        (model.tendon_springyield, "springyield"),
+        (model.tendon_dampingpoly, "damping that is not linear"),
+    )
+    return [what for values, what in every if np.any(values[number])]
+
+
+def _law(source: Source, number: int) -> dict[str, Any]:
+    model = source.model
+    found = law(model.tendon_stiffness[number], model.tendon_stiffnesspoly[number])
+    if damping := float(model.tendon_damping[number]):
+        found["damping"] = damping
+    return found
