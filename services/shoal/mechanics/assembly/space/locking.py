@@ -14,7 +14,7 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.assembly.space.redundancy import SHARE, joints_of
-from shoal.mechanics.assembly.space.values import slopes, uncancelled, value_of
+from shoal.mechanics.assembly.space.values import jacobian, uncancelled, value_of
 from shoal.mechanics.assembly.terms import Term
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene
@@ -40,11 +40,7 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
         return np.asarray([value_of(term, q, 0) for term in terms] / length)
 
     def slope(q: Array) -> Array:
-        found = np.zeros((len(terms), len(q)))
-        for row, term in zip(found, terms, strict=True):
-            for unknown, part in slopes(term, q, 0):
-                row[unknown] += part
-        return np.asarray(found / length[:, None])
+        return np.asarray(jacobian(terms, q, 0) / length[:, None])
 
     if (found := lock(gap, slope, q)) is not None:
         first, *others = joints_of(scene, [terms[row].name for row in found.rows])

@@ -6,7 +6,7 @@ in the coordinates themselves: poses by Gauss and Newton's method, rates of leas
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -23,6 +23,7 @@ from shoal.mechanics.assembly.space.values import (
     at,
     drive_rate,
     everywhere,
+    jacobian,
     of_lane,
     slopes,
     value_of,
@@ -154,14 +155,6 @@ class _Closing:
         lanes = max((len(one) for one in found), default=1)
         return np.stack([np.broadcast_to(one, lanes) for one in found]) if found else np.zeros((0, lanes))
 
-    def jacobian(self, q: Array, lane: int, terms: Sequence[Term | Mesh]) -> Array:
-        """Derivatives of constraints by the coordinates of a lane, (constraints, unknowns)."""
-        found = np.zeros((len(terms), len(q)))
-        for row, term in enumerate(terms):
-            for unknown, slope in slopes(term, q, lane):
-                found[row, unknown] += slope
-        return found
-
     def _keeps(self, lane: int) -> bool:
         """Whether the poses are those that are stated."""
         away = (abs(one.off(self.q[:, lane])) for one in self._rows(_POSES, lane))
@@ -195,7 +188,7 @@ class _Closing:
         """Poses that keep the guesses too, one after the other, where the joints and those before let them."""
         for guess in _guesses(self._rows(_POSES, lane)):
             if max(abs(one.off(q)) for one in guess) > CLOSED * max(self.size, 1.0):
-                held = np.vstack([self.jacobian(q, lane, self.terms) / self.scale[:, None], _dense(kept, len(q))])
+                held = np.vstack([jacobian(self.terms, q, lane) / self.scale[:, None], _dense(kept, len(q))])
                 if not _leaves_free(held, _dense(guess, len(q))):
                     continue
                 found = self._newton(q, lane, [*kept, *guess], GUESSED)
@@ -248,7 +241,7 @@ class _Closing:
             away = held @ q - wanted
             if np.all(np.abs(gap) <= small) and np.all(np.abs(away) <= CLOSED * max(self.size, 1.0)):
                 return q
-            rows = np.vstack([self.jacobian(q, lane, self.terms) / self.scale[:, None], held])
+            rows = np.vstack([jacobian(self.terms, q, lane) / self.scale[:, None], held])
             move = np.linalg.lstsq(rows, -np.concatenate([gap / self.scale, away]), DEPENDENT)[0]
             longest = float(np.max(np.abs(move), initial=0.0))
             q = q + move * min(1.0, 0.5 * max(self.size, 1.0) / (longest + 1e-300))
@@ -338,7 +331,7 @@ class _Closing:
         if self._moves(lane, asked):
             return True
         (terms, scale, driven, stated, pace), q, v = asked, self.q[:, lane], self.v[:, lane].copy()
-        slope = self.jacobian(self.q, lane, terms) / scale[:, None] if terms else np.zeros((0, len(q)))
+        slope = jacobian(terms, self.q, lane) / scale[:, None] if terms else np.zeros((0, len(q)))
         held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
         rows, right = np.vstack([slope, held]), np.concatenate([-driven, wanted])

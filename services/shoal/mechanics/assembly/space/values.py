@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -43,6 +43,15 @@ def slopes(term: Term | Mesh, q: Array, lane: int) -> Iterator[tuple[int, float]
     u, w = (at(vector, q, lane) for vector in (term.u, term.w))
     for vector, other in ((term.u, term.form @ w), (term.w, term.form.T @ u)):
         yield from _along(vector, other, lane)
+
+
+def jacobian(terms: Sequence[Term | Mesh], q: Array, lane: int) -> Array:
+    """Derivatives of constraints by the coordinates (unknowns,) or (unknowns, lanes) of a lane, (terms, unknowns)."""
+    found = np.zeros((len(terms), len(q)))
+    for row, term in zip(found, terms, strict=True):
+        for unknown, slope in slopes(term, q, lane):
+            row[unknown] += slope
+    return found
 
 
 def uncancelled(term: Term, q: Array) -> float:
