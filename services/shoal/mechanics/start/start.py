@@ -18,7 +18,7 @@ from shoal.mechanics.frames import Frame, ModalFrame
 from shoal.mechanics.joints import Meet, of_scene
 from shoal.mechanics.numerics.tile import Array, Flags
 from shoal.mechanics.start.closure import Rows
-from shoal.mechanics.start.poses import Assembly, Statement
+from shoal.mechanics.start.poses import ROUNDING, Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
 from shoal.mechanics.start.strained import gives_way, numbers_of_start, require_numbers
 from shoal.scene import GROUND, InitialState, Scene
@@ -31,8 +31,6 @@ _EFFORT = 8_000
 """Gaps (`Assembly.effort`) after which no fewer statements are sought that contradict each other."""
 _SLACK = 1e-3
 """Part of the largest pull on a statement below which one is not pulled."""
-_ROUNDED = 1e-4
-"""Gaps below this, of the machine's size or rad, are those of rounded numbers."""
 ROUND_OFF = 1e-9
 """Changes below this, relative to the value, 1 rad, the size or the speed of the machine, are not spoken of."""
 _UNITS: dict[Quantity, str] = {
@@ -203,7 +201,7 @@ def _gape(assembly: Assembly, chosen: list[Statement]) -> tuple[str, str, bool]:
     name = rows.names[worst]
     total = float(np.linalg.norm([g for g, n, a in zip(size, rows.names, rows.angular, strict=True)
                                   if n == name and a == rows.angular[worst]]))  # fmt: skip
-    small = total < _ROUNDED * (1.0 if rows.angular[worst] else assembly.size)
+    small = total < ROUNDING * (1.0 if rows.angular[worst] else assembly.size)
     return name, f"{total:.3g} {'rad' if rows.angular[worst] else 'm'}", small
 
 
