@@ -46,16 +46,16 @@ def _loads(name: str, joint: dict[str, Any]) -> dict[str, Any]:
     taken = {} if first["body"] == GROUND else {"reaction": first}
     spring = {"kind": "torsion-spring", "first": first, "second": second, "stiffness": 0.0, "angle": 0.0, **axis}
     return {
-        f"spring-{name}": spring,
-        f"preload-{name}": {"kind": "torque", "at": second, "torque": 0.0, **taken, **axis},
+        f"further-spring-{name}": spring,
+        f"further-torque-{name}": {"kind": "torque", "at": second, "torque": 0.0, **taken, **axis},
     }
 
 
 def _candidate(name: str, size: Size, scene: Scene) -> Candidate:
     most = _LARGEST * size.mass * size.gravity * size.length
     numbers = (
-        Parameter(path=f"loads.spring-{name}.stiffness", lower=0.0, upper=most),
-        Parameter(path=f"loads.preload-{name}.torque", lower=-np.pi * most, upper=np.pi * most),
+        Parameter(path=f"loads.further-spring-{name}.stiffness", lower=0.0, upper=most),
+        Parameter(path=f"loads.further-torque-{name}.torque", lower=-np.pi * most, upper=np.pi * most),
     )
     probes = np.array([[[_STEP * most, 0.0], [0.0, _STEP * most]]])
 
