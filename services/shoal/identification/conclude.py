@@ -11,25 +11,23 @@ from shoal.identification.adapt import Stage
 from shoal.identification.carried import fitted, joint
 from shoal.identification.deadline import unless_late
 from shoal.identification.estimate import Estimate
+from shoal.identification.evidence import Evidence, evidence
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.other_laws import OtherLaw, other_laws, sentences
 from shoal.identification.judge.remarks import remarks
-from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.judge.rivals import valley
 from shoal.identification.judge.verdict import Judgement, Verdict, judge
 from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread import intervals
 from shoal.identification.spread.bootstrap import bootstrap
-from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.curvature import bent, by_profile
-from shoal.identification.spread.model_error import ModelError, model_error, rms_of
 from shoal.identification.spread.posterior import Posterior, news, posterior
 from shoal.identification.spread.prediction import Prediction, predictions
 from shoal.identification.spread.profiles import Profile, profiles
 from shoal.identification.spread.rank import combinations
-from shoal.identification.spread.sensitivity import Sensitivity, believed
-from shoal.identification.spread.uncertainty import Linearisation, autocorrelation, linearise
+from shoal.identification.spread.uncertainty import autocorrelation
+from shoal.identification.spread.value import Value
 from shoal.scene import Rod, Scene
 from shoal.trajectory import Array
 
@@ -69,90 +67,41 @@ def conclude(
 
     Where what looks for the cause of a misfit meets a better minimum, that one is concluded from, so many times.
     """
-    searched, point, measurement = model, outcome.point, model.measurement
-    model = model.aside()
+    searched, model = model, model.aside()
     if model.deadline is not None:
         model.deadline.extend()
-    predicted = {name: _predicted(model, point, name) for name in measurement.recordings}
-    # The intervals look at the neighbourhood of the answer.
-    residual = model.compared(point[None], {name: seen[None] for name, seen in predicted.items()})[0]
-    looked = unless_late(lambda: believed(model, point, residual), None)
-    seen = looked or _unseen(model)
-    if looked is None:
+    near = evidence(model, outcome.point)
+    if not near.looked:
         outcome = replace(outcome, ended=False, message=outcome.message or "no time was left for the intervals")
-    possible = bool(np.all(np.isfinite(seen.residual)))
-    if not possible:
-        seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
-    known = possible and looked is not None
-    blocks = blocks_of(model, len(seen.residual))
-    at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks)
-    error = ModelError(None, None)
-    if known:
-        error = unless_late(lambda: model_error(model, point, predicted, seen.residual), error)
-    correction = error.corrections(at.pseudo_inverse)
-    mesh, theory = (
-        None if part is None else rms_of(part[: len(model.rows.time)]) for part in (error.mesh, error.theory)
-    )
-    refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
-    tests = residual_tests(model, seen.residual, blocks, at.noise, float(np.hypot(mesh or 0.0, theory or 0.0)), refined)
-    told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
-    at = replace(at, systematic=tests.excess * told)
-    found, beside = outcome, list[Array]()
-    if known:
-        found, beside = unless_late(lambda: valley(model, outcome, at), (found, beside))
-    laws = unless_late(lambda: other_laws(model, point, seen), list[OtherLaw]()) if known else []
-    # Where there is a misfit, what it may be due to is in the intervals; else it is said.
-    ends = [point, *beside, *(law.end for law in laws if law.fits and tests.limited)]
-    values = intervals.possible(
-        model, intervals.spanning([intervals.parameters(model, end, at, correction) for end in ends])
-    )
-    if looked is None:
-        values = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in values.items()}
-    curved = _curved(model, outcome, at, seen, tests) if known else []
-    values, profiled = by_profile(model, ends, at, values, curved)
-    if wishes.profiles and known:
-        profiled = profiles(model, point, at, profiled)
-    values |= {n: replace(values[n], identifiable=False) for n, p in profiled.items() if p.open}
-    unknown = combinations(model, point, at) if known else []
-    if possible:
-        judgement = judge(model, found, seen, at, tests, values, unknown)
-        values = intervals.with_refits(values, judgement.refits)
-    else:
-        why = f" ({model.failure})" if model.failure else ""
-        message = f"no parameter set could be simulated{why}; look at the bounds and the scene"
-        judgement = Judgement(Verdict.FAILED, message)
+    known = _known(model, outcome, near, wishes.profiles)
+    judgement = _judged(model, near, known)
+    values = intervals.with_refits(known.values, judgement.refits)
     ended = outcome.ended and judgement.verdict is not Verdict.UNFINISHED
-    better = judgement.better or (unless_late(lambda: _lower(model, outcome, profiled), None) if ended else None)
+    better = judgement.better or (unless_late(lambda: _lower(model, outcome, known.profiled), None) if ended else None)
     if better is not None and rounds > 0:
         return conclude(searched, _moved(outcome, better), method, seed, wall, stages, wishes, rounds - 1)
-    selected = {"selection": [vars(stage) for stage in stages]} if stages else {}
-    correlation = autocorrelation(seen.residual, blocks)
-    draws = wishes.bootstrap if known else 0
+    point, at, measurement = near.point, near.at, model.measurement
+    foretold: list[Prediction] = unless_late(
+        lambda: predictions(model, point, near.seen if near.known else None, at, near.blocks, near.error), []
+    )
+    drawn, undrawn = _drawn(model, near, judgement, wishes.sample, seed)
+    correlation = autocorrelation(near.seen.residual, near.blocks)
+    draws = wishes.bootstrap if near.known else 0
     rng = np.random.default_rng(seed)
     # Away from the minimum the mesh is not what limits the fit.
     limits = judgement.verdict is not Verdict.UNFINISHED and not stages
-    names = [model.names[k] for k in curved]
-    carried, left = fitted(model.parameters, point)
-    foretold: list[Prediction] = unless_late(
-        lambda: predictions(model, point, seen if known else None, at, blocks, error), []
-    )
-    square, minimum = float(residual @ residual), judgement.verdict not in (Verdict.FAILED, Verdict.UNFINISHED)
-    drawn: Posterior | None = None
-    if wishes.sample and minimum:
-        drawn = unless_late(lambda: posterior(model, point, at, blocks, square, wishes.sample, seed), None)
-    notes = [judgement.message or outcome.message]
-    if judgement.verdict.trusted:
-        notes += sentences(laws, values, lambda law: intervals.parameters(model, law.end, at, correction)[law.sought])
-    notes += remarks(values, profiled, names, tests, mesh if limits else None, theory)
-    if drawn is not None:
-        alone = judgement.verdict is Verdict.AMBIGUOUS
-        notes += [drawn.sentence(), *news(drawn, values), "the draws are about the first of them alone" * alone]
-    elif wishes.sample:
-        why = "no time was left" if minimum else f"'{judgement.verdict}' is no minimum to draw about"
-        notes.append(f"no posterior was drawn: {why}")
-    several = len(measurement.recordings) > 1
-    notes += [one.sentence(named=several) for one in foretold]
+    notes = [
+        judgement.message or outcome.message,
+        *(_of_laws(model, near, known.laws, values) if judgement.verdict.trusted else []),
+        *remarks(values, known.profiled, known.bent(model), near.tests, near.mesh if limits else None, near.theory),
+        *([undrawn] if drawn is None else [drawn.sentence(), *news(drawn, values)]),
+        "the draws are about the first of them alone" * (drawn is not None and judgement.verdict is Verdict.AMBIGUOUS),
+        *(one.sentence(named=len(measurement.recordings) > 1) for one in foretold),
+    ]
     beyond = ["look for what the model leaves out: a prediction is worse than the estimate states"]
+    carried, left = fitted(model.parameters, point)
+    covariance = intervals.covariance(model, point, at)
+    selected = {"selection": [vars(stage) for stage in stages]} if stages else {}
     return Estimate(
         problem=model.problem.name,
         method=method,
@@ -163,13 +112,8 @@ def conclude(
         advice=judgement.advice + beyond * any(one.inside is False for one in foretold),
         choice=outcome.choice,
         parameters=values,
-        quantities=intervals.spanning(
-            [
-                *(intervals.quantities(model, end, at, correction, curved) for end in ends),
-                *(refit.quantities() for refit in judgement.refits),
-            ]
-        ),
-        combinations=unknown,
+        quantities=known.quantities(model, near, judgement),
+        combinations=known.combinations,
         fitness=outcome.fitness,
         rms=float(np.sqrt(outcome.fitness / model.rows.things)),
         evaluations=searched.counter.evaluations,
@@ -180,43 +124,107 @@ def conclude(
         iterations=outcome.iterations,
         minima=[
             {**model.parameters.told(p), "fitness": f}
-            for p, f in sorted(found.minima, key=lambda end: end[1])
+            for p, f in sorted(known.outcome.minima, key=lambda end: end[1])
             if np.isfinite(f)
         ],
         residual_autocorrelation=correlation,
-        residual_tests=tests,
+        residual_tests=near.tests,
         suspects=judgement.suspects,
-        profiles=profiled,
-        bootstrap=bootstrap(model, point, predicted, correlation, draws, rng) if draws else None,
+        profiles=known.profiled,
+        bootstrap=bootstrap(model, point, near.predicted, correlation, draws, rng) if draws else None,
         posterior=drawn,
-        sensitivity_doubt=seen.doubt,
-        model_error_rms=_by_thing(model, error.mesh),
-        theory_error_rms=_by_thing(model, error.theory),
+        sensitivity_doubt=near.seen.doubt,
+        model_error_rms=_by_thing(model, near.error.mesh),
+        theory_error_rms=_by_thing(model, near.error.theory),
         truth=dict(measurement.truth),
         data=measurement.origin,
         notes=[note for recording in measurement.recordings.values() for note in recording.notes],
         model={"scene": model.scene.name, **model.problem.values, **_fitted(model.scene), **selected},
         scenes={name: model.scene_at(point, name) for name in measurement.recordings},
-        predicted=predicted,
+        predicted=near.predicted,
         measurement=measurement,
-        covariance=intervals.covariance(model, point, at),
+        covariance=covariance,
         values=carried,
         left_out=left,
         prediction=foretold,
-        joint=joint(model.parameters, point, intervals.covariance(model, point, at), values),
+        joint=joint(model.parameters, point, covariance, values),
     )
 
 
-def _unseen(model: ForwardModel) -> Sensitivity:
-    """What is known of the neighbourhood of an answer where there is no time to look: nothing."""
-    rows = len(model.rows.time) + len(model.parameters.priors)
-    return Sensitivity(np.zeros(rows), np.zeros((rows, len(model.names))), np.inf, np.inf)
+@dataclass(frozen=True)
+class _Known:
+    """What an answer tells of its parameters, before the verdict.
+
+    outcome: without the minima in the valley of the answer; ends: the answer, those minima, and where other laws of
+    friction would move it that a misfit may be due to: the intervals hold them all
+    curved: parameters whose intervals are those of their profiles
+    """
+
+    outcome: Outcome
+    ends: list[Array]
+    laws: list[OtherLaw]
+    values: dict[str, Value]
+    curved: list[int]
+    profiled: dict[str, Profile]
+    combinations: list[str]
+
+    def bent(self, model: ForwardModel) -> list[str]:
+        """The names of those that are curved."""
+        return [model.names[k] for k in self.curved]
+
+    def quantities(self, model: ForwardModel, near: Evidence, judgement: Judgement) -> dict[str, Value]:
+        """Quantities with intervals that hold all ends, and the refits of a judgement."""
+        ends = (intervals.quantities(model, end, near.at, near.correction, self.curved) for end in self.ends)
+        return intervals.spanning([*ends, *(refit.quantities() for refit in judgement.refits)])
 
 
-def _predicted(model: ForwardModel, point: Array, name: str) -> Array:
-    """Channels of a recording at an answer, (samples, channels); nan where there is no time to run it."""
-    nothing = np.full((1, *model.measurement.recordings[name].values.shape), np.nan)
-    return np.asarray(unless_late(lambda: model.observe(point[None], name), nothing)[0])
+def _known(model: ForwardModel, outcome: Outcome, near: Evidence, profiles_too: bool) -> _Known:
+    """What the surroundings of an outcome tell of its parameters."""
+    point, at, found, beside, laws = near.point, near.at, outcome, list[Array](), list[OtherLaw]()
+    if near.known:
+        found, beside = unless_late(lambda: valley(model, outcome, at), (found, beside))
+        laws = unless_late(lambda: other_laws(model, point, near.seen), laws)
+    # Where there is a misfit, what it may be due to is in the intervals; else it is said.
+    ends = [point, *beside, *(law.end for law in laws if law.fits and near.tests.limited)]
+    values = intervals.possible(
+        model, intervals.spanning([intervals.parameters(model, end, at, near.correction) for end in ends])
+    )
+    if not near.looked:
+        values = {n: replace(p, std=np.nan, lower=np.nan, upper=np.nan) for n, p in values.items()}
+    curved = _curved(model, outcome, near) if near.known else []
+    values, profiled = by_profile(model, ends, at, values, curved)
+    if profiles_too and near.known:
+        profiled = profiles(model, point, at, profiled)
+    values |= {n: replace(values[n], identifiable=False) for n, p in profiled.items() if p.open}
+    return _Known(found, ends, laws, values, curved, profiled, combinations(model, point, at) if near.known else [])
+
+
+def _judged(model: ForwardModel, near: Evidence, known: _Known) -> Judgement:
+    """The verdict; a failure where the answer cannot be simulated."""
+    if near.possible:
+        return judge(model, known.outcome, near.seen, near.at, near.tests, known.values, known.combinations)
+    why = f" ({model.failure})" if model.failure else ""
+    return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at the bounds and the scene")
+
+
+def _drawn(
+    model: ForwardModel, near: Evidence, judgement: Judgement, wanted: int, seed: int
+) -> tuple[Posterior | None, str]:
+    """So many draws from the posterior about a minimum; else why there are none, where some were wanted."""
+    if not wanted:
+        return None, ""
+    if judgement.verdict in (Verdict.FAILED, Verdict.UNFINISHED):
+        return None, f"no posterior was drawn: '{judgement.verdict}' is no minimum to draw about"
+    square = float(near.residual @ near.residual)
+    drawn = unless_late(lambda: posterior(model, near.point, near.at, near.blocks, square, wanted, seed), None)
+    return drawn, "no posterior was drawn: no time was left"
+
+
+def _of_laws(model: ForwardModel, near: Evidence, laws: list[OtherLaw], values: dict[str, Value]) -> list[str]:
+    """What other laws of friction would change."""
+    return sentences(
+        laws, values, lambda law: intervals.parameters(model, law.end, near.at, near.correction)[law.sought]
+    )
 
 
 def _fitted(scene: Scene) -> dict[str, Any]:
@@ -252,10 +260,8 @@ def _by_thing(model: ForwardModel, rows: Array | None) -> float | None:
     return None if rows is None else float(np.sqrt(np.sum(rows**2) / model.rows.samples / model.rows.things))
 
 
-def _curved(
-    model: ForwardModel, outcome: Outcome, at: Linearisation, seen: Sensitivity, tests: ResidualTests
-) -> list[int]:
+def _curved(model: ForwardModel, outcome: Outcome, near: Evidence) -> list[int]:
     """Parameters whose intervals linear theory does not tell; where the model limits them they are wider anyway."""
-    if not outcome.ended or not outcome.converged or tests.limited or not seen.reliable:
+    if not outcome.ended or not outcome.converged or near.tests.limited or not near.seen.reliable:
         return []
-    return unless_late(lambda: bent(model, outcome.point, at, seen), [])
+    return unless_late(lambda: bent(model, near.point, near.at, near.seen), [])

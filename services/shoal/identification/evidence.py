@@ -1,0 +1,94 @@
+"""What runs beside an answer tell of it before anybody judges: residuals, derivatives, the model's error, tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shoal.identification.deadline import unless_late
+from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
+from shoal.identification.spread.covariance import Block, blocks_of
+from shoal.identification.spread.model_error import Corrections, ModelError, model_error, rms_of
+from shoal.identification.spread.sensitivity import Sensitivity, believed
+from shoal.identification.spread.uncertainty import Linearisation, linearise
+from shoal.trajectory import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Of a point (parameters,).
+
+    predicted: channels there by recording, (samples, channels)
+    residual: there, (rows,); nan where it cannot be simulated
+    seen: the same with zeros in place of nan, and its Jacobian
+    looked: whether there was time for derivatives
+    possible: whether the point can be simulated
+    blocks: the series of the residuals
+    at: the linearisation, with what the model, not the noise, leaves
+    error: of the model itself; mesh, theory: sizes of its parts, root mean squares
+    """
+
+    point: Array
+    predicted: dict[str, Array]
+    residual: Array
+    seen: Sensitivity
+    looked: bool
+    possible: bool
+    blocks: list[Block]
+    at: Linearisation
+    error: ModelError
+    mesh: float | None
+    theory: float | None
+    tests: ResidualTests
+
+    @property
+    def known(self) -> bool:
+        """Whether intervals can be told."""
+        return self.possible and self.looked
+
+    @property
+    def correction(self) -> Corrections:
+        """What the model's error adds to the point."""
+        return self.error.corrections(self.at.pseudo_inverse)
+
+
+def evidence(model: ForwardModel, point: Array) -> Evidence:
+    """Around a point, as far as time allows."""
+    predicted = {name: _predicted(model, point, name) for name in model.measurement.recordings}
+    residual = model.compared(point[None], {name: seen[None] for name, seen in predicted.items()})[0]
+    looked = unless_late(lambda: believed(model, point, residual), None)
+    seen = looked or _unseen(model)
+    possible = bool(np.all(np.isfinite(seen.residual)))
+    if not possible:
+        seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
+    blocks = blocks_of(model, len(seen.residual))
+    at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks)
+    error = ModelError(None, None)
+    if possible and looked is not None:
+        error = unless_late(lambda: model_error(model, point, predicted, seen.residual), error)
+    parts = (_size(model, error.mesh), _size(model, error.theory))
+    limit = float(np.hypot(parts[0] or 0.0, parts[1] or 0.0))
+    refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
+    tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined)
+    told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
+    at = replace(at, systematic=tests.excess * told)
+    return Evidence(point, predicted, residual, seen, looked is not None, possible, blocks, at, error, *parts, tests)
+
+
+def _size(model: ForwardModel, rows: Array | None) -> float | None:
+    """Root mean square of rows of what was measured."""
+    return None if rows is None else rms_of(rows[: len(model.rows.time)])
+
+
+def _unseen(model: ForwardModel) -> Sensitivity:
+    """What is known of the neighbourhood of an answer where there is no time to look: nothing."""
+    rows = len(model.rows.time) + len(model.parameters.priors)
+    return Sensitivity(np.zeros(rows), np.zeros((rows, len(model.names))), np.inf, np.inf)
+
+
+def _predicted(model: ForwardModel, point: Array, name: str) -> Array:
+    """Channels of a recording at an answer, (samples, channels); nan where there is no time to run it."""
+    nothing = np.full((1, *model.measurement.recordings[name].values.shape), np.nan)
+    return np.asarray(unless_late(lambda: model.observe(point[None], name), nothing)[0])
