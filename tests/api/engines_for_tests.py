@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from shoal.engines import ENGINES
 from shoal.engines.contract import Capabilities, sampling_times
+from shoal.mechanics import clock
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 
@@ -18,7 +19,7 @@ NAME = "obedient"
 
 
 class Obedient:
-    """Does what the scene's name says: `hang`, `short`, `crash`, `nan`, `huge`, else it rests at the origin.
+    """Does what the scene's name says: `hang`, `short`, `compile`, `crash`, `nan`, `huge`, else it rests at the origin.
 
     It writes its process id into the file that the description names, if any.
     """
@@ -38,6 +39,9 @@ class Obedient:
             time.sleep(3600)
         if scene.name == "short":
             time.sleep(1.0)
+        if scene.name == "compile":
+            with clock.stopped():
+                time.sleep(4.5)
         if scene.name == "crash":
             os.kill(os.getpid(), signal.SIGKILL)
         if scene.name == "huge":

@@ -23,6 +23,7 @@ from shoal.engines.contract import Engine
 from shoal.engines.verification import verified
 from shoal.errors import InputError, ShoalError
 from shoal.identification import Problem
+from shoal.mechanics import clock
 from shoal.scene import Scene, load_scene
 from shoal.versions import versions
 
@@ -48,12 +49,20 @@ def main(pipe: Connection, make_engine: Callable[[], Engine], settings: Settings
     os.environ["SHOAL_LIBRARY"] = str(settings.library.absolute())
     os.chdir(folder)
     bench = Bench(engine, settings)
+    sending = threading.Lock()
+
+    def send(kind: str, content: Any) -> None:
+        with sending:
+            pipe.send((kind, content))
+
     while True:
         try:
             task, request = pipe.recv()
         except (EOFError, OSError):
             return _end_with_parent(folder)
-        pipe.send(_result(bench, task, request, lambda content: pipe.send(("note", content))))
+        with clock.heard(lambda stands: send("clock", stands)):
+            result = _result(bench, task, request, lambda content: send("note", content))
+        send(*result)
         _empty(Path(folder))
 
 

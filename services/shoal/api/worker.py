@@ -59,7 +59,7 @@ class Worker:
         self.about = self._answer(START_SECONDS, lambda _: None)
 
     def run(self, task: str, request: Any, seconds: float, note: Note) -> bytes:
-        """Compute one of process.TASKS within so many seconds.
+        """Compute one of process.TASKS within so many seconds, beside those in which kernels are compiled.
 
         Raises Refusal; where the process did not survive, the worker is not up.
         """
@@ -70,16 +70,21 @@ class Worker:
         return bytes(self._answer(seconds, note))
 
     def _answer(self, seconds: float, note: Note) -> Any:
-        deadline = time.monotonic() + seconds
+        left, stands = seconds, False
         while True:
+            begin = time.monotonic()
             try:
-                if not self._pipe.poll(max(0.0, deadline - time.monotonic())):
+                if not self._pipe.poll(START_SECONDS if stands else left):
                     self.kill()
                     raise Refusal("timeout", f"ended after {seconds:g} s, which is all it may take")
                 kind, content = self._pipe.recv()
             except (EOFError, OSError):
                 raise self._died() from None
-            if kind == "note":
+            if not stands:
+                left = max(0.0, left - (time.monotonic() - begin))
+            if kind == "clock":
+                stands = content
+            elif kind == "note":
                 note(content)
             elif kind == "done":
                 return content

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
+from shoal.mechanics import clock
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
@@ -35,14 +35,14 @@ class Deadline:
     def __init__(self, limit: float) -> None:
         self.limit = limit
         self.cost = 0.0
-        self._end = time.monotonic() + limit
+        self._end = clock.now() + limit
         self._extended = False
         self._paces: dict[object, tuple[float, float, float]] = {}
 
     @property
     def remaining(self) -> float:
-        """Seconds left."""
-        return self._end - time.monotonic()
+        """Seconds left, compiling aside."""
+        return self._end - clock.now()
 
     def extend(self) -> None:
         """Allow what the answer takes after a search that was stopped, once."""
@@ -53,11 +53,11 @@ class Deadline:
     @contextmanager
     def paused(self) -> Iterator[None]:
         """Time that does not count."""
-        begin = time.monotonic()
+        begin = clock.now()
         try:
             yield
         finally:
-            self._end += time.monotonic() - begin
+            self._end += clock.now() - begin
 
     def check(self) -> None:
         """Raises TimeIsUp."""
@@ -80,18 +80,18 @@ class Deadline:
         most = int(max(self.remaining / each, _MORE * taken * end)) + _STEPS
         if most < scene.solver.max_steps:
             scene = scene.model_copy(update={"solver": scene.solver.model_copy(update={"max_steps": most})})
-        begin = time.monotonic()
+        begin = clock.now()
         found = run(scene, times)
-        self._learn(kind, time.monotonic() - begin, end, found)
+        self._learn(kind, clock.now() - begin, end, found)
         return found
 
     def _probe(self, kind: object, scene: Scene, times: Array, run: Run) -> None:
         """See the pace by the beginning of a record, a longer one while what every run costs may be most of it."""
         part = _PROBE
         while True:
-            begin = time.monotonic()
+            begin = clock.now()
             found = run(scene, times[-1:] * part)
-            spent = time.monotonic() - begin
+            spent = clock.now() - begin
             self._paces.pop(kind, None)
             self._learn(kind, spent, part * float(times[-1]), found)
             if spent / part <= self.remaining or part >= _LONGEST or 4 * spent > _SHARE * self.remaining:

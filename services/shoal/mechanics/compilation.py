@@ -21,7 +21,7 @@ from numba import types
 from numba.core import caching, config, dispatcher, event
 from numba.core.compiler_lock import global_compiler_lock
 
-from shoal.mechanics import linking
+from shoal.mechanics import clock, linking
 from shoal.mechanics.notes import tell
 
 if sys.platform != "win32":
@@ -114,10 +114,13 @@ _numbas_save = caching.Cache.save_overload
 
 
 def _compile(self: Any, sig: Any) -> Any:
-    """`Dispatcher.compile`: looks into the cache, compiles, saves. Kernels wait for those they call: in no circle."""
+    """`Dispatcher.compile`: looks into the cache, compiles, saves. Kernels wait for those they call: in no circle.
+
+    No time limit counts it.
+    """
     whole = isinstance(self._cache, caching.NullCache)
     name = f"{self.py_func.__module__}.{self.py_func.__qualname__} {sig}"
-    with global_compiler_lock if whole else _alone(name), linking.level(self, sig):
+    with clock.stopped(), global_compiler_lock if whole else _alone(name), linking.level(self, sig):
         return _numbas_compile(self, sig)
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.mechanics import clock
 from shoal.memory import Memory
 from shoal.response.runs import Answers, TooManyRunsError
 from shoal.trajectory import Array
@@ -19,8 +19,8 @@ class TimeIsUpError(TooManyRunsError):
 
 @dataclass
 class Keep:
-    """memory: of the runs, None if they are not kept; end: by the monotonic clock [s], None if there is none; over:
-    whether a run was refused because of it
+    """memory: of the runs, None if they are not kept; end: by `clock` [s], None if there is none; over: whether a run
+    was refused because of it
     """
 
     memory: Memory | None = None
@@ -42,7 +42,7 @@ class Keep:
             good = known[:-1, -1] == 1.0
             why = "" if good.all() else "they failed before the study was broken off"
             return Answers(known[:-1, :-1].copy(), good, int(known[-1, -1]), why)
-        if self.end is not None and time.monotonic() > self.end:
+        if self.end is not None and clock.now() > self.end:
             self.over = True
             raise TimeIsUpError
         found = run(values)

@@ -18,7 +18,7 @@ from shoal.engines.contract import sampling_times
 from shoal.engines.spot_checks import larger
 from shoal.engines.verification import WRONG, verified
 from shoal.errors import ComputationError, InputError
-from shoal.mechanics import reach
+from shoal.mechanics import clock, reach
 from shoal.memory import Memory
 from shoal.response.allocation import (
     TARGET,
@@ -102,11 +102,11 @@ def uncertain(
     limit_method: one of `WAYS`; limit_runs: for each of them;
     allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of tightening each;
     target: probability of passing it that is allowed; checkpoint: file that keeps the runs, from which the
-    same study goes on; time_limit [s]: after which it ends with what is known; progress: is told how many runs there
-    are. Raises InputError, ComputationError.
+    same study goes on; time_limit [s]: after which, compiling aside, it ends with what is known; progress: is told how
+    many runs there are. Raises InputError, ComputationError.
     """
     begin = time.perf_counter()
-    end = None if time_limit is None else time.monotonic() + time_limit
+    end = None if time_limit is None else clock.now() + time_limit
     wanted = load_scene(scene) if isinstance(scene, str) else scene
     wanted = wanted.with_values(values) if values else wanted
     inputs = Inputs(parameters(vary, wanted), correlations)
