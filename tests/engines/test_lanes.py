@@ -44,6 +44,7 @@ SPATIAL: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow  # its time loop takes long to compile
 @pytest.mark.parametrize(
     ("path", "values"),
     [

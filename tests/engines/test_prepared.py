@@ -28,6 +28,8 @@ SPRING = {
     "damping": 0.1,
     "angle": 7.0,
 }
+LONG_TO_COMPILE = ("flyball-governor", "swinging-strip", "flexible-spherical-double-pendulum")
+"""Their time loops in space take up to a minute."""
 
 
 def assert_same(one: Trajectory, other: Trajectory) -> None:
@@ -47,9 +49,8 @@ def repeated(scene: shoal.Scene, **asked: Any) -> Trajectory:
 
 
 @pytest.mark.parametrize(
-    # The governor's implicit integrator takes a minute to compile in space.
     "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name == "flyball-governor")) for name in scene_names()],
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG_TO_COMPILE)) for name in scene_names()],
 )
 def test_every_scene_repeats_itself(name: str) -> None:
     scene = load_scene(name)

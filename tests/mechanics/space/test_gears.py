@@ -18,6 +18,8 @@ ROOT: dict[str, Any] = {"body": "ground", "point": [0.0, 0.0, 0.0]}
 AWAY: dict[str, Any] = {"body": "ground", "point": [1.0, 0.0, 0.0]}
 OBLIQUE = [0.0, 1.0, 1.0]
 FLAT = {"kind": "gear", "first": {"body": "OA"}, "second": {"body": "AB"}, "ratio": 1, "second_axis": [1.0, 0.0, 0.0]}
+LONG_TO_COMPILE = ("radau5", "implicit-gauss", "energy-momentum", "semi-implicit-euler")
+"""No other test of machines in space with constraints takes them."""
 
 
 def wheel(inertia: float) -> dict[str, Any]:
@@ -58,7 +60,7 @@ def rims(angle: Array, ratio: float) -> tuple[Array, Array]:
 @pytest.mark.parametrize(
     "integrator",
     [
-        pytest.param(name, marks=[pytest.mark.slow] * (name in ("radau5", "implicit-gauss")))
+        pytest.param(name, marks=[pytest.mark.slow] * (name in LONG_TO_COMPILE))
         for name in INTEGRATORS
         if name != "auto"
     ],

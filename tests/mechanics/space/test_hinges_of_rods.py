@@ -58,7 +58,8 @@ def check_stiff(kinds: tuple[str, str], loads: dict[str, Any], *, turned: bool) 
     assert moved(chain(kinds, turned=turned, loads=loads)) == pytest.approx(rigid, abs=change / 200)
 
 
-@pytest.mark.parametrize("turned", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("turned", [False, True])
 def test_a_stiff_director_rod_at_a_rigid_one_moves_as_that(turned: bool) -> None:
     check_stiff(("rigid", "director-rod"), LOADS, turned=turned)
 
