@@ -38,6 +38,8 @@ def refused(client: httpx.Client, path: str, **request: Any) -> tuple[int, str, 
         (b"null", "input"),
         (b'{"scene": "single-pendulum", "surprise": 1}', "input"),
         (b'{"scene": "\\u0000"}', "input"),
+        (b'{"scene": "single-pendulum", "times": [true]}', "input"),
+        (b'{"scene": "single-pendulum", "values": {"gravity": [0, true]}}', "input"),
     ],
 )
 def test_body(gauss: httpx.Client, body: bytes, kind: str) -> None:

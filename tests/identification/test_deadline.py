@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.errors import InputError
-from shoal.identification import Problem, Verdict, deadline, identify
+from shoal.identification import Problem, Verdict, identify
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.scene import load_scene
 
@@ -34,7 +35,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock(0.01)
-    monkeypatch.setattr(deadline.time, "monotonic", lambda: clock.now)
+    monkeypatch.setattr(time, "monotonic", lambda: clock.now)
     return clock
 
 

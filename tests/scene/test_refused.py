@@ -54,6 +54,11 @@ GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": 
         pytest.param(("gravity", [0.0, math.inf]), "gravity.1", "finite", id="infinite-gravity"),
         pytest.param(("gravity", [0.0]), "gravity", "at least 2 items", id="one-component-of-gravity"),
         pytest.param(("bodies.OA.length", "long"), "bodies.OA.length", "number", id="text-for-a-number"),
+        pytest.param(
+            ("bodies.OA.length", True), "bodies.OA.length", "needs a number, found True", id="yes-for-a-number"
+        ),
+        pytest.param(("gravity", [0.0, False]), "gravity", "needs a number, found .*False", id="no-in-a-vector"),
+        pytest.param(("solver.samples", True), "solver.samples", "needs a number", id="yes-for-a-whole-number"),
         pytest.param(("bodies.OA.length", GONE), "bodies.OA.length", "required", id="missing-length"),
         pytest.param(
             ("bodies.OA.element", "brick"),

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from shoal.scene.record import Base
 from shoal.trajectory import Status
 
 BuiltIn = Annotated[str, Field(min_length=1, max_length=100)]
@@ -17,7 +18,7 @@ Number = float | None
 """null is what is not finite."""
 
 
-class Asked(BaseModel):
+class Asked(Base):
     """Base of requests: unknown fields and non-finite numbers are refused."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
@@ -136,7 +137,7 @@ MODELS = ("tip-motion", "misfit")
 Operation = Literal["InputSizes", "OutputSizes", "Evaluate", "Gradient", "ApplyJacobian"]
 
 
-class ModelCall(BaseModel):
+class ModelCall(Base):
     """A call of UM-Bridge 1.0; which fields count depends on the endpoint."""
 
     model_config = ConfigDict(allow_inf_nan=False, frozen=True)

@@ -10,12 +10,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BeforeValidator, ConfigDict, Field, ValidationError
 
 from shoal.errors import InputError
 from shoal.response.read import correlations, prices
 from shoal.scene import Scene, load_scene
 from shoal.scene.load import LARGEST, read_yaml, unknown
+from shoal.scene.record import Base
 from shoal.shelf import located, shelf
 
 KEY = "uncertain"
@@ -52,7 +53,7 @@ def _values(value: Any) -> Any:
     return {path: one for path, _, one in texts}
 
 
-class Stated(BaseModel):
+class Stated(Base):
     """The fields of such a file; see `shoal uncertain --help`. What it writes is for the command line only."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", alias_generator=lambda name: name.replace("_", "-"))

@@ -4,15 +4,64 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from difflib import get_close_matches
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails
 
 from shoal.errors import InputError
 
+_MAY_HOLD_TRUTH = (bool, dict, list, tuple)
 
-class Record(BaseModel):
+
+class Base(BaseModel):
+    """What is read from elsewhere: true and false (in YAML also yes, no, on, off) are refused in place of a number."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_truth(cls, given: Any) -> Any:
+        for name, value in given.items() if isinstance(given, dict) else ():
+            if isinstance(value, _MAY_HOLD_TRUTH) and name in _numbers(cls) and _holds_truth(value):
+                error = InitErrorDetails(type="float_type", loc=(name,), input=value)
+                raise ValidationError.from_exception_data(cls.__name__, [error])
+        return given
+
+
+@cache
+def _numbers(model: type[BaseModel]) -> frozenset[str]:
+    """The fields of a model that hold numbers and neither flags nor other models, which look after themselves."""
+    held = {name: set(_scalars(field.annotation)) for name, field in model.model_fields.items()}
+    numbers = (name for name, kinds in held.items() if kinds & {int, float} and bool not in kinds)
+    return frozenset(model.model_fields[name].alias or name for name in numbers)
+
+
+def _scalars(annotation: Any) -> Iterator[Any]:
+    """What a type is made of in the end."""
+    if parts := get_args(annotation):
+        for part in parts:
+            yield from _scalars(part)
+    else:
+        yield annotation
+
+
+def _holds_truth(given: Any) -> bool:
+    """Whether a value is, or has among its parts, true or false."""
+    parts = given.values() if isinstance(given, dict) else given if isinstance(given, list | tuple) else ()
+    return isinstance(given, bool) or any(map(_holds_truth, parts))
+
+
+class Record(Base):
     """An immutable description in SI units; unknown fields and non-finite numbers are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from shoal.engines.capabilities import require
 from shoal.engines.contract import Capabilities, check_lanes, sampling_times
+from shoal.engines.interrupts import interruptible
 from shoal.errors import InputError
 from shoal.mechanics.reach import MARGIN, stretch
 from shoal.mechanics.start.start import started
@@ -103,7 +104,8 @@ class CasadiEngine:
         x0 = model.start([start.angle for start in starts], [start.rate for start in starts])
         grid, wanted = _check_grid(times)
         try:
-            states, steps = self._integrate(model, scene, x0, grid[1:])
+            with interruptible():
+                states, steps = self._integrate(model, scene, x0, grid[1:])
         except RuntimeError as error:
             return _failed(model, times.size, Status.FAILED, f"the integrator stopped: {_reason(error)}")
         return _check(model, scene, np.hstack([x0.full(), states]), wanted, steps)

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from shoal.engines.casadi.fixed_step import runge_kutta
 from shoal.engines.casadi.model import casadi_model
 from shoal.engines.casadi.shooting import OPTIONS, ShootingResult, box, initial_state, left, record, result, shot
+from shoal.engines.interrupts import interruptible
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array
@@ -57,7 +58,8 @@ def identify_by_segments(
     optimise = nlp.optimiser(left(limit, began))
     built = time.perf_counter()
     free = np.full(nlp.unknowns - len(paths), _UNBOUNDED)
-    solution = optimise(x0=nlp.guess(first), lbx=np.append(low, -free), ubx=np.append(high, free), lbg=0.0, ubg=0.0)
+    with interruptible():
+        solution = optimise(x0=nlp.guess(first), lbx=np.append(low, -free), ubx=np.append(high, free), lbg=0.0, ubg=0.0)
     wall = time.perf_counter() - built
     values = np.clip(solution["x"].full().ravel()[: len(paths)], low, high)
     fitness = float(np.sum((whole(values).full() - target.T) ** 2) / len(target))

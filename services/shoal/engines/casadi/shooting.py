@@ -16,6 +16,7 @@ from shoal.engines.casadi.engine import CasadiEngine
 from shoal.engines.casadi.fixed_step import runge_kutta
 from shoal.engines.casadi.model import CasadiModel, casadi_model
 from shoal.engines.contract import sampling_times
+from shoal.engines.interrupts import interruptible
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status
@@ -102,7 +103,8 @@ def identify_initial_angles(
     plain, linearised = (shot(scene, paths, instants, marker, longest, count) for count in (0, len(paths)))
     optimise, fitness_at = _least_squares(plain, linearised, target, solver, left(limit, began))
     built = time.perf_counter()
-    values = optimise(x0=first, lbx=low, ubx=high)["x"].full().ravel()
+    with interruptible():
+        values = optimise(x0=first, lbx=low, ubx=high)["x"].full().ravel()
     wall = time.perf_counter() - built
     return result(values, float(fitness_at(values)), optimise.stats(), solver, 1, len(paths), wall, built - began)
 

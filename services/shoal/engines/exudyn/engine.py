@@ -19,6 +19,7 @@ from shoal.engines.exudyn.loads import LOADS
 from shoal.engines.exudyn.record import Record, Steps, choose_steps
 from shoal.engines.exudyn.space.build import build_in_space
 from shoal.engines.exudyn.space.joints import SPATIAL_JOINTS
+from shoal.engines.interrupts import interruptible
 from shoal.engines.one_by_one import one_by_one
 from shoal.mechanics.halts import CROSSED
 from shoal.mechanics.start.start import facts
@@ -155,7 +156,7 @@ class ExudynEngine:
             return ""
         machine.mbs.SetPostStepUserFunction(record.take)
         try:
-            with silence(exu):
+            with interruptible(), silence(exu):
                 done, begin, runs = True, 0.0, record.steps.runs
                 for number, (count, end) in enumerate(runs):
                     record.resumed = number > 0

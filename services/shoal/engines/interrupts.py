@@ -1,0 +1,38 @@
+"""Ctrl-C during a call into a library that takes it for a failure of its own."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Raise KeyboardInterrupt at the end of the block if it came within, whatever became of it there.
+
+    Callbacks raise it inside of Exudyn and CasADi, which make it a RuntimeError, or nothing. Only the main thread hears
+    of signals; elsewhere, and where somebody ignores them, nothing is done.
+    """
+    usual = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(usual):
+        yield
+        return
+    came = threading.Event()
+
+    def hear(*signalled: Any) -> None:
+        came.set()
+        usual(*signalled)
+
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield
+    except Exception:
+        if not came.is_set():
+            raise
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    if came.is_set():
+        raise KeyboardInterrupt
