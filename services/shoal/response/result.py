@@ -126,7 +126,7 @@ class Response:
         width = float((found["upper"] - found["lower"]).max())
         beyond = np.maximum(found["lower"] - found["lower_outer"], found["upper_outer"] - found["upper"])
         # What is not known stays so where nothing varies.
-        return np.asarray(beyond / width if width > 0 else 0.0 * beyond)
+        return np.asarray(beyond / width if width > 0 else np.where(np.isfinite(beyond), 0.0, np.nan))
 
     def gap(self, marker: str, quantity: str) -> float:
         """The largest of `gaps` within the horizon."""

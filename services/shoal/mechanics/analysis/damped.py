@@ -63,7 +63,7 @@ def undamped(found: Spectrum) -> Roots:
     squares = np.where(np.abs(found.values) <= found.levels, 0.0, found.values)
     sizes = np.sqrt(np.abs(squares))
     values = np.where(squares < 0, sizes + 0j, 1j * sizes)
-    levels = np.where(sizes > 0, found.levels / np.maximum(sizes, 1e-300), np.sqrt(found.levels))
+    levels = np.divide(found.levels, sizes, out=np.sqrt(found.levels), where=sizes > 0)
     return Roots(values, found.shapes.astype(complex), levels).ordered()
 
 
