@@ -67,4 +67,4 @@ def measured(
         beyond = np.maximum(found.lower_outer - low, high - found.upper_outer)[within].max(initial=0.0) / width
         held = beyond <= found.gap + ROUNDING
         verdict = ("holds" if within.all() else "horizon") if held else "silent"
-    return Line(problem.name, method, answer.runs.evaluations, short, verdict)
+    return Line(problem.name, method, answer.runs.own, short, verdict)
