@@ -8,10 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import special
+from scipy.integrate import solve_ivp
 from shoal import simulate
+from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.response import uncertain
+from shoal.response.machine import Machine
 from shoal.scene import Scene
+from shoal.trajectory import Status
 
 SOFT, STIFF, DRAWN, END, STEP = 4.0, 1e4, 0.1, 1.0, 0.018
 """Two bodies of 1 kg on springs [N/m]; the stiff one rests at its place. Leapfrog takes steps of 2 / sqrt(STIFF)."""
@@ -62,6 +66,52 @@ def test_a_tail_beyond_the_stable_step() -> None:
     # A step of h is off by (w h)^2 / 24 of the phase.
     off = DRAWN * 2 * END * (2 * STEP) ** 2 / 24
     assert found.column("P", "x", found.statistics.mean)[0] == pytest.approx(mean, abs=off)
+
+
+def test_a_run_that_another_integrator_can_make() -> None:
+    """A spring's end passes its anchor, where the force jumps; there explicit steps may become ever shorter."""
+    stiffness, driven, end = 29.130278247578264, 5.559108123501284, 38.459483414117315
+    ground = {"body": "ground", "point": [0.0, 0.0]}
+    scene = Scene.parse(
+        {
+            "name": "through its anchor",
+            "gravity": [0.0, 0.0],
+            "bodies": {"b": {"kind": "point-mass", "mass": 1.0}},
+            "joints": {"s": {"kind": "slider", "first": ground, "second": {"body": "b"}}},
+            "loads": {
+                "k": {
+                    "kind": "spring",
+                    "first": {"body": "ground", "point": [-1.0, 0.0]},
+                    "second": {"body": "b"},
+                    "stiffness": stiffness,
+                    "length": 1.0,
+                },
+                "f": {"kind": "force", "at": {"body": "b"}, "force": [1.0, 0.0], "scale": f"cos({driven}*t)"},
+            },
+            "markers": {"p": {"body": "b"}},
+            "initial": {"b": {"position": [0.0, 0.0]}},
+            "solver": {"duration": end},
+        }
+    )
+
+    def passed(t: float, y: Any, side: float) -> float:
+        return float(y[0] + 1.0)
+
+    passed.terminal = True  # type: ignore[attr-defined]
+    at, state, side = 0.0, [0.0, 0.0], 1.0
+    while at < end:
+        found = solve_ivp(
+            lambda t, y, side: [y[1], -stiffness * (y[0] + 1.0 - side) + np.cos(driven * t)],
+            (at, end), state, "DOP853", args=(side,), events=passed, rtol=1e-11, atol=1e-12, max_step=0.01,
+        )  # fmt: skip
+        at, state, side = float(found.t[-1]), [-1.0 - side * 1e-15, found.y[1, -1]], -side
+    values = {"loads.k.stiffness": np.array([stiffness, stiffness + 1e-3])}
+    engine = get_engine("gauss")
+    assert engine.simulate_many(scene, values, [end]).status[0] is Status.DIVERGED
+    answers = Machine(scene, np.array([end]), engine)(values)
+    assert answers.good.all()
+    assert answers.repeated == 1
+    assert answers.values[0, 0] == pytest.approx(found.y[0, -1], abs=1e-6)
 
 
 def test_the_worst_case_beyond_the_stable_step_can_be_run() -> None:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shoal.engines.contract import Engine
+from shoal.engines.one_by_one import one_by_one
 from shoal.errors import InputError, UnstableStepError
 from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.kept import Keep
@@ -21,6 +22,8 @@ CHUNK = 2_000_000
 FINER = 4.0, 16.0
 """A run that failed is repeated with a step, and adaptive errors, smaller by this, then by that."""
 LEAST_TOLERANCE = 1e-14
+ALONE = 32
+"""So many runs of a call at most, that fail with smaller steps too, are made one by one."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,10 @@ class Machine:
                 break
             done |= again
             good = np.isin(lanes, [lane for lane, one in done.items() if one.good])
+        left = lanes[~good]
+        if left.size <= ALONE and done and self.scene.solver.integrator == "auto":
+            done |= self._alone(values, left)
+            good = np.isin(lanes, [lane for lane, one in done.items() if one.good])
         if not done:
             raise InputError(why)
         missing = np.full_like(next(iter(done.values())).values, np.nan)
@@ -109,9 +116,19 @@ class Machine:
                 return {}, str(error)
             halves = [self._run(scene, values, half) for half in np.array_split(lanes, 2)]
             return halves[0][0] | halves[1][0], halves[0][1] or halves[1][1]
-        told, good = self.told(motion, scene, those), _good(motion)
+        return self._lanes(motion, scene, those, lanes), motion.message
+
+    def _alone(self, values: Mapping[str, Array], lanes: IntArray) -> dict[int, _Lane]:
+        """Some lanes one after the other: then `auto` takes another integrator where its first choice fails."""
+        those = {path: at[lanes] for path, at in values.items()}
+        return self._lanes(one_by_one(self.engine, self.scene, those, self.times), self.scene, those, lanes)
+
+    def _lanes(
+        self, motion: Trajectory, scene: Scene, values: Mapping[str, Array], lanes: IntArray
+    ) -> dict[int, _Lane]:
+        told, good = self.told(motion, scene, values), _good(motion)
         each = zip(lanes.tolist(), told, good.tolist(), strict=True)
-        return {lane: _Lane(row, well) for lane, row, well in each}, motion.message
+        return {lane: _Lane(row, well) for lane, row, well in each}
 
 
 class _Lane(NamedTuple):
