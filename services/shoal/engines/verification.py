@@ -60,6 +60,8 @@ GENEROUS = 5.0
 """or than so many times the run itself, if that is longer."""
 HALVINGS = 3
 """So often the step of a second run that is unstable is halved, before an implicit method is asked."""
+SMALLER = "a smaller solver.step, or solver.relative_tolerance and solver.absolute_tolerance"
+"""What cures a time error; the absolute tolerance is that of a motion of nanometres."""
 CLOSE = {"solver.relative_tolerance": 1e-8, "solver.absolute_tolerance": 1e-9}
 """Tolerances of second runs by integrators that choose their steps."""
 
@@ -92,12 +94,12 @@ class Verification:
     def complaint(self) -> str:
         """Why the run is not to be trusted; empty if nothing speaks against it."""
         if self.rejected:
-            return f"a more careful run is rejected ({self.rejected}); use a smaller solver.step or tolerance"
+            return f"a more careful run is rejected ({self.rejected}); use {SMALLER}"
         found = (self.time_error or 0.0, WRONG * self.scale, "m"), (self.angle_error or 0.0, WRONG, "rad")
         for error, allowed, unit in found:
             if error > allowed:
                 return (
-                    f"the time error is about {error:.2g} {unit}: use a smaller solver.step or tolerance, "
+                    f"the time error is about {error:.2g} {unit}: use {SMALLER}, "
                     "or a shorter solver.duration if the motion is chaotic"
                 )
         if self.mesh_error is not None and self.mesh_error > WRONG * self.scale:
