@@ -20,13 +20,14 @@ _ROWS = 50
 
 
 def of_motion(motion: Trajectory) -> str:
-    """Where the markers end, and the evidence."""
+    """Where the markers end if the motion is believed, and the evidence."""
     ends = [(name, *motion.marker(name)[-1]) for name in motion.markers]
+    shown = table(("marker", *_places(motion.axes)), ends) if motion.ok else "No places are shown, as it is rejected."
     evidence = f"{motion.status[0]}; energy drift {motion.energy_drift[0]:.1e}, constraint drift "
     evidence += f"{motion.constraint_drift[0]:.1e}, {motion.steps} steps, {motion.wall_s:.3f} s"
     verification = motion.model.get("verification")
     notes = [] if verification is None else list(estimates(verification))
-    return "\n\n".join([table(("marker", *_places(motion.axes)), ends), evidence, *notes])
+    return "\n\n".join([shown, evidence, *notes])
 
 
 def of_comparison(comparison: Comparison) -> str:

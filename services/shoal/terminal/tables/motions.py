@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shoal.pictures.choice import rows
+from shoal.pictures.choice import rows, tells_places
 from shoal.pictures.estimates import estimates
 from shoal.pictures.start import remarks
 from shoal.terminal import screen
@@ -30,7 +30,7 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
     if selection is not None:
         selection_table(selection)
     title = f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s"
-    if trajectory.ok or (selection is not None and np.isfinite(selection.chosen.error)):
+    if tells_places(trajectory, selection):
         table = screen.table(title, "marker", *(f"{axis} [m]" for axis in trajectory.axes))
         for name in trajectory.markers:
             table.add_row(name, *(f"{part:z.9f}" for part in trajectory.marker(name)[-1]))
