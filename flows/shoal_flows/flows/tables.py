@@ -10,6 +10,7 @@ from shoal.engines.sweep import Sweep
 from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.estimates import estimates
+from shoal.pictures.numbers import looked_at
 from shoal.response import Response
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory
@@ -58,11 +59,15 @@ def of_response(found: Response) -> str:
     shown = table(("at the end", *next(iter(ends.values()))), ((of, *told.values()) for of, told in ends.items()))
     said = [f"{found.status}; {found.evaluations} runs; {found.why}", found.message]
     for one in found.limits:
-        kept = {True: "kept", False: "passed", None: "not decided"}[one.kept]
-        told = kept if one.passing is None else f"passed with probability {one.passing.estimate.probability:.3g}"
+        kept = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
+        told = (
+            kept
+            if one.passing is None
+            else f"passed {looked_at(one.times)} with probability {one.passing.estimate.probability:.3g}"
+        )
         if one.between is not None:
             least, largest = one.between.estimates
-            told = f"passed with a probability between {least:.3g} and {largest:.3g}"
+            told = f"passed {looked_at(one.times)} with a probability between {least:.3g} and {largest:.3g}"
         said.append(f"limit {one.limit.text}: {told}")
     return "\n\n".join([shown, *(one for one in said if one)])
 
