@@ -26,6 +26,7 @@ def curve(axes: Axes, times: Array, values: Array, **look: Any) -> None:
 def band(axes: Axes, times: Array, lower: Array, upper: Array, **look: Any) -> None:
     """What lies between two values at these times [s]; what is not finite is left out."""
     if len(times) <= FEW:
+        axes.use_sticky_edges = False  # a bar would stand on the edge of the picture
         axes.bar(times, upper - lower, _width(times), bottom=lower, **{"edgecolor": look["color"], **look})
     else:
         axes.fill_between(times, lower, upper, **look)

@@ -107,7 +107,7 @@ def comparison_table(comparison: Comparison) -> None:
     columns = ("engine", *(f"{axis} [m]" for axis in axes), "energy", "time", "status")
     table = screen.table(f"{comparison.scene.name}: {last} at the end", *columns)
     for name, trajectory in comparison.trajectories.items():
-        place = (f"{part:.7f}" for part in trajectory.marker(last)[-1])
+        place = (f"{part:.7f}" if trajectory.ok else "-" for part in trajectory.marker(last)[-1])
         time = f"{trajectory.wall_s * 1e3:.0f} ms"
         table.add_row(name, *place, f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0]))
     screen.out.print(table)
