@@ -107,8 +107,9 @@ def _limit(judged: Judged) -> None:
         )
         how = "most probably with"
     else:
-        says = {True: f"is kept for all values {at}", False: "is passed"}
-        screen.say(f"{title}: {says.get(judged.kept, f'is kept by all runs {at}, which proves nothing')}", style="bold")
+        undecided = f"is kept by all runs {at}, which proves nothing"
+        says = {True: f"is kept for all values {at}", False: "is passed", None: undecided}
+        screen.say(f"{title}: {says[judged.kept]}", style="bold")
         how = "passed with" if judged.kept is False else "nearest with"
     if judged.note:
         screen.say(f"  {judged.note}")
