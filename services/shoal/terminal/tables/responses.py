@@ -77,8 +77,8 @@ def response_table(response: Response) -> None:
             )
     if response.boxes is not None:
         screen.say(
-            f"statistics lie between these values, whatever the intervals are; they are known to "
-            f"{response.boxes.gap:.1e} of the scatter, until {response.horizon:g} s"
+            f"statistics {looked_at(response.times)} lie between these values, whatever the intervals are; they are "
+            f"known to {response.boxes.gap:.1e} of the scatter, until {response.horizon:g} s"
         )
     errors = {"mesh": response.mesh_error, "step": response.step_error}
     told_of = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
