@@ -119,6 +119,15 @@ def test_no_row_is_folded(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert few > 0
 
 
+@pytest.mark.parametrize("what", TABLES)
+def test_no_number_is_broken_on_a_narrow_terminal(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What has no room beside each other stands below each other: no number of the wide table is broken."""
+    wide, narrow = (printed(TABLES[what], monkeypatch, width, log=True) for width in (200, 40))
+    below = re.split(r"\n\s*\n", wide[wide.index("─") :])[0]
+    numbers = re.findall(r"(?<![\w.])-?\d+\.\d+(?:e[-+]\d+)?(?![\w.])", below)
+    assert set(numbers) <= set(re.findall(r"-?\d+\.\d+(?:e[-+]\d+)?", narrow))
+
+
 def test_a_rejected_run_shows_no_places(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not even plausible ones."""
     scene = DOUBLE.with_values({"solver.step": 0.5, "solver.integrator": "rk4"})
@@ -133,7 +142,7 @@ def test_a_rejected_run_shows_no_places(monkeypatch: pytest.MonkeyPatch) -> None
 def test_numbers_have_their_units(monkeypatch: pytest.MonkeyPatch) -> None:
     """Brackets are no markup."""
     estimated = printed(TABLES["estimate"], monkeypatch, WIDTH, log=True)
-    for words in ("theta1 [rad] ", " m (RMS), ", " m², RMS "):
+    for words in ("theta1 [rad] ", " m (RMS for each channel), ", " m², RMS ", " m for each place or angle; "):
         assert words in estimated
     assert "OA.angle [rad]" in printed(TABLES["sweep"], monkeypatch, WIDTH, log=True)
 

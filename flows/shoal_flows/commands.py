@@ -24,7 +24,8 @@ def run_flow(flow: str, parameters: dict[str, str], as_json: bool) -> None:
     """
     from shoal_flows import run
 
-    check_trusted(run.main(flow, parameters, as_json), "the flow did not end well")
+    doubts = run.main(flow, parameters, as_json)
+    check_trusted(not doubts, f"not to be trusted: {'; '.join(doubts)}")
 
 
 @click.command()
@@ -34,7 +35,8 @@ def rerun(run_id: str, as_json: bool) -> None:
     """Repeat a study from its MLflow run, and compare the figures."""
     from shoal_flows import rerun
 
-    check_trusted(rerun.main(run_id, as_json), "the figures do not agree")
+    complaint = rerun.main(run_id, as_json)
+    check_trusted(not complaint, complaint)
 
 
 @click.command()

@@ -90,7 +90,7 @@ def moved(trajectory: Trajectory, scene: Scene, selection: Selection | None = No
         moving = simulation.moved(trajectory, scene)
     except (InputError, ComputationError):
         return {} if selection is None else {"ladder.png": png(ladder(selection))}
-    drawn = simulation.drawn(scene, moving, selection)
+    drawn = simulation.drawn(trajectory, scene, moving, selection)
     page = simulation.page(trajectory, scene, moving, drawn, selection)
     return {"motion.html": page.encode(), **{f"{one.name}.png": png(one.figure) for one in drawn}}
 

@@ -24,17 +24,30 @@ _TIMES = ("wall_s", "seconds")
 
 @dataclass(frozen=True)
 class Repeated:
-    """Figures of two runs: name -> (before, now), both with those of their parts; versions that differ, likewise."""
+    """Figures of two runs: name -> (before, now), both with those of their parts; versions that differ, likewise.
+
+    verdicts: before and now; doubts: every reason not to trust the answer that is there now
+    """
 
     before: str
     now: str
     figures: dict[str, tuple[float, float]]
     versions: dict[str, tuple[str, str]]
+    verdicts: tuple[str, str] = ("", "")
+    doubts: tuple[str, ...] = ()
 
     @property
     def agree(self) -> bool:
         """Whether there are figures and all of them agree."""
         return bool(self.figures) and not self.different
+
+    @property
+    def complaint(self) -> str:
+        """Why the repetition does not confirm an answer that can be trusted; empty if it does."""
+        if self.doubts:
+            told = f"the figures {'agree, but are' if self.agree else 'are'} not to be trusted"
+            return f"{told}: {'; '.join(self.doubts)}"
+        return "" if self.agree else "the figures do not agree"
 
     @property
     def different(self) -> dict[str, tuple[float, float]]:
@@ -48,7 +61,9 @@ class Repeated:
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal rerun --json` prints."""
         return {
-            "status": "ok" if self.agree else "failed",
+            "status": "failed" if self.complaint else "ok",
+            "message": self.complaint,
+            "verdicts": self.verdicts,
             "before": self.before,
             "now": self.now,
             "figures": len(self.figures),
@@ -68,7 +83,8 @@ def rerun(run_id: str) -> Repeated:
         with remembered.anew():
             # A text in quotes: `run_flow` reads texts as YAML.
             texts = {name: json.dumps(value) for name, value in parameters.items() if isinstance(value, str)}
-            now = str(run.run_flow(flow, {**parameters, **texts}).run_id)
+            answer = run.run_flow(flow, {**parameters, **texts})
+    now = str(answer.run_id)
     if now.startswith(LOCAL):
         notice()
         raise ComputationError("rerun: MLflow stopped answering, so that the figures cannot be compared yet")
@@ -77,27 +93,31 @@ def rerun(run_id: str) -> Repeated:
     tags = [client.get_run(one).data.tags for one in (known, now)]
     names = (*(f"version.{package}" for package in provenance.PACKAGES), "source.revision", "platform")
     versions = {n: (tags[0].get(n, "?"), tags[1].get(n, "?")) for n in names if tags[0].get(n) != tags[1].get(n)}
-    return Repeated(known, now, figures, versions)
+    verdicts = tags[0].get("verdict", ""), tags[1].get("verdict", "")
+    doubts = () if answer.trusted else tuple(answer.doubts())
+    return Repeated(known, now, figures, versions, verdicts, doubts)
 
 
-def main(run_id: str, as_json: bool) -> bool:
-    """Print what `rerun` found; returns whether all figures agree."""
+def main(run_id: str, as_json: bool) -> str:
+    """Print what `rerun` found; returns its complaint."""
     from rich.console import Console
     from shoal.trajectory import json_text
 
     repeated = rerun(run_id)
     if as_json:
         print(json_text(repeated.to_json()))  # noqa: T201 - this is the output
-        return repeated.agree
+        return repeated.complaint
     console = Console(highlight=False)
     console.print(f"run {repeated.now} repeats {repeated.before}", soft_wrap=True)
+    old, new = repeated.verdicts
+    console.print(f"  verdict: {new}" if new == old else f"  verdict: {old or 'not kept'}, now {new}", soft_wrap=True)
     for name, (old, new) in repeated.versions.items():
         console.print(f"  {name}: {old}, now {new}", soft_wrap=True)
     for name, (before, after) in repeated.different.items():
         console.print(f"  {name}: {before:.9g}, now {after:.9g}", soft_wrap=True)
     agree = len(repeated.figures) - len(repeated.different)
     console.print(f"{agree} of {len(repeated.figures)} figures agree within {AGREEMENT:g}")
-    return repeated.agree
+    return repeated.complaint
 
 
 def _origin(client: Any, run_id: str, folder: Path) -> tuple[str, dict[str, Any]]:

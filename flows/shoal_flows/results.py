@@ -17,6 +17,7 @@ from shoal.trajectory import Trajectory, plain
 from shoal_flows.exports import Exports
 from shoal_flows.jobs import Fit
 from shoal_flows.pictures import Picture
+from shoal_flows.verdicts import verdict
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,11 @@ class Study:
     def trusted(self) -> bool:
         """Whether every optimisation ended with an answer that can be used."""
         return bool(self.fits) and not self.failures and all(f.estimate.verdict.trusted for f in self.fits)
+
+    def doubts(self) -> list[str]:
+        """Every reason not to trust the whole."""
+        found = [f"{fit.cell.name}: {doubt}" for fit in self.fits for doubt in verdict(fit.estimate).doubts]
+        return [*found, *(f"{name} failed: {reason}" for name, reason in self.failures.items())]
 
     def by_method(self) -> dict[str, Fit]:
         """The first fit of each method."""
@@ -77,6 +83,10 @@ class Logged(Generic[A]):
         """Whether it may be believed."""
         return self.answer.ok
 
+    def doubts(self) -> list[str]:
+        """Why not."""
+        return list(verdict(self.answer).doubts)
+
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal run FLOW --json` prints."""
         return {**self.answer.to_json(), "run_id": self.run_id}
@@ -112,6 +122,10 @@ class Simulated:
         """Whether the motion may be believed."""
         return self.motion.ok
 
+    def doubts(self) -> list[str]:
+        """Why not."""
+        return list(verdict(self.motion).doubts)
+
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal run forward --json` prints."""
         return plain({**self.motion.to_json(), "scene": self.scene.name, "run_id": self.run_id})  # type: ignore[no-any-return]
@@ -133,6 +147,10 @@ class Selected:
     def trusted(self) -> bool:
         """Whether it meets the tolerance."""
         return self.selection.met and self.selection.trajectory.ok
+
+    def doubts(self) -> list[str]:
+        """Why not."""
+        return list(verdict(self.selection).doubts)
 
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal run select --json` prints."""

@@ -14,8 +14,8 @@ from shoal_flows import events, server, workers
 from shoal_flows.terminal import following, notice, show
 
 
-def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> bool:
-    """Run a flow with its progress on standard error, print its answer; returns whether it can be trusted."""
+def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> list[str]:
+    """Run a flow with its progress on standard error, print its answer; returns every reason not to trust it."""
     # Records that Prefect could not be sent: it would print each of them.
     logging.raiseExceptions = False
     with following(f"flow {name}") as listener, events.listening(listener):
@@ -27,7 +27,7 @@ def main(name: str, parameters: Mapping[str, Any], as_json: bool) -> bool:
         print(json_text(result.to_json()))  # noqa: T201 - this is the output
     else:
         show(result)
-    return bool(result.trusted)
+    return [] if result.trusted else list(result.doubts())
 
 
 def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:

@@ -78,9 +78,7 @@ def show(result: Any) -> None:
     elif isinstance(result, DemoResult):
         demo_tables(console, result)
     elif isinstance(result, Simulated):
-        for name in result.motion.markers:
-            place = ", ".join(f"{part:.9f}" for part in result.motion.marker(name)[-1])
-            console.print(f"{name} at {result.motion.times[-1]:g} s: ({place}) m")
+        tables.trajectory_table(result.motion, result.scene)
     elif isinstance(result, AtRest):
         tables.equilibrium_table(result.answer)
     elif isinstance(result, Selected):
@@ -183,15 +181,17 @@ def _study(console: Console, study: Study) -> None:
 def _differences(console: Console, results: list[Compared]) -> None:
     for compared in results:
         comparison = compared.answer
-        marker = list(comparison.scene.markers)[-1]
+        largest: dict[str, tuple[float, str]] = {}
+        for row in comparison.differences():
+            pair, distance = "-".join(row["engines"]), row["largest"]
+            far = math.inf if distance is None else distance
+            largest[pair] = max(largest.get(pair, (-1.0, "")), (far, row["marker"]))
         parts = [
-            f"{one}-{other} {row['largest'] * 1e6:.1f} µm" if row["largest"] is not None else f"{one}-{other} ?"
-            for row in comparison.differences()
-            if row["marker"] == marker
-            for one, other in [row["engines"]]
+            f"{pair} {far * 1e6:.1f} µm at {marker}" if far < math.inf else f"{pair} ? at {marker}"
+            for pair, (far, marker) in largest.items()
         ]
         if parts:
-            console.print(f"{comparison.scene.name}, largest distance at {marker}:", soft_wrap=True)
+            console.print(f"{comparison.scene.name}, largest distance:", soft_wrap=True)
             console.print(f"  {', '.join(parts)}", soft_wrap=True)
         elif not comparison.refused:
             console.print(f"{comparison.scene.name}: {comparison.complaint}", soft_wrap=True)

@@ -19,7 +19,7 @@ NAME = "obedient"
 
 
 class Obedient:
-    """Does what the scene's name says: `hang`, `short`, `compile`, `crash`, `nan`, `huge`, else it rests at the origin.
+    """Does what the scene's name says: `hang`, `short`, `compile`, `stuck`, `crash`, `nan`, `huge`, else it rests.
 
     It writes its process id into the file that the description names, if any.
     """
@@ -42,6 +42,9 @@ class Obedient:
         if scene.name == "compile":
             with clock.stopped():
                 time.sleep(4.5)
+        if scene.name == "stuck":
+            with clock.stopped():
+                time.sleep(3600)
         if scene.name == "crash":
             os.kill(os.getpid(), signal.SIGKILL)
         if scene.name == "huge":

@@ -13,6 +13,7 @@ from typing import Any
 
 import engines_for_tests
 import httpx
+import psutil
 import pytest
 from fastapi import APIRouter
 from fastapi.routing import APIRoute
@@ -98,6 +99,23 @@ def test_nobody_computes_for_a_client_that_left(obedient: httpx.Client, machine:
     assert not note.exists()
     assert post(obedient, machine | {"description": str(note)}).status_code == 200
     assert note.exists()
+
+
+def test_what_a_client_that_left_had_computed_is_ended(
+    obedient: httpx.Client, machine: Machine, tmp_path: Path
+) -> None:
+    """Its worker is gone before its time is over, and a fresh one takes the next call."""
+    eventually(lambda: post(obedient, machine).status_code == 200)
+    note = tmp_path / "pid"
+    with (
+        httpx.Client(base_url=obedient.base_url, timeout=httpx.Timeout(60, read=0.3)) as hasty,
+        pytest.raises(httpx.ReadTimeout),
+    ):
+        # It holds the clock still while it "compiles": nothing but the client's leaving ends it.
+        post(hasty, machine | {"name": "stuck", "description": str(note)})
+    eventually(note.exists)
+    eventually(lambda: not psutil.pid_exists(int(note.read_text())), 30.0)
+    assert post(obedient, machine).status_code == 200
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,9 @@ from shoal.errors import InputError
 from shoal.shelf import shelf
 from shoal_flows import run
 from shoal_flows.rerun import rerun
+from shoal_flows.results import Compared
 from shoal_flows.terminal import show
+from shoal_flows.tracking.record import LOCAL
 
 
 @pytest.fixture(scope="module")
@@ -123,6 +126,51 @@ def test_a_result_that_is_not_to_be_trusted_comes_back_as_it_is() -> None:
     found = run.run_flow("compare", {"scene": "n-four-bar-2", "engines": "gauss,casadi"})
     assert not found.trusted
     assert list(found.answer.refused) == ["casadi"]
+
+
+REJECTED = ["scene=single-pendulum", "values={solver.energy_tolerance: 1.0e-18}"]
+"""No arithmetic conserves energy so well: the run is rejected, whatever the solver."""
+
+
+def told(*command: str) -> tuple[int, str, str]:
+    found = CliRunner().invoke(main, command)
+    return found.exit_code, " ".join(found.stdout.split()), " ".join(found.stderr.split())
+
+
+def test_a_rejected_motion_is_told_as_the_command_tells_it_and_so_is_its_repetition() -> None:
+    """No places, its status and the reason, exit status 3; figures of a rejected run that agree are no good news."""
+    status, out, err = told("run", "forward", *(part for one in REJECTED for part in ("--param", one)))
+    alone = told("simulate", "single-pendulum", "--set", "solver.energy_tolerance=1e-18")
+    assert status == alone[0] == 3
+    for said in ("no places are shown, as the run is rejected", "status energy-check-failed"):
+        assert said in out
+        assert said in alone[1]
+    assert "not to be trusted: energy-check-failed: energy is off by" in err
+    run_id = out.partition("MLflow run ")[2].partition(";")[0]
+    assert _client().get_run(run_id).data.tags["verdict"] == "energy-check-failed"
+    status, out, err = told("rerun", run_id)
+    assert status == 3
+    assert "verdict: energy-check-failed" in out
+    assert "the figures agree, but are not to be trusted: energy-check-failed: energy is off by" in err
+
+
+def test_a_motion_that_is_refused_leaves_a_failed_run() -> None:
+    with pytest.raises(InputError, match="casadi") as refusal:
+        run.run_flow("forward", {"scene": "n-four-bar-2", "engine": "casadi"})
+    experiment = _client().get_experiment_by_name("Forward").experiment_id
+    (latest,) = _client().search_runs([experiment], "tags.scene = 'n-four-bar-2'", max_results=1)
+    assert (latest.info.status, latest.data.tags["verdict"]) == ("FAILED", "refused")
+    assert str(refusal.value) in latest.data.tags["mlflow.note.content"]
+
+
+def test_a_comparison_tells_the_largest_distance_with_its_marker(comparison: Any, capsys: Any) -> None:
+    """Not that of the last marker: a difference at another one would be hidden."""
+    motion = comparison.trajectories["gauss"]
+    points = motion.points.copy()
+    points[:, 0, 0] += 1.0
+    moved = replace(comparison, trajectories={"gauss": motion, "casadi": replace(motion, points=points)})
+    show(Compared(moved, LOCAL, (b"", b"")))
+    assert f"gauss-casadi 1000000.0 µm at {motion.markers[0]}" in capsys.readouterr().out
 
 
 def test_forward_sweep_and_compare_are_logged() -> None:

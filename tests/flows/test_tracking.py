@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,12 @@ from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
 from shoal.pictures.signals import signals
+from shoal.trajectory import Status, Trajectory
 from shoal_flows import pictures
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.report.stored import stored
 from shoal_flows.tracking import addresses, store
-from shoal_flows.tracking.engines import log_comparison, log_sweep
+from shoal_flows.tracking.engines import log_comparison, log_forward, log_sweep
 from shoal_flows.tracking.identification import log_fit, log_outcome, open_study
 from shoal_flows.tracking.store import connect
 
@@ -105,6 +107,56 @@ def test_comparison_and_sweep_are_logged(client: Any, comparison: Comparison, sw
     swept = log_sweep(sweep)
     assert names(client, swept) == {"scene.yaml", "sweep.csv", "displacement-A.png", "displacement-B.png"}
     assert client.get_run(swept).data.metrics["final/failed_points"] == 0
+
+
+def rejected(motion: Trajectory) -> Trajectory:
+    return replace(motion, status=(Status.OUT_OF_REACH,), message="a marker is 31 m away")
+
+
+def test_what_is_rejected_says_so_and_tells_no_places(client: Any, comparison: Comparison, sweep: Sweep) -> None:
+    """Of a motion, of the engines of a comparison and of a sweep alike: the verdict as a tag, the reason in words."""
+    wrong = {name: rejected(motion) for name, motion in comparison.trajectories.items()}
+    of_motion = log_forward(comparison.scene, wrong["gauss"], {})
+    compared = log_comparison(replace(comparison, trajectories={**comparison.trajectories, "exudyn": wrong["exudyn"]}))
+    of_engines = {run.data.params["engine"]: run.info.run_id for run in children(client, compared)}
+    swept = log_sweep(replace(sweep, status=(Status.OUT_OF_REACH, *sweep.status[1:])))
+    verdicts = {of_motion: "out-of-reach", of_engines["exudyn"]: "out-of-reach", compared: "failed", swept: "failed"}
+    for run_id, verdict in verdicts.items():
+        tags = client.get_run(run_id).data.tags
+        assert tags["verdict"] == verdict
+        assert tags["mlflow.note.content"].startswith("**Not to be trusted:** ")
+        assert ("31 m away" if run_id != swept else "1 of 5 points: out-of-reach") in tags["mlflow.note.content"]
+    for run_id in (of_motion, of_engines["exudyn"]):
+        assert not [name for name in client.get_run(run_id).data.metrics if name.endswith(("/x", "/y"))]
+        assert "trajectory-rejected.csv" in names(client, run_id)
+    sound = client.get_run(of_engines["gauss"]).data
+    assert (sound.tags["verdict"], "final/B/x" in sound.metrics) == ("ok", True)
+
+
+def test_every_marker_has_its_place_and_the_tip_its_name(client: Any, comparison: Comparison) -> None:
+    """`tip/x` and `final/x` are those of the marker that is called so, wherever it stands, else of the last."""
+    motion = comparison.trajectories["gauss"]
+    called = replace(motion, markers=("tip", *motion.markers[1:]))
+    for one, shown in ((motion, motion.markers[-1]), (called, "tip")):
+        run_id = log_forward(comparison.scene, one, {})
+        run = client.get_run(run_id).data
+        for name in one.markers:
+            assert [run.metrics[f"final/{name}/{axis}"] for axis in "xy"] == one.marker(name)[-1].tolist()
+        assert run.params["tip"] == shown
+        assert run.metrics["final/x"] == run.metrics[f"final/{shown}/x"] == one.marker(shown)[-1, 0]
+        assert client.get_metric_history(run_id, "tip/x")[-1].value == one.marker(shown)[-1, 0]
+
+
+def test_what_is_refused_before_it_is_computed_is_a_failed_run(client: Any) -> None:
+    with (
+        pytest.raises(InputError, match="too long"),
+        store.or_failed("Forward", "a machine · gauss", {"kind": "forward"}),
+    ):
+        raise InputError("solver.step: 1 s is too long")
+    experiment = client.get_experiment_by_name("Forward").experiment_id
+    (latest,) = client.search_runs([experiment], "attributes.run_name = 'a machine · gauss'")
+    assert (latest.info.status, latest.data.tags["verdict"]) == ("FAILED", "refused")
+    assert latest.data.tags["mlflow.note.content"] == "**No answer:** solver.step: 1 s is too long"
 
 
 def test_experiments_explain_themselves(client: Any, fits: list[Fit]) -> None:

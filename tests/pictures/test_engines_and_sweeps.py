@@ -18,6 +18,7 @@ from shoal.pictures.gaps import gaps
 from shoal.pictures.indices import indices
 from shoal.pictures.response import response
 from shoal.pictures.sweep import sweep as draw_sweep
+from shoal.pictures.uncertainty import uncertainty
 from shoal.response import uncertain
 from shoal.scene import load_scene
 
@@ -87,12 +88,31 @@ def test_bounds_at_a_single_instant_can_be_seen(marginal: Any) -> None:
     found = uncertain(SCENE, {"initial.OA.angle": marginal}, times=[0.5])
     for axes, quantity in zip(response(found, "A").axes, found.axes, strict=True):
         low, high = axes.get_xlim()
-        begin, end = axes.collections[0].get_paths()[0].get_extents().intervalx
+        begin, end = axes.patches[0].get_bbox().intervalx
         assert low < begin < 0.5 < end < high
         assert end - begin > 0.1 * (high - low)
         assert axes.get_ylabel() == f"{quantity} of A [m]"
     for axes in (gaps if found.bounds is not None else indices)(found, "A").axes:
-        assert np.ptp(np.asarray(axes.lines[0].get_xdata())) > 0.1 * np.ptp(axes.get_xlim())
+        assert axes.lines[0].get_marker() == "o"
+
+
+@pytest.mark.parametrize("marginal", [(0.9, 1.1), "normal(1, 0.1)"])
+def test_nothing_is_drawn_between_few_instants(marginal: Any) -> None:
+    """A band from 0.5 s to 1.5 s went straight past half a swing; many instants are a band as before."""
+    path = "initial.OA.angle"
+    few, many = (uncertain(SCENE, {path: marginal}, times=times) for times in ([0.5, 1.5], np.linspace(0, 1.5, 40)))
+    for found, bands in ((few, False), (many, True)):
+        for axes, quantity in zip(response(found, "A").axes, found.axes, strict=True):
+            lines = [line for line in axes.lines if line.get_linestyle() != "None" and len(line.get_xdata()) > 2]
+            assert bool(axes.collections) == bool(lines) == bands
+            if found.bounds is not None and not bands:
+                low, high = (found.column("A", quantity, of) for of in (found.bounds.lower, found.bounds.upper))
+                bars = [bar.get_bbox() for bar in axes.patches]
+                np.testing.assert_allclose([bar.intervaly for bar in bars], np.column_stack([low, high]))
+                np.testing.assert_allclose([np.mean(bar.intervalx) for bar in bars], found.times)
+    page = uncertainty(few)
+    assert "at the 2 instants looked at" in page
+    assert "The band that runs attain" not in page
 
 
 def test_files_are_png(tmp_path: Path) -> None:

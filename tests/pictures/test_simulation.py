@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,10 +17,13 @@ from PIL import Image
 from shoal.cli import main
 from shoal.engines import get_engine
 from shoal.errors import ComputationError
+from shoal.pictures import simulation
+from shoal.pictures.inline import html, plot
 from shoal.pictures.motion import plain_motion, scene_motion
 from shoal.pictures.outline import ground
 from shoal.pictures.poses import poses
 from shoal.scene import load_scene, scene_names
+from shoal.trajectory import Status
 
 COMPILES = "flyball-governor"
 """Its implicit integrator takes a minute to compile in space."""
@@ -85,7 +89,25 @@ def test_what_cannot_be_trusted_says_so(tmp_path: Path) -> None:
     out = tmp_path / "x.html"
     settings = ["--set", "solver.energy_tolerance=1e-30", "--out", str(out)]
     assert CliRunner().invoke(main, ["simulate", "single-pendulum", *settings]).exit_code == 3
-    assert '<p class="lead bad">Not to be trusted: energy is off by' in out.read_text(encoding="utf-8")
+    page = out.read_text(encoding="utf-8")
+    assert '<p class="lead bad">Not to be trusted: energy is off by' in page
+    assert "No places are shown, as the run is rejected." in page
+    assert "Where the markers are at the end" not in page
+    assert "moves within" not in page
+
+
+def test_pictures_of_a_rejected_run_tell_no_places() -> None:
+    """On a page and in a notebook as on the terminal; their titles told where the last marker ended."""
+    scene = load_scene("single-pendulum").with_values({"solver.duration": 0.1})
+    motion = get_engine("gauss").simulate(scene)
+    wrong = replace(motion, status=(Status.ENERGY,), message="energy is off")
+    moving = simulation.moved(motion, scene)
+    for run, said in ((motion, False), (wrong, True)):
+        told = [one.figure.get_suptitle().replace("\n", " ") for one in simulation.drawn(run, scene, moving)]
+        told.append(plot(run).figure.get_suptitle().replace("\n", " "))
+        assert [title.endswith("not to be trusted (energy-check-failed)") for title in told] == [said] * 3
+        assert [any(word in title for word in (" is at ", "moves within")) for title in told] == [not said] * 3
+        assert ("<td>" in html(run)) is not said
 
 
 def test_a_motion_that_ends_early_is_shown_so_far() -> None:

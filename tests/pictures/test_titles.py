@@ -31,7 +31,7 @@ def test_a_motion_says_where_it_ends_and_how_far_it_goes(motion: Motion) -> None
 
 
 def test_markers_in_one_place_are_one_line(motion: Motion) -> None:
-    figure = paths(motion, "machine")
+    figure = paths(motion, reaches("machine", motion))
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["A, B", "C"]
 
 

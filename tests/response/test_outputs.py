@@ -10,6 +10,7 @@ import pytest
 from shoal.pictures import files
 from shoal.response import Response, uncertain
 from shoal.scene import Scene
+from shoal.terminal.tables import response_table
 from thrown import ALONG, THROWN, UP
 
 HEIGHT = "initial.P.position.1"
@@ -51,7 +52,31 @@ def test_the_page_of_distributions(distributions: Response, tmp_path: Path) -> N
     page = (tmp_path / "page.html").read_text()
     assert "95 % interval" in page
     assert "Total Sobol indices" in page
-    assert "passed by each instant" in page
+    assert "passed at an instant looked at" in page
+
+
+def test_a_limit_that_is_kept_is_kept_at_the_instants_looked_at(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Thrown up at 5 m/s, the point is above 1.2 m at its top (v^2 / 2 g = 1.25 m), not at the two instants stated."""
+    looked = [0.1, 0.9]
+    found = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, looked, limits=["P.y > 1.2"])
+    (judged,) = found.limits
+    assert judged.kept
+    assert judged.shown is not None
+    first = (5.0 - np.sqrt(25.0 - 2 * 10.0 * 1.2)) / 10.0
+    assert judged.shown.between == pytest.approx(first, abs=0.01)
+    response_table(found)
+    told = " ".join(capsys.readouterr().out.split())
+    assert "is kept for all values at the 2 instants looked at" in told
+    assert "the run shown passes it between the instants looked at" in told
+    files.response(found, tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text()
+    assert "kept at the 2 instants looked at" in page
+    assert "passes it between the instants looked at" in page
+    below = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, looked, limits=["P.y > 1.3"]).limits[0]
+    assert below.kept
+    assert (below.note, below.shown is not None and below.shown.between is None) == ("", True)
 
 
 def test_netcdf(intervals: Response, distributions: Response, tmp_path: Path) -> None:

@@ -32,5 +32,6 @@ def compare(
     name = title(scene)
     with progress(1, f"{name} on {', '.join(engines or ['several engines'])}"):
         comparison, picture, run_id = run_engines(scene, engines, values)
-    show_result(f"{name}: engines", tables.of_comparison(comparison), run_id)
-    return ended(Compared(comparison, run_id, picture), [comparison.complaint])
+    result = Compared(comparison, run_id, picture)
+    show_result(f"{name}: engines", tables.of_comparison(comparison), result)
+    return ended(result)

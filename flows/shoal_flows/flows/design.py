@@ -49,5 +49,5 @@ def design(
     how = {**sizes, "about": about, "duration": duration, "rate": rate}
     with progress(1, f"a measurement for {name}"):
         result = Designed(*plan(problem, data or None, {**how, "parameter": parameter, "values": values}))
-    show_result(f"{name}: what to measure", tables.of_design(result.answer), result.run_id)
-    return ended(result, [result.answer.message])
+    show_result(f"{name}: what to measure", tables.of_design(result.answer), result)
+    return ended(result)

@@ -35,5 +35,5 @@ def export(
     name = title(scene)
     with progress(1, f"{name} for {', '.join(to)}"):
         result = Exported(*write(scene, to, values, {"verify": verify, "parameters": parameters, "inputs": inputs}))
-    show_result(f"{name} for {', '.join(to)}", tables.of_exports(result.answer), result.run_id)
-    return ended(result, [result.answer.message])
+    show_result(f"{name} for {', '.join(to)}", tables.of_exports(result.answer), result)
+    return ended(result)

@@ -29,5 +29,5 @@ def forward(
     name = title(scene)
     with progress(1, f"{name} on {engine}"):
         result = Simulated(*simulate(scene, engine, values))
-    show_result(f"{name} on {engine}", tables.of_motion(result.motion), result.run_id)
-    return ended(result, [f"{result.motion.status[0]}: {result.motion.message}"])
+    show_result(f"{name} on {engine}", tables.of_motion(result.motion), result)
+    return ended(result)

@@ -66,8 +66,6 @@ def identify(
             study.submit(cell)
         found = study.finish(name, pictures, ended=bar.advance)
         study.publish(found)
-        show_result(name, summary(found.fits, found.failures), found.run_id, answer(found.fits))
+        show_result(name, summary(found.fits, found.failures), found, answer(found.fits))
         study.check_any()
-    doubtful = {f.cell.name: f.estimate for f in found.fits if not f.estimate.verdict.trusted}
-    doubts = [f"{name}: {estimate.verdict}: {estimate.message}" for name, estimate in doubtful.items()]
-    return ended(found, [*doubts, *(f"{name} failed: {reason}" for name, reason in found.failures.items())])
+    return ended(found)

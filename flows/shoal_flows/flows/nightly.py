@@ -31,6 +31,10 @@ class Validated:
         """Whether every line is as it should be."""
         return self.night.passed
 
+    def doubts(self) -> list[str]:
+        """What is not."""
+        return [line.complaint for line in self.night.lines if not line.verdict.fine]
+
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal run nightly --json` prints."""
         return {**self.night.to_json(), "run_id": self.run_id}
@@ -51,9 +55,9 @@ def nightly(only: Only = ALL, quick: bool = False) -> Validated:
     with progress(len(lines), "lines of the night") as bar:
         held = hold(lines, quick=quick, only=problem, progress=_note(bar))
     night = held.night
-    run_id = log_night(night, held.text)
-    show_result(headline(night), f"{_changes(night)}{_table(night)}", run_id)
-    return ended(Validated(night, run_id), [line.complaint for line in night.lines if not line.verdict.fine])
+    result = Validated(night, log_night(night, held.text))
+    show_result(headline(night), f"{_changes(night)}{_table(night)}", result)
+    return ended(result)
 
 
 def _note(bar: Bar) -> Any:

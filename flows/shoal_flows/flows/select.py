@@ -29,5 +29,5 @@ def select(
     name = title(scene)
     with progress(1, f"{name} within {tolerance:g} m"):
         result = Selected(*task(scene, tolerance, values))
-    show_result(f"{name} within {tolerance:g} m", tables.of_selection(result.selection), result.run_id)
-    return ended(result, [result.selection.reason, result.selection.trajectory.message])
+    show_result(f"{name} within {tolerance:g} m", tables.of_selection(result.selection), result)
+    return ended(result)

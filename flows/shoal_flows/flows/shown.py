@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar, cast
 
@@ -28,21 +28,35 @@ class Result(Protocol):
         """Whether it can be used."""
         ...
 
+    @property
+    def run_id(self) -> str:
+        """Of its run in MLflow."""
+        ...
+
+    def doubts(self) -> list[str]:
+        """Every reason why not."""
+        ...
+
 
 R = TypeVar("R", bound=Result)
 
 
-def ended(result: R, doubts: Iterable[str]) -> R:
+def ended(result: R) -> R:
     """What a flow returns; one that cannot be trusted with a state of that name, and every reason in one line."""
     if result.trusted:
         return result
     # Prefect takes the state, and whoever called the flow gets the result in it.
-    return cast(R, Completed(name="Not to be trusted", message="; ".join(doubts), data=result))
+    return cast(R, Completed(name="Not to be trusted", message="; ".join(result.doubts()), data=result))
 
 
-def show_result(title: str, table: str, run_id: str, answer: str = "") -> None:
-    """The table (Markdown) of a flow that runs, and a link to its run in MLflow; answer: what a card has room for."""
-    text = f"## {title}\n\n{table}\n\n{_where(run_id)}\n"
+def show_result(title: str, table: str, result: Result, answer: str = "") -> None:
+    """The table (Markdown) of a flow that runs, after why it cannot be trusted, and a link to its run in MLflow.
+
+    answer: what a card has room for
+    """
+    run_id, doubts = result.run_id, result.doubts()
+    doubt = f"**Not to be trusted:** {'; '.join(doubts)}\n\n" if doubts else ""
+    text = f"## {title}\n\n{doubt}{table}\n\n{_where(run_id)}\n"
     create_markdown_artifact(text, key="result", description=answer or title)
     if address := run_address(run_id):
         create_link_artifact(address, link_text="The run in MLflow", key="mlflow-run", description=title)

@@ -31,5 +31,5 @@ def statics(
     name = title(scene)
     with progress(1, f"{name} at rest"):
         result = AtRest(*at_rest(scene, time, tolerance, values))
-    show_result(f"{name} at rest", tables.of_equilibrium(result.answer), result.run_id)
-    return ended(result, [f"{result.answer.status}: {result.answer.message}"])
+    show_result(f"{name} at rest", tables.of_equilibrium(result.answer), result)
+    return ended(result)

@@ -31,5 +31,5 @@ def sweep(
     name = title(scene)
     with progress(1, f"{name} over {', '.join(axis.path for axis in vary)}"):
         result = Swept(*run_grid(scene, {axis.path: axis.values() for axis in vary}, engine, time))
-    show_result(f"{name}: sweep", tables.of_sweep(result.answer), result.run_id)
-    return ended(result, [result.answer.complaint])
+    show_result(f"{name}: sweep", tables.of_sweep(result.answer), result)
+    return ended(result)

@@ -10,6 +10,7 @@ from shoal.engines.sweep import Sweep
 from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.estimates import estimates
+from shoal.pictures.numbers import looked_at
 from shoal.response import Response
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory
@@ -20,13 +21,14 @@ _ROWS = 50
 
 
 def of_motion(motion: Trajectory) -> str:
-    """Where the markers end, and the evidence."""
+    """Where the markers end if the motion is believed, and the evidence."""
     ends = [(name, *motion.marker(name)[-1]) for name in motion.markers]
+    shown = table(("marker", *_places(motion.axes)), ends) if motion.ok else "No places are shown, as it is rejected."
     evidence = f"{motion.status[0]}; energy drift {motion.energy_drift[0]:.1e}, constraint drift "
     evidence += f"{motion.constraint_drift[0]:.1e}, {motion.steps} steps, {motion.wall_s:.3f} s"
     verification = motion.model.get("verification")
     notes = [] if verification is None else list(estimates(verification))
-    return "\n\n".join([table(("marker", *_places(motion.axes)), ends), evidence, *notes])
+    return "\n\n".join([shown, evidence, *notes])
 
 
 def of_comparison(comparison: Comparison) -> str:
@@ -57,11 +59,15 @@ def of_response(found: Response) -> str:
     shown = table(("at the end", *next(iter(ends.values()))), ((of, *told.values()) for of, told in ends.items()))
     said = [f"{found.status}; {found.evaluations} runs; {found.why}", found.message]
     for one in found.limits:
-        kept = {True: "kept", False: "passed", None: "not decided"}[one.kept]
-        told = kept if one.passing is None else f"passed with probability {one.passing.estimate.probability:.3g}"
+        kept = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
+        told = (
+            kept
+            if one.passing is None
+            else f"passed {looked_at(one.times)} with probability {one.passing.estimate.probability:.3g}"
+        )
         if one.between is not None:
             least, largest = one.between.estimates
-            told = f"passed with a probability between {least:.3g} and {largest:.3g}"
+            told = f"passed {looked_at(one.times)} with a probability between {least:.3g} and {largest:.3g}"
         said.append(f"limit {one.limit.text}: {told}")
     return "\n\n".join([shown, *(one for one in said if one)])
 

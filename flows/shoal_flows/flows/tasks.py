@@ -28,6 +28,8 @@ from shoal_flows.pictures import Picture
 from shoal_flows.tracking import analyses, responses
 from shoal_flows.tracking import engines as tracked
 from shoal_flows.tracking.identification import log_fit
+from shoal_flows.tracking.motion import tip
+from shoal_flows.tracking.store import or_failed
 
 
 @task(task_run_name="measure", cache_policy=NO_CACHE)
@@ -51,10 +53,12 @@ def run_engines(
     scene: str, engines: Sequence[str] | None, values: Mapping[str, Any]
 ) -> tuple[Comparison, Picture, str]:
     """One scene on several engines; with its picture and the id of its run."""
-    with events.work(f"{inputs.title(scene)} on {', '.join(engines or ['several engines'])}"):
-        key = fingerprint.of_simulations("compare", scene, values, tuple(engines or ()))
-        comparison = remembered.run(key, jobs.compared, scene, engines, values)
-        marker = tracked.tip(comparison.scene)
+    name = inputs.title(scene)
+    with events.work(f"{name} on {', '.join(engines or ['several engines'])}"):
+        with or_failed("Comparison", f"{name} · compare", {"kind": "study", "scene": name}):
+            key = fingerprint.of_simulations("compare", scene, values, tuple(engines or ()))
+            comparison = remembered.run(key, jobs.compared, scene, engines, values)
+        marker = tip(list(comparison.scene.markers))
         picture = workers.run(pictures.draw_engines, comparison, marker)
         return comparison, picture, tracked.log_comparison(comparison, picture[0])
 
@@ -62,8 +66,10 @@ def run_engines(
 @task(task_run_name="simulate", cache_policy=NO_CACHE)
 def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene, Trajectory, str]:
     """One motion, with the id of its run."""
-    with events.work(f"{inputs.title(scene)} on {engine}"):
-        wanted, motion = workers.run(jobs.simulated, scene, engine, values)
+    name = inputs.title(scene)
+    with events.work(f"{name} on {engine}"):
+        with or_failed("Forward", f"{name} · {engine}", {"kind": "forward", "scene": name}):
+            wanted, motion = workers.run(jobs.simulated, scene, engine, values)
         album = workers.run(pictures.moved, motion, wanted)
         return wanted, motion, tracked.log_forward(wanted, motion, album)
 
@@ -71,16 +77,20 @@ def simulate(scene: str, engine: str, values: Mapping[str, Any]) -> tuple[Scene,
 @task(task_run_name="statics", cache_policy=NO_CACHE)
 def at_rest(scene: str, time: float, tolerance: float | None, values: Mapping[str, Any]) -> tuple[Equilibrium, str]:
     """Where a scene comes to rest, with the id of its run."""
-    with events.work(f"{inputs.title(scene)} at rest"):
-        found = workers.run(notebook.statics, scene, time, values=values, tolerance=tolerance)
+    name = inputs.title(scene)
+    with events.work(f"{name} at rest"):
+        with or_failed("Statics", f"{name} · statics", {"kind": "statics", "scene": name}):
+            found = workers.run(notebook.statics, scene, time, values=values, tolerance=tolerance)
         return found, analyses.log_statics(found, workers.run(pictures.rested, found))
 
 
 @task(task_run_name="select", cache_policy=NO_CACHE)
 def select(scene: str, tolerance: float, values: Mapping[str, Any]) -> tuple[Selection, str]:
     """The cheapest model that meets a tolerance, with the id of its run."""
-    with events.work(f"{inputs.title(scene)} within {tolerance:g} m"):
-        found = workers.run(notebook.select, scene, tolerance, values=values)
+    name = inputs.title(scene)
+    with events.work(f"{name} within {tolerance:g} m"):
+        with or_failed("Selection", f"{name} · select", {"kind": "selection", "scene": name}):
+            found = workers.run(notebook.select, scene, tolerance, values=values)
         album = workers.run(pictures.moved, found.trajectory, found.chosen.scene, found)
         return found, analyses.log_selection(found, album)
 
@@ -88,33 +98,41 @@ def select(scene: str, tolerance: float, values: Mapping[str, Any]) -> tuple[Sel
 @task(task_run_name="design", cache_policy=NO_CACHE)
 def plan(problem: str, data: str | None, how: Mapping[str, Any]) -> tuple[Design, str]:
     """What to measure, with the id of its run."""
-    with events.work(f"a measurement for {inputs.title(problem)}"):
-        found = workers.run(notebook.design, problem, data, **how)
+    name = inputs.title(problem)
+    with events.work(f"a measurement for {name}"):
+        with or_failed("Design", f"{name} · design", {"kind": "design", "problem": name}):
+            found = workers.run(notebook.design, problem, data, **how)
         return found, analyses.log_design(found)
 
 
 @task(task_run_name="uncertain", cache_policy=NO_CACHE)
 def respond(study: str, values: Mapping[str, Any]) -> tuple[Response, str]:
     """How a machine may move whose parameters are uncertain, with the id of its run."""
-    with events.work(f"{inputs.title(study)}: uncertain response"):
-        found, album = workers.run(pictures.responded, study, values)
-        return found, responses.log_response(inputs.title(study), found, album)
+    name = inputs.title(study)
+    with events.work(f"{name}: uncertain response"):
+        with or_failed("Uncertain", f"{name} · uncertain", {"kind": "uncertain"}):
+            found, album = workers.run(pictures.responded, study, values)
+        return found, responses.log_response(name, found, album)
 
 
 @task(task_run_name="export", cache_policy=NO_CACHE)
 def write(scene: str, to: Sequence[str], values: Mapping[str, Any], how: Mapping[str, Any]) -> tuple[Exports, str]:
     """Files of a scene, with the id of the run that keeps them."""
-    with events.work(f"{inputs.title(scene)} for {', '.join(to)}"):
-        found = workers.run(exported, scene, to, values, **how)
+    name = inputs.title(scene)
+    with events.work(f"{name} for {', '.join(to)}"):
+        with or_failed("Export", f"{name} · export", {"kind": "export", "scene": name}):
+            found = workers.run(exported, scene, to, values, **how)
         return found, analyses.log_exports(found)
 
 
 @task(task_run_name="sweep", cache_policy=NO_CACHE)
 def run_grid(scene: str, vary: Mapping[str, Array], engine: str, time: float | None) -> tuple[Sweep, str]:
     """One scene over a grid, with the id of its run."""
-    with events.work(f"{inputs.title(scene)} over {', '.join(vary)}"):
-        whole = joined([part.result() for part in _parts(scene, vary, engine, time)])
-        result = workers.run(jobs.spot_checked, whole, engine)
+    name = inputs.title(scene)
+    with events.work(f"{name} over {', '.join(vary)}"):
+        with or_failed("Sweep", f"{name} · sweep", {"kind": "sweep", "scene": name}):
+            whole = joined([part.result() for part in _parts(scene, vary, engine, time)])
+            result = workers.run(jobs.spot_checked, whole, engine)
         return result, tracked.log_sweep(result)
 
 

@@ -28,5 +28,5 @@ def uncertain(
     name = title(study)
     with progress(1, f"{name}: uncertain response"):
         result = Responded(*respond(study, values))
-    show_result(f"{name}: uncertain response", tables.of_response(result.answer), result.run_id)
-    return ended(result, [f"{result.answer.status}: {result.answer.message}"])
+    show_result(f"{name}: uncertain response", tables.of_response(result.answer), result)
+    return ended(result)

@@ -15,13 +15,15 @@ from shoal_flows.exports import Exports
 from shoal_flows.tracking.engines import log_motion_of, stated
 from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.store import open_run
+from shoal_flows.verdicts import verdict
 
 
 def log_statics(found: Equilibrium, picture: bytes) -> str:
     """One run; returns its id. picture: of the machine at rest"""
     scene = found.scene
-    tags = {"kind": "statics", "scene": scene.name, "verdict": str(found.status)}
+    tags = {"kind": "statics", "scene": scene.name}
     with open_run("Statics", f"{scene.name} · statics", description=scene.description, tags=tags) as run:
+        run.judge(*verdict(found))
         run.params({**stated(scene), "time": found.time})
         run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
         run.text(json_text(found.to_json(), indent=1), "equilibrium.json")
@@ -41,9 +43,10 @@ def log_selection(found: Selection, album: Mapping[str, bytes]) -> str:
     file. Returns its id.
     """
     scene = found.chosen.scene
-    tags = {"kind": "selection", "scene": scene.name, "verdict": "met" if found.met else "not met"}
+    tags = {"kind": "selection", "scene": scene.name}
     with open_run("Selection", f"{scene.name} · select", description=scene.description, tags=tags) as run:
-        log_motion_of(run, scene, found.trajectory)
+        run.judge(*verdict(found))
+        log_motion_of(run, scene, found.trajectory, found)
         run.params({"tolerance": found.tolerance, "chosen": found.chosen.name})
         run.metric("final/estimated_error", found.chosen.error)
         run.metric("final/rungs", len(found.rungs))
@@ -55,8 +58,9 @@ def log_selection(found: Selection, album: Mapping[str, bytes]) -> str:
 
 def log_design(found: Design) -> str:
     """One run with the table of what could be measured; returns its id."""
-    tags = {"kind": "design", "problem": found.problem, "verdict": "ok" if found.ok else "failed"}
+    tags = {"kind": "design", "problem": found.problem}
     with open_run("Design", f"{found.problem} · design", tags=tags) as run:
+        run.judge(*verdict(found))
         asked = {"noise": json_text(found.noise), "duration": found.duration, "rate": found.rate}
         run.params({"problem": found.problem, "best": found.ranked[0][0].label, **asked})
         best = found.ranked[0][1]
@@ -72,8 +76,9 @@ def log_design(found: Design) -> str:
 def log_exports(found: Exports) -> str:
     """One run with the files, and the motion where its table was asked for; returns its id."""
     scene = found.scene
-    tags = {"kind": "export", "scene": scene.name, "verdict": "ok" if found.ok else "failed"}
+    tags = {"kind": "export", "scene": scene.name}
     with open_run("Export", f"{scene.name} · export", description=scene.description, tags=tags) as run:
+        run.judge(*verdict(found))
         if found.motion is None:
             run.params(stated(scene))
             run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")

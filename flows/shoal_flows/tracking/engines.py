@@ -7,16 +7,19 @@ from typing import Any
 
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
+from shoal.pictures.choice import tells_places
 from shoal.pictures.engines import engines
 from shoal.pictures.files import rows
 from shoal.pictures.style import png
 from shoal.pictures.sweep import sweep as draw_sweep
 from shoal.scene import Scene
+from shoal.selection import Selection
 from shoal.trajectory import Trajectory, json_text
 
 from shoal_flows.tracking.model.files import as_yaml
-from shoal_flows.tracking.motion import log_motion
+from shoal_flows.tracking.motion import log_ends, log_motion, tip
 from shoal_flows.tracking.store import Run, open_run
+from shoal_flows.verdicts import verdict
 
 
 def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
@@ -24,18 +27,20 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
     scene = comparison.scene
     tags = {"kind": "study", "scene": scene.name}
     with open_run("Comparison", f"{scene.name} · compare", description=scene.description, tags=tags) as study:
+        study.judge(*verdict(comparison))
         study.params({**stated(scene), "engines": ", ".join(comparison.trajectories), **_refused(comparison)})
         for row in comparison.differences():
             pair = "-".join(row["engines"])
             for part in ("largest", "final"):
                 if row[part] is not None:
                     study.metric(f"difference/{pair}/{row['marker']}/{part}", row[part])
-        marker = tip(scene)
+        marker = tip(list(scene.markers))
         shown = picture or png(engines(comparison, marker, f"{scene.name}: the engines over each other"))
         study.picture(shown, "engines.png")
         study.text(json_text(comparison.differences(), indent=1), "differences.json")
         for name, motion in comparison.trajectories.items():
             with open_run("Comparison", name, tags={"kind": "engine", "scene": scene.name}, parent=study.run_id) as run:
+                run.judge(*verdict(motion))
                 log_motion_of(run, scene, motion)
         return study.run_id
 
@@ -45,6 +50,7 @@ def log_forward(scene: Scene, motion: Trajectory, album: Mapping[str, bytes]) ->
     tags = {"kind": "forward", "scene": scene.name}
     name = f"{scene.name} · {motion.engine}"
     with open_run("Forward", name, description=scene.description, tags=tags) as run:
+        run.judge(*verdict(motion))
         log_motion_of(run, scene, motion)
         for name, error in motion.model.get("verification", {}).items():
             if name.endswith("_error") and error is not None:
@@ -59,6 +65,7 @@ def log_sweep(result: Sweep) -> str:
     scene = result.scene
     tags = {"kind": "sweep", "scene": scene.name}
     with open_run("Sweep", f"{scene.name} · sweep", description=scene.description, tags=tags) as run:
+        run.judge(*verdict(result))
         spans = {f"vary.{path}": f"{v.min():g} to {v.max():g}" for path, v in result.grid.items()}
         run.params({**stated(scene), "engine": result.engine, "time": result.time, **spans})
         run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
@@ -76,24 +83,20 @@ def log_sweep(result: Sweep) -> str:
         return run.run_id
 
 
-def tip(scene: Scene) -> str:
-    """The marker that a picture shows if it shows one: the scene's last."""
-    return list(scene.markers)[-1]
-
-
-def log_motion_of(run: Run, scene: Scene, motion: Trajectory) -> None:
-    """What was computed of a scene, and where its last marker went."""
+def log_motion_of(run: Run, scene: Scene, motion: Trajectory, selection: Selection | None = None) -> None:
+    """What was computed of a scene, and where its markers went if places may be told; selection: of its model."""
     kept = (item for item in motion.model.items() if not item[0].startswith(("initial", "verification")))
     made = {f"model.{name}": value for name, value in kept}
     run.params({**stated(scene), "engine": motion.engine, **made})
     run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
-    for axis, place in zip(motion.axes, motion.marker(tip(scene))[-1].tolist(), strict=True):
-        run.metric(f"final/{axis}", place)
     run.metric("final/energy_drift", float(motion.energy_drift[0]))
     run.metric("final/constraint_drift", float(motion.constraint_drift[0]))
     run.metric("final/steps", motion.steps)
     run.metric("final/wall_s", motion.wall_s)
-    log_motion(run, motion, tip(scene))
+    told = tells_places(motion, selection)
+    if told:
+        log_ends(run, motion)
+    log_motion(run, motion, told=told)
 
 
 def stated(scene: Scene) -> dict[str, Any]:

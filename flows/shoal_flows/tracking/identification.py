@@ -18,6 +18,7 @@ from shoal_flows.pictures import Album
 from shoal_flows.tracking.data import of_measurement
 from shoal_flows.tracking.motion import log_motion
 from shoal_flows.tracking.store import Run, open_run
+from shoal_flows.verdicts import verdict
 
 ARCHIVE = "estimate.json"
 """The artifact that `shoal report` reads."""
@@ -44,7 +45,7 @@ def log_outcome(study: Run, fits: Sequence[Fit], failures: Mapping[str, str], pi
     study.text(table, "summary.md")
     study.describe(f"{table}\n{study.tags['mlflow.note.content']}")
     if best := best_of(fits):
-        study.tags["verdict"] = str(best.estimate.verdict)
+        study.judge(*verdict(best.estimate))
         study.tags["machine"] = best.estimate.scene.name
         study.params({"method": best.cell.name})
         study.metric("final/fitness", best.estimate.fitness)
@@ -88,10 +89,11 @@ def _values(estimate: Estimate) -> str:
 def log_fit(fit: Fit, album: Album, study: str) -> str:
     """A child of the run `study` with all there is to know about one fit; returns its id."""
     cell, estimate = fit.cell, fit.estimate
-    tags = {"kind": "optimisation", "problem": cell.title, "method": cell.method, "verdict": str(estimate.verdict)}
-    with open_run(
-        "Identification", cell.name, tags=tags, parent=study, description=estimate.message, took=estimate.wall_s
-    ) as run:
+    tags = {"kind": "optimisation", "problem": cell.title, "method": cell.method}
+    judged = verdict(estimate)
+    about = "" if judged.doubts else estimate.message
+    with open_run("Identification", cell.name, tags=tags, parent=study, description=about, took=estimate.wall_s) as run:
+        run.judge(*judged)
         scene = estimate.scene
         run.data = of_measurement(estimate.measurement)
         mesh = {name: sum(b.mesh.values()) for name, b in scene.bodies.items() if isinstance(b, Rod) and b.mesh}
@@ -102,7 +104,8 @@ def log_fit(fit: Fit, album: Album, study: str) -> str:
         _log_result(run, fit)
         for name, recording in estimate.measurement.recordings.items():
             prefix = f"{name}/" if len(fit.motions) > 1 else ""
-            log_motion(run, fit.motions[name], recording.channels[0].marker or fit.motions[name].markers[-1], prefix)
+            motion = fit.motions[name]
+            log_motion(run, motion, recording.channels[0].marker, prefix, told=motion.ok)
         for name, picture in album.pictures.items():
             run.picture(picture, name)
         run.text(album.page, "report.html")

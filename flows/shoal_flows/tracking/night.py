@@ -11,8 +11,10 @@ from shoal_flows.tracking.store import open_run
 def log_night(night: Night, page: str) -> str:
     """Error and time of every line, counts of the verdicts, the page and the lines; returns the id of the run."""
     kind = "quick" if night.quick else "full"
-    tags = {"kind": "night", "night": kind, "verdict": "passed" if night.passed else "not as it should be"}
+    tags = {"kind": "night", "night": kind}
     with open_run("Validation", f"night {night.started}", tags=tags) as run:
+        wrong = [line.complaint for line in night.lines if not line.verdict.fine]
+        run.judge("not as it should be" if wrong else "passed", wrong)
         run.params({"started": night.started, "machine": night.machine, "night": kind, "only": night.only or "all"})
         run.metric("final/wall_s", night.wall_s)
         for verdict, count in night.counts.items():

@@ -6,7 +6,7 @@ import json
 import math
 import re
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -20,6 +20,9 @@ MODEL = "model"
 """The folder among the files of a run that holds its model."""
 _TEXT = "record.json"
 _FILES = "files"
+_NOTE = "mlflow.note.content"
+_LONGEST = 6000
+"""Of a text that MLflow takes."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +71,19 @@ class Run:
         return not self.run_id.startswith(LOCAL)
 
     def describe(self, text: str) -> None:
-        """What MLflow shows as the run's description (Markdown)."""
+        """What MLflow shows as the run's description (Markdown); what is too long for it is cut."""
         if text:
-            self.tags["mlflow.note.content"] = text
+            self.tags[_NOTE] = text[:_LONGEST]
+
+    def judge(self, word: str, doubts: Sequence[str] = (), says: str = "Not to be trusted") -> None:
+        """What became of it, as tag `verdict`; doubts: every reason not to trust it, which begin the description."""
+        self.tags["verdict"] = word
+        if doubts:
+            self.describe(f"**{says}:** {'; '.join(doubts)}\n\n{self.tags.get(_NOTE, '')}".strip())
 
     def params(self, values: Mapping[str, Any]) -> None:
         """Settings, which never change; what is too long for MLflow is cut."""
-        self.kept_params |= {name: str(value)[:6000] for name, value in values.items()}
+        self.kept_params |= {name: str(value)[:_LONGEST] for name, value in values.items()}
 
     def metric(self, name: str, value: float, step: int = 0) -> None:
         """One number; what is not finite is left out."""

@@ -11,6 +11,7 @@ from shoal.trajectory import json_text
 
 from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.store import Run, open_run
+from shoal_flows.verdicts import verdict
 
 POINTS = 300
 """Of a curve, at most."""
@@ -19,8 +20,9 @@ POINTS = 300
 def log_response(study: str, found: Response, album: Mapping[str, bytes]) -> str:
     """One run; album: artifacts by path. Returns its id."""
     scene = found.stated
-    tags = {"kind": "uncertain", "scene": scene.name, "verdict": found.status}
+    tags = {"kind": "uncertain", "scene": scene.name}
     with open_run("Uncertain", f"{study} · uncertain", description=scene.description, tags=tags) as run:
+        run.judge(*verdict(found))
         known = {f"vary.{one.name}": one.marginal.text for one in found.inputs.parameters}
         run.params({"study": study, "scene": scene.name, "method": found.method, "seed": found.seed, **known})
         run.params({"why": found.why, "engine": found.engine})

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from shoal.errors import ComputationError
+from shoal.errors import ComputationError, InputError
 
 from shoal_flows import alive, provenance, settings
 from shoal_flows.tracking import data, origin, outbox, registry, views
@@ -66,6 +66,8 @@ def open_run(
         try:
             yield run
         except BaseException as error:
+            if isinstance(error, Exception):
+                run.judge("refused" if isinstance(error, InputError) else "failed", [str(error)], "No answer")
             run.end("FAILED" if isinstance(error, Exception) else "KILLED")
             _deliver(run)
             raise
@@ -75,6 +77,17 @@ def open_run(
         # MLflow answers: what an earlier study could not tell it goes along.
         with suppress(ComputationError):
             upload()
+
+
+@contextmanager
+def or_failed(experiment: str, name: str, tags: Mapping[str, str]) -> Iterator[None]:
+    """What is computed within the block and logged after it: where it fails, there is a failed run with the reason."""
+    try:
+        yield
+    except Exception as error:
+        with suppress(type(error)), open_run(experiment, name, tags=tags):
+            raise
+        raise
 
 
 def upload() -> int:

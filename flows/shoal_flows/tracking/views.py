@@ -56,13 +56,15 @@ VIEWS: dict[str, dict[str, View]] = {
         ),
     },
     "Comparison": {
-        "studies": View("Comparisons", ("params.scene", "params.engines"), {"searchFilter": "tags.kind = 'study'"}),
+        "studies": View(
+            "Comparisons", ("params.scene", "params.engines", "tags.verdict"), {"searchFilter": "tags.kind = 'study'"}
+        ),
     },
     "Forward": {
-        "studies": View("Motions", ("params.scene", "params.engine", "metrics.final/energy_drift")),
+        "studies": View("Motions", ("params.scene", "params.engine", "tags.verdict", "metrics.final/energy_drift")),
     },
     "Sweep": {
-        "studies": View("Sweeps", ("params.scene", "params.engine", "metrics.final/points")),
+        "studies": View("Sweeps", ("params.scene", "params.engine", "tags.verdict", "metrics.final/points")),
     },
     "Uncertain": {
         "studies": View("Studies", ("params.study", "params.method", "tags.verdict", "metrics.final/evaluations")),

@@ -14,11 +14,22 @@ from shoal.api.worker import Note, Worker
 
 LONGEST_PAUSE = 30.0
 """Between two attempts to start a worker [s]."""
+LOOK = 0.5
+"""How often it is looked whether somebody still waits for an answer [s]; what takes no longer is never broken off."""
 log = logging.getLogger("shoal.api")
 
 
 async def _never() -> bool:
     return False
+
+
+async def _end_if(gone: Callable[[], Awaitable[bool]], worker: Worker, answer: asyncio.Future[bytes]) -> None:
+    """Kill a worker whose answer nobody waits for."""
+    while not answer.done():
+        await asyncio.sleep(LOOK)
+        if await gone() and not answer.done():
+            worker.kill()
+            return
 
 
 class Pool:
@@ -65,8 +76,8 @@ class Pool:
     ) -> bytes:
         """What the task gives, within so many seconds of computing. Raises Refusal.
 
-        note: told how it goes; started: called when a worker has been found; gone: whether, after the wait for one,
-        nobody asks any longer. Where this is cancelled, the worker that computes is killed.
+        note: told how it goes; started: called when a worker has been found; gone: whether nobody asks any longer.
+        Then, and where this is cancelled, the worker that computes is killed.
         """
         worker = await self._free(gone)
         started()
@@ -75,12 +86,15 @@ class Pool:
         def noted(content: Any) -> None:
             loop.call_soon_threadsafe(note, content)
 
+        answer = loop.run_in_executor(self._threads, worker.run, task, request, seconds, noted)
+        watch = asyncio.create_task(_end_if(gone, worker, answer))
         try:
-            return await loop.run_in_executor(self._threads, worker.run, task, request, seconds, noted)
+            return await answer
         except asyncio.CancelledError:
             worker.kill()
             raise
         finally:
+            watch.cancel()
             self._release(worker)
 
     async def _free(self, gone: Callable[[], Awaitable[bool]]) -> Worker:

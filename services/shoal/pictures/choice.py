@@ -1,4 +1,4 @@
-"""How a model was chosen, in words and as the rows of a table."""
+"""How a model was chosen, in words and as the rows of a table, and whether its places may be told."""
 
 from __future__ import annotations
 
@@ -10,6 +10,12 @@ from shoal.pictures.numbers import length
 
 if TYPE_CHECKING:
     from shoal.selection import Selection
+    from shoal.trajectory import Trajectory
+
+
+def tells_places(motion: Trajectory, found: Selection | None = None) -> bool:
+    """Whether places of markers may be told: of a run that is believed, or misses a tolerance by a known error."""
+    return motion.ok or (found is not None and bool(np.isfinite(found.chosen.error)))
 
 
 def why(found: Selection) -> list[str]:

@@ -54,10 +54,10 @@ def trajectory(motion: Trajectory, scene: Scene, path: Path, selection: Selectio
         from shoal.pictures.poses import poses
         from shoal.pictures.simulation import moved
         from shoal.pictures.style import png
-        from shoal.pictures.titles import ends
+        from shoal.pictures.titles import ends, rejected
 
-        moving, trust = moved(motion, scene), "" if motion.ok else f" ({motion.status[0]}: not to be trusted)"
-        title = f"{ends(scene.name, moving)}{trust}"
+        moving = moved(motion, scene)
+        title = ends(scene.name, moving) if motion.ok else rejected(scene.name, motion)
         return gif(moving, title) if moves else png(poses(moving, title))
 
     def kept() -> bytes:

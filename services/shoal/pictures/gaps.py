@@ -7,7 +7,7 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from shoal.pictures.instants import instants, over, time_axis
+from shoal.pictures.instants import curve, time_axis
 from shoal.pictures.style import GREY, LINES, ORANGE, VERMILION, canvas, headline, log_ticks, styled
 from shoal.response import Response
 from shoal.response.boxes import Ends
@@ -26,12 +26,12 @@ def gaps(found: Response, marker: str) -> Figure:
     """
     what, width, beyond = _known(found)
     figure, panel = canvas()
-    t, within = instants(found.times), over(found.times, found.times <= found.horizon)
+    t, within = found.times, found.times <= found.horizon
     largest = list[float]()
     for look, quantity in zip(LINES, found.axes, strict=False):
-        wide, gap = (over(found.times, found.column(marker, quantity, of)) for of in (width, beyond))
-        panel.plot(t, np.maximum(wide, LEAST), label=f"{what} of {quantity}", **look)
-        panel.plot(t[within], np.maximum(gap[within], LEAST), alpha=0.5, label=f"gap of {quantity}", **look)
+        wide, gap = (found.column(marker, quantity, of) for of in (width, beyond))
+        curve(panel, t, np.maximum(wide, LEAST), label=f"{what} of {quantity}", **look)
+        curve(panel, t, np.where(within, np.maximum(gap, LEAST), np.nan), alpha=0.5, label=f"gap of {quantity}", **look)
         if within.any():
             largest.append(float(gap[within].max()) / max(float(wide.max()), LEAST))
     for error, name, colour in ((found.mesh_error, "mesh error", VERMILION), (found.step_error, "step error", ORANGE)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from shoal.pictures.instants import instants, over, time_axis
+from shoal.pictures.instants import band, curve, time_axis
 from shoal.pictures.style import LINES, canvas, headline, styled
 from shoal.response import Response
 from shoal.trajectory import Array
@@ -22,16 +22,16 @@ def indices(found: Response, marker: str) -> Figure:
     """
     names, low, high = _totals(found)
     figure, axes = canvas(2.2 + 2.0 * len(found.axes), nrows=len(found.axes), sharex=True)
-    t = instants(found.times)
-    ends = {axis: [over(found.times, found.column(marker, axis, of)) for of in (low, high)] for axis in found.axes}
+    t = found.times
+    ends = {axis: [found.column(marker, axis, of) for of in (low, high)] for axis in found.axes}
     largest = np.max([np.nan_to_num(of).max(axis=1) for _, of in ends.values()], axis=0)
     shown = sorted(np.argsort(-largest, kind="stable")[:MOST].tolist())
     for panel, (quantity, (least, most)) in zip(axes, ends.items(), strict=True):
         for look, k in zip(LINES, shown, strict=False):
-            panel.plot(t, most[k], label=names[k], **look)
+            curve(panel, t, most[k], label=names[k], **look)
             if found.boxes is not None:
-                panel.plot(t, least[k], **look)
-                panel.fill_between(t, least[k], most[k], color=look["color"], alpha=0.2, linewidth=0)
+                curve(panel, t, least[k], **look)
+                band(panel, t, least[k], most[k], color=look["color"], alpha=0.2, linewidth=0)
         panel.set_ylim(-0.03, 1.05)
         panel.set_ylabel(f"share of {quantity} of {marker}")
     axes[0].legend(fontsize=10)

@@ -27,7 +27,7 @@ from shoal.pictures.report import shown, verdict
 from shoal.pictures.rest import rest
 from shoal.pictures.style import png
 from shoal.pictures.sweep import sweep
-from shoal.pictures.titles import agrees, ends
+from shoal.pictures.titles import agrees, ends, reaches, rejected
 from shoal.scene import Rod, Scene
 from shoal.trajectory import Trajectory
 
@@ -113,14 +113,13 @@ def _(trajectory: Trajectory) -> str:
     end, trust = float(trajectory.times[-1]), f"status {trajectory.status[0]}"
     several = f"the first of {trajectory.lanes} lanes, " if trajectory.lanes > 1 else ""
     message = f" ({trajectory.message})" if trajectory.message else ""
-    rows = [[name, *(f"{x:.6f}" for x in trajectory.marker(name)[-1])] for name in trajectory.markers]
+    ends = [[name, *(f"{x:.6f}" for x in trajectory.marker(name)[-1])] for name in trajectory.markers]
+    caption, rows = (f"At {end:g} s", ends) if trajectory.ok else ("No places are shown, as the run is rejected", [])
     reach = ", ".join(trajectory.markers)
     alt = f"{' and '.join(trajectory.axes)} of {reach} against time."
     picture = Drawn("paths", _paths(trajectory), alt, "The coordinates of each marker.")
     headings = ["marker", *(f"{axis} [m]" for axis in trajectory.axes)]
-    return _html(
-        f"Motion by {trajectory.engine}", f"{several}{trust}{message}.", f"At {end:g} s", headings, rows, picture
-    )
+    return _html(f"Motion by {trajectory.engine}", f"{several}{trust}{message}.", caption, headings, rows, picture)
 
 
 @html.register
@@ -144,7 +143,6 @@ def _html(
 
 def _paths(trajectory: Trajectory) -> Figure:
     markers = {name: trajectory.marker(name) for name in trajectory.markers}
-    trust = "" if trajectory.ok else f" ({trajectory.status[0]}: not to be trusted)"
-    return paths(
-        Motion("", trajectory.times, np.empty((0, len(trajectory.axes))), {}, markers), f"{trajectory.engine}{trust}"
-    )
+    moving = Motion("", trajectory.times, np.empty((0, len(trajectory.axes))), {}, markers)
+    name = trajectory.engine
+    return paths(moving, reaches(name, moving) if trajectory.ok else rejected(name, trajectory))

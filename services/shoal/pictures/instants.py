@@ -1,4 +1,7 @@
-"""The axis of time of pictures of bounds; a single instant, whose curves had no length to see, is a bar."""
+"""What is known at some instants, over time: curves and bands, or, where the instants are few, marks and bars at each.
+
+Nothing is known between instants: a line or a band through few of them would state what nobody has looked at.
+"""
 
 from __future__ import annotations
 
@@ -6,27 +9,38 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from shoal.trajectory import Array
 
+FEW = 20
+"""So many instants are shown one by one."""
 WIDTH = 0.02
-"""Of the bar, as a share of the instant."""
+"""Of a bar, as a share of the time from the first instant to the last, or of a single instant."""
 
 
-def instants(times: Array) -> Array:
-    """The times [s] as they are, or the two ends of the bar."""
-    return times if len(times) > 1 else times[0] + 0.5 * WIDTH * (times[0] or 1.0) * np.array([-1.0, 1.0])
+def curve(axes: Axes, times: Array, values: Array, **look: Any) -> None:
+    """Values at these times [s]."""
+    axes.plot(times, values, **(look | {"linestyle": "none", "marker": "o"} if len(times) <= FEW else look))
 
 
-def over(times: Array, values: NDArray[Any]) -> NDArray[Any]:
-    """Values (..., times) at `instants(times)`."""
-    return np.broadcast_to(values, (*values.shape[:-1], len(instants(times))))
+def band(axes: Axes, times: Array, lower: Array, upper: Array, **look: Any) -> None:
+    """What lies between two values at these times [s]; what is not finite is left out."""
+    if len(times) <= FEW:
+        axes.use_sticky_edges = False  # a bar would stand on the edge of the picture
+        axes.bar(times, upper - lower, _width(times), bottom=lower, **{"edgecolor": look["color"], **look})
+    else:
+        axes.fill_between(times, lower, upper, **look)
 
 
 def time_axis(axes: Axes, times: Array) -> None:
-    """Label the axis, about a single instant with room beside the bar."""
+    """Label the axis, about a single instant with room beside its bar."""
     axes.set_xlabel("time [s]")
     if len(times) == 1:
         axes.set_xticks(times)
-        axes.set_xlim(*(times[0] + 5 * (instants(times) - times[0])))
+        axes.set_xlim(times[0] - 2.5 * _width(times), times[0] + 2.5 * _width(times))
+
+
+def _width(times: Array) -> float:
+    """Of a bar [s]: neighbours do not touch."""
+    whole = WIDTH * float(times[-1] - times[0] or times[0] or 1.0)
+    return min(whole, 0.8 * float(np.min(np.diff(times), initial=np.inf)))

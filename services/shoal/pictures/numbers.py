@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from shoal.trajectory import Array
+
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -13,6 +15,11 @@ def handy(size: float, unit: str) -> tuple[float, str]:
         if size >= 0.1 * power_of_ten:
             return 1.0 / power_of_ten, prefix + unit
     return 1e12, "p" + unit
+
+
+def looked_at(times: Array) -> str:
+    """At which instants something is known: a limit or a bound says nothing between them."""
+    return f"at the {len(times)} instants looked at" if len(times) > 1 else f"at {times[0]:g} s, the instant looked at"
 
 
 def length(metres: float | None) -> str:

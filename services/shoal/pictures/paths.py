@@ -7,14 +7,13 @@ from matplotlib.figure import Figure
 
 from shoal.pictures.motion import Motion
 from shoal.pictures.style import LINES, canvas, headline, styled
-from shoal.pictures.titles import reaches
 from shoal.trajectory import Array
 
 _MOST = 6
 
 
 @styled
-def paths(found: Motion, name: str) -> Figure:
+def paths(found: Motion, title: str) -> Figure:
     """x above, y below it, in space z below them, a line for each of at most six paths."""
     axes = "xyz"[: found.ground.shape[1]]
     figure, panels = canvas(1.4 + 1.8 * len(axes), nrows=len(axes), sharex=True)
@@ -26,7 +25,7 @@ def paths(found: Motion, name: str) -> Figure:
         panel.set_ylabel(f"{axis} [m]")
     panels[-1].set_xlabel("time [s]")
     more = f" ({_MOST} of {len(lines)} paths are shown)" if len(lines) > _MOST else ""
-    headline(figure, f"{reaches(name, found)}{more}")
+    headline(figure, f"{title}{more}")
     figure.align_ylabels()
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=min(4, len(shown)))
     return figure

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from shoal.pictures.instants import FEW, band, curve, time_axis
+from shoal.pictures.numbers import looked_at
 from shoal.pictures.style import BLUE, VERMILION, canvas, headline, log_ticks, styled
 from shoal.response.limits import Judged
 
 RARE = 0.1
 """Below this probability the axis is logarithmic."""
-FEW = 20
-"""So many instants are marked, as a line through one of them would not be seen."""
 
 
 @styled
@@ -23,7 +23,6 @@ def probability(found: Judged) -> Figure:
     figure, axes = canvas()
     estimates = found.estimates
     rare = estimates[-1].probability < RARE
-    few = {"marker": "o", "markersize": 4} if len(found.times) <= FEW else {}
     labels = ["passed by then"] if len(estimates) == 1 else ["least probable", "most probable"]
     seen = False
     for estimate, label, colour in zip(estimates, labels, (BLUE, VERMILION), strict=False):
@@ -31,10 +30,11 @@ def probability(found: Judged) -> Figure:
         seen = seen or bool(some.any())
         some |= np.full(len(some), not rare and bool(some.any()))
         lower, upper = estimate.interval
-        axes.fill_between(found.times[some], lower[some], upper[some], color=colour, alpha=0.25, linewidth=0)
+        low, high, passed = (np.where(some, of, np.nan) for of in (lower, upper, estimate.passed))
+        band(axes, found.times, low, high, color=colour, alpha=0.25, linewidth=0)
         if some.any():
             label = f"{label}; band: 95 % confidence"
-            axes.plot(found.times[some], estimate.passed[some], color=colour, label=label, **few)
+            curve(axes, found.times, passed, color=colour, label=label)
     most = estimates[-1]
     if not seen:
         below = most.interval[1][-1]
@@ -44,13 +44,14 @@ def probability(found: Judged) -> Figure:
         axes.set_yscale("log")
         axes.set_ylim(least * 1e-4, most.interval[1][-1] * 3)
         log_ticks(axes)
-    axes.set_xlim(found.times[0], max(found.times[-1], found.times[0] + 1e-9))
-    axes.set_xlabel("time [s]")
+    if len(found.times) > FEW:
+        axes.set_xlim(found.times[0], found.times[-1])
+    time_axis(axes, found.times)
     axes.set_ylabel("probability")
     if seen:
         axes.legend()
     chances = " to ".join(_number(one.probability) for one in estimates)
-    headline(figure, f"{found.limit.text} happens with probability {chances}")
+    headline(figure, f"{found.limit.text} happens with probability {chances}, {looked_at(found.times)}")
     return figure
 
 

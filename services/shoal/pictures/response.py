@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shoal.pictures.instants import instants, over, time_axis
-from shoal.pictures.numbers import length
+from shoal.pictures.instants import FEW, band, curve, time_axis
+from shoal.pictures.numbers import length, looked_at
 from shoal.pictures.style import BLUE, GREY, ORANGE, canvas, headline, styled
 from shoal.response import Response
 from shoal.trajectory import Array
@@ -32,36 +32,37 @@ def response(found: Response, marker: str) -> Figure:
         if found.boxes is not None
         else "{0} scatters with a standard deviation of {1} at most"
     )
+    when = f", {looked_at(found.times)}" if len(found.times) <= FEW else ""
     trust = "" if found.ok else f" ({found.status}: see the message)"
-    headline(figure, f"{found.scene}: {says.format(marker, length(widest))}{trust}")
+    headline(figure, f"{found.scene}: {says.format(marker, length(widest))}{when}{trust}")
     return figure
 
 
 def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
     """One coordinate; the largest width or deviation [m]."""
-    t = instants(found.times)
+    t = found.times
 
     def column(of: Array) -> Array:
-        return over(found.times, found.column(marker, quantity, of))
+        return found.column(marker, quantity, of)
 
     if found.bounds is not None:
         lower, upper, low, high = (
             column(of)
             for of in (found.bounds.lower, found.bounds.upper, found.bounds.lower_outer, found.bounds.upper_outer)
         )
-        panel.fill_between(t, lower, upper, color=BLUE, alpha=0.35, label="attained by runs")
-        within = over(found.times, found.times <= found.horizon)
-        panel.plot(t[within], low[within], color=ORANGE, linestyle="--", label="outer bounds")
-        panel.plot(t[within], high[within], color=ORANGE, linestyle="--")
+        band(panel, t, lower, upper, color=BLUE, alpha=0.35, label="attained by runs")
+        within = t <= found.horizon
+        for outer, label in ((low, "outer bounds"), (high, None)):
+            curve(panel, t, np.where(within, outer, np.nan), color=ORANGE, linestyle="--", markersize=4, label=label)
         if not within.all():
             panel.axvline(found.horizon, color=GREY, linestyle=":", label="horizon")
         widest = float(np.max(upper - lower))
     elif found.boxes is not None:
         mean, levels = found.boxes.mean, found.boxes.quantiles
         low, high = (column(of) for of in (levels[1].lower, levels[-2].upper))
-        panel.fill_between(t, low, high, color=BLUE, alpha=0.25, linewidth=0, label="5 % and 95 % at their farthest")
+        band(panel, t, low, high, color=BLUE, alpha=0.25, linewidth=0, label="5 % and 95 % at their farthest")
         low, high = (column(of) for of in (mean.lower, mean.upper))
-        panel.fill_between(t, low, high, color=ORANGE, alpha=0.5, linewidth=1.5, label="means over the intervals")
+        band(panel, t, low, high, color=ORANGE, alpha=0.5, linewidth=1.5, label="means over the intervals")
         if found.horizon < found.times[-1]:
             panel.axvline(found.horizon, color=GREY, linestyle=":", label="horizon")
         widest = float(np.max(column(found.boxes.std.upper)))
@@ -70,8 +71,8 @@ def _panel(panel: Axes, found: Response, marker: str, quantity: str) -> float:
         assert told is not None
         quantiles = column(told.quantiles)
         for one, other, dark in FANS:
-            panel.fill_between(t, quantiles[one], quantiles[other], color=BLUE, alpha=dark, linewidth=0)
-        panel.plot(t, column(told.mean), color=BLUE, label="mean; 50, 90, 98 % lie in the bands")
+            band(panel, t, quantiles[one], quantiles[other], color=BLUE, alpha=dark, linewidth=0)
+        curve(panel, t, column(told.mean), color=BLUE, label="mean; 50, 90, 98 % lie in the bands")
         widest = float(np.max(column(told.std)))
     panel.set_ylabel(f"{quantity} of {marker} [m]")
     return widest

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shoal.engines import get_engine
-from shoal.pictures.choice import rows, why
+from shoal.pictures.choice import rows, tells_places, why
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.estimates import estimates
 from shoal.pictures.ladder import ladder
@@ -17,7 +17,7 @@ from shoal.pictures.pages import animation, render, settings, software
 from shoal.pictures.paths import paths
 from shoal.pictures.poses import poses
 from shoal.pictures.start import remarks
-from shoal.pictures.titles import ends
+from shoal.pictures.titles import ends, reaches, rejected
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
 
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 def simulation(trajectory: Trajectory, scene: Scene, selection: Selection | None = None) -> str:
     """The page as HTML without a reference to anything outside. Raises InputError, ComputationError."""
     moving = moved(trajectory, scene)
-    return page(trajectory, scene, moving, drawn(scene, moving, selection), selection)
+    return page(trajectory, scene, moving, drawn(trajectory, scene, moving, selection), selection)
 
 
-def drawn(scene: Scene, moving: Motion, selection: Selection | None = None) -> list[Drawn]:
+def drawn(trajectory: Trajectory, scene: Scene, moving: Motion, selection: Selection | None = None) -> list[Drawn]:
     """What the page shows on paper: poses, paths and, of a chosen model, the ladder."""
-    pictures = [_poses(scene, moving), _paths(scene, moving)]
+    pictures = [_poses(trajectory, scene, moving), _paths(trajectory, scene, moving)]
     if selection is not None:
         tried, name = len(selection.rungs), selection.chosen.name
         alt = f"Estimated error over the cost of a run for {tried} models; {name} is taken."
@@ -58,7 +58,7 @@ def page(
             *(f"{axis} [m]" for axis in trajectory.axes),
             *(["angle [rad]"] if _is_flat(trajectory) else []),
         ],
-        rows=[[name, *_end(trajectory, name)] for name in trajectory.markers],
+        rows=[[name, *_end(trajectory, name)] for name in trajectory.markers if tells_places(trajectory, selection)],
         remarks=remarks(trajectory.model) + _remarks(trajectory, selection),
         pictures=[one.embedded() for one in pictures],
         models=[] if selection is None else rows(selection),
@@ -102,23 +102,25 @@ def _end(trajectory: Trajectory, name: str) -> list[str]:
     return [f"{x:.6f}" for x in numbers]
 
 
-def _poses(scene: Scene, moving: Motion) -> Drawn:
+def _poses(trajectory: Trajectory, scene: Scene, moving: Motion) -> Drawn:
     until = f"until {moving.times[-1]:.3g} s"
     alt = f"The bodies {', '.join(moving.outlines)} at several instants {until}, later ones darker."
     return Drawn(
         "poses",
-        poses(moving, ends(scene.name, moving)),
+        poses(moving, ends(scene.name, moving) if trajectory.ok else rejected(scene.name, trajectory)),
         alt if moving.up is None else f"From the front, above, right and a corner: {alt}",
         f"The later, the darker; the thin {'red ' if moving.up is not None else ''}lines are the paths of the markers.",
     )
 
 
-def _paths(scene: Scene, moving: Motion) -> Drawn:
+def _paths(trajectory: Trajectory, scene: Scene, moving: Motion) -> Drawn:
     reach = {name: float(np.max(np.ptp(path, axis=0))) for name, path in moving.markers.items()}
-    words = ", ".join(f"{name} moves within {length(size)}" for name, size in reach.items())
+    moves = ", ".join(f"{name} moves within {length(size)}" for name, size in reach.items())
+    words = moves if trajectory.ok else "not to be trusted"
+    title = reaches(scene.name, moving) if trajectory.ok else rejected(scene.name, trajectory)
     return Drawn(
         "paths",
-        paths(moving, scene.name),
+        paths(moving, title),
         f"{'x, y and z' if moving.up is not None else 'x and y'} of every marker against time: {words}.",
         f"{'All' if moving.up is not None else 'Both'} coordinates of each marker.",
     )

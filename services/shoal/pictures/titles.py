@@ -10,6 +10,7 @@ from shoal.engines.compare import Comparison
 from shoal.identification import Estimate
 from shoal.pictures.motion import Motion
 from shoal.pictures.numbers import length
+from shoal.trajectory import Trajectory
 
 _AS_GOOD = 1.01
 """A fitness within this factor of the best is as good as the best."""
@@ -51,6 +52,11 @@ def ends(name: str, found: Motion) -> str:
     marker, path = list(found.markers.items())[-1]
     place = f"({', '.join(f'{x:.3g}' for x in path[-1])})".replace("-", "−")
     return f"{name}: {marker} is at {place} m after {found.times[-1]:.3g} s"
+
+
+def rejected(name: str, trajectory: Trajectory) -> str:
+    """Of a run whose places mean nothing."""
+    return f"{name}: not to be trusted ({trajectory.status[0]})"
 
 
 def reaches(name: str, found: Motion) -> str:

@@ -12,8 +12,9 @@ from shoal.errors import ComputationError, InputError
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.gaps import gaps
 from shoal.pictures.indices import indices
+from shoal.pictures.instants import FEW
 from shoal.pictures.motion import scene_motion
-from shoal.pictures.numbers import length
+from shoal.pictures.numbers import length, looked_at
 from shoal.pictures.pages import animation, render, software
 from shoal.pictures.probability import probability
 from shoal.pictures.response import response
@@ -36,6 +37,7 @@ def uncertainty(found: Response) -> str:
         lead=_lead(found),
         parameters=_parameters(found),
         limits=[_limit(one) for one in found.limits],
+        looked_at=looked_at(found.times),
         motions=[_over_nominal(found, case) for case in cases],
         cases=[_case(case) for case in cases],
         pictures=[one.embedded() for one in _pictures(found)],
@@ -53,14 +55,14 @@ def _lead(found: Response) -> str:
     told = found.bounds.upper - found.bounds.lower if found.bounds is not None else None
     if told is not None:
         widest, marker = _largest(found, told)
-        return f"Places of {marker} differ by up to {length(widest)}; runs attain the bounds."
+        return f"Places of {marker} differ by up to {length(widest)} {looked_at(found.times)}; runs attain the bounds."
     if found.boxes is not None:
         deviation, among = found.boxes.std.upper, "Over all interval values, "
     else:
         assert found.statistics is not None
         deviation, among = found.statistics.std, ""
     spread, marker = _largest(found, deviation)
-    return f"{among}{marker} scatters with a standard deviation of up to {length(spread)}."
+    return f"{among}{marker} scatters with a standard deviation of up to {length(spread)} {looked_at(found.times)}."
 
 
 def _largest(found: Response, of: Array) -> tuple[float, str]:
@@ -79,7 +81,7 @@ def _limit(one: Judged) -> list[str]:
         ends = (f"{low:.3g} to {high:.3g}" for low, high in (one.between.estimates, one.between.interval))
         return [one.limit.text, *ends, how]
     if one.passing is None:
-        says = {True: "kept", False: "passed", None: "not decided"}[one.kept]
+        says = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
         return [one.limit.text, says, f"{one.margin:.3g} {one.limit.unit}", how]
     lower, upper = one.passing.estimate.interval
     chance = one.passing.estimate.probability
@@ -121,7 +123,9 @@ def _case(case: Worst) -> list[str]:
 
 def _pictures(found: Response) -> list[Drawn]:
     drawn = []
-    what = "The band that runs attain, with outer bounds" if found.bounds is not None else "Mean and quantiles"
+    few = len(found.times) <= FEW
+    band = "What runs attain at the instants looked at" if few else "The band that runs attain"
+    what = f"{band}, with outer bounds" if found.bounds is not None else "Mean and quantiles"
     if found.boxes is not None:
         what = "Where the mean and the 5 % and 95 % quantiles may lie"
     for marker in found.markers[-MARKERS:]:
@@ -145,7 +149,7 @@ def _pictures(found: Response) -> list[Drawn]:
 
 
 def _passage(one: Judged) -> Drawn:
-    words = "The probability that the limit has been passed by each instant."
+    words = "The probability that the limit has been passed at an instant looked at, by each of them."
     return Drawn(f"passage-{one.limit.text}", probability(one), f"{words[:-1]}: {one.limit.text}.", words)
 
 
@@ -171,6 +175,7 @@ def _allocated(found: Response) -> list[str]:
 
 def _remarks(found: Response) -> list[str]:
     remarks = [f"{one.limit.text}: {one.passing.why}." for one in found.limits if one.passing is not None]
+    remarks += [f"{one.limit.text}: {one.note}." for one in found.limits if one.note]
     for one in found.limits:
         if one.between is not None:
             for side, at in (("least", one.between.at_lower), ("most", one.between.at_upper)):

@@ -7,13 +7,17 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.markup import escape
+from rich.measure import Measurement
 from rich.table import Table
 
 from shoal.mechanics import notes
 from shoal.scene import Scene
 from shoal.trajectory import json_text
+
+_ENOUGH = 10_000
+"""Columns that every table has room in."""
 
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
@@ -62,10 +66,24 @@ def compile_for(engine: str, lanes: Iterable[int], *scenes: Scene) -> None:
         notes.before_models(compile_all)
 
 
+class _Fitting(Table):
+    """A table that breaks no word: on a terminal too narrow for that its columns stand below each other."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        needed = Measurement.get(console, options.update(width=_ENOUGH), self).minimum
+        if needed <= options.max_width:
+            yield from super().__rich_console__(console, options)
+            return
+        for row in zip(*(column.cells for column in self.columns), strict=True):
+            for column, cell in zip(self.columns, row, strict=True):
+                yield f"{column.header}  {cell}".strip()
+            yield ""
+
+
 def table(title: str, *headings: str) -> Table:
     """An empty table; its title is printed at once, so that it is not folded to the width of the table."""
     out.print(title, style="bold")
-    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    made = _Fitting(box=box.SIMPLE_HEAD, pad_edge=False)
     for index, heading in enumerate(headings):
         made.add_column(escape(heading), justify="left" if index == 0 else "right", overflow="fold")
     return made

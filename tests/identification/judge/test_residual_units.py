@@ -23,11 +23,14 @@ def estimate(channels: list[dict[str, str]]) -> Estimate:
     return identify(Problem.parse({**stated, "source": source}, "one"), method="least-squares")
 
 
-@pytest.mark.parametrize(("channels", "size"), [(TIP, " m (RMS), "), ([TURN], " rad (RMS), "), ([*TIP, TURN], "times")])
+@pytest.mark.parametrize(
+    ("channels", "size"),
+    [(TIP, " m (RMS for each channel), "), ([TURN], " rad (RMS for each channel), "), ([*TIP, TURN], "times")],
+)
 def test_size_of_the_residual_has_a_unit(channels: list[dict[str, str]], size: str) -> None:
     first = estimate(channels).residual_tests.sentences()[0]
     assert size in first
-    assert ("(RMS)" in first) is (len(channels) != 3)
+    assert ("(RMS" in first) is (len(channels) != 3)
 
 
 def test_covariance_is_of_the_values_and_their_units() -> None:

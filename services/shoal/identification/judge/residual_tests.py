@@ -118,7 +118,7 @@ class ResidualTests:
     def sentences(self) -> list[str]:
         """The tests in words."""
         kind = "the stated noise" if self.noise_stated else "the noise that the data show without a model"
-        size = f"{self.sized(self.size)} (RMS), " if self.unit else ""
+        size = f"{self.sized(self.size)} (RMS for each channel), " if self.unit else ""
         times = self.size / max(self.noise, 1e-300)
         against = f"{_digits(times, 2)} times {kind}" if np.isfinite(times) else "against a noise that is not known"
         found = [f"size: {size}{against}"]

@@ -21,6 +21,8 @@ from shoal.trajectory import Array, Trajectory
 
 MOST = 5_000
 """Runs for the probability of a limit unless another number is asked for."""
+FINER = 200
+"""Instants at which the run nearest to a limit is looked at, from the first instant to the last."""
 Reach = Callable[[Model, float], tuple[Array, Array, Array, int, int]]
 """Of the margins of a model over time, from a bound of some size: the least that runs attain, that may be, (instants,);
 the germs of the former, (instants, parameters); runs made, and how many failed."""
@@ -100,10 +102,21 @@ def judge(
     worst = int(lower.argmin())
     kept = False if lower[worst] < 0 else True if outer.min() >= 0 else None
     shown = _show(limit, machine, inputs, germs[worst], verify)
+    if verify and kept is not False and 1 < len(times) < FINER:
+        shown = replace(shown, between=_between(limit, machine, shown))
     return Judged(
         *(limit, "bounds", inputs, times, None, kept, float(lower[worst]), float(outer.min())),
         *(shown, evaluations, failed, ""),
     )
+
+
+def _between(limit: Limit, machine: Machine, shown: Shown) -> float | None:
+    """When [s] a run passes a limit first of all instants between those of a machine; None if at none."""
+    when = np.linspace(machine.times[0], machine.times[-1], FINER)
+    scene = limit.scene(machine.scene.with_values(shown.values))
+    motion = limit.engine(machine.engine, scene).simulate(scene, limit.instants(when))
+    passed = Watch(limit, len(when)).margins(motion, scene, {})[0] < 0
+    return float(when[passed.argmax()]) if motion.ok and passed.any() else None
 
 
 def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Inputs, named: Array) -> Shown:

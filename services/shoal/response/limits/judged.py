@@ -26,7 +26,8 @@ class Shown:
     """A run that shows how a limit is passed, or how close to it the machine comes, made again and verified.
 
     parameters: name -> value; values: path -> value; time [s]: of the least margin; margin: there; status: of the run;
-    mesh_error, step_error [m]: estimated
+    mesh_error, step_error [m]: estimated; between [s]: when it passes the limit although it does not at the instants
+    looked at, None where it does not, or nobody has looked
     """
 
     parameters: dict[str, float]
@@ -37,6 +38,7 @@ class Shown:
     message: str
     mesh_error: float | None
     step_error: float | None
+    between: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -138,6 +140,8 @@ class Judged:
     @property
     def note(self) -> str:
         """What else a user should know, empty if nothing."""
+        if self.shown is not None and self.shown.between is not None:
+            return f"the run shown passes it between the instants looked at, at {self.shown.between:.4g} s: state more"
         if not self.estimates or not min(one.probability for one in self.estimates) > NEARLY_SURE:
             return ""
         return f"{self.limit.text} states what must not happen, and nearly always does: is it what is required instead?"

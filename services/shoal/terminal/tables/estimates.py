@@ -99,8 +99,8 @@ def _effort(estimate: Estimate) -> None:
     screen.say(f"data: {estimate.data}")
     screen.say(*(f"note: {note}" for note in estimate.notes))
     screen.say(
-        f"fitness {estimate.fitness:.4e} {fitness_unit(estimate)}, RMS {estimate.rms:.3e} {rms_unit(estimate)}; "
-        f"{estimate.evaluations} evaluations in {estimate.wall_s:.2f} s"
+        f"fitness {estimate.fitness:.4e} {fitness_unit(estimate)}, RMS {estimate.rms:.3e} {rms_unit(estimate)} "
+        f"for each place or angle; {estimate.evaluations} evaluations in {estimate.wall_s:.2f} s"
     )
     for stage in estimate.model.get("selection", ()):
         screen.say(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shoal.pictures.choice import rows
+from shoal.pictures.choice import rows, tells_places
 from shoal.pictures.estimates import estimates
 from shoal.pictures.start import remarks
 from shoal.terminal import screen
@@ -30,7 +30,7 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
     if selection is not None:
         selection_table(selection)
     title = f"{scene.name}, {trajectory.engine}, at t = {trajectory.times[-1]:g} s"
-    if trajectory.ok or (selection is not None and np.isfinite(selection.chosen.error)):
+    if tells_places(trajectory, selection):
         table = screen.table(title, "marker", *(f"{axis} [m]" for axis in trajectory.axes))
         for name in trajectory.markers:
             table.add_row(name, *(f"{part:z.9f}" for part in trajectory.marker(name)[-1]))
@@ -107,7 +107,7 @@ def comparison_table(comparison: Comparison) -> None:
     columns = ("engine", *(f"{axis} [m]" for axis in axes), "energy", "time", "status")
     table = screen.table(f"{comparison.scene.name}: {last} at the end", *columns)
     for name, trajectory in comparison.trajectories.items():
-        place = (f"{part:.7f}" for part in trajectory.marker(last)[-1])
+        place = (f"{part:.7f}" if trajectory.ok else "-" for part in trajectory.marker(last)[-1])
         time = f"{trajectory.wall_s * 1e3:.0f} ms"
         table.add_row(name, *place, f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0]))
     screen.out.print(table)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.markup import escape
 
+from shoal.pictures.numbers import looked_at
 from shoal.terminal import screen
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def response_table(response: Response) -> None:
         gap = response.bounds.gap
         known = f"outer ones lie {gap:.1e} of the width off; they hold until {response.horizon:g} s"
         unknown = "how much farther other values go is not known"
-        screen.say(f"bounds are attained by runs; {unknown if np.isnan(gap) else known}")
+        screen.say(f"bounds {looked_at(response.times)} are attained by runs; {unknown if np.isnan(gap) else known}")
         if response.unseen is not None:
             screen.say(
                 f"{response.controls} of the runs lie all over the box: what is told may be otherwise in "
@@ -76,8 +77,8 @@ def response_table(response: Response) -> None:
             )
     if response.boxes is not None:
         screen.say(
-            f"statistics lie between these values, whatever the intervals are; they are known to "
-            f"{response.boxes.gap:.1e} of the scatter, until {response.horizon:g} s"
+            f"statistics {looked_at(response.times)} lie between these values, whatever the intervals are; they are "
+            f"known to {response.boxes.gap:.1e} of the scatter, until {response.horizon:g} s"
         )
     errors = {"mesh": response.mesh_error, "step": response.step_error}
     told_of = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
@@ -92,21 +93,22 @@ def response_table(response: Response) -> None:
 
 def _limit(judged: Judged) -> None:
     """What is told of a limit, and the values that show it."""
-    title, shown = f"limit {judged.limit.text}", judged.shown
+    title, shown, at = f"limit {judged.limit.text}", judged.shown, looked_at(judged.times)
     if judged.between is not None:
         _between(title, judged, judged.between)
         how = "most probably with"
     elif judged.passing is not None:
         lower, upper = judged.passing.estimate.interval
         screen.say(
-            f"{title}: is passed with probability {judged.passing.estimate.probability:.3g}, with 95 % confidence "
+            f"{title}: is passed {at} with probability {judged.passing.estimate.probability:.3g}, with 95 % confidence "
             f"between {lower[-1]:.3g} and {upper[-1]:.3g}",
             f"  by {judged.passing.why}; {judged.evaluations} runs",
             style="bold",
         )
         how = "most probably with"
     else:
-        says = {True: "is kept for all values", False: "is passed", None: "is kept by all runs, which proves nothing"}
+        undecided = f"is kept by all runs {at}, which proves nothing"
+        says = {True: f"is kept for all values {at}", False: "is passed", None: undecided}
         screen.say(f"{title}: {says[judged.kept]}", style="bold")
         how = "passed with" if judged.kept is False else "nearest with"
     if judged.note:
@@ -120,8 +122,8 @@ def _between(title: str, judged: Judged, found: Between) -> None:
     """Two probabilities and the interval values that they are told at."""
     (least, largest), (lower, upper) = found.estimates, found.interval
     screen.say(
-        f"{title}: is passed with a probability between {least:.3g} and {largest:.3g}, with 95 % confidence between "
-        f"{lower:.3g} and {upper:.3g}",
+        f"{title}: is passed {looked_at(judged.times)} with a probability between {least:.3g} and "
+        f"{largest:.3g}, with 95 % confidence between {lower:.3g} and {upper:.3g}",
         style="bold",
     )
     for name, at in (("least", found.at_lower), ("largest", found.at_upper)):
