@@ -99,10 +99,12 @@ def import_scene(file: Path, out: Out) -> None:
     import yaml
 
     from shoal.imported import read
+    from shoal.whole import whole
 
     found = read(file)
     path = out or Path(f"{found.scene['name']}.yaml")
-    path.write_text(yaml.safe_dump(found.scene, sort_keys=False), encoding="utf-8")
+    with whole(path) as part:
+        part.write_text(yaml.safe_dump(found.scene, sort_keys=False), encoding="utf-8")
     for line in found.left_out:
         click.echo(f"left out: {line}", err=True)
     click.echo(path)

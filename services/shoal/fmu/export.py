@@ -33,8 +33,8 @@ def export(
     """Write a unit; returns its file. Raises InputError, and ComputationError if it cannot be written or does not move.
 
     paths: fields of the scene that are its parameters, by default gravity and the stated initial angles; out: by
-    default the scene's name in the working folder; inputs: loads' scales or torques and drives that a host may change in the run;
-    fmi: version, 2 or 3
+    default the scene's name in the working folder; inputs: loads' scales or torques and drives that a host may change
+    in the run; fmi: version, 2 or 3
     """
     if asked_for(scene):
         raise InputError(f"solver.acceleration: {scene.solver.acceleration!r} is for studies; a unit needs a solver")

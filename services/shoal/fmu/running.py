@@ -15,6 +15,7 @@ from shoal.errors import ComputationError, ShoalError
 from shoal.fmu.ahead import Ahead
 from shoal.identification.recording.units import unit as unit_of
 from shoal.scene import Scene
+from shoal.whole import LONGEST
 
 CONTENT = "scene.json"
 """The file among the unit's resources that holds the scene and the names of its parameters and inputs."""
@@ -38,8 +39,8 @@ SAME = 1e-15
 
 
 def identifier(scene: Scene) -> str:
-    """The scene's name as FMI allows it for models: an identifier of C."""
-    name = re.sub(r"\W", "_", scene.name, flags=re.ASCII)
+    """The scene's name as FMI allows it for models, and any folder for files: an identifier of C."""
+    name = re.sub(r"\W", "_", scene.name, flags=re.ASCII)[:LONGEST]
     return name if re.match(r"[A-Za-z_]", name) else f"_{name}"
 
 
