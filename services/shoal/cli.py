@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any
 
 import click
@@ -65,6 +66,7 @@ class Program(click.Group):
         # At its end Python would look through all of them once more, for a fifth of a second, before it forgets them.
         atexit.register(gc.freeze)
         os.environ.setdefault(*ONE_THREAD)
+        _open_all()
         try:
             try:
                 with _extras_named():
@@ -89,6 +91,13 @@ class Program(click.Group):
             click.echo(f"shoal: cannot write: {error.strerror}", err=True)
             # What is still in the buffer of standard output would fail once more.
             os._exit(ComputationError.exit_status)
+
+
+def _open_all() -> None:
+    """Where a shell has closed a stream (`>&-`) what is said goes nowhere; else a file that is opened would get it."""
+    for name, mode in {"stdin": "r", "stdout": "w", "stderr": "w"}.items():
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 - until the end
 
 
 @cache
