@@ -134,6 +134,8 @@ def test_a_printed_scene_can_be_simulated_again(tmp_path: Path) -> None:
         (["uncertain", "single-pendulum", "--vary", "gravity.0=1:2", *("--cost", "a=1") * 2], "cost: a is given twice"),
         (["uncertain", "single-pendulum", "--vary", "gravity.0=1:2", "--correlate", "a,b=0", "--correlate", "b,a=1"],
          "correlate: b, a: is given twice"),
+        (["simulate", f"{'a' * 300}.yaml"], "aaa.yaml: File name too long"),
+        (["import", f"{'a' * 300}.xml"], "aaa.xml: File name too long"),
         (["simulate", "-"], "-: a scene is read from a file whose name ends in .yaml; save it as one"),
         (["simulate", "/dev/null"], "/dev/null: a scene is read from a file whose name ends in .yaml"),
         (["identify", "/dev/null"], "/dev/null: a problem is read from a file whose name ends in .yaml"),

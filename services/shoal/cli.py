@@ -32,6 +32,8 @@ from shoal.errors import ComputationError, InputError, ShoalError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """No room: on the disk, for this user, in this file."""
+NO_NAME = errno.ENAMETOOLONG, errno.ELOOP
+"""What is given for a file can be none, wherever one first looks for it."""
 RARELY = 500_000, 20, 20
 """Python looks for circles among its objects so seldom: imports make many that all stay, a tenth of a second's look."""
 ONE_THREAD = "OPENBLAS_NUM_THREADS", "1"
@@ -86,6 +88,9 @@ class Program(click.Group):
             click.echo("shoal: stopped", err=True)
             sys.exit(130)
         except OSError as error:
+            if error.errno in NO_NAME:
+                click.echo(f"shoal: {error.filename}: {error.strerror}", err=True)
+                sys.exit(InputError.exit_status)
             if error.errno not in FULL:
                 raise
             click.echo(f"shoal: cannot write: {error.strerror}", err=True)
