@@ -123,6 +123,23 @@ def test_a_printed_scene_can_be_simulated_again(tmp_path: Path) -> None:
         (["simulate", "single-pendulum", "--out", "/no/such/folder/a.csv"], "folder"),
         (["sweep", "single-pendulum", "--vary", "initial.OA.angle=0:1"], "LOW:HIGH:COUNT"),
         (["sweep", "single-pendulum", "--vary", "initial.OA.colour=0:1:3"], "colour"),
+        (["sweep", "single-pendulum", "--vary", "bodies.OA.mass=1:2:2", "--vary", "bodies.OA.mass=3:4:2"],
+         "bodies.OA.mass is given twice, as 1:2:2 and as 3:4:2"),
+        (["sweep", "single-pendulum", "--vary", "bodies.OA.mass=1:2:1"], "1:2:1: one value is not at both ends"),
+        (["simulate", "single-pendulum", "--set", "bodies.OA.mass=1", "--set", "bodies.OA.mass=2"],
+         "bodies.OA.mass is given twice, as 1 and as 2"),
+        (["simulate", "single-pendulum", "--at", "0.1", "--at", "0.2"], "'--at': is given 2 times"),
+        (["sweep", "single-pendulum", "--vary", "bodies.OA.mass=1:2:2", "--at", "1", "--at", "2"], "is given 2 times"),
+        (["run", "sweep", "--param", "engine=gauss", "--param", "engine=exudyn"], "engine is given twice"),
+        (["uncertain", "single-pendulum", "--vary", "gravity.0=1:2", *("--cost", "a=1") * 2], "cost: a is given twice"),
+        (["uncertain", "single-pendulum", "--vary", "gravity.0=1:2", "--correlate", "a,b=0", "--correlate", "b,a=1"],
+         "correlate: b, a: is given twice"),
+        (["simulate", f"{'a' * 300}.yaml"], "aaa.yaml: File name too long"),
+        (["import", f"{'a' * 300}.xml"], "aaa.xml: File name too long"),
+        (["simulate", "-"], "-: a scene is read from a file whose name ends in .yaml; save it as one"),
+        (["simulate", "/dev/null"], "/dev/null: a scene is read from a file whose name ends in .yaml"),
+        (["identify", "/dev/null"], "/dev/null: a problem is read from a file whose name ends in .yaml"),
+        (["simulate", "single-pendulum", "--out", f"{'a' * 300}.csv"], "File name too long"),
         (["compare", "single-pendulum", "--engines", "gauss,magic"], "magic"),
         (["identify", "paper-case-1", "--method", "magic"], "magic"),
         (["identify", "kaheman-double"], "--data"),
@@ -137,7 +154,7 @@ def test_a_printed_scene_can_be_simulated_again(tmp_path: Path) -> None:
         (["simulate"], "SCENE"),
         (["dance"], "dance"),
     ],
-)
+)  # fmt: skip
 def test_bad_input_is_one_line_and_status_two(arguments: list[str], word: str) -> None:
     result = shoal(*arguments)
     assert result.exit_code == 2

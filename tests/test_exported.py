@@ -8,6 +8,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from shoal.cli import main
+from shoal.fmu.running import identifier
+from shoal.scene import load_scene
+from shoal.scene.edited import as_yaml
+from shoal_flows.exports import exported
 
 
 def test_an_exported_script_is_compared_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -57,3 +61,31 @@ def test_what_is_not_exported(
     assert re.search(message, done.stderr.strip()), done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("../../evil", "evil"),
+        ("/a/b c", "a-b-c"),
+        ("..", "scene"),
+        ("Greifer \u00fc2.1", "Greifer-\u00fc2.1"),
+        ("n" * 300, "n" * 50),
+    ],
+)
+def test_files_that_are_called_after_a_scene_stay_in_the_folder(
+    name: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the command, by the flow and as a unit; a name is any text."""
+    pytest.importorskip("mujoco")
+    below = tmp_path / "one" / "two"
+    below.mkdir(parents=True)
+    monkeypatch.chdir(below)
+    scene = load_scene("single-pendulum").model_copy(update={"name": name})
+    Path("s.yaml").write_text(as_yaml(scene.model_dump(mode="json", exclude_unset=True)), encoding="utf-8")
+    done = CliRunner().invoke(main, ["export", "s.yaml", "--to", "mjcf", "--no-verify"])
+    assert (done.exit_code, done.stdout) == (0, f"{file}.xml\n"), done.output
+    found = exported("s.yaml", ["mjcf", "csv"], {"solver.duration": 0.01}, verify=False)
+    assert {*found.files} == {f"{file}.xml", f"{file}.csv"}
+    assert re.fullmatch(r"[A-Za-z_]\w{0,50}", identifier(scene), re.ASCII)
+    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {"s.yaml", f"{file}.xml"}

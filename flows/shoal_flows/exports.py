@@ -17,6 +17,7 @@ from shoal.fmu.running import identifier
 from shoal.pictures import files
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Trajectory, plain
+from shoal.whole import file_name
 
 FMU = "fmu"
 MOTIONS = ("csv", "parquet", "nc")
@@ -83,5 +84,5 @@ def exported(
             else:
                 engine = get_engine("gauss")
                 motion = motion or (verified(engine, wanted) if verify else engine.simulate(wanted))
-                files.trajectory(motion, wanted, folder / f"{wanted.name}.{form}")
+                files.trajectory(motion, wanted, folder / f"{file_name(wanted.name)}.{form}")
         return Exports(wanted, {one.name: one.read_bytes() for one in sorted(folder.iterdir())}, distances, motion)

@@ -7,8 +7,8 @@ import os
 from collections.abc import Callable, Mapping
 from typing import Any, get_args, get_origin, get_type_hints
 
-import yaml
 from shoal.errors import ComputationError, InputError, ShoalError
+from shoal.scene.load import read_yaml
 
 from shoal_flows import events, server, workers
 from shoal_flows.terminal import following, notice, show
@@ -72,9 +72,9 @@ def _parsed(flow: str, function: Callable[..., Any], parameters: Mapping[str, An
             raise InputError(f"{flow}: no parameter {name!r}; there are {', '.join(known) or 'none'}")
         if isinstance(value, str):
             try:
-                value = yaml.safe_load(value)
-            except yaml.YAMLError:
-                raise InputError(f"{flow}: {name}: {value!r} is not a value (write lists as [a, b])") from None
+                value = read_yaml(value, f"{flow}: {name}")
+            except InputError as error:
+                raise InputError(f"{error} (write lists as [a, b])") from None
         a_list = list in {get_origin(one) for one in (types[name], *get_args(types[name]))}
         if a_list and value is not None and not isinstance(value, list | dict):
             value = value.split(",") if isinstance(value, str) else [value]

@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any
 
 import click
@@ -31,6 +32,8 @@ from shoal.errors import ComputationError, InputError, ShoalError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """No room: on the disk, for this user, in this file."""
+NO_NAME = errno.ENAMETOOLONG, errno.ELOOP
+"""What is given for a file can be none, wherever one first looks for it."""
 RARELY = 500_000, 20, 20
 """Python looks for circles among its objects so seldom: imports make many that all stay, a tenth of a second's look."""
 ONE_THREAD = "OPENBLAS_NUM_THREADS", "1"
@@ -65,6 +68,7 @@ class Program(click.Group):
         # At its end Python would look through all of them once more, for a fifth of a second, before it forgets them.
         atexit.register(gc.freeze)
         os.environ.setdefault(*ONE_THREAD)
+        _open_all()
         try:
             try:
                 with _extras_named():
@@ -84,11 +88,21 @@ class Program(click.Group):
             click.echo("shoal: stopped", err=True)
             sys.exit(130)
         except OSError as error:
+            if error.errno in NO_NAME:
+                click.echo(f"shoal: {error.filename}: {error.strerror}", err=True)
+                sys.exit(InputError.exit_status)
             if error.errno not in FULL:
                 raise
             click.echo(f"shoal: cannot write: {error.strerror}", err=True)
             # What is still in the buffer of standard output would fail once more.
             os._exit(ComputationError.exit_status)
+
+
+def _open_all() -> None:
+    """Where a shell has closed a stream (`>&-`) what is said goes nowhere; else a file that is opened would get it."""
+    for name, mode in {"stdin": "r", "stdout": "w", "stderr": "w"}.items():
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 - until the end
 
 
 @cache

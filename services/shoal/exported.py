@@ -12,7 +12,7 @@ from shoal.engines.contract import sampling_times
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Scene
 from shoal.trajectory import Trajectory
-from shoal.whole import whole
+from shoal.whole import file_name, whole
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def export(scene: Scene, to: str, *, verify: bool = True) -> Exported:
     """
     tool = TOOLS[checked(to)]
     text = tool.text(scene)
-    return Exported(to, f"{scene.name}{tool.ending}", text, _compared(tool, scene) if verify else None)
+    return Exported(to, f"{file_name(scene.name)}{tool.ending}", text, _compared(tool, scene) if verify else None)
 
 
 def checked(to: str, file: Path | None = None) -> str:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import resource
+import shlex
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -52,6 +55,48 @@ def test_a_result_is_written_whole_or_not_at_all(ending: str, tmp_path: Path) ->
     assert (ended.exit_code, ended.stdout) == (3, "")
     assert ended.stderr == f"shoal: out: {out} cannot be written: File too large\n"
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(out.name, "yesterday's")]
+
+
+@pytest.mark.parametrize("ending", ["csv", "json"])
+def test_a_name_that_leaves_no_room_for_more_is_a_name(ending: str, tmp_path: Path) -> None:
+    """255 bytes; what is written beside it first has a shorter one. One byte more is told."""
+    out = tmp_path / f"{'a' * (254 - len(ending))}.{ending}"
+    with whole(out) as part:
+        part.write_text("all")
+    assert out.read_text() == "all"
+    with (
+        pytest.raises(ComputationError, match="cannot be written: File name too long"),
+        whole(out.with_stem("a" * 255)),
+    ):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == [out.name]
+
+
+def test_a_link_to_itself_is_no_file(tmp_path: Path) -> None:
+    out = tmp_path / "loop.csv"
+    out.symlink_to(out)
+    ended = CliRunner().invoke(main, ["simulate", "single-pendulum", "--out", str(out)])
+    assert (ended.exit_code, ended.stdout) == (2, "")
+    assert ended.stderr == f"shoal: out: {out} cannot be written: Too many levels of symbolic links\n"
+    with pytest.raises(ComputationError, match="symbolic links"), whole(out):
+        pass
+
+
+def test_a_pipe_is_written_into_and_stays_one(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    reader = subprocess.Popen(["cat", pipe], stdout=subprocess.PIPE)
+    with whole(pipe) as part:
+        part.write_text("all of it")
+    assert reader.communicate(timeout=10)[0] == b"all of it"
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert list(tmp_path.iterdir()) == [pipe]
+
+
+def test_a_shell_may_close_the_output() -> None:
+    command = f'{shlex.quote(sys.executable)} -c "from shoal.cli import main; main()" scenes single-pendulum >&-'
+    ended = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
 
 
 def test_a_unit_is_written_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -212,6 +212,8 @@ def test_a_night_is_a_run_with_a_metric_per_line() -> None:
         ("compare", {"scene": "single-pendulum", "engines": "[gauss, gauss]"}, "two different"),
         ("export", {"scene": "single-pendulum", "to": "csv,step"}, "to: no form 'step'; there are exudyn, mjcf, fmu"),
         ("export", {"scene": "single-pendulum", "to": "csv", "inputs": "gravity.1"}, "`to` has no fmu"),
+        ("sweep", {"vary": "{gravity.1: [-9, 0, 1]}"}, "one value is not at both ends"),
+        ("sweep", {"vary": "{gravity.1: [-9, 0, 2], gravity.1: [0, 9, 2]}"}, "the key 'gravity.1' stands twice"),
         ("export", {"scene": "flexible-double-pendulum", "to": "csv,mjcf"}, "MJCF has no ancf-cable"),
     ],
 )

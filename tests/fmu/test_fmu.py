@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +10,23 @@ import fmpy
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from fmpy.fmi2 import FMU2Slave
+from fmpy import calloc, free
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
 from fmpy.validation import validate_fmu
 from pythonfmu.builder import FmuBuilder
 from shoal.cli import main
 from shoal.engines import get_engine
-from shoal.errors import InputError
+from shoal.errors import ComputationError, InputError
+from shoal.fmu.ahead import Ahead
 from shoal.fmu.export import export
+from shoal.fmu.running import UNITS, Running
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
 
@@ -127,17 +138,142 @@ def test_a_torque_as_a_parameter(tmp_path: Path) -> None:
 
 
 def test_a_motion_that_cannot_be_trusted_ends_the_run(unit: Path) -> None:
-    """The first step fails with the reason in the host's log; nothing is passed off as a result."""
+    """The first step is not made, with the reason in the host's log; nothing is passed off as a result."""
     said: list[str] = []
 
     def hear(_: Any, __: Any, ___: Any, ____: Any, message: bytes) -> None:
         said.append(message.decode())
 
-    with pytest.raises(Exception, match="fmi2DoStep failed"):
+    with pytest.raises(Exception, match="fmi2GetReal failed"):
         fmpy.simulate_fmu(
             str(unit), stop_time=0.5, step_size=0.1, start_values={"gravity.1": -9e6}, logger=hear, debug_logging=True
         )
     assert any("flexible-double-pendulum: the motion up to 0.5 s: " in line for line in said), said
+
+
+def slider_crank(**initial: Any) -> Scene:
+    """A crank of 0.2 m and a rod of 0.6 m; the piston on the line through the crank's bearing."""
+    bar = {"kind": "rod", "height": 0.02, "width": 0.02, "density": 7800.0}
+    ground = {"body": "ground", "point": [0.0, 0.0]}
+    return Scene.parse({
+        "name": "slider-crank",
+        "bodies": {
+            "crank": bar | {"length": 0.2},
+            "rod": bar | {"length": 0.6},
+            "piston": {"kind": "rigid-body", "mass": 0.5, "inertia": 0.001},
+        },
+        "joints": {
+            "O": {"first": ground, "second": {"body": "crank", "point": "start"}},
+            "P": {"first": {"body": "crank", "point": "end"}, "second": {"body": "rod", "point": "start"}},
+            "Q": {"first": {"body": "rod", "point": "end"}, "second": {"body": "piston"}},
+            "S": {"kind": "slider", "first": ground, "second": {"body": "piston"}, "rotation": "locked"},
+        },
+        "markers": {"pin": {"body": "piston"}},
+        "initial": initial,
+        "solver": {"duration": 0.1},
+    })  # fmt: skip
+
+
+def test_a_machine_starts_as_its_scene_says_and_not_where_unstated_angles_would_be_zero(tmp_path: Path) -> None:
+    """By the triangle of crank and rod; and as the host says of the crank where it says anything."""
+    unit = export(slider_crank(crank={"angle": 0.6}), out=tmp_path / "c.fmu")
+    names = [one.name for one in fmpy.read_model_description(str(unit)).modelVariables if one.causality == "parameter"]
+    assert names == ["gravity.0", "gravity.1", "initial.crank.angle"]
+    for start in ({}, {"initial.crank.angle": 1.0}):
+        angle = start.get("initial.crank.angle", 0.6)
+        pin = 0.2 * np.cos(angle) + np.sqrt(0.6**2 - (0.2 * np.sin(angle)) ** 2)
+        assert run(unit, 0.02, 0.01, **start)["pin.x"][0] == pytest.approx(pin, abs=1e-9)
+
+
+def test_start_values_that_a_host_gives_back_change_nothing(tmp_path: Path) -> None:
+    """FMI's file rounds them to 16 digits; the guessed rate would else be one of several that may give way."""
+    third = 0.1 + 0.2 + 1e-16
+    assert float(f"{third:.16g}") != third
+    scene = slider_crank(crank={"angle": third}, piston={"velocity": [-0.5, 0.0]}, rod={"rate": 0.4, "guess": ["rate"]})
+    unit = export(scene, out=tmp_path / "g.fmu")
+    told = {one.name: one.start for one in fmpy.read_model_description(str(unit)).modelVariables}
+    names = "gravity.0", "gravity.1", "initial.crank.angle"
+    found = run(unit, 0.04, 0.02, **{name: float(told[name]) for name in names})
+    np.testing.assert_allclose(found["pin.x"], simulated(scene, found["time"], "pin")[:, 0], rtol=0, atol=1e-12)
+
+
+def test_a_unit_that_would_stand_elsewhere_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = load_scene("single-pendulum")
+    monkeypatch.setattr(Running, "begin", lambda unit, stop: setattr(unit, "_motion", moved_ahead(unit.scene)))
+
+    def moved_ahead(scene: Scene) -> Ahead:
+        return Ahead(scene.with_values({"initial.OA.angle": 0.5}))
+
+    monkeypatch.setattr(Running, "go_on", lambda unit, time, step: True)
+    with pytest.raises(
+        ComputationError, match=r"single-pendulum: the unit would be off by 0\.\d+ m from `shoal simulate`"
+    ):
+        export(scene, out=tmp_path / "a.fmu")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def pendulum(tmp_path: Path) -> Iterator[tuple[FMU2Slave, dict[str, int], list[str]]]:
+    """A unit as a host holds it, the numbers of its variables, and the host's log."""
+    data = load_scene("single-pendulum").model_dump(mode="json", exclude_unset=True)
+    motor = {"kind": "torque", "at": {"body": "OA"}, "torque": 0.0}
+    scene = Scene.parse(data | {"loads": {"motor": motor}})
+    paths = ["initial.OA.angle", "bodies.OA.mass"]
+    path = export(scene, paths, tmp_path / "p.fmu", inputs=["loads.motor.torque"])
+    told, log = fmpy.read_model_description(str(path)), list[str]()
+    numbers = {one.name: one.valueReference for one in told.modelVariables}
+    folder = fmpy.extract(str(path), str(tmp_path / "unit"))
+    unit = FMU2Slave(guid=told.guid, modelIdentifier=told.modelName, unzipDirectory=folder, instanceName="one")
+    calls = fmi2CallbackFunctions()
+    calls.logger = fmi2CallbackLoggerTYPE(lambda _, __, ___, ____, message: log.append(message.decode()))
+    calls.allocateMemory, calls.freeMemory = fmi2CallbackAllocateMemoryTYPE(calloc), fmi2CallbackFreeMemoryTYPE(free)
+    unit.instantiate(callbacks=calls, loggingOn=True)
+    yield unit, numbers, log
+    unit.freeInstance()
+
+
+def begin(unit: FMU2Slave) -> None:
+    unit.setupExperiment(startTime=0.0, stopTime=0.2)
+    unit.enterInitializationMode()
+    unit.exitInitializationMode()
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "initial", "line"),
+    [
+        ("bodies.OA.mass", -1.0, True, "single-pendulum: bodies.OA.mass: Input should be greater than 0, found -1.0"),
+        ("initial.OA.angle", np.nan, True, "initial.OA.angle: Input should be a finite number, found nan"),
+        ("loads.motor.torque", np.nan, False, "loads.motor.torque.number: Input should be a finite number, found nan"),
+        ("bodies.OA.mass", 2.0, False, "bodies.OA.mass: is fixed since the initialisation has ended; reset the unit"),
+    ],
+)
+def test_bad_values_discard_the_step_and_a_reset_goes_on(
+    pendulum: Any, path: str, value: float, initial: bool, line: str
+) -> None:
+    """With the reason in the log; no fatal error, after which a host may not reset and would crash if it went on."""
+    unit, numbers, log = pendulum
+    if not initial:
+        begin(unit)
+    unit.setReal([numbers[path]], [value])
+    if initial:
+        begin(unit)
+    for _ in range(2):
+        with pytest.raises(FMICallException, match=r"fmi2DoStep failed with status 2 \(discard\)"):
+            unit.doStep(0.0, 0.1)
+    assert any(line in said for said in log), log
+    unit.reset()
+    begin(unit)
+    unit.doStep(0.0, 0.1)
+    expected = simulated(load_scene("single-pendulum"), np.array([0.1]), "A")[0, 1]
+    assert unit.getReal([numbers["A.y"]])[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_variables_have_their_units(unit: Path) -> None:
+    found = {one.name: one.unit for one in fmpy.read_model_description(str(unit)).modelVariables}
+    assert found["gravity.1"] == "m/s²"
+    assert (found["initial.OA.angle"], found["B.x"], found["energy"]) == ("rad", "m", "J")
+    for name, powers in UNITS.items():
+        assert {"s", "m", "kg", "rad"} >= set(powers), name
 
 
 @pytest.mark.parametrize(
@@ -146,6 +282,7 @@ def test_a_motion_that_cannot_be_trusted_ends_the_run(unit: Path) -> None:
         (["bodies.AB.elements"], {}, "bodies.AB.elements is not a real number"),
         (["bodies.AB.colour"], {}, "colour"),
         (["name"], {}, "name is not a real number"),
+        (["initial.AB.rate"], {}, "initial.AB.rate: the scene does not state it"),
         ([], {"solver.acceleration": "afsa"}, "solver.acceleration"),
     ],
 )

@@ -144,6 +144,35 @@ def test_a_drive_goes_straight_to_its_value(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.arctan2(motion["P.y"], motion["P.x"])[1:], wanted[:-1], rtol=0, atol=1e-8)
 
 
+def test_a_drive_that_changes_later_leaves_the_start_as_it_is(tmp_path: Path) -> None:
+    """Of a crank whose angle is a guess beside a rod whose angle is not: by the triangle, then by the table."""
+    bar = {"kind": "rod", "height": 0.02, "width": 0.02, "density": 7800.0}
+    base, ground = {"body": "ground", "point": "base"}, {"body": "ground", "point": [0.0, 0.0]}
+    rod = -np.arcsin(0.2 * np.sin(0.6) / 0.6)
+    scene = Scene.parse({
+        "name": "slider-crank",
+        "gravity": [0.0, 0.0],
+        "ground_points": {"base": {"x": 0.0}},
+        "bodies": {"crank": bar | {"length": 0.2}, "rod": bar | {"length": 0.6}},
+        "joints": {
+            "O": {"first": base, "second": {"body": "crank", "point": "start"}},
+            "P": {"first": {"body": "crank", "point": "end"}, "second": {"body": "rod", "point": "start"}},
+            "S": {"kind": "slider", "first": ground, "second": {"body": "rod", "point": "end"}},
+        },
+        "markers": {"pin": {"body": "rod", "point": "end"}},
+        "initial": {"crank": {"angle": 0.9, "guess": ["angle"]}, "rod": {"angle": rod}},
+        "solver": {"duration": 0.2},
+    })  # fmt: skip
+    unit = export(scene, out=tmp_path / "c.fmu", inputs=["ground_points.base.x"])
+    motion = driven_by(unit, "ground_points.base.x", np.array([0.0, 0.0, 0.01, 0.01, 0.01]), 0.2)
+    pin = 0.2 * np.cos(0.6) + 0.6 * np.cos(rod)
+    np.testing.assert_allclose(motion["pin.x"][:3], pin, rtol=0, atol=1e-9)
+    table = {"table": [[0.0, 0.0], [2 * STEP, 0.0], [3 * STEP, 0.01]], "smooth": False}
+    stated = Scene.parse(scene.model_dump(mode="json", exclude_unset=True) | {"ground_points": {"base": {"x": table}}})
+    expected = get_engine("gauss").simulate(stated, motion["time"]).marker("pin")[:, 0]
+    np.testing.assert_allclose(motion["pin.x"], expected, rtol=0, atol=1e-9)
+
+
 def test_tables_of_inputs() -> None:
     inputs = Inputs({"loads.a.scale": 1.0, "joints.b.angle": 0.5})
     assert inputs.take(0.0, 0.1, {"loads.a.scale": 2.0, "joints.b.angle": 0.5})

@@ -60,7 +60,7 @@ def test_a_problem_that_computes_its_data_takes_no_file() -> None:
     ("given", "words"),
     [
         (["a.csv", "b.csv"], "'a.csv' is not NAME=FILE"),
-        (["run=a.csv", "run=b.csv"], "named twice"),
+        (["run=a.csv", "run=b.csv"], "run is given twice"),
         (["other=a.csv"], "no recording 'other'"),
         (["a=b.csv"], "no column 't'"),
     ],

@@ -65,6 +65,31 @@ def test_what_is_set_last_makes_guesses_of_the_rest_that_it_may_move() -> None:
     assert Scene.parse(later.model_dump(mode="json")) == later
 
 
+def test_a_drive_that_begins_as_before_makes_no_guesses() -> None:
+    """What it does later moves no start; another slope at the start moves rates alone, another value poses as well."""
+    data = SCENE.model_dump(mode="json")
+    data["ground_points"] = {"P": {"x": 0.5, "y": 0.0}}
+    data["initial"]["OA"]["rate"] = 1.0
+    scene = Scene.parse(data)
+    for value, guess in {
+        "0.5": (),
+        "0.5 + 0.1*t**2": ("rate",),
+        "0.5 + 0.1*t": ("rate",),
+        "0.6": ("angle", "rate"),
+        "0.6 + t": ("angle", "rate"),
+    }.items():
+        assert scene.with_values({"ground_points.P.x": value}).initial["OA"].guess == guess, value
+    for rows, guess in (
+        ([[0, 0.5], [1, 0.5], [2, 3]], ()),
+        ([[0, 0.5], [1, 0.7]], ("rate",)),
+        ([[0, 0.4], [1, 0.4]], ("angle", "rate")),
+    ):
+        table = {"table": rows, "smooth": False}
+        assert scene.with_values({"ground_points.P.x": table}).initial["OA"].guess == guess, rows
+    with pytest.raises(InputError, match="ground_points"):
+        scene.with_values({"ground_points.Q.x": 0.5})
+
+
 def test_zero_is_a_statement() -> None:
     assert SCENE.initial["OA"].rate is None
     assert SCENE.start("OA").rate == 0.0

@@ -8,10 +8,10 @@ from where Prefect takes it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
 from shoal.engines import ENGINES
 from shoal.errors import InputError
 from shoal.identification.methods import METHODS
@@ -90,6 +90,12 @@ class Axis(BaseModel):
     high: float = Field(title="to")
     count: int = Field(title="how many", ge=1)
 
+    @model_validator(mode="after")
+    def _both_ends(self) -> Self:
+        if self.count == 1 and self.low != self.high:
+            raise ValueError(f"{self.path}: one value is not at both ends; count is 2 or more, or high is low")
+        return self
+
     def values(self) -> Array:
         """All of them, (count,)."""
         return np.linspace(self.low, self.high, self.count)
@@ -105,4 +111,11 @@ def _axes(given: Any) -> Any:
     return [{"path": path, "low": low, "high": high, "count": count} for path, (low, high, count) in given.items()]
 
 
-Axes = Annotated[list[Axis], BeforeValidator(_axes), Field(min_length=1)]
+def _once_each(axes: list[Axis]) -> list[Axis]:
+    paths = [axis.path for axis in axes]
+    if twice := next((path for path in paths if paths.count(path) > 1), None):
+        raise ValueError(f"{twice} is varied twice")
+    return axes
+
+
+Axes = Annotated[list[Axis], BeforeValidator(_axes), Field(min_length=1), AfterValidator(_once_each)]

@@ -62,7 +62,13 @@ def modes(
 @click.command()
 @click.argument("scene")
 @click.option(
-    "--at", "times", required=True, metavar="T,T,...", callback=options.times_list, help="Times of the motion [s]."
+    "--at",
+    "times",
+    cls=options.Once,
+    required=True,
+    metavar="T,T,...",
+    callback=options.times_list,
+    help="Times of the motion [s].",
 )
 @options.values
 @options.verify

@@ -92,7 +92,15 @@ def simulate(
 )
 @options.engine
 @options.values
-@click.option("--at", "time", type=float, metavar="T", help="Instant [s]; the scene's duration by default.")
+@click.option(
+    "--at",
+    "time",
+    cls=options.Once,
+    type=float,
+    metavar="T",
+    callback=options.once,
+    help="Instant [s]; the scene's duration by default.",
+)
 @options.verify
 @options.as_json
 @options.out(".csv", ".parquet", ".nc", ".json", ".png")

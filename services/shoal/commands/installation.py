@@ -55,8 +55,13 @@ def export_fmu(
     """Write SCENE as an FMI unit for co-simulation. A host needs this installation to run it."""
     from shoal.fmu.export import export
     from shoal.scene import load_scene
+    from shoal.terminal import screen
 
-    click.echo(export(load_scene(scene).with_values(values), parameters, out, inputs=inputs, fmi=fmi))
+    wanted = load_scene(scene).with_values(values)
+    with screen.working(f"exporting {wanted.name}"):
+        screen.compile_for("gauss", [1], wanted)
+        written = export(wanted, parameters, out, inputs=inputs, fmi=fmi)
+    click.echo(written)
 
 
 @click.command()
@@ -94,10 +99,12 @@ def import_scene(file: Path, out: Out) -> None:
     import yaml
 
     from shoal.imported import read
+    from shoal.whole import whole
 
     found = read(file)
     path = out or Path(f"{found.scene['name']}.yaml")
-    path.write_text(yaml.safe_dump(found.scene, sort_keys=False), encoding="utf-8")
+    with whole(path) as part:
+        part.write_text(yaml.safe_dump(found.scene, sort_keys=False), encoding="utf-8")
     for line in found.left_out:
         click.echo(f"left out: {line}", err=True)
     click.echo(path)

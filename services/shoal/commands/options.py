@@ -29,13 +29,15 @@ _VALUES = "shoal.values"
 
 
 def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, str]:
-    """PATH=VALUE pairs as a mapping."""
-    found = {}
+    """PATH=VALUE pairs as a mapping; of a path that stands twice no value is lost in silence."""
+    found: dict[str, str] = {}
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not (key and equals and value):
             raise click.BadParameter(f"{pair!r} is not PATH=VALUE")
-        found[key.strip()] = value.strip()
+        if (key := key.strip()) in found:
+            raise click.BadParameter(f"{key} is given twice, as {found[key]} and as {value.strip()}")
+        found[key] = value.strip()
     return found
 
 
@@ -81,6 +83,8 @@ def _axis(path: str, text: str) -> Any:
         raise InputError(f"vary: {path}={text} is not PATH=LOW:HIGH:COUNT, such as initial.OA.angle=0:1.5:31") from None
     if not (1 <= number <= 1_000_000) or not np.isfinite([first, last]).all():
         raise InputError(f"vary: {path}={text}: COUNT is between 1 and 1000000, LOW and HIGH are finite")
+    if number == 1 and first != last:
+        raise InputError(f"vary: {path}={text}: one value is not at both ends; COUNT is 2 or more, or HIGH is LOW")
     return np.linspace(first, last, number)
 
 
@@ -92,9 +96,7 @@ def recordings(
         return given[0]
     if bare := [one for one in given if "=" not in one]:
         raise click.BadParameter(f"{bare[0]!r} is not NAME=FILE, as several recordings need it")
-    if len(found := key_value(context, parameter, given)) < len(given):
-        raise click.BadParameter("a recording is named twice")
-    return found or None
+    return key_value(context, parameter, given) or None
 
 
 def sizes(context: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> dict[str, float] | None:
@@ -123,10 +125,27 @@ def windows(
     return found.get("", found or None)
 
 
-def times_list(context: click.Context, parameter: click.Parameter, text: str | None) -> Times:
+class Once(click.Option):
+    """An option that is refused twice, by its callback; of others click takes the last in silence."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **{**kwargs, "multiple": True})
+
+
+def once(context: click.Context, parameter: click.Parameter, given: tuple[Any, ...]) -> Any:
+    """The value of an option of the class `Once`."""
+    if len(given) > 1:
+        raise click.BadParameter(f"is given {len(given)} times; once is right")
+    return given[0] if given else None
+
+
+def times_list(context: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> Times:
     """T,T,... as numbers that increase from 0 on."""
-    if text is None:
+    if len(given) > 1:
+        raise click.BadParameter(f"is given {len(given)} times; write the times in one list, such as 0.1,0.2,0.5")
+    if not given:
         return None
+    text = given[0]
     try:
         times = [float(part) for part in text.split(",")]
     except ValueError:
@@ -230,7 +249,12 @@ def values(command: Any) -> Any:
 
 
 at = click.option(
-    "--at", "times", metavar="T,T,...", callback=times_list, help="Sample at these times [s]; else as the scene says."
+    "--at",
+    "times",
+    cls=Once,
+    metavar="T,T,...",
+    callback=times_list,
+    help="Sample at these times [s]; else as the scene says.",
 )
 verify = click.option("--verify/--no-verify", default=True, show_default=True, help="Estimate errors by more runs.")
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
@@ -251,6 +275,12 @@ def out(*endings: str, default: str | None = None, otherwise: str = "") -> Calla
             raise InputError(f"out: {path} ends in {path.suffix or 'nothing'}; use one of {', '.join(endings)}")
         if not path.absolute().parent.is_dir():
             raise InputError(f"out: the folder {path.absolute().parent} does not exist")
+        try:
+            path.stat()
+        except FileNotFoundError:
+            pass
+        except OSError as error:
+            raise InputError(f"out: {path} cannot be written: {error.strerror}") from None
         if path.suffix in NEEDED and find_spec(NEEDED[path.suffix]) is None:
             raise InputError(f"out: {path} needs the package {NEEDED[path.suffix]}; install it, or write another form")
         return path

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from shoal.commands.options import Once
 from shoal.errors import InputError
 from shoal.shelf import shelf
 
@@ -49,10 +50,12 @@ def stated(context: click.Context, parameter: click.Parameter, given: str) -> st
 
 def _as_option(field: str, value: Any, option: click.Parameter) -> Any:
     """What would stand on the command line."""
-    if option.multiple:
+    once = isinstance(option, Once)
+    if option.multiple and not once:
         from shoal.response.stated import pairs
 
         return pairs(field, value)
     if isinstance(value, list):
-        return ",".join(map(str, value))
-    return value if isinstance(value, bool) else str(value)
+        value = ",".join(map(str, value))
+    text = value if isinstance(value, bool) else str(value)
+    return [text] if once else text

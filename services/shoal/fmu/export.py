@@ -11,24 +11,30 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from shoal.engines import get_engine
 from shoal.engines.swarm_motion import asked_for
-from shoal.errors import InputError
+from shoal.errors import ComputationError, InputError
 from shoal.fmu.inputs import require_input
-from shoal.fmu.running import CONTENT, identifier
+from shoal.fmu.running import CONTENT, Running, identifier
 from shoal.scene import Scene
 from shoal.scene.ended import End
 from shoal.scene.function import Function
 from shoal.whole import whole
 
+SAME_PLACE = 1e-9
+"""A unit and `simulate` run the same solver; so far apart [m] they are not the same machine."""
+
 
 def export(
     scene: Scene, paths: Sequence[str] = (), out: Path | None = None, *, inputs: Sequence[str] = (), fmi: str = "2"
 ) -> Path:
-    """Write a unit; returns its file. Raises InputError, and ComputationError if it cannot be written.
+    """Write a unit; returns its file. Raises InputError, and ComputationError if it cannot be written or does not move.
 
-    paths: fields of the scene that are its parameters, by default gravity and the initial angles; out: by default the
-    scene's name in the working folder; inputs: loads' scales or torques and drives that a host may change in the run;
-    fmi: version, 2 or 3
+    paths: fields of the scene that are its parameters, by default gravity and the stated initial angles; out: by
+    default the scene's name in the working folder; inputs: loads' scales or torques and drives that a host may change
+    in the run; fmi: version, 2 or 3
     """
     if asked_for(scene):
         raise InputError(f"solver.acceleration: {scene.solver.acceleration!r} is for studies; a unit needs a solver")
@@ -38,7 +44,7 @@ def export(
             raise InputError(f"input: {path} is a parameter as well; it can be one of them")
         require_input(scene, path)
     content = {
-        "scene": scene.model_dump(mode="json"),
+        "scene": scene.model_dump(mode="json", exclude_unset=True),
         "parameters": {path: number(scene, path) for path in chosen},
         "inputs": {path: number(scene, path) for path in dict.fromkeys(inputs)},
     }
@@ -48,6 +54,7 @@ def export(
         script, data = Path(folder) / name, Path(folder) / CONTENT
         shutil.copy(str(Path(__file__).with_name(name)), script)
         data.write_text(json.dumps(content), encoding="utf-8")
+        _require_same(Running(folder), scene)
         made = builder.build_FMU(script, unit if fmi == "2" else folder, [data])
         if fmi == "3":
             shutil.copy(made, unit)
@@ -67,11 +74,25 @@ def _builder(fmi: str) -> tuple[Any, str]:
     raise InputError(f"fmi: there are versions 2 and 3, found {fmi}")
 
 
+def _require_same(unit: Running, scene: Scene) -> None:
+    """Raises ComputationError for a unit that does not stand and go on as `simulate` says of the scene."""
+    _, _, step = unit.experiment
+    outputs = [one.getter for one in unit.variables() if one.causality == "output" and one.unit == "m"]
+    unit.begin(step)
+    places = [[where() for where in outputs]]
+    unit.go_on(0.0, step)
+    places.append([where() for where in outputs])
+    right = get_engine("gauss").simulate(scene, [0.0, step])
+    expected = np.concatenate([right.marker(name) for name in scene.markers], axis=1) if outputs else np.zeros((2, 0))
+    apart = float(np.abs(np.array(places) - expected).max(initial=0.0))
+    if not apart <= SAME_PLACE:
+        raise ComputationError(f"{scene.name}: the unit would be off by {apart:.2g} m from `shoal simulate`")
+
+
 def _usual(scene: Scene) -> list[str]:
-    """Gravity and the initial angles; in space those that are stated, as others may be rotations."""
-    stated = {name for name, start in scene.initial.items() if start.stated("angle")}
+    """Gravity and the initial angles that are stated: what else a body has is said by the joints."""
     goes_on = isinstance(scene.initial_from, End)
-    turned = [name for name in scene.bodies if not goes_on and (scene.dimensions == 2 or name in stated)]
+    turned = [name for name, start in scene.initial.items() if not goes_on and start.stated("angle")]
     return [*(f"gravity.{k}" for k in range(len(scene.gravity))), *(f"initial.{name}.angle" for name in turned)]
 
 
@@ -82,6 +103,11 @@ def number(scene: Scene, path: str) -> float:
         value = value.number
     if not isinstance(value, float):
         raise InputError(f"{path} is not a real number that stands in the scene")
+    head, *rest = path.split(".")
+    if head == "initial" and len(rest) > 1 and getattr(scene.initial.get(rest[0]), rest[1], None) is None:
+        raise InputError(
+            f"{path}: the scene does not state it, so that the joints decide; set it as well to some value"
+        )
     scene.with_values({path: value})
     return value
 

@@ -17,7 +17,7 @@ from pythonfmu3 import (
     Unit,
 )
 
-from shoal.fmu.running import Running, as_dict, identifier, require_start
+from shoal.fmu.running import UNITS, Running, as_dict, identifier
 
 KINDS: dict[str, dict[str, Any]] = {
     "parameter": {"variability": Fmi3Variability.fixed, "initial": Fmi3Initial.exact},
@@ -33,12 +33,12 @@ class SceneUnit3(Fmi3Slave):  # type: ignore[misc]
     def __init__(self, **told: Any) -> None:
         """As pythonfmu3 calls it; resources: the folder that holds the scene."""
         super().__init__(**told)
-        self._running = Running(self.resources)
+        self._running = Running(self.resources, lambda line: self.log(line, Fmi3Status.error))
         self.guid = self._running.token
         self.modelName = identifier(self._running.scene)
         self.description = self._running.scene.description
         self.default_experiment = DefaultExperiment(*self._running.experiment)
-        self.register_units([Unit("s", s=1), Unit("m", m=1), Unit("J", kg=1, m=2, s=-2)])
+        self.register_units([Unit(name, **powers) for name, powers in UNITS.items()])
         for one in self._running.variables():
             kind = {"causality": Fmi3Causality[one.causality], **KINDS[one.causality]}
             start = {} if one.causality == "output" else {"start": one.getter()}
@@ -58,8 +58,8 @@ class SceneUnit3(Fmi3Slave):  # type: ignore[misc]
         return description
 
     def setup_experiment(self, start_time: float) -> None:
-        """Raises InputError. The library does not pass on where the experiment ends."""
-        require_start(start_time)
+        """The library does not pass on where the experiment ends."""
+        self._running.require_start(start_time)
 
     def exit_initialization_mode(self) -> None:
         """See `Running.begin`."""
@@ -67,5 +67,9 @@ class SceneUnit3(Fmi3Slave):  # type: ignore[misc]
 
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
         """See `Running.go_on`."""
-        self._running.go_on(current_time, step_size)
-        return Fmi3StepResult(status=Fmi3Status.ok)
+        made = self._running.go_on(current_time, step_size)
+        return Fmi3StepResult(status=Fmi3Status.ok if made else Fmi3Status.error)
+
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        """The library would set the inputs back and say that all is."""
+        self._running.refuse("the state of the unit cannot be set back")

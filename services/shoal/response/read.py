@@ -102,11 +102,15 @@ def correlations(pairs: Sequence[str]) -> Correlations | None:
         names, _, value = text.rpartition("=")
         one, comma, other = names.partition(",")
         try:
-            found[one.strip(), other.strip()] = float(value)
+            known = float(value)
         except ValueError:
             comma = ""
         if not comma:
             raise InputError(f"correlate: {text!r} is not PATH,PATH=VALUE, such as bodies.A.length,bodies.B.length=0.8")
+        pair = one.strip(), other.strip()
+        if pair in found or pair[::-1] in found:
+            raise InputError(f"correlate: {', '.join(pair)}: is given twice")
+        found[pair] = known
     return found or None
 
 
@@ -116,11 +120,14 @@ def prices(texts: Sequence[str]) -> dict[str, float]:
     for text in texts:
         name, _, cost = text.rpartition("=")
         try:
-            found[name.strip()] = float(cost)
+            known = float(cost)
         except ValueError:
             name = ""
         if not name:
             raise InputError(f"cost: {text!r} is not PATH=COST, such as bodies.OA.length=2.5")
+        if (name := name.strip()) in found:
+            raise InputError(f"cost: {name} is given twice")
+        found[name] = known
     return found
 
 

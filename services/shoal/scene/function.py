@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from itertools import pairwise
@@ -122,6 +123,21 @@ class Function(Record):
         for power in self._spline().c:
             value = value * since + power[row]
         return np.asarray(value)
+
+    def begins_like(self, other: Any, *, slope: bool) -> bool:
+        """Whether another function, as a user may write it, has the same value at time zero; slope: that as well."""
+        try:
+            other = Function.model_validate(other)
+            alike = bool(self(np.zeros(1))[0] == other(np.zeros(1))[0])
+        except (ValueError, InputError):
+            return False
+        return alike and (not slope or self._first_slope() == other._first_slope())
+
+    def _first_slope(self) -> float:
+        """At time zero, to its right; nan for an expression."""
+        if self.table is not None:
+            return self.table_slope(0.0, left=False)
+        return 0.0 if self.number is not None else math.nan
 
     def table_slope(self, t: float, left: bool) -> float:
         """The derivative of a table at one time [s], on its left or right side."""

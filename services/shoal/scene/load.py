@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Hashable
 from difflib import get_close_matches
 from functools import cache
@@ -123,6 +124,8 @@ def read_named(name: str, folder: Traversable, what: str, known: list[str]) -> A
     if path.suffix in (".yaml", ".yml"):
         return read_yaml(_text(path), name)
     if name not in names(folder):
+        if name == "-" or (os.path.exists(name) and not os.path.isdir(name)):
+            raise InputError(f"{name}: a {what} is read from a file whose name ends in .yaml; save it as one")
         raise InputError(f"{unknown(name, what, known)}; give a .yaml file or one of {some(known)}")
     return read_yaml((folder / f"{name}.yaml").read_text(encoding="utf-8"), name)
 

@@ -18,6 +18,7 @@ from shoal.scene.bodies import Body
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.ended import End
 from shoal.scene.expect import Expectation, ExpectedValue
+from shoal.scene.function import Function
 from shoal.scene.initial import (
     FROM,
     INITIAL,
@@ -245,12 +246,14 @@ class Scene(Record):
     def with_values(self, values: Mapping[str, Any]) -> Scene:
         """This scene with fields replaced, by dotted path (`bodies.OA.length`). Raises InputError.
 
-        What is set last is kept: where a path moves the start or a joint, the other initial values become guesses.
+        What is set last is kept: where a path moves the start or a joint, the other initial values become guesses. A
+        drive that begins as the one before moves nothing.
         """
         values = {f"{INITIAL}_{FROM}" if path == f"{INITIAL}.{FROM}" else path: x for path, x in values.items()}
         fresh = [path for path, value in values.items() if not self._has(path, value)]
         check_start(values.get(f"{INITIAL}_{FROM}", self.initial_from), fresh)
-        data = self._guessing(fresh).model_dump(mode="json")
+        turned = [path for path in fresh if self._begins_there(path, values[path])]
+        data = self._guessing(fresh, turned).model_dump(mode="json")
         for path, value in values.items():
             place: Any = data
             *parents, leaf = path.split(".")
@@ -288,20 +291,33 @@ class Scene(Record):
         return next((path for path in paths if shared(self, path.split("."))), None)
 
     def _has(self, path: str, value: Any) -> bool:
-        """Whether the scene states this value there already."""
+        """Whether the scene states this value there already, or a function that begins like this one."""
         head, *rest = path.split(".")
         if head == "initial" and len(rest) > 1 and getattr(self.initial.get(rest[0]), rest[1], None) is None:
             return False
         try:
-            return bool(self.value(path) == value)
+            return bool(self.value(path) == value) or self._begins_there(path, value, slope=True)
         except InputError:
             return False
 
-    def _guessing(self, paths: Iterable[str]) -> Scene:
-        """This scene with the initial values that `paths` leave alone as guesses, if a path moves the start."""
+    def _begins_there(self, path: str, value: Any, *, slope: bool = False) -> bool:
+        """Whether a function of time that drives joints has this value at the start already; slope: that as well."""
+        try:
+            stated = self.value(path) if _places(path.split(".")) else None
+        except InputError:
+            return False
+        return isinstance(stated, Function) and stated.begins_like(value, slope=slope)
+
+    def _guessing(self, paths: Iterable[str], turned: Iterable[str] = ()) -> Scene:
+        """This scene with the initial values that `paths` leave alone as guesses, if a path moves the start.
+
+        turned: those of them that move its rates alone
+        """
         split = [path.split(".") for path in paths]
         fresh = {(p[1], p[2]) for p in split if p[0] == "initial" and len(p) > 2}
-        moved = {quantity for _, quantity in fresh} | {POSES[0] for p in split if _places(p)}
+        rates = {tuple(path.split(".")) for path in turned}
+        moved = {quantity for _, quantity in fresh}
+        moved |= {RATES[0] if tuple(p) in rates else POSES[0] for p in split if _places(p)}
         loose = (*POSES, *RATES) if moved & {*POSES} else RATES if moved & {*RATES} else ()
         if not loose:
             return self
