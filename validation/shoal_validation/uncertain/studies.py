@@ -170,7 +170,7 @@ def against(asked: Drawn, answer: Answer, runs: int) -> Judged:
         parameters=len(asked.varied),
         cycles=asked.cycles,
         why=answer.found.why,
-        runs=answer.runs.evaluations,
+        runs=answer.runs.own,
         gap=bounds.gap,
         ok=ok,
         beyond=float(beyond[within].max(initial=0.0)),
