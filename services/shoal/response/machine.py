@@ -97,7 +97,7 @@ class Machine:
             done |= again
             good = np.isin(lanes, [lane for lane, one in done.items() if one.good])
         left = lanes[~good]
-        if left.size <= ALONE and done and self.scene.solver.integrator == "auto":
+        if 0 < left.size <= ALONE and done and self.scene.solver.integrator == "auto":
             done |= self._alone(values, left)
             good = np.isin(lanes, [lane for lane, one in done.items() if one.good])
         if not done:
