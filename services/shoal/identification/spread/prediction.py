@@ -342,15 +342,15 @@ def _too_small(model: ForwardModel, number: int, out: Mask, kept: Mask, fit: _Fi
         gaps = np.diff(model.rows.time[rows])
         gaps = gaps / np.median(gaps) if len(gaps) else gaps
         blocks.append(replace(block, rows=place[rows], gaps=gaps))
-    jacobian, residual = fit.seen.jacobian[kept], fit.seen.residual[kept]
+    jacobian, residual, error = fit.seen.jacobian[kept], fit.seen.residual[kept], fit.seen.error[kept]
     if not np.all(np.isfinite(jacobian)) or np.count_nonzero(kept) <= 2 * len(fit.sizes):
         return 1.0
-    first = linearise(jacobian, residual, fit.sizes, blocks)
+    first = linearise(jacobian, residual, fit.sizes, blocks, error)
     if first.unknown.size > fit.at.unknown.size:
         return 1.0
     step = first.pseudo_inverse @ residual
     left = residual - jacobian @ step
-    at = linearise(jacobian, left, fit.sizes, blocks)
+    at = linearise(jacobian, left, fit.sizes, blocks, error)
     share = float(np.linalg.norm(left) / max(float(np.linalg.norm(fit.seen.residual)), 1e-300))
     at = replace(at, systematic=fit.at.systematic * share)
     worst = 1.0
@@ -361,7 +361,7 @@ def _too_small(model: ForwardModel, number: int, out: Mask, kept: Mask, fit: _Fi
             continue
         weight = float(model.rows.weight[rows[0]])
         slopes = fit.seen.jacobian[rows] / weight
-        error = (fit.seen.residual[rows] - fit.seen.jacobian[rows] @ step) / weight
+        off = (fit.seen.residual[rows] - fit.seen.jacobian[rows] @ step) / weight
         told = _stated(slopes, at, mine, weight, LEVEL, _unevenness(left[blocks[mine].rows], len(rows)))
-        worst = max(worst, float(np.sqrt(np.mean(error**2))) / max(told.limit, 1e-300))
+        worst = max(worst, float(np.sqrt(np.mean(off**2))) / max(told.limit, 1e-300))
     return worst
