@@ -107,18 +107,29 @@ def few(model: ForwardModel) -> bool:
 
 def possible(model: ForwardModel, values: dict[str, Value]) -> dict[str, Value]:
     """Parameters; those whose intervals reach values that cannot be, such as a mass below zero, are not known."""
-    told = {
-        name: _possible(model, path, values[name])
-        for name, path in zip(model.names, model.parameters.paths, strict=True)
-    }
+    point = model.parameters.to_vector(np.array([values[name].value for name in model.names]))
+    told = {name: _possible(model, k, point, values[name]) for k, name in enumerate(model.names)}
     return {name: replace(value, identifiable=value.identifiable and told[name]) for name, value in values.items()}
 
 
-def _possible(model: ForwardModel, path: str, known: Value) -> bool:
+def _possible(model: ForwardModel, k: int, point: Array, known: Value) -> bool:
+    path = model.parameters.paths[k]
     head, _, name = path.partition(".")
     if head == RESERVED:
         return known.lower > 0.0 or name not in ("clock", "scale")
-    return not path or all(model.accepts(path, end) for end in (known.lower, known.upper))
+    return not path or all(_accepted(model, k, point, end) for end in (known.lower, known.upper))
+
+
+def _accepted(model: ForwardModel, k: int, point: Array, end: float) -> bool:
+    """Whether a parameter may have a value, beside those of the scene, or else with its ties at the answer."""
+    if model.accepts(model.parameters.paths[k], end):
+        return True
+    if not model.problem.ties or (model.parameters.logarithmic[k] and end <= 0.0):
+        return False
+    values = model.parameters.to_values(point)
+    values[k] = end
+    recording = list(model.parameters.entries.values())[k].recording
+    return model.can_be(model.parameters.to_vector(values), recording)
 
 
 def _own(model: ForwardModel, text: str) -> bool:
