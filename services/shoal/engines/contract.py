@@ -77,7 +77,7 @@ def sampling_times(scene: Scene, times: Sequence[float] | Array | None) -> Array
 def check_lanes(
     scene: Scene, values: Mapping[str, Array], accepted: dict[str, tuple[float, float]] | None = None
 ) -> int:
-    """Number of lanes in `values`, after the scene accepted the extremes of each, or else whole lanes. Raises InputError.
+    """Number of lanes in `values`, after the scene accepted the extremes of each, or whole lanes. Raises InputError.
 
     accepted: the extremes of earlier calls, by path, which these widen; what lies between them is accepted too.
     """

@@ -233,7 +233,7 @@ class Problem(Record):
                     raise InputError(f"{where}: {bound:g} cannot be: {error}{told}") from None
 
     def _fields(self, scene: Scene, name: str, value: float) -> dict[str, float]:
-        """What a value of a parameter sets in the scene, ties of it included; the other parameters are at their starts."""
+        """What a value of a parameter sets in the scene, by path, with its ties; the others are at their starts."""
         known = {other: parameter.begin for other, parameter in self.parameters.items()} | {name: value}
         known |= {constant: float(scene.value(path)) for constant, path in self.constants.items()}
         tied = {path: text for path, text in self.ties.items() if name in expression.names(text)}
