@@ -111,13 +111,13 @@ def spread(function: Callable[[Array], float], point: Array, at: Linearisation) 
     return Spread(std, float(np.hypot(quantile(shares, at.noise) * std, ABSORBED * lever * at.systematic)), fixed)
 
 
-def quantile(shares: Array, noise: tuple[Noise, ...]) -> float:
+def quantile(shares: Array, noise: tuple[Noise, ...], level: float = LEVEL) -> float:
     """Student's t for a variance whose shares (blocks,) are known with the freedom of each (Welch 1947)."""
     total = float(np.sum(shares))
     if total <= 0.0:
         return 0.0
     doubt = float(np.sum([(share / total) ** 2 / seen.freedom for share, seen in zip(shares, noise, strict=True)]))
-    return student_above(1.0 / max(doubt, 1e-9), 0.5 - LEVEL / 2)
+    return student_above(1.0 / max(doubt, 1e-9), 0.5 - level / 2)
 
 
 def autocorrelation(residual: Array, blocks: list[Block]) -> float:
