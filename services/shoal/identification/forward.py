@@ -302,7 +302,7 @@ class ForwardModel:
             if not all(self.accepts(path, x, scene) for x in extremes):
                 possible[doubtful] &= [self.accepts(path, float(x), scene) for x in numbers[doubtful]]
         # What cannot be beside the other values of the scene may be beside those of the point.
-        for k in np.flatnonzero(~possible) if self.problem.ties else ():
+        for k in np.flatnonzero(np.logical_not(possible)) if self.problem.ties else ():
             possible[k] = accepts(scene, {path: float(numbers[k]) for path, numbers in values.items()})
         return possible
 

@@ -15,6 +15,8 @@ class Value:
     the interval
     theory: what shear and rotary inertia would add where slender beams neglect them; likewise
     unit: of all of them, empty where there is none or none is known
+
+    An estimate tells neither deviation nor interval (nan, in JSON null) of what is not identifiable: see `told`.
     """
 
     value: float
@@ -26,6 +28,10 @@ class Value:
     at_bound: bool = False
     unit: str = ""
     theory: float | None = None
+
+    def told(self) -> Value:
+        """As an estimate tells it: along what the data leave open theory to first order knows no limits."""
+        return self if self.identifiable else replace(self, std=np.nan, lower=np.nan, upper=np.nan)
 
     def exponential(self) -> Value:
         """The value of a parameter that was sought by its logarithm."""
