@@ -101,7 +101,7 @@ class Estimate:
         return f"Estimate({self.problem}: {self.verdict}; {values})"
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row for each parameter and quantity: value, std, lower, upper (nan if not known), identifiable, ..."""
+        """A row for each parameter and quantity: value, std, lower, upper (nan if open), identifiable, ..."""
         import pandas as pd
 
         rows = {name: vars(value) for name, value in {**self.parameters, **self.quantities}.items()}

@@ -32,7 +32,7 @@ def parameters(model: ForwardModel, point: Array, at: Linearisation, correction:
         told = about.fixed and not at_bound and about.std < span and not few(model)
         known = _value(float(point[k]), about, told, shift, at_bound)
         known = known.exponential() if model.parameters.logarithmic[k] else known
-        found[name] = replace(known, unit=unit(model.parameters.paths[k]))
+        found[name] = replace(known, unit=unit(model.parameters.paths[k]), fixed=about.fixed and not few(model))
     return possible(model, found)
 
 
@@ -52,7 +52,8 @@ def quantities(
             about = spread(value_at, point, at)
             shift = correction.of(value_at, point)
             told = about.fixed and not doubtful & set(expression.names(text))
-            found[f"{recording}.{name}" if recording else name] = _value(value_at(point), about, told, shift, False)
+            known = replace(_value(value_at(point), about, told, shift, False), fixed=about.fixed)
+            found[f"{recording}.{name}" if recording else name] = known
     return found
 
 
@@ -91,7 +92,8 @@ def with_refits(values: dict[str, Value], refits: list[Refit]) -> dict[str, Valu
     """Values whose intervals span those of refits too; what a refit leaves open is not identifiable."""
     ends = [values, *(refit.values() for refit in refits)]
     told = {name: all(end[name].identifiable for end in ends) for name in values}
-    return {name: replace(value, identifiable=told[name]) for name, value in spanning(ends).items()}
+    fixed = {name: all(end[name].fixed for end in ends) for name in values}
+    return {name: replace(value, identifiable=told[name], fixed=fixed[name]) for name, value in spanning(ends).items()}
 
 
 def covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:
