@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from shoal.cli import main
 from shoal.errors import InputError
-from shoal.identification import Estimate, Problem, identify, load_problem
+from shoal.identification import Estimate, Problem, Verdict, identify, load_problem
 from shoal.identification.recording.measurement import Recording
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.identification.spread import prediction
@@ -121,6 +121,9 @@ def test_the_stated_limit_is_what_95_of_100_errors_stay_below(rho: float) -> Non
     rms = np.sqrt(np.mean(errors**2, axis=1))
     assert told.expected == pytest.approx(np.sqrt(np.mean(rms**2)), rel=0.02)
     assert np.mean(rms < told.limit) == pytest.approx(0.95, abs=0.015)
+    surely = prediction._stated(slopes, at, 0, 1.0, 1.0 - prediction._REFUTES)
+    assert np.mean(rms > surely.limit) < 1e-3
+    np.testing.assert_array_equal(surely.half, told.half)
     np.testing.assert_allclose(np.mean(np.abs(errors) < told.half, axis=0), 0.95, atol=0.01)
 
 
@@ -144,8 +147,8 @@ def test_a_bad_window_on_the_command_line_has_status_two(tmp_path: Path, given: 
     assert len(result.stderr.strip().splitlines()) == 1
 
 
-def test_a_motion_that_the_model_does_not_predict_is_said(tmp_path: Path) -> None:
-    """A machine that is pushed after the fit."""
+def test_a_motion_that_the_model_does_not_predict_refutes_it(tmp_path: Path) -> None:
+    """A machine that is pushed after the fit: what was fitted is right, and yet no answer to rely on."""
     whole = fitted().measurement.first
     pushed = whole.values + np.where(whole.times > 0.8, 0.3 * (whole.times - 0.8), 0.0)[:, None]
     text = "\n".join(["t,x,y", *(",".join(map(repr, row)) for row in np.column_stack([whole.times, pushed]).tolist())])
@@ -153,6 +156,8 @@ def test_a_motion_that_the_model_does_not_predict_is_said(tmp_path: Path) -> Non
     recorded = problem().model_copy(update={"source": FileSource(start=0.0, hold_out=[(0.81, 1.0)])})
     found = identify(recorded, data=str(tmp_path / "run.csv"), method="least-squares")
     assert found.prediction[0].inside is False
+    assert (found.verdict, found.status) == (Verdict.REJECTED, "failed")
+    assert found.message.startswith("held-out data refute the model: predicted ")
     assert "predicted worse than the estimate states" in found.message
     assert "a prediction is worse than the estimate states" in found.advice[-1]
 
@@ -162,9 +167,11 @@ def test_a_motion_that_the_model_does_not_predict_is_said(tmp_path: Path) -> Non
 def test_right_models_predict_19_of_20_windows(noise: float | None) -> None:
     """At the start, within and at the end; of 120 windows at 95 %, 106 or fewer inside have a chance below 1 %."""
     windows = [[0.02, 0.1], [0.4, 0.5], [0.8, 1.0]]
-    inside = [one.inside for seed in range(40) for one in fitted(seed, hold_out=windows, noise=noise).prediction]
+    found = [fitted(seed, hold_out=windows, noise=noise) for seed in range(40)]
+    inside = [one.inside for estimate in found for one in estimate.prediction]
     assert len(inside) == 120
     assert inside.count(True) > 106
+    assert all(estimate.verdict.trusted for estimate in found)
 
 
 @pytest.mark.slow

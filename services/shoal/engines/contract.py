@@ -77,19 +77,27 @@ def sampling_times(scene: Scene, times: Sequence[float] | Array | None) -> Array
 def check_lanes(
     scene: Scene, values: Mapping[str, Array], accepted: dict[str, tuple[float, float]] | None = None
 ) -> int:
-    """Number of lanes in `values`, after the scene accepted the extremes of each. Raises InputError.
+    """Number of lanes in `values`, after the scene accepted the extremes of each, or whole lanes. Raises InputError.
 
     accepted: the extremes of earlier calls, by path, which these widen; what lies between them is accepted too.
     """
     sizes = {path: np.asarray(lanes).size for path, lanes in values.items()}
     if len(set(sizes.values())) != 1:
         raise InputError(f"lanes: every path needs as many numbers as the others, found {sizes}")
-    known = {} if accepted is None else accepted
+    known, count = {} if accepted is None else accepted, next(iter(sizes.values()))
     for path, lanes in values.items():
         low, high = float(np.min(lanes)), float(np.max(lanes))
         least, most = known.get(path, (np.inf, -np.inf))
         if not (least <= low and high <= most):
-            for extreme in (low, high):
-                scene.with_values({path: extreme})
+            try:
+                for extreme in (low, high):
+                    scene.with_values({path: extreme})
+            except InputError:
+                if len(values) == 1:
+                    raise
+                # What cannot be beside the other numbers of the scene may be beside those of its lane.
+                for k in range(count):
+                    scene.with_values({name: float(np.ravel(numbers)[k]) for name, numbers in values.items()})
+                return count
             known[path] = min(low, least), max(high, most)
-    return next(iter(sizes.values()))
+    return count

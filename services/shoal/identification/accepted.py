@@ -24,7 +24,7 @@ class Accepted:
         least, most = self._known.get(path, (np.inf, -np.inf))
         if least <= value <= most:
             return True
-        told = accepts(self._scene, path, value)
+        told = accepts(self._scene, {path: value})
         if told:
             self._known[path] = min(value, least), max(value, most)
         return told

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 
 from shoal.errors import InputError
@@ -11,19 +13,22 @@ _HALVINGS = 60
 """Until no number lies between what can be and what cannot."""
 
 
-def accepts(scene: Scene, path: str, value: float) -> bool:
-    """Whether a scene may have a value at a path."""
+def accepts(scene: Scene, values: Mapping[str, float]) -> bool:
+    """Whether a scene may have values at paths."""
     try:
-        scene.with_values({path: value})
+        scene.with_values(values)
     except InputError:
         return False
     return True
 
 
-def possible_bound(scene: Scene, path: str, bound: float) -> float | None:
+def possible_bound(
+    scene: Scene, path: str, bound: float, fields: Callable[[float], Mapping[str, float]]
+) -> float | None:
     """The number nearest to a bound that a scene accepts at a path, to three digits on the side of its own value.
 
-    None where the scene has no number there, or where none of three digits lies between.
+    fields: the values that go with a number at the path. None where the scene has no number there, or where none of
+    three digits lies between.
     """
     try:
         inside, outside = float(scene.value(path)), bound
@@ -31,10 +36,10 @@ def possible_bound(scene: Scene, path: str, bound: float) -> float | None:
         return None
     for _ in range(_HALVINGS):
         middle = 0.5 * (inside + outside)
-        inside, outside = (middle, outside) if accepts(scene, path, middle) else (inside, middle)
+        inside, outside = (middle, outside) if accepts(scene, fields(middle)) else (inside, middle)
     if abs(inside) < 1e-12 * abs(bound):
         return None
     digit = 10.0 ** (np.floor(np.log10(abs(inside))) - 2)
     inwards = np.ceil if bound < inside else np.floor
     nearest = float(f"{inwards(inside / digit) * digit:.3g}")
-    return nearest if accepts(scene, path, nearest) else None
+    return nearest if accepts(scene, fields(nearest)) else None

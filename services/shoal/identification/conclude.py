@@ -84,6 +84,7 @@ def conclude(
     foretold: list[Prediction] = unless_late(
         lambda: predictions(model, point, near.seen if near.known else None, at, near.blocks, near.error), []
     )
+    fits, judgement = judgement.verdict.trusted, _refuted(judgement, foretold)
     drawn, undrawn = _drawn(model, near, judgement, wishes.sample, seed)
     correlation = autocorrelation(near.seen.residual, near.blocks)
     draws = wishes.bootstrap if near.known else 0
@@ -92,7 +93,7 @@ def conclude(
     limits = judgement.verdict is not Verdict.UNFINISHED and not stages
     notes = [
         judgement.message or outcome.message,
-        *(_of_laws(model, near, known.laws, values) if judgement.verdict.trusted else []),
+        *(_of_laws(model, near, known.laws, values) if fits else []),
         *remarks(values, known.profiled, known.bent(model), near.tests, near.mesh if limits else None, near.theory),
         *([undrawn] if drawn is None else [drawn.sentence(), *news(drawn, values)]),
         "the draws are about the first of them alone" * (drawn is not None and judgement.verdict is Verdict.AMBIGUOUS),
@@ -111,8 +112,8 @@ def conclude(
         message="; ".join(note for note in notes if note),
         advice=judgement.advice + beyond * any(one.inside is False for one in foretold),
         choice=outcome.choice,
-        parameters=values,
-        quantities=known.quantities(model, near, judgement),
+        parameters={name: value.told() for name, value in values.items()},
+        quantities={name: value.told() for name, value in known.quantities(model, near, judgement).items()},
         combinations=known.combinations,
         fitness=outcome.fitness,
         rms=float(np.sqrt(outcome.fitness / model.rows.things)),
@@ -205,6 +206,15 @@ def _judged(model: ForwardModel, near: Evidence, known: _Known) -> Judgement:
         return judge(model, known.outcome, near.seen, near.at, near.tests, known.values, known.combinations)
     why = f" ({model.failure})" if model.failure else ""
     return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at the bounds and the scene")
+
+
+def _refuted(judgement: Judgement, foretold: list[Prediction]) -> Judgement:
+    """A judgement with what windows that were held out say: an answer that they refute is none."""
+    worst = max((one for one in foretold if one.refutes), key=lambda one: one.ratio, default=None)
+    if worst is None or not judgement.verdict.trusted:
+        return judgement
+    reason = f"held-out data refute the model: predicted {worst.ratio:.2g} times worse than the estimate states"
+    return replace(judgement, verdict=Verdict.REJECTED, message="; ".join(filter(None, [reason, judgement.message])))
 
 
 def _drawn(

@@ -94,11 +94,14 @@ class Estimate:
         return "ok" if self.verdict.trusted else "failed"
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name} {value.value:.6g} ± {value.std:.2g}" for name, value in self.parameters.items())
+        values = ", ".join(
+            f"{name} {value.value:.6g}" + (f" ± {value.std:.2g}" if value.identifiable else " (not known)")
+            for name, value in self.parameters.items()
+        )
         return f"Estimate({self.problem}: {self.verdict}; {values})"
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row for each parameter and quantity: value, std, lower, upper, identifiable, ..."""
+        """A row for each parameter and quantity: value, std, lower, upper (nan if open), identifiable, ..."""
         import pandas as pd
 
         rows = {name: vars(value) for name, value in {**self.parameters, **self.quantities}.items()}

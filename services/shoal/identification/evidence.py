@@ -64,7 +64,7 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
     if not possible:
         seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
     blocks = blocks_of(model, len(seen.residual))
-    at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks)
+    at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks, seen.error)
     error = ModelError(None, None)
     if possible and looked is not None:
         error = unless_late(lambda: model_error(model, point, predicted, seen.residual), error)
@@ -85,7 +85,8 @@ def _size(model: ForwardModel, rows: Array | None) -> float | None:
 def _unseen(model: ForwardModel) -> Sensitivity:
     """What is known of the neighbourhood of an answer where there is no time to look: nothing."""
     rows = len(model.rows.time) + len(model.parameters.priors)
-    return Sensitivity(np.zeros(rows), np.zeros((rows, len(model.names))), np.inf, np.inf)
+    nothing = np.zeros((rows, len(model.names)))
+    return Sensitivity(np.zeros(rows), nothing, np.inf, np.inf, nothing)
 
 
 def _predicted(model: ForwardModel, point: Array, name: str) -> Array:

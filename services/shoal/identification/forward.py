@@ -301,13 +301,24 @@ class ForwardModel:
             extremes = {float(np.min(numbers[doubtful])), float(np.max(numbers[doubtful]))}
             if not all(self.accepts(path, x, scene) for x in extremes):
                 possible[doubtful] &= [self.accepts(path, float(x), scene) for x in numbers[doubtful]]
+        # What cannot be beside the other values of the scene may be beside those of the point.
+        for k in np.flatnonzero(np.logical_not(possible)) if self.problem.ties else ():
+            possible[k] = accepts(scene, {path: float(numbers[k]) for path, numbers in values.items()})
         return possible
 
     def accepts(self, path: str, value: float, scene: Scene | None = None) -> bool:
         """Whether a scene, else the model's, may have a value at a path."""
         if scene is not None and scene is not self.scene:
-            return accepts(scene, path, value)
+            return accepts(scene, {path: value})
         return self._accepted(path, value)
+
+    def can_be(self, point: Array, name: str | None = None) -> bool:
+        """Whether a point (parameters,) is a scene in a recording (else the first)."""
+        try:
+            self.scene_at(point, name)
+        except InputError:
+            return False
+        return True
 
     @cached_property
     def _accepted(self) -> Accepted:

@@ -27,13 +27,13 @@ _ORDER = 2
 def paced(model: ForwardModel, point: Array) -> ForwardModel:
     """The model with its step halved until that counts no more, at a point.
 
-    A step is chosen where the scene leaves the integrator open, rods have elements, and the noise of all channels is
-    stated; the scene's own is the longest. A run that is rejected has an infinite error. Runs are not
+    A step is chosen where the scene leaves the integrator open and rods have elements; the scene's own is the longest.
+    Noise that is not stated is what the data show. A run that is rejected has an infinite error. Runs are not
     counted. Raises TimeIsUp.
     """
     rods = [body for body in model.scene.bodies.values() if isinstance(body, Rod)]
     free = model.scene.solver.integrator == "auto" and any(rod.element not in FRAMED for rod in rods)
-    if not free or model.rows.noise is None:
+    if not free:
         return model
     step, before = model.scene.solver.step, np.inf
     try:
@@ -41,7 +41,7 @@ def paced(model: ForwardModel, point: Array) -> ForwardModel:
         for halvings in range(1, _HALVINGS + 1):
             shorter = _stepping(model, step / 2**halvings)
             found = shorter.uncounted(point[None])[0]
-            error = _between(seen, found) / model.rows.noise
+            error = _between(seen, found) / model.rows.shown
             if error > before / _SETTLES:
                 return model
             if error <= _OF_NOISE:

@@ -97,11 +97,7 @@ class Parametrization:
     @cached_property
     def start(self) -> Array:
         """The stated starts, else the middle between the bounds, (components,)."""
-        starts = [entry.parameter.start for entry in self.entries.values()]
-        given = np.array([np.nan if start is None else start for start in starts])
-        with np.errstate(invalid="ignore"):
-            vector = self.to_vector(given)
-        return np.where(np.isnan(given), (self.lower + self.upper) / 2, vector)
+        return self.to_vector(np.array([entry.parameter.begin for entry in self.entries.values()]))
 
     @cached_property
     def logarithmic(self) -> npt.NDArray[np.bool_]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from functools import partial
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -11,7 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from shoal.errors import InputError
-from shoal.identification.bounds import possible_bound
+from shoal.identification.bounds import accepts, possible_bound
 from shoal.identification.recording.sensor_checks import check_felt
 from shoal.identification.recording.source import IN_SPACE, Channel, EngineSource, FileSource, Source
 from shoal.scene import Scene, expression, load_scene
@@ -93,6 +95,13 @@ class Parameter(Record):
         """Whether it is sought by its logarithm."""
         positive = self.lower > 0 and (self.path or "").rpartition(".")[2] in _POSITIVE
         return self.scale == "log" or (self.scale == "auto" and positive)
+
+    @property
+    def begin(self) -> float:
+        """Where a search begins if nothing better is known: the start, else the middle of the range."""
+        if self.start is not None:
+            return self.start
+        return math.sqrt(self.lower) * math.sqrt(self.upper) if self.logarithmic else (self.lower + self.upper) / 2
 
     @property
     def of_measurement(self) -> bool:
@@ -212,13 +221,24 @@ class Problem(Record):
             free = set()
         for name, (path, *ends) in bounds.items():
             for end, bound in zip(("lower", "upper"), ends, strict=True) if name not in free else ():
+                if accepts(scene, {path: bound}):
+                    continue
+                fields = partial(self._fields, scene, name)
                 try:
-                    scene.with_values({path: bound})
+                    scene.with_values(fields(bound))
                 except InputError as error:
-                    nearest = possible_bound(scene, path, bound)
+                    nearest = possible_bound(scene, path, bound, fields)
                     told = "" if nearest is None else f"; with the rest of {scene.name} as it is {nearest:g} can be"
                     where = f"{self.name}: parameters.{name}.{end}"
                     raise InputError(f"{where}: {bound:g} cannot be: {error}{told}") from None
+
+    def _fields(self, scene: Scene, name: str, value: float) -> dict[str, float]:
+        """What a value of a parameter sets in the scene, by path, with its ties; the others are at their starts."""
+        known = {other: parameter.begin for other, parameter in self.parameters.items()} | {name: value}
+        known |= {constant: float(scene.value(path)) for constant, path in self.constants.items()}
+        tied = {path: text for path, text in self.ties.items() if name in expression.names(text)}
+        found = {path: expression.evaluate(text, known) for path, text in tied.items()}
+        return {self.parameters[name].path or name: value, **found}
 
     def check_channels(self, channels: tuple[Channel, ...], scene: Scene, where: str) -> None:
         """Whether a recording can be compared with the scene. Raises InputError."""

@@ -51,7 +51,7 @@ class Answer:
         """Covariance at the answer."""
         seen = believed(self.model, self.point)
         blocks = blocks_of(self.model, len(seen.residual))
-        return linearise(seen.jacobian, seen.residual, self.model.sizes(self.point), blocks)
+        return linearise(seen.jacobian, seen.residual, self.model.sizes(self.point), blocks, seen.error)
 
     @cached_property
     def correlation(self) -> Array:

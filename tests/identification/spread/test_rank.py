@@ -59,6 +59,10 @@ def test_a_damped_swing_shows_friction_over_mass_only() -> None:
     assert estimate.parameters["theta"].identifiable
     assert not estimate.parameters["c"].identifiable
     assert not estimate.parameters["m"].identifiable
+    told = estimate.to_json()["parameters"]
+    assert [told["m"][field] for field in ("std", "lower", "upper")] == [None, None, None]
+    assert told["theta"]["lower"] < told["theta"]["value"] < told["theta"]["upper"]
+    assert f"m {estimate.parameters['m'].value:.6g} (not known)" in repr(estimate)
 
 
 def test_a_flexible_machine_shows_stiffness_over_density_only() -> None:

@@ -1,5 +1,8 @@
 """Derivatives against two independent ways: CasADi's exact ones, and variational equations by short segments."""
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 from shoal.engines import get_engine
@@ -10,6 +13,7 @@ from shoal.identification.methods.least_squares import differentiate as naive
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.sensitivity import believed, sensitivity
 from shoal.identification.spread.uncertainty import linearise
+from shoal.scene import Scene
 from shoal_validation.coverage.cases import tip
 from shoal_validation.inverse_precision.cases import rigid_problem, textbook
 
@@ -128,3 +132,59 @@ def test_derivatives_that_hold_are_those_of_the_whole_record() -> None:
     one, other = sensitivity(model, point), believed(model, point)
     assert other.end is None
     assert np.array_equal(one.jacobian, other.jacobian)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_jacobian_of_a_linear_model_with_equal_singular_values_is_its_matrix(seed: int) -> None:
+    """Within such a pair any direction is singular, so that the directions never settle."""
+    rng = np.random.default_rng(seed)
+    left, right = np.linalg.qr(rng.standard_normal((30, 4)))[0], np.linalg.qr(rng.standard_normal((4, 4)))[0]
+    matrix = left * [1.0, 1.0, 1e-4, 1e-4] @ right.T
+    linear = SimpleNamespace(
+        sizes=np.ones_like,
+        box_at=lambda point: (point - 1.0, point + 1.0),
+        uncounted=lambda points: points @ matrix.T,
+        rows=SimpleNamespace(signal=1.0),
+    )
+    seen = sensitivity(cast(ForwardModel, linear), np.zeros(4))
+    assert seen.reliable
+    assert seen.jacobian == pytest.approx(matrix, abs=1e-9)
+
+
+def falling(speed: float, reach: float) -> ForwardModel:
+    """A point mass thrown at 45 degrees, so fast [m/s] and from so near the origin [m], seen by three cameras."""
+    first = {"position": [0.0, 0.0], "velocity": [speed, speed]}
+    ball = {"name": "ball", "bodies": {"b": {"kind": "point-mass", "mass": 0.5}}, "initial": {"b": first}}
+    scene = Scene.parse(ball | {"markers": {"b": {"body": "b"}}, "solver": {"duration": 1.0}}, "ball")
+    sought = {"vx": "velocity.0", "vy": "velocity.1", "px": "position.0", "py": "position.1"}
+    bounds = {name: 10 * speed if name.startswith("v") else reach for name in sought}
+    starts = {name: speed if name.startswith("v") else 0.0 for name in sought}
+    stated = {
+        "name": "ball",
+        "scene": "ball",
+        "parameters": {
+            name: {"path": f"initial.b.{path}", "lower": -bounds[name], "upper": bounds[name], "start": starts[name]}
+            for name, path in sought.items()
+        },
+        "channels": [{"marker": "b", "quantity": q, "column": q} for q in ("x", "y")],
+        "noise": 1e-3,
+        "source": {"kind": "file"},
+    }
+    problem = Problem.parse(stated, "ball")
+    times = np.linspace(0.0, 1.0, 41)
+    points = np.column_stack([speed * times, speed * times - 0.5 * 9.81 * times**2])
+    measurement = Measurement.single(times, tuple(problem.channels), points, "parabola", noise=1e-3)
+    return ForwardModel(problem, scene, get_engine("gauss"), measurement)
+
+
+@pytest.mark.parametrize(("speed", "reach"), [(1.0, 1.0), (40.0, 0.01), (1000.0, 1e-3)])
+def test_a_linear_problem_is_known_exactly_however_its_sizes_differ(speed: float, reach: float) -> None:
+    """Positions shift the data one to one, be they ever so small beside the speeds. Judged by the normal equations."""
+    model = falling(speed, reach)
+    point = model.parameters.start
+    seen = sensitivity(model, point)
+    at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks_of(model, len(seen.residual)), seen.error)
+    lines = np.column_stack([model.measurement.first.times, np.ones(41)])
+    exact = np.sqrt(np.diag(np.linalg.inv(lines.T @ lines)))
+    assert at.unknown.size == 0
+    assert np.linalg.norm(at.pseudo_inverse, axis=1) == pytest.approx(np.repeat(exact, 2), rel=1e-2)

@@ -80,7 +80,7 @@ def astray(model: ForwardModel, rng: np.random.Generator) -> Iterator[tuple[floa
             noise = rng.standard_normal(len(effect))
             wrong = size * np.sqrt(len(effect)) / np.linalg.norm(own) * rng.choice([-1, 1]) * effect + noise
             left = wrong - basis @ (basis.T @ wrong)
-            at = linearise(seen.jacobian, left, model.sizes(truth), blocks)
+            at = linearise(seen.jacobian, left, model.sizes(truth), blocks, seen.error)
             tests = residual_tests(model, left, blocks, at.noise)
             excess = 0.0 if tests.white else np.sqrt(max(float(np.mean(left**2)) - 1.0, 0.0))
             wider = replace(at, systematic=excess * np.sqrt(len(left)))

@@ -67,10 +67,8 @@ def trial(seed: int, kind: str | None = None) -> Trial:
     model = ForwardModel(drawn.problem, drawn.scene, get_engine("gauss"), drawn.measurement)
     outcome = get_method("least-squares")(model, np.random.default_rng(seed), lambda *_: None)
     estimate = conclude(model, outcome, "least-squares", seed, 0.0, [], NOTHING)
-    held = [
-        estimate.parameters[name].lower <= truth <= estimate.parameters[name].upper
-        for name, truth in drawn.truth.items()
-    ]
+    known = {name: estimate.parameters[name] for name in drawn.truth}
+    held = [not value.identifiable or value.lower <= drawn.truth[name] <= value.upper for name, value in known.items()]
     tests = estimate.residual_tests
     named = first_of(estimate.suspects, tests.rows)
     return Trial(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shoal.identification.spread.uncertainty import RANK_TOLERANCE
+from shoal.identification.spread.uncertainty import told
 from shoal.trajectory import Array
 
 
@@ -69,9 +69,7 @@ def precision(jacobian: Array, span: Array, error: Array | None = None) -> Preci
     count = len(span)
     rows = np.concatenate([jacobian * span, np.zeros((count, count))])
     _, singular, right = np.linalg.svd(np.linalg.qr(rows, mode="r"))
-    known = singular > RANK_TOLERANCE * singular[0] if singular[0] > 0 else np.zeros(count, dtype=bool)
-    if error is not None:
-        known &= singular > np.linalg.norm(error * span @ right.T, axis=0)
+    known = told(singular, right, None if error is None else error * span)
     inverse = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
     relative = np.sqrt(np.sum((right.T * inverse) ** 2, axis=1))
     hidden = np.linalg.norm(right[~known], axis=0) > 1e-3

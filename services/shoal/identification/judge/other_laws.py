@@ -18,7 +18,7 @@ from shoal.identification.judge.suspects.of_machine import RESISTING, resisting
 from shoal.identification.judge.suspects.size import size_of
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.sensitivity import Sensitivity
-from shoal.identification.spread.uncertainty import RANK_TOLERANCE, linearise, spread
+from shoal.identification.spread.uncertainty import inverse, linearise, spread
 from shoal.identification.spread.value import Value
 from shoal.scene.joints import Resisted
 from shoal.trajectory import Array
@@ -98,15 +98,15 @@ def _most(model: ForwardModel, point: Array, seen: Sensitivity, column: Array) -
     if not (np.all(np.isfinite(column)) and np.any(column)):
         return None
     known = model.sizes(point)
-    scaled = seen.jacobian * known
-    slope = -known * (np.linalg.pinv(scaled, rcond=RANK_TOLERANCE) @ column)
+    slope = -inverse(seen.jacobian, known, seen.error)[0] @ column
     # By a size of the law that changes the motion as much as the parameters do, so that it counts among them.
-    size = float(np.linalg.norm(scaled, axis=0).max() / np.linalg.norm(column))
+    size = float(np.linalg.norm(seen.jacobian * known, axis=0).max() / np.linalg.norm(column))
     freed, scale = np.column_stack([seen.jacobian, column]), np.append(known, size)
-    change = -scale * (np.linalg.pinv(freed * scale, rcond=RANK_TOLERANCE) @ seen.residual)
+    error = np.column_stack([seen.error, np.zeros_like(column)])
+    change = -inverse(freed, scale, error)[0] @ seen.residual
     amount = float(change[-1])
     left = seen.residual + freed @ change if amount > 0.0 else seen.residual
-    at = linearise(freed, left, scale, blocks_of(model, len(left)))
+    at = linearise(freed, left, scale, blocks_of(model, len(left)), error)
     most = max(0.0, amount + spread(lambda p: float(p[-1]), np.append(point, 0.0), at).half)
     with np.errstate(divide="ignore", invalid="ignore"):
         room = np.where(slope < 0.0, model.lower - point, model.upper - point) / slope

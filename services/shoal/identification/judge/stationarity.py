@@ -14,7 +14,7 @@ import numpy as np
 from shoal.identification.forward import ForwardModel
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.sensitivity import Sensitivity
-from shoal.identification.spread.uncertainty import RANK_TOLERANCE, linearise
+from shoal.identification.spread.uncertainty import linearise, told
 from shoal.trajectory import Array
 
 _FAR = 2.0
@@ -79,7 +79,7 @@ def _step(model: ForwardModel, point: Array, seen: Sensitivity) -> Array:
     """Gauss-Newton step within the bounds, of least norm among those that the data do not tell apart, (parameters,)."""
     sizes, steeper = model.sizes(point), model.steepness(seen.residual)
     left, singular, right = np.linalg.svd(steeper[:, None] * seen.jacobian * sizes, full_matrices=False)
-    known = singular > RANK_TOLERANCE * singular[0]
+    known = told(singular, right, steeper[:, None] * seen.error * sizes)
     if not np.any(known):
         return np.zeros(len(point))
     low, high = model.box_at(point)
@@ -101,7 +101,7 @@ def _distance(model: ForwardModel, point: Array, place: Array, seen: Sensitivity
     """
     sizes, blocks = model.sizes(point), blocks_of(model, len(residual))
     basis = np.linalg.qr(seen.jacobian)[0]
-    at = linearise(seen.jacobian, residual - basis @ (basis.T @ residual), sizes, blocks)
+    at = linearise(seen.jacobian, residual - basis @ (basis.T @ residual), sizes, blocks, seen.error)
     values, directions = np.linalg.eigh(at.covariance / np.outer(sizes, sizes))
     told = slice(at.unknown.shape[1], None)
     along = directions.T @ ((place - point) / sizes)

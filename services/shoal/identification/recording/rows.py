@@ -65,8 +65,16 @@ class Rows:
             return np.asarray(self.noise / self._stated)
         if of_channels(self.whole):
             return np.ones(len(self.time))
-        noise = self._each([_beside(recording) for recording in self.whole.recordings.values()])
-        return np.asarray(np.exp(np.mean(np.log(noise))) / noise)
+        return np.asarray(np.exp(np.mean(np.log(self._shown))) / self._shown)
+
+    @cached_property
+    def shown(self) -> float:
+        """Standard deviation of a weighted row: as stated, else as the data show; the geometric mean of all rows."""
+        return float(np.exp(np.mean(np.log(self._shown * self.weight))))
+
+    @cached_property
+    def _shown(self) -> Array:
+        return self._each([_beside(recording) for recording in self.whole.recordings.values()])
 
     @cached_property
     def estimated(self) -> Array:

@@ -32,7 +32,7 @@ def parameters(model: ForwardModel, point: Array, at: Linearisation, correction:
         told = about.fixed and not at_bound and about.std < span and not few(model)
         known = _value(float(point[k]), about, told, shift, at_bound)
         known = known.exponential() if model.parameters.logarithmic[k] else known
-        found[name] = replace(known, unit=unit(model.parameters.paths[k]))
+        found[name] = replace(known, unit=unit(model.parameters.paths[k]), fixed=about.fixed and not few(model))
     return possible(model, found)
 
 
@@ -52,7 +52,8 @@ def quantities(
             about = spread(value_at, point, at)
             shift = correction.of(value_at, point)
             told = about.fixed and not doubtful & set(expression.names(text))
-            found[f"{recording}.{name}" if recording else name] = _value(value_at(point), about, told, shift, False)
+            known = replace(_value(value_at(point), about, told, shift, False), fixed=about.fixed)
+            found[f"{recording}.{name}" if recording else name] = known
     return found
 
 
@@ -91,7 +92,8 @@ def with_refits(values: dict[str, Value], refits: list[Refit]) -> dict[str, Valu
     """Values whose intervals span those of refits too; what a refit leaves open is not identifiable."""
     ends = [values, *(refit.values() for refit in refits)]
     told = {name: all(end[name].identifiable for end in ends) for name in values}
-    return {name: replace(value, identifiable=told[name]) for name, value in spanning(ends).items()}
+    fixed = {name: all(end[name].fixed for end in ends) for name in values}
+    return {name: replace(value, identifiable=told[name], fixed=fixed[name]) for name, value in spanning(ends).items()}
 
 
 def covariance(model: ForwardModel, point: Array, at: Linearisation) -> Array:
@@ -107,18 +109,29 @@ def few(model: ForwardModel) -> bool:
 
 def possible(model: ForwardModel, values: dict[str, Value]) -> dict[str, Value]:
     """Parameters; those whose intervals reach values that cannot be, such as a mass below zero, are not known."""
-    told = {
-        name: _possible(model, path, values[name])
-        for name, path in zip(model.names, model.parameters.paths, strict=True)
-    }
+    point = model.parameters.to_vector(np.array([values[name].value for name in model.names]))
+    told = {name: _possible(model, k, point, values[name]) for k, name in enumerate(model.names)}
     return {name: replace(value, identifiable=value.identifiable and told[name]) for name, value in values.items()}
 
 
-def _possible(model: ForwardModel, path: str, known: Value) -> bool:
+def _possible(model: ForwardModel, k: int, point: Array, known: Value) -> bool:
+    path = model.parameters.paths[k]
     head, _, name = path.partition(".")
     if head == RESERVED:
         return known.lower > 0.0 or name not in ("clock", "scale")
-    return not path or all(model.accepts(path, end) for end in (known.lower, known.upper))
+    return not path or all(_accepted(model, k, point, end) for end in (known.lower, known.upper))
+
+
+def _accepted(model: ForwardModel, k: int, point: Array, end: float) -> bool:
+    """Whether a parameter may have a value, beside those of the scene, or else with its ties at the answer."""
+    if model.accepts(model.parameters.paths[k], end):
+        return True
+    if not model.problem.ties or (model.parameters.logarithmic[k] and end <= 0.0):
+        return False
+    values = model.parameters.to_values(point)
+    values[k] = end
+    recording = list(model.parameters.entries.values())[k].recording
+    return model.can_be(model.parameters.to_vector(values), recording)
 
 
 def _own(model: ForwardModel, text: str) -> bool:

@@ -28,7 +28,9 @@ from shoal.trajectory import Array, plain
 
 Mask = npt.NDArray[np.bool_]
 
-_NORMAL = 1.959963984540054
+_REFUTES = 1e-4
+"""Chance by Satterthwaite's approximation, whose tail is up to several times too thin: a right model is refuted by its
+windows, all of them together, less than once in a thousand times."""
 _HIDDEN = 1e-3
 """Share of a derivative along directions that the data leave open, from which on a prediction is not known."""
 _PARTS = np.array([1.0, 1.25, 1.5, 1.75, 2.0])
@@ -45,6 +47,7 @@ class Foretold:
 
     rms: of model minus measurement; expected: what noise and the parameters' covariance predict for it; limit: what it
     stays below in 95 % of windows, model error included, nan where that cannot be told; inside: whether it does
+    most: likewise what it stays below but for a chance below 0.001: what is above refutes the model
     """
 
     name: str
@@ -54,6 +57,7 @@ class Foretold:
     rms: float
     expected: float
     limit: float
+    most: float
 
     @property
     def inside(self) -> bool | None:
@@ -89,6 +93,16 @@ class Prediction:
         """Whether every channel is; None where the estimate states no error."""
         told = [channel.inside for channel in self.channels]
         return None if None in told else all(told)
+
+    @property
+    def refutes(self) -> bool:
+        """Whether a right model would hardly be so far off."""
+        return any(channel.rms > channel.most for channel in self.channels)
+
+    @property
+    def ratio(self) -> float:
+        """How many times worse than stated it is: RMS over limit of the worst channel, nan where there is no limit."""
+        return max((channel.rms / channel.limit for channel in self.channels), default=float("nan"))
 
     def sentence(self, named: bool) -> str:
         """The outcome in words; named: whether the recording has to be."""
@@ -151,7 +165,8 @@ def _predicted(
     rms = np.sqrt(
         [np.mean(column[np.isfinite(column)] ** 2) if np.any(np.isfinite(column)) else np.nan for column in off.T]
     )
-    half, expected, limit = np.full_like(off, np.nan), np.full(len(channels), np.nan), np.full(len(channels), np.nan)
+    half, (expected, limit, most) = np.full_like(off, np.nan), np.full((3, len(channels)), np.nan)
+    windows = sum(len(recording.held) for recording in model.measurement.recordings.values())
     allowance, why = 1.0, ""
     there = None if fit is None else sensitivity(window, point)
     if not np.all(np.isfinite(predicted)):
@@ -179,13 +194,15 @@ def _predicted(
                 weight = float(model.rows.weight[fit.blocks[block].rows[0]])
                 level = 1.0 - (1.0 - LEVEL) / len(channels)
                 uneven = _unevenness(fit.seen.residual[fit.blocks[block].rows], int(np.sum(rows)))
-                told = _stated(slopes[rows], fit.at, block, weight, level, uneven)
+                sure = 1.0 - _REFUTES / len(channels) / windows
+                told, surely = (_stated(slopes[rows], fit.at, block, weight, p, uneven) for p in (level, sure))
                 extra = float(np.sqrt(np.mean(bias[rows] ** 2)))
                 expected[k], limit[k] = told.expected, allowance * told.limit + extra
+                most[k] = allowance * surely.limit + extra
                 half[np.isfinite(held.values[:, k]), k] = allowance * told.half + np.abs(bias[rows])
     told_of = [
         Foretold(c.name, c.place, c.quantity, of_channel(c), *map(float, numbers))
-        for c, *numbers in zip(channels, rms, expected, limit, strict=True)
+        for c, *numbers in zip(channels, rms, expected, limit, most, strict=True)
         if np.isfinite(numbers[0])
     ]
     return Prediction(name, held.window, told_of, held.times, held.values, predicted, half, allowance, why)
@@ -275,13 +292,14 @@ def _stated(slopes: Array, at: Linearisation, block: int, weight: float, level: 
     freedom = mean**2 / spread
     shares = np.maximum(np.einsum("ni,bij,nj->b", slopes, at.parts, slopes) / count, 0.0)
     shares[block] += variance
-    doubt = quantile(shares, at.noise) / _NORMAL
+    normal = np.sqrt(chi_square_above(1.0, 1.0 - level))
+    doubt = quantile(shares, at.noise, level) / normal
     lever = slopes @ at.pseudo_inverse
     follows = ABSORBED * at.systematic
     systematic = follows * float(np.linalg.svd(lever, compute_uv=False)[0]) / np.sqrt(count)
     above = chi_square_above(freedom, 1.0 - level) / freedom * mean * doubt**2
     each = variance + np.einsum("ni,ij,nj->n", slopes, at.covariance, slopes)
-    half = np.hypot(doubt * _NORMAL * np.sqrt(each), follows * np.linalg.norm(lever, axis=1))
+    half = np.hypot(quantile(shares, at.noise) * np.sqrt(each), follows * np.linalg.norm(lever, axis=1))
     return _Stated(float(np.sqrt(mean)), float(np.hypot(np.sqrt(above), systematic)), half)
 
 
@@ -342,15 +360,15 @@ def _too_small(model: ForwardModel, number: int, out: Mask, kept: Mask, fit: _Fi
         gaps = np.diff(model.rows.time[rows])
         gaps = gaps / np.median(gaps) if len(gaps) else gaps
         blocks.append(replace(block, rows=place[rows], gaps=gaps))
-    jacobian, residual = fit.seen.jacobian[kept], fit.seen.residual[kept]
+    jacobian, residual, error = fit.seen.jacobian[kept], fit.seen.residual[kept], fit.seen.error[kept]
     if not np.all(np.isfinite(jacobian)) or np.count_nonzero(kept) <= 2 * len(fit.sizes):
         return 1.0
-    first = linearise(jacobian, residual, fit.sizes, blocks)
+    first = linearise(jacobian, residual, fit.sizes, blocks, error)
     if first.unknown.size > fit.at.unknown.size:
         return 1.0
     step = first.pseudo_inverse @ residual
     left = residual - jacobian @ step
-    at = linearise(jacobian, left, fit.sizes, blocks)
+    at = linearise(jacobian, left, fit.sizes, blocks, error)
     share = float(np.linalg.norm(left) / max(float(np.linalg.norm(fit.seen.residual)), 1e-300))
     at = replace(at, systematic=fit.at.systematic * share)
     worst = 1.0
@@ -361,7 +379,7 @@ def _too_small(model: ForwardModel, number: int, out: Mask, kept: Mask, fit: _Fi
             continue
         weight = float(model.rows.weight[rows[0]])
         slopes = fit.seen.jacobian[rows] / weight
-        error = (fit.seen.residual[rows] - fit.seen.jacobian[rows] @ step) / weight
+        off = (fit.seen.residual[rows] - fit.seen.jacobian[rows] @ step) / weight
         told = _stated(slopes, at, mine, weight, LEVEL, _unevenness(left[blocks[mine].rows], len(rows)))
-        worst = max(worst, float(np.sqrt(np.mean(error**2))) / max(told.limit, 1e-300))
+        worst = max(worst, float(np.sqrt(np.mean(off**2))) / max(told.limit, 1e-300))
     return worst

@@ -6,7 +6,7 @@ orders of magnitude); a step that is too small drowns in round-off. Both show wh
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,16 +37,16 @@ class Sensitivity:
 
     doubt: relative difference of two step sizes, the worst of all directions
     growth: largest over smallest singular value, of parameters in units of their size
-    end: until when the derivatives can be believed [s by the clock]; those of later rows are zero; None: all can
     error: by how much the derivatives by the two steps differ, (rows, parameters)
+    end: until when the derivatives can be believed [s by the clock]; those of later rows are zero; None: all can
     """
 
     residual: Array
     jacobian: Array
     doubt: float
     growth: float
+    error: Array
     end: float | None = None
-    error: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def reliable(self) -> bool:
@@ -63,20 +63,21 @@ def sensitivity(model: ForwardModel, point: Array, residual: Array | None = None
     singular directions found, until these stay. At a bound the difference is taken to the inner side.
     """
     sizes = model.sizes(point)
-    basis = np.eye(len(point))
+    basis = turned = np.eye(len(point))
     residual = model.uncounted(point[None])[0] if residual is None else residual
     columns, doubt, error = _differences(model, point, sizes, basis, _USUAL)
     if np.max(doubt) < _SURE and (growth := _growth(columns)) < _WELL_CONDITIONED:
-        return Sensitivity(residual, columns / sizes, float(np.max(doubt)), growth, error=error / sizes)
+        return Sensitivity(residual, columns / sizes, float(np.max(doubt)), growth, error / sizes)
     for _ in range(_ROUNDS):
+        basis = turned
         columns, doubt, error = _differences(model, point, sizes, basis, _STEPS)
-        turned = np.linalg.svd(columns, full_matrices=False)[2]
+        right = np.linalg.svd(columns, full_matrices=False)[2]
         growth = _growth(columns)
-        if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(turned) - np.eye(len(point)))) < AGREED / growth:
+        if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(right) - np.eye(len(point)))) < AGREED / growth:
             break
-        basis = basis @ turned.T
+        turned = basis @ right.T
     turned_back = basis.T / sizes
-    return Sensitivity(residual, columns @ turned_back, float(np.max(doubt)), growth, error=error @ turned_back)
+    return Sensitivity(residual, columns @ turned_back, float(np.max(doubt)), growth, error @ turned_back)
 
 
 def believed(model: ForwardModel, point: Array, residual: Array | None = None) -> Sensitivity:
@@ -93,10 +94,10 @@ def believed(model: ForwardModel, point: Array, residual: Array | None = None) -
             break
         early = sensitivity(part, point)
         if early.reliable:
-            jacobian = np.zeros_like(seen.jacobian)
+            jacobian, error = np.zeros_like(seen.jacobian), np.zeros_like(seen.error)
             kept = np.append(model.rows.time <= end + 1e-12, np.ones(len(seen.residual) - len(model.rows.time), bool))
-            jacobian[kept] = early.jacobian
-            return replace(seen, jacobian=jacobian, end=float(end))
+            jacobian[kept], error[kept] = early.jacobian, early.error
+            return replace(seen, jacobian=jacobian, error=error, end=float(end))
     return seen
 
 

@@ -6,13 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.identification.spread.chances import student_above
 from shoal.identification.spread.covariance import Block, Noise, correlate, estimate_noise
 from shoal.trajectory import Array
 
-RANK_TOLERANCE = 1e-6
-"""Singular values below this fraction of the largest (columns scaled to the parameters' size) carry nothing."""
+_ROUND_OFF = 1e-12
+"""Of the largest singular value: a smaller one is round-off, whatever the derivatives say."""
+_UNTRIED = 1e-6
+"""Likewise of derivatives by a single step, whose error is not known."""
 LEVEL = 0.95
 """Of the intervals."""
 ABSORBED = 4.0
@@ -52,22 +55,47 @@ class Spread:
     fixed: bool
 
 
-def linearise(jacobian: Array, residual: Array, scale: Array, blocks: list[Block]) -> Linearisation:
+def told(singular: Array, right: Array, error: Array | None) -> npt.NDArray[np.bool_]:
+    """Which singular directions, rows of `right` (k, p), of a Jacobian the data tell, (k,).
+
+    Those along which the derivatives are larger than their `error` (rows, p). How weak they are beside the strongest
+    one is a matter of the parameters' sizes alone; what they tell beside the noise is in the covariance. None: the
+    error is not known.
+    """
+    largest = np.max(singular, initial=0.0)
+    if error is None:
+        return np.asarray(singular > _UNTRIED * largest)
+    return np.asarray(singular > np.maximum(np.linalg.norm(error @ right.T, axis=0), _ROUND_OFF * largest))
+
+
+def inverse(jacobian: Array, scale: Array, error: Array | None = None) -> tuple[Array, Array, Array]:
+    """Pseudo-inverse (p, m) of a Jacobian (m, p), orthonormal columns of what it changes (m, k), and `unknown` (p, u).
+
+    scale: size of each parameter, (p,); error: of the Jacobian; see `told` and Linearisation
+    """
+    left, singular, right = np.linalg.svd(jacobian * scale, full_matrices=False)
+    known = told(singular, right, None if error is None else error * scale)
+    over = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
+    return scale[:, None] * (right.T * over) @ left.T, left[:, known], right[~known].T
+
+
+def linearise(
+    jacobian: Array, residual: Array, scale: Array, blocks: list[Block], error: Array | None = None
+) -> Linearisation:
     """Uncertainty from the Jacobian (m, p) and residuals (m,) at the optimum; scale: size of each parameter, (p,).
+
+    error: by how much the Jacobian may be off, (m, p); None where that is not known
 
     The covariance is the sandwich (J'J)^-1 J' R J (J'J)^-1 of an unweighted fit, R being the covariance of the noise
     (Seber and Wild, Nonlinear Regression, 1989, 6.2).
     """
-    left, singular, right = np.linalg.svd(jacobian * scale, full_matrices=False)
-    known = singular > RANK_TOLERANCE * singular[0] if singular[0] > 0 else np.zeros(len(singular), dtype=bool)
-    inverse = np.where(known, 1.0 / np.where(known, singular, 1.0), 0.0)
-    pseudo_inverse = scale[:, None] * (right.T * inverse) @ left.T
-    noise = estimate_noise(residual, left[:, known], blocks)
+    pseudo_inverse, changed, unknown = inverse(jacobian, scale, error)
+    noise = estimate_noise(residual, changed, blocks)
     parts = []
     for block, seen in zip(blocks, noise, strict=True):
         rows = pseudo_inverse.T[block.rows]
         parts.append(seen.variance * rows.T @ correlate(block, seen.rho, rows))
-    return Linearisation(right[~known].T, pseudo_inverse, scale, np.array(parts), tuple(noise))
+    return Linearisation(unknown, pseudo_inverse, scale, np.array(parts), tuple(noise))
 
 
 def spread(function: Callable[[Array], float], point: Array, at: Linearisation) -> Spread:
@@ -83,13 +111,13 @@ def spread(function: Callable[[Array], float], point: Array, at: Linearisation) 
     return Spread(std, float(np.hypot(quantile(shares, at.noise) * std, ABSORBED * lever * at.systematic)), fixed)
 
 
-def quantile(shares: Array, noise: tuple[Noise, ...]) -> float:
+def quantile(shares: Array, noise: tuple[Noise, ...], level: float = LEVEL) -> float:
     """Student's t for a variance whose shares (blocks,) are known with the freedom of each (Welch 1947)."""
     total = float(np.sum(shares))
     if total <= 0.0:
         return 0.0
     doubt = float(np.sum([(share / total) ** 2 / seen.freedom for share, seen in zip(shares, noise, strict=True)]))
-    return student_above(1.0 / max(doubt, 1e-9), 0.5 - LEVEL / 2)
+    return student_above(1.0 / max(doubt, 1e-9), 0.5 - level / 2)
 
 
 def autocorrelation(residual: Array, blocks: list[Block]) -> float:

@@ -15,6 +15,7 @@ class Value:
     the interval
     theory: what shear and rotary inertia would add where slender beams neglect them; likewise
     unit: of all of them, empty where there is none or none is known
+    fixed: whether the data limit it at all; an estimate tells neither deviation nor interval of what they do not
     """
 
     value: float
@@ -26,6 +27,11 @@ class Value:
     at_bound: bool = False
     unit: str = ""
     theory: float | None = None
+    fixed: bool = True
+
+    def told(self) -> Value:
+        """As an estimate tells it: theory to first order knows nothing along what is open, nor beyond a bound."""
+        return replace(self, std=np.nan, lower=np.nan, upper=np.nan) if self.at_bound or not self.fixed else self
 
     def exponential(self) -> Value:
         """The value of a parameter that was sought by its logarithm."""
