@@ -96,7 +96,7 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
         chosen = chosen[::part]
     origin = f"{path.name}, {_span(times[chosen])}, {len(chosen)} samples"
     unknown = np.full(len(channels), np.nan)
-    found = Recording(times[chosen] - begin, channels, values[chosen], origin, unknown, notes=tuple(notes))
+    found = Recording(times[chosen] - begin, channels, values[chosen], origin, unknown, notes=tuple(notes), begin=begin)
     try:
         return found.holding(source.hold_out, begin), source
     except InputError as error:
