@@ -7,11 +7,13 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from shoal.errors import InputError
 from shoal.identification.recording.measurement import Recording
 from shoal.trajectory import Array
 
+Samples = npt.NDArray[np.intp]
 _SHARED = 2
 """Samples from which on windows overlap: two that touch have one in common."""
 _FEWEST = 3
@@ -58,7 +60,7 @@ def _pairs(a: Recording, b: Recording) -> list[tuple[int, int]]:
     ]
 
 
-def _at_once(a: Recording, b: Recording) -> tuple[Array, Array]:
+def _at_once(a: Recording, b: Recording) -> tuple[Samples, Samples]:
     """Samples by number, of either recording, at the same times of their tables."""
     times, others = a.begin + a.times, b.begin + b.times
     near = np.clip(np.searchsorted(others, times), 1, len(others) - 1)
