@@ -80,6 +80,14 @@ def test_garbage_is_refused_in_one_line_and_nothing_else(tmp_path: Path, data: b
     assert "\n" not in str(refusal.value)
 
 
+def test_the_statement_of_the_separator_that_excel_reads_is_no_row(tmp_path: Path) -> None:
+    path = written(tmp_path, "sep=;\nt;theta\n0;0,5\n1;0,25\n2;x\n")
+    with pytest.raises(InputError, match="row 5, column 'theta': 'x'"):
+        read(FileSource(), ANGLE, path)
+    path.write_text(path.read_text().replace("x", "1"))
+    np.testing.assert_array_equal(read(FileSource(), ANGLE, path).values[:, 0], [0.5, 0.25, 1.0])
+
+
 @given(st.text(alphabet="0123456789.,;-+einfa \t\n\"'xé_", max_size=80))
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_table_of_any_text_is_read_or_refused(tmp_path: Path, text: str) -> None:
@@ -109,6 +117,11 @@ def test_a_table_of_any_text_is_read_or_refused(tmp_path: Path, text: str) -> No
         ("t,phi\n0,1\n", ["no column 'theta'", "t, phi"]),
         ("t,theta,theta\n0,1,1\n", ["'theta'", "twice"]),
         ("0,1\n1,2\n2,3\n", ["no header line", "columns"]),
+        (
+            "By a tracker\nmass A\nt,theta\n0,1\n1,2\n",
+            ["no header line: row 1", "row 4 has 2 cells", "row 3 may be it"],
+        ),
+        ("t,theta\n0,1\n1,-9999\n2,1.1\n3,-9999\n4,1.2\n", ["'theta': -9999 stands 2 times", "1 to 1.2", "empty"]),
         ("t,theta\n0,1\n", ["only 1 samples"]),
         ("", ["not CSV"]),
     ],

@@ -41,8 +41,8 @@ def odd_one(model: ForwardModel, point: Array, residual: Array) -> tuple[str, st
         return told, "check what is known of either recording, and whether they are of one machine"
     if found:
         best = min(found, key=lambda name: found[name])
-        left = f"{found[best]:.2g} {unit}".strip()
-        return f"without recording {best} the others fit, and leave {left}", f"check recording {best}"
+        size = f"{found[best]:.2g} {unit}".strip()
+        return f"without recording {best} the others fit, and leave {size}", f"check recording {best}"
     worst, *others = largest
     usual = float(np.median([sizes[name] for name in others]))
     if sizes[worst] > _LARGE * usual:

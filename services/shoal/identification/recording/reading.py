@@ -32,6 +32,10 @@ _OUTLIER = 8.0
 """Times the noise; an isolated sample farther off is counted as an outlier."""
 _PAUSE = 1.5
 """Times the usual interval; a longer one is a gap."""
+_MARKS = (999.0, 9999.0, 99999.0, 999999.0, 32768.0, 1e30, 1e37, 1e38)
+"""Sizes of numbers that programs write for a gap."""
+_APART = 3.0
+"""Times the range of all other values, by which such a number is away from them."""
 _NEARLY = 0.8
 """Of half a turn; an angle that turns farther from one sample to the next may as well have turned the other way."""
 
@@ -78,6 +82,8 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
     begin = _begin(source, times)
     inside = _window(source, times, begin, path)
     columns = {name: table.numbers(name) for c in channels for name in (c.column, c.origin) if name is not None}
+    for name, numbers in columns.items():
+        _refuse_marks(numbers[inside], f"{path}: column {name!r}")
     notes = [f"the motion's time is zero at {begin:g} s, the first sample"] if source.start is None and begin else []
     notes = of_units + notes + (_mend(times, columns, channels) if source.swaps else [])
     signals = []
@@ -138,6 +144,20 @@ def _window(source: FileSource, times: Array, begin: float, path: Path) -> Mask:
             f"{_FEWEST} are needed; the recording covers {_span(times)}"
         )
     return inside
+
+
+def _refuse_marks(column: Array, where: str) -> None:
+    """Refuse a number that programs write for a gap, such as -9999, where it is far from all others."""
+    known = column[np.isfinite(column)]
+    for mark in (known.min(), known.max()) if known.size else ():
+        rest = known[known != mark]
+        if abs(mark) not in _MARKS or len(rest) < _FEWEST:
+            continue
+        if min(abs(rest.min() - mark), abs(rest.max() - mark)) > _APART * np.ptp(rest):
+            raise InputError(
+                f"{where}: {mark:g} stands {len(known) - len(rest)} times, far from the other values "
+                f"({rest.min():.4g} to {rest.max():.4g}), as a mark of gaps does; leave such cells empty"
+            )
 
 
 def _mend(times: Array, columns: dict[str, Array], channels: tuple[Channel, ...]) -> list[str]:
