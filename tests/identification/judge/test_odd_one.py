@@ -85,3 +85,28 @@ def test_two_that_contradict_each_other_and_right_ones() -> None:
     found = answer(a=swing(-0.4), b=0.97 * swing(-0.9, TIMES * 0.99, seed=1))
     assert found.verdict is Verdict.REJECTED
     assert answer(a=swing(-0.4), b=swing(-0.9, seed=1)).verdict is Verdict.IDENTIFIED
+
+
+def test_a_prior_that_the_data_contradict_is_named() -> None:
+    """The start is known to a milliradian, and stated a tenth of a radian off."""
+    prior = {"mean": -0.5, "std": 1e-3}
+    angle = {"path": "initial.OA.angle", "lower": -2.5, "upper": 1.0, "start": -0.5, "prior": prior}
+    data = {
+        "name": "pendulum",
+        "scene": "single-pendulum",
+        "values": {"bodies.OA.inertia": INERTIA},
+        "parameters": {"angle": angle},
+        "channels": [{"marker": "A", "quantity": q, "column": q} for q in ("x", "y")],
+        "noise": 10 * NOISE,
+        "source": {"kind": "file"},
+        "method": "least-squares",
+    }
+    problem = Problem.parse(data, "pendulum")
+    noise = 9 * NOISE * np.random.default_rng(1).standard_normal((len(TIMES), 2))
+    found = identify(
+        problem,
+        measurement=Measurement.single(TIMES, tuple(problem.channels), swing(-0.4) + noise, "scipy", noise=1e-2),
+    )
+    assert found.verdict is Verdict.REJECTED
+    assert "standard deviations off its prior" in found.message
+    assert found.advice[0] == "check the prior of angle"

@@ -30,6 +30,8 @@ _NEGLIGIBLE = 1e-4
 """Of the signal: a misfit below it is not looked into."""
 _LOUD = 1.5
 """Times what noise explains: what leaves more is not the whole cause."""
+_FAR_OFF = 5.0
+"""Standard deviations of a prior, from where on the data contradict it."""
 _OTHERS = 3
 """Suspects that explain less than the best, and are named beside it."""
 
@@ -138,6 +140,9 @@ def _rejected(
         seek = "" if found[0].kind == "data" else ", or seek it as a parameter"
         advice.append(f"check the {' or the '.join([best, *equals])}{seek}")
         advice += [f"less likely: the {' or the '.join(others)}"] if others else []
+    for name, off in _against_priors(model, seen.residual):
+        reason += f"; {name} is {off:.2g} standard deviations off its prior"
+        advice.insert(0, f"check the prior of {name}")
     said, do = unless_late(lambda: odd_one(model, outcome.point, seen.residual), ("", ""))
     if said:
         reason += f"; {said}"
@@ -150,6 +155,13 @@ def _rejected(
     if not found and not said:
         advice.append("check lengths, masses and friction of the model, and which bodies bend")
     return Judgement(Verdict.REJECTED, reason, advice, found)
+
+
+def _against_priors(model: ForwardModel, residual: Array) -> list[tuple[str, float]]:
+    """Parameters whose priors the data contradict, and by how many standard deviations, the farthest last."""
+    off = np.abs(residual[len(model.rows.time) :]) / (model.rows.noise or 1.0)
+    named = [(model.names[k], float(far)) for (k, _), far in zip(model.parameters.priors, off, strict=True)]
+    return sorted((one for one in named if one[1] > _FAR_OFF), key=lambda one: one[1])
 
 
 def _against(tests: ResidualTests) -> str:

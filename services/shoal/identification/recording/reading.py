@@ -36,6 +36,9 @@ _MARKS = (999.0, 9999.0, 99999.0, 999999.0, 32768.0, 1e30, 1e37, 1e38)
 """Sizes of numbers that programs write for a gap."""
 _APART = 3.0
 """Times the range of all other values, by which such a number is away from them."""
+_HELD = 4
+"""Samples in a row that are equal to the last digit: not measured, where else hardly any two are (_SELDOM)."""
+_SELDOM = 0.02
 _NEARLY = 0.8
 """Of half a turn; an angle that turns farther from one sample to the next may as well have turned the other way."""
 
@@ -232,12 +235,30 @@ def _findings(times: Array, values: Array, channels: tuple[Channel, ...]) -> lis
     for channel, signal in zip(channels, values.T, strict=True):
         if missing := int(np.isnan(signal).sum()):
             notes.append(f"{channel.place} {channel.quantity}: {missing} of {len(times)} samples are gaps")
+        notes += [f"{channel.place} {channel.quantity}: {held}" for held in _held(times, signal)]
         if count := _outliers(times, signal):
             notes.append(
                 f"{channel.place} {channel.quantity}: outliers, {count} samples beyond {_OUTLIER:g} standard "
                 "deviations of the noise; `loss: huber` lets them weigh less"
             )
     return notes
+
+
+def _held(times: Array, signal: Array) -> list[str]:
+    """Where a signal that changes with every sample stands still to the last digit, as a lost marker is written."""
+    known = np.isfinite(signal)
+    t, x = times[known], signal[known]
+    ends = np.flatnonzero(np.append(np.diff(x) != 0.0, True))
+    lengths = np.diff(np.append(-1, ends))
+    moving = lengths[lengths < _HELD]
+    if not len(moving) or np.mean(moving > 1) > _SELDOM:
+        return []
+    found = []
+    for k in [k for k in np.flatnonzero(lengths >= _HELD) if lengths[k] <= len(x) / 2][:1]:
+        begin = ends[k] - lengths[k] + 1
+        told = f"{lengths[k]} samples in a row are all {x[begin]:.6g} from {t[begin]:g} s on"
+        found.append(f"{told}; if a marker was lost there, leave the cells empty")
+    return found
 
 
 def _outliers(times: Array, signal: Array) -> int:
