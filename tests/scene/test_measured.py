@@ -127,7 +127,8 @@ def test_smoothing_leaves_what_is_smooth_and_finds_the_noise_of_what_is_not() ->
     assert smooth(times, quartic, 1e6) == pytest.approx(quartic, abs=1e-6)
     times = np.linspace(0.0, 3.2, 320)
     angle = 0.6 * np.sin(4.0 * times + 1.0)
-    assert strength_of(times, angle) == (0.0, 0.0)
+    for clean in (angle, np.sign(angle), 1.0 * (times > 1.0), np.abs(angle), 0.0 * times):
+        assert strength_of(times, clean) == (0.0, 0.0)
     measured = angle + 1e-3 * np.random.default_rng(0).standard_normal(len(times))
     strength, noise = strength_of(times, measured)
     assert noise == pytest.approx(1e-3, rel=0.1)

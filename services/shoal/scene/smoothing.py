@@ -13,6 +13,8 @@ _ORDER = 5
 _REFINEMENTS = 2
 _FEWEST = 20
 """Samples, below which nothing tells noise from motion."""
+_FEW_PLACES = 4.0
+"""Times the median deviation: a root mean square above it is that of jumps (1.5 of normal noise)."""
 _PROBES = 8
 _LESS = 1e-2
 """Of the strength that predicts best: more noise is left, but it then is larger than what is bent near the ends."""
@@ -48,20 +50,24 @@ def smooth(times: Array, columns: Array, strength: float) -> Array:
 def strength_of(times: Array, values: Array) -> tuple[float, float]:
     """Strength of smoothing, and the noise of a signal, by generalised cross-validation (Craven and Wahba 1979).
 
-    Both 0 where smoothing is of no use: a signal without noise, or of few samples.
+    Both 0 where smoothing is of no use: a signal without noise, of few samples, or one that jumps, where what smoothing
+    takes away stands in few places.
     """
     if len(times) < _FEWEST:
         return 0.0, 0.0
     # The trace of the smoothing is that which random signs see of it (Hutchinson 1990).
     signs = np.sign(np.random.default_rng(0).standard_normal((len(times), _PROBES)))
-    best = (np.inf, 0.0, 0.0)
+    least, best = np.inf, (0.0, 0.0)
     for strength in _STRENGTHS:
         try:
             seen = smooth(times, np.column_stack([values, signs]), float(strength))
         except np.linalg.LinAlgError:  # intervals of very different lengths
             break
-        left = float(np.sum((values - seen[:, 0]) ** 2))
+        off = np.abs(values - seen[:, 0])
+        left = float(off @ off)
         free = len(times) - float(np.sum(signs * seen[:, 1:])) / _PROBES
-        best = min(best, (left / free**2, float(strength), float(np.sqrt(left / free))))
-    _, strength, noise = best
-    return (_LESS * strength, noise) if strength > _STRENGTHS[0] else (0.0, 0.0)
+        if (score := left / free**2) < least:
+            jumps = np.sqrt(left / len(times)) >= _FEW_PLACES * np.median(off)
+            useful = strength > _STRENGTHS[0] and not jumps
+            least, best = score, (_LESS * float(strength), float(np.sqrt(left / free))) if useful else (0.0, 0.0)
+    return best
