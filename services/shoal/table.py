@@ -26,9 +26,13 @@ LARGEST = 200_000_000
 """Bytes of a table, unpacked; more are refused."""
 _MOST_COLUMNS = 2000
 _COMMENT = re.compile(rb"^[ \t]*[#%][^\r\n]*", re.MULTILINE)
+_SEPARATES = re.compile(rb"\A\"?sep=.\"?[ \t]*(?=\r?\n)", re.IGNORECASE)
+"""What Excel reads as a statement of the separator, above the header."""
 _CELLS = re.compile(r"[,;\t]")
 _MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 """First bytes of a text by its encoding."""
+_LOOKED = 200
+"""Lines at the beginning, among which a header is looked for where the first is none."""
 _EMPTY = ("", "nan", "na", "n/a", "null", "none", "<na>", "nat")
 """Cells that are gaps, in small letters."""
 
@@ -142,6 +146,7 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
 
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")
+    data = _SEPARATES.sub(rb"#\g<0>", data, count=1)
     try:
         head = _units(_header(_tabbed(data), columns is not None))
         first, skipped, comments = head.first, head.skipped, head.comments
@@ -174,12 +179,29 @@ def _csv(path: Path, data: bytes, columns: list[str] | None) -> Table:
                 low_memory=False,
             )
     except (ValueError, csv.Error, pandas.errors.ParserWarning, OverflowError, MemoryError) as error:
+        _refuse_preamble(path, data, columns is not None)
         raise InputError(f"data: {path} is not CSV: {_short(str(error))}") from None
     rows = np.arange(len(frame)) + 1 + skipped
     filled = frame.notna().any(axis=1).to_numpy()
     cells = next(csv.reader([head.units], delimiter=separator), [])
     units = of_columns(path, head.unit_row, names, cells) if head.units else None
     return Table(path, frame[filled], rows[filled], decimal, comments, units)
+
+
+def _refuse_preamble(path: Path, data: bytes, named: bool) -> None:
+    """Say where the first line has fewer cells than the numbers below it, so that it cannot name their columns."""
+    lines = [line.decode().strip() for line in data.splitlines()[:_LOOKED]]
+    cells = [line.split(_separator(line)) for line in lines]
+    told = [k for k, line in enumerate(lines) if line and line[0] not in "#%"]
+    row = next((k for k in told if len(cells[k]) > 1 and _are_numbers(cells[k])), None)
+    if named or row is None or len(cells[told[0]]) >= len(cells[row]):
+        return
+    wide = [k for k in told if k < row and len(cells[k]) == len(cells[row])]
+    if not wide and len(cells[told[0]]) > 1:
+        return
+    first = f"row {told[0] + 1} is {_short(lines[told[0]])}, while row {row + 1} has {len(cells[row])} cells"
+    header = f"row {wide[0] + 1} may be it, and " if wide else ""
+    raise InputError(f"{path}: no header line: {first}; {header}lines above the header have to go, or to begin with #")
 
 
 def _separator(line: str) -> str:

@@ -61,3 +61,33 @@ def test_a_problem_file_finds_a_scene_beside_it(tmp_path: Path) -> None:
     (tmp_path / "mine.yaml").write_text(yaml.safe_dump({**scene, "name": "mine"}))
     (tmp_path / "problem.yaml").write_text(yaml.safe_dump({**GOOD, "scene": "mine.yaml"}))
     assert load_problem(str(tmp_path / "problem.yaml")).load_scene().name == "mine"
+
+
+GEARED = {
+    "name": "geared",
+    "bodies": {name: {"kind": "rigid-body", "mass": 1.0, "inertia": 0.1} for name in ("wheel", "arm")},
+    "joints": {
+        "W": {"kind": "revolute", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "wheel"}},
+        "O": {"kind": "revolute", "first": {"body": "ground", "point": [1.0, 0.0]}, "second": {"body": "arm"}},
+        "G": {"kind": "gear", "first": {"body": "wheel"}, "second": {"body": "arm"}, "ratio": -2.0},
+    },
+    "markers": {"A": {"body": "arm", "point": "start"}},
+}
+
+
+@pytest.mark.parametrize(
+    "sought",
+    [
+        {"parameters": {"a": {"path": "joints.G.ratio", "lower": -4.0, "upper": 4.0}}},
+        {"parameters": {"a": {"lower": -4.0, "upper": 4.0}}, "ties": {"joints.G.ratio": "2*a"}},
+    ],
+)
+def test_the_ratio_of_a_gear_cannot_be_sought(tmp_path: Path, sought: dict[str, object]) -> None:
+    import yaml
+
+    (tmp_path / "geared.yaml").write_text(yaml.safe_dump(GEARED))
+    problem = Problem.parse({**GOOD, "scene": str(tmp_path / "geared.yaml"), **sought}, "small")
+    with pytest.raises(
+        InputError, match=r"joints.G.ratio is of whole teeth and cannot be sought; .*--set joints.G.ratio"
+    ):
+        problem.load_scene()

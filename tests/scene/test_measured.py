@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from scipy.interpolate import CubicSpline
 from shoal import library
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
+from shoal.scene.smoothing import smooth, strength_of
 
 CRANK: dict[str, Any] = {
     "name": "driven",
@@ -116,3 +118,42 @@ def test_a_scene_that_is_no_file_states_its_tables() -> None:
         InputError, match=r"'encoder.csv' is read from beside the YAML file of a scene; here state its table"
     ):
         Scene.parse(CRANK)
+
+
+def test_smoothing_leaves_what_is_smooth_and_finds_the_noise_of_what_is_not() -> None:
+    """Quartics pass unchanged, signals without noise too; the acceleration of one with noise is then its own."""
+    times = np.sort(np.random.default_rng(0).uniform(0.0, 3.2, 300)) + 1e-3 * np.arange(300)
+    quartic = np.polyval([1.0, -4.0, 5.0, -2.0, 0.3], times)
+    assert smooth(times, quartic, 1e6) == pytest.approx(quartic, abs=1e-6)
+    times = np.linspace(0.0, 3.2, 320)
+    angle = 0.6 * np.sin(4.0 * times + 1.0)
+    for clean in (angle, np.sign(angle), 1.0 * (times > 1.0), np.abs(angle), 0.0 * times):
+        assert strength_of(times, clean) == (0.0, 0.0)
+    measured = angle + 1e-3 * np.random.default_rng(0).standard_normal(len(times))
+    strength, noise = strength_of(times, measured)
+    assert noise == pytest.approx(1e-3, rel=0.1)
+    accelerations = (
+        CubicSpline(times, smooth(times, measured, strength))(times, 2),
+        CubicSpline(times, measured)(times, 2),
+    )
+    freed, raw = (np.sqrt(np.mean((found + 16.0 * angle)[20:-20] ** 2)) for found in accelerations)
+    assert freed < 0.4 < 20.0 < raw
+
+
+@pytest.mark.parametrize(
+    ("stated", "noise", "left"), [({}, 1e-3, 3e-4), ({"noise": 0.0}, 0.0, None), ({"noise": 0.002}, 0.002, 3e-4)]
+)
+def test_a_signal_is_freed_of_its_noise_and_tells_how_large_it_was(
+    tmp_path: Path, stated: dict[str, float], noise: float, left: float | None
+) -> None:
+    times = np.linspace(0.0, 1.2, 240)
+    drawn = 1e-3 * np.random.default_rng(1).standard_normal(len(times))
+    rows = "\n".join(
+        f"{t!r},{x!r}" for t, x in zip(times.tolist(), (0.3 * np.sin(2 * times) + drawn).tolist(), strict=True)
+    )
+    scene = load_scene(written(tmp_path, {"column": "angle", **stated}, f"t,angle\n{rows}\n"))
+    angle = scene.joints["motor"].angle
+    off = np.array(angle.table)[:, 1] - 0.3 * np.sin(2 * times)
+    assert angle.noise == pytest.approx(noise, rel=0.1)
+    assert np.allclose(off, drawn, atol=1e-15) if left is None else np.std(off) < left
+    assert Scene.parse(scene.model_dump(mode="json")).joints["motor"].angle == angle

@@ -12,6 +12,7 @@ from shoal.identification.judge.residual_tests import ResidualTests, residual_te
 from shoal.identification.spread.covariance import Block, blocks_of
 from shoal.identification.spread.model_error import Corrections, ModelError, model_error, rms_of
 from shoal.identification.spread.sensitivity import Sensitivity, believed
+from shoal.identification.spread.signal_noise import NONE, SignalNoise, signal_noise
 from shoal.identification.spread.uncertainty import Linearisation, linearise
 from shoal.trajectory import Array
 
@@ -28,6 +29,7 @@ class Evidence:
     blocks: the series of the residuals
     at: the linearisation, with what the model, not the noise, leaves
     error: of the model itself; mesh, theory: sizes of its parts, root mean squares
+    signals: what the noise of measured signals does
     """
 
     point: Array
@@ -42,6 +44,7 @@ class Evidence:
     mesh: float | None
     theory: float | None
     tests: ResidualTests
+    signals: SignalNoise
 
     @property
     def known(self) -> bool:
@@ -65,16 +68,20 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
         seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
     blocks = blocks_of(model, len(seen.residual))
     at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks, seen.error)
-    error = ModelError(None, None)
+    error, signals = ModelError(None, None), NONE
     if possible and looked is not None:
         error = unless_late(lambda: model_error(model, point, predicted, seen.residual), error)
+        signals = unless_late(lambda: signal_noise(model, point, predicted, seen.residual), signals)
     parts = (_size(model, error.mesh), _size(model, error.theory))
-    limit = float(np.hypot(parts[0] or 0.0, parts[1] or 0.0))
+    driven = signals.left(seen.jacobian, at.pseudo_inverse)
+    limit = float(np.linalg.norm([parts[0] or 0.0, parts[1] or 0.0, driven]))
     refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
     tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined)
     told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
-    at = replace(at, systematic=tests.excess * told)
-    return Evidence(point, predicted, residual, seen, looked is not None, possible, blocks, at, error, *parts, tests)
+    at = signals.spread(replace(at, systematic=tests.excess * told))
+    return Evidence(
+        point, predicted, residual, seen, looked is not None, possible, blocks, at, error, *parts, tests, signals
+    )
 
 
 def _size(model: ForwardModel, rows: Array | None) -> float | None:

@@ -19,6 +19,7 @@ from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import camera, observe, without_turns
 from shoal.identification.recording.plausible import check_units
 from shoal.identification.recording.reading import described, sampled
+from shoal.identification.recording.repeated import check_repeated
 from shoal.identification.recording.source import Channel, Clocked, EngineSource, FileSource
 from shoal.scene import Scene
 from shoal.scene.load import unknown
@@ -44,7 +45,7 @@ def measure(
         there are several
     """
     files, windows = _named(problem, data), _held(problem, hold_out)
-    recordings, truth = {}, dict[str, float]()
+    recordings, truth, read = {}, dict[str, float](), dict[str, Path]()
     for name, source in problem.sources.items():
         where = name if problem.recordings else problem.name
         if isinstance(source, EngineSource):
@@ -61,7 +62,8 @@ def measure(
             raise InputError(
                 f"data: {where} needs a recording; give one as data=FILE (on the command line: --data FILE)"
             )
-        recordings[name] = _recorded(problem, scene, source, _file(path), windows.get(name, {}))
+        recordings[name], read[name] = _recorded(problem, scene, source, _file(path), windows.get(name, {}))
+    check_repeated(recordings, read)
     return Measurement(recordings, truth)
 
 
@@ -141,7 +143,10 @@ def _true(scene: Scene, source: EngineSource, path: str) -> float:
     return float(getattr(source, rest) if head == RESERVED else scene.value(path))
 
 
-def _recorded(problem: Problem, scene: Scene, source: FileSource, path: Path, windows: Mapping[str, Any]) -> Recording:
+def _recorded(
+    problem: Problem, scene: Scene, source: FileSource, path: Path, windows: Mapping[str, Any]
+) -> tuple[Recording, Path]:
+    """A recording, and its table."""
     source = FileSource.model_validate({**described(source.model_dump(exclude_unset=True), path), **windows})
     channels = problem.channels_of(source)
     problem.check_channels(channels, scene, path.name)
@@ -150,7 +155,8 @@ def _recorded(problem: Problem, scene: Scene, source: FileSource, path: Path, wi
     sized = any(parameter.path == f"{RESERVED}.scale" for parameter in problem.parameters.values())
     check_units(source, channels, found.times, found.values, scene, sized)
     notes = (*found.notes, *_without_scale(problem, source, channels))
-    return replace(found, noise=_noise(problem, channels), stated=source.as_stated(), notes=notes)
+    found = replace(found, noise=_noise(problem, channels), stated=source.as_stated(), notes=notes)
+    return found, Path(source.path or path)
 
 
 def _without_scale(problem: Problem, source: FileSource, channels: tuple[Channel, ...]) -> tuple[str, ...]:

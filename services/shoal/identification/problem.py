@@ -17,6 +17,7 @@ from shoal.identification.bounds import accepts, possible_bound
 from shoal.identification.recording.sensor_checks import check_felt
 from shoal.identification.recording.source import IN_SPACE, Channel, EngineSource, FileSource, Source
 from shoal.scene import Scene, expression, load_scene
+from shoal.scene.joints import Gear
 from shoal.scene.load import names, read_named
 from shoal.scene.record import Positive, Record, one_line
 from shoal.scene.scene import Name
@@ -194,6 +195,7 @@ class Problem(Record):
         """The scene to fit, with this problem's and the given values set, and every path checked. Raises InputError."""
         scene = load_scene(self.scene)
         scene = scene.with_values({**self.values, **(values or {})})
+        self._check_gears(scene)
         self._check_bounds(scene)
         for path in (*self.ties, *self.constants.values()):
             try:
@@ -204,6 +206,17 @@ class Problem(Record):
             if channels := self.channels_of(source):
                 self.check_channels(channels, scene, self.name)
         return scene
+
+    def _check_gears(self, scene: Scene) -> None:
+        """Refuse a gear's ratio that is sought, or tied to what is. Raises InputError."""
+        sought = {f"parameters.{name}.path": parameter.path for name, parameter in self.parameters.items()}
+        for where, path in {**sought, **{f"ties.{path}": path for path in self.ties}}.items():
+            part, name, field = (*(path or "").split("."), "", "", "")[:3]
+            if part == "joints" and field == "ratio" and isinstance(scene.joints.get(name), Gear):
+                raise InputError(
+                    f"{self.name}: {where}: {path} is of whole teeth and cannot be sought; fit with each that may be "
+                    f"(--set {path}=RATIO) and compare the residuals"
+                )
 
     def _check_bounds(self, scene: Scene) -> None:
         """Whether the scene accepts the bounds of each parameter. Raises InputError."""

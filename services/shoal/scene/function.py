@@ -15,7 +15,8 @@ from pydantic import field_validator, model_serializer, model_validator
 from shoal.errors import InputError
 from shoal.scene import expression as arithmetic
 from shoal.scene import formula
-from shoal.scene.record import Record
+from shoal.scene.record import NonNegative, Record
+from shoal.scene.smoothing import smooth
 
 Array = npt.NDArray[Any]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
@@ -27,12 +28,16 @@ class Function(Record):
 
     A table needs times that increase; `smooth` (the default) draws a cubic spline through it (not-a-knot, two
     continuous derivatives), otherwise straight lines. Outside its times a table keeps its end values.
+    noise: standard deviation of what each value of a table was measured with, smoothing: strength of the smoothing that
+    followed (`smoothing.smooth`, 0: none). Identification carries that noise to the intervals.
     """
 
     number: float | None = None
     expression: str | None = None
     table: tuple[tuple[float, float], ...] | None = None
     smooth: bool = True
+    noise: NonNegative = 0.0
+    smoothing: NonNegative = 0.0
 
     @model_validator(mode="before")
     @classmethod
@@ -78,14 +83,16 @@ class Function(Record):
         given = [name for name in ("number", "expression", "table") if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(f"give one of number, expression and table, found {' and '.join(given) or 'none'}")
-        if "smooth" in self.model_fields_set and self.table is None:
-            raise ValueError("smooth: belongs to a table")
+        for name in ("smooth", "noise", "smoothing"):
+            if name in self.model_fields_set and self.table is None:
+                raise ValueError(f"{name}: belongs to a table")
         return self
 
     @model_serializer
     def _as_written(self) -> Any:
         if self.table is not None:
-            return {"table": self.table, "smooth": self.smooth}
+            told = {"noise": self.noise, "smoothing": self.smoothing}
+            return {"table": self.table, "smooth": self.smooth, **{name: x for name, x in told.items() if x}}
         return self.number if self.number is not None else self.expression
 
     @property
@@ -138,6 +145,14 @@ class Function(Record):
         if self.table is not None:
             return self.table_slope(0.0, left=False)
         return 0.0 if self.number is not None else math.nan
+
+    def perturbed(self, rng: np.random.Generator) -> Function:
+        """A table measured with its noise once more, and smoothed again: what smoothing bends is bent once more too."""
+        assert self.table is not None
+        times, values = np.array(self.table).T
+        values = values + self.noise * rng.standard_normal(len(times))
+        values = smooth(times, values, self.smoothing) if self.smoothing else values
+        return self.model_copy(update={"table": tuple(zip(times.tolist(), values.tolist(), strict=True))})
 
     def table_slope(self, t: float, left: bool) -> float:
         """The derivative of a table at one time [s], on its left or right side."""

@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from shoal.errors import InputError
-from shoal.scene.record import Positive, Record, one_line
+from shoal.scene.record import NonNegative, Positive, Record, one_line
+from shoal.scene.smoothing import smooth, strength_of
 from shoal.shelf import LARGEST
 from shoal.table_units import SI, TIMES, AngleUnit, ForceUnit, LengthUnit, TorqueUnit, Units
 
@@ -30,8 +31,10 @@ class Signal(Record):
     """A column of a table (CSV or Parquet) over another.
 
     path: from the folder of the scene's file. time, column: their names; time_scale: seconds in a unit of the time,
-    scale: SI units in a unit of the column. start: the time of the table [s] at which the motion begins. smooth: as of
-    `Function`. Rows with a gap are left out.
+    scale: SI units in a unit of the column. start: the time of the table [s] at which the motion begins. Rows with a
+    gap are left out.
+    smooth: as of `Function`; what is drawn smoothly is freed of noise first, as far as its samples tell noise from
+    motion. noise: its standard deviation in SI units, else as its samples show; 0: none, the samples stay as they are
     """
 
     path: str
@@ -41,21 +44,33 @@ class Signal(Record):
     scale: float = 1.0
     start: float = 0.0
     smooth: bool = True
+    noise: NonNegative | None = None
 
     def table(self, folder: Path, field: str) -> dict[str, Any]:
         """The function as a scene has it, for a field by its name. Raises InputError."""
         # Where no scene names a file, none of what reads tables is loaded.
         from shoal.table import load_table
 
-        found = load_table(folder / self.path, largest=LARGEST)
-        times, values = found.numbers(self.time), found.numbers(self.column)
+        table = load_table(folder / self.path, largest=LARGEST)
+        times, values = table.numbers(self.time), table.numbers(self.column)
         told = np.isfinite(times) & np.isfinite(values)
-        pace = self._factor("time_scale", self.time, found.units, ("a time", TIMES))
-        factor = self._factor("scale", self.column, found.units, _MEASURES.get(field, ("a number", SI)))
+        pace = self._factor("time_scale", self.time, table.units, ("a time", TIMES))
+        factor = self._factor("scale", self.column, table.units, _MEASURES.get(field, ("a number", SI)))
         rows = np.column_stack([pace * times - self.start, factor * values])[told]
-        if field != "elastic":
-            self._check_start(rows[:, 0])
-        return {"table": rows.tolist(), "smooth": self.smooth}
+        if field == "elastic":
+            return {"table": rows.tolist(), "smooth": self.smooth}
+        self._check_start(rows[:, 0])
+        return {"smooth": self.smooth, **self._without_noise(rows)}
+
+    def _without_noise(self, rows: np.ndarray) -> dict[str, Any]:
+        """Rows [t, value] as the table of a function, with what is known of their noise."""
+        if not self.smooth or self.noise == 0.0 or np.any(np.diff(rows[:, 0]) <= 0.0):
+            return {"table": rows.tolist(), "noise": self.noise or 0.0}
+        strength, seen = strength_of(rows[:, 0], rows[:, 1])
+        if strength:
+            rows[:, 1] = smooth(rows[:, 0], rows[:, 1], strength)
+        noise = seen if self.noise is None else self.noise
+        return {"table": rows.tolist(), "noise": noise, "smoothing": strength}
 
     def _check_start(self, times: np.ndarray) -> None:
         """Refuse a motion of which the table tells nothing: times [s] of the motion.

@@ -80,6 +80,28 @@ def test_garbage_is_refused_in_one_line_and_nothing_else(tmp_path: Path, data: b
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.parametrize(("value", "digits", "told"), [(None, 9, True), (0.0, 9, True), (None, 2, False)])
+def test_a_marker_that_stands_still_to_the_last_digit_is_noted(
+    tmp_path: Path, value: float | None, digits: int, told: bool
+) -> None:
+    """The last place or a zero in place of a lost marker; where digits are few, equal neighbours are usual."""
+    t = np.arange(100) * 0.02
+    theta = np.round(np.sin(3.0 * t) + 1e-4 * np.random.default_rng(0).standard_normal(100), digits)
+    theta[40:46] = theta[40] if value is None else value
+    path = written(tmp_path, rows([t, theta], "t,theta"))
+    notes = [note for note in read(FileSource(), ANGLE, path).notes if "in a row" in note]
+    assert len(notes) == told
+    assert not told or f"6 samples in a row are all {theta[40]:.6g} from 0.8 s on" in notes[0]
+
+
+def test_the_statement_of_the_separator_that_excel_reads_is_no_row(tmp_path: Path) -> None:
+    path = written(tmp_path, "sep=;\nt;theta\n0;0,5\n1;0,25\n2;x\n")
+    with pytest.raises(InputError, match="row 5, column 'theta': 'x'"):
+        read(FileSource(), ANGLE, path)
+    path.write_text(path.read_text().replace("x", "1"))
+    np.testing.assert_array_equal(read(FileSource(), ANGLE, path).values[:, 0], [0.5, 0.25, 1.0])
+
+
 @given(st.text(alphabet="0123456789.,;-+einfa \t\n\"'xé_", max_size=80))
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_table_of_any_text_is_read_or_refused(tmp_path: Path, text: str) -> None:
@@ -109,6 +131,11 @@ def test_a_table_of_any_text_is_read_or_refused(tmp_path: Path, text: str) -> No
         ("t,phi\n0,1\n", ["no column 'theta'", "t, phi"]),
         ("t,theta,theta\n0,1,1\n", ["'theta'", "twice"]),
         ("0,1\n1,2\n2,3\n", ["no header line", "columns"]),
+        (
+            "By a tracker\nmass A\nt,theta\n0,1\n1,2\n",
+            ["no header line: row 1", "row 4 has 2 cells", "row 3 may be it"],
+        ),
+        ("t,theta\n0,1\n1,-9999\n2,1.1\n3,-9999\n4,1.2\n", ["'theta': -9999 stands 2 times", "1 to 1.2", "empty"]),
         ("t,theta\n0,1\n", ["only 1 samples"]),
         ("", ["not CSV"]),
     ],

@@ -172,7 +172,10 @@ def test_several_recordings_are_named(tmp_path: Path) -> None:
     path = str(described_run(tmp_path / "data"))
     problem = Problem.parse({**SINGLE, "recordings": {"low": {"kind": "file"}, "high": {"kind": "file"}}}, "single")
     scene = problem.load_scene()
-    assert list(measure(problem, scene, {"high": path, "low": path}).recordings) == ["low", "high"]
+    other = described_run(tmp_path / "other")
+    table = other.parent / "table.csv"
+    table.write_text(table.read_text().replace("12", "13"))
+    assert list(measure(problem, scene, {"high": path, "low": str(other)}).recordings) == ["low", "high"]
     for data, words in (({"low": path}, "high needs"), ({"other": path}, "no recording 'other'"), (path, "NAME=FILE")):
         with pytest.raises(InputError, match=words):
             measure(problem, scene, data)

@@ -8,9 +8,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from shoal.identification.deadline import TimeIsUp
+from shoal.identification.deadline import TimeIsUp, unless_late
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
+from shoal.identification.judge.odd_one import odd_one
 from shoal.identification.judge.residual_tests import ResidualTests
 from shoal.identification.judge.rivals import relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
@@ -27,6 +28,10 @@ _DECISIVE = 5.0
 """A property of the measurement that lowers even a small misfit by this factor refutes what was stated of it."""
 _NEGLIGIBLE = 1e-4
 """Of the signal: a misfit below it is not looked into."""
+_LOUD = 1.5
+"""Times what noise explains: what leaves more is not the whole cause."""
+_FAR_OFF = 5.0
+"""Standard deviations of a prior, from where on the data contradict it."""
 _OTHERS = 3
 """Suspects that explain less than the best, and are named beside it."""
 
@@ -91,7 +96,7 @@ def judge(
         return Judgement(Verdict.FAILED, reason, advice, looked.suspects, better=looked.better)
     found = looked.suspects
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
-        return _rejected(model, tests, found)
+        return _rejected(model, outcome, seen, tests, found)
     if looked.cut:
         reason = f"no time was left to see what a misfit of {tests.sized(tests.size)} is due to"
         return Judgement(Verdict.FAILED, reason, ["allow more time"], found)
@@ -121,7 +126,9 @@ def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
     return "" if better is None else sentence(model, point, better)
 
 
-def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -> Judgement:
+def _rejected(
+    model: ForwardModel, outcome: Outcome, seen: Sensitivity, tests: ResidualTests, found: list[Suspect]
+) -> Judgement:
     reason = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
     advice = []
     if found:
@@ -133,13 +140,28 @@ def _rejected(model: ForwardModel, tests: ResidualTests, found: list[Suspect]) -
         seek = "" if found[0].kind == "data" else ", or seek it as a parameter"
         advice.append(f"check the {' or the '.join([best, *equals])}{seek}")
         advice += [f"less likely: the {' or the '.join(others)}"] if others else []
+    for name, off in _against_priors(model, seen.residual):
+        reason += f"; {name} is {off:.2g} standard deviations off its prior"
+        advice.insert(0, f"check the prior of {name}")
+    said, do = unless_late(lambda: odd_one(model, outcome.point, seen.residual), ("", ""))
+    if said:
+        reason += f"; {said}"
+        # A suspect that leaves more than noise explains less than a recording that is left out.
+        advice.insert(0 if found and found[0].after > _LOUD * tests.explained else len(advice), do)
     if (exchange := exchanged(model)) is not None:
         reason += f"; {exchange}"
         advice.append("check which column is which marker")
     advice.append("look for another minimum (--method multi-start)")
-    if not found:
+    if not found and not said:
         advice.append("check lengths, masses and friction of the model, and which bodies bend")
     return Judgement(Verdict.REJECTED, reason, advice, found)
+
+
+def _against_priors(model: ForwardModel, residual: Array) -> list[tuple[str, float]]:
+    """Parameters whose priors the data contradict, and by how many standard deviations, the farthest last."""
+    off = np.abs(residual[len(model.rows.time) :]) / (model.rows.noise or 1.0)
+    named = [(model.names[k], float(far)) for (k, _), far in zip(model.parameters.priors, off, strict=True)]
+    return sorted((one for one in named if one[1] > _FAR_OFF), key=lambda one: one[1])
 
 
 def _against(tests: ResidualTests) -> str:

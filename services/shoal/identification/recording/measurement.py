@@ -37,6 +37,7 @@ class Recording:
     stated: clock, position of the camera, fields of the scene of this run
     origin: where the data come from; notes: what was found and mended in them
     held: windows that are not fitted, whose samples are not among the others
+    begin [s]: when the motion starts, by the clock of the table
     """
 
     times: Array
@@ -47,6 +48,7 @@ class Recording:
     stated: Clocked = field(default_factory=Clocked)
     notes: tuple[str, ...] = ()
     held: tuple[Held, ...] = ()
+    begin: float = 0.0
 
     def holding(self, windows: Sequence[tuple[float, float]], begin: float = 0.0) -> Recording:
         """With the samples of these windows [s] held out; begin [s]: the motion's start by their clock.

@@ -32,6 +32,13 @@ _OUTLIER = 8.0
 """Times the noise; an isolated sample farther off is counted as an outlier."""
 _PAUSE = 1.5
 """Times the usual interval; a longer one is a gap."""
+_MARKS = (999.0, 9999.0, 99999.0, 999999.0, 32768.0, 1e30, 1e37, 1e38)
+"""Sizes of numbers that programs write for a gap."""
+_APART = 3.0
+"""Times the range of all other values, by which such a number is away from them."""
+_HELD = 4
+"""Samples in a row that are equal to the last digit: not measured, where else hardly any two are (_SELDOM)."""
+_SELDOM = 0.02
 _NEARLY = 0.8
 """Of half a turn; an angle that turns farther from one sample to the next may as well have turned the other way."""
 
@@ -78,6 +85,8 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
     begin = _begin(source, times)
     inside = _window(source, times, begin, path)
     columns = {name: table.numbers(name) for c in channels for name in (c.column, c.origin) if name is not None}
+    for name, numbers in columns.items():
+        _refuse_marks(numbers[inside], f"{path}: column {name!r}")
     notes = [f"the motion's time is zero at {begin:g} s, the first sample"] if source.start is None and begin else []
     notes = of_units + notes + (_mend(times, columns, channels) if source.swaps else [])
     signals = []
@@ -96,7 +105,7 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
         chosen = chosen[::part]
     origin = f"{path.name}, {_span(times[chosen])}, {len(chosen)} samples"
     unknown = np.full(len(channels), np.nan)
-    found = Recording(times[chosen] - begin, channels, values[chosen], origin, unknown, notes=tuple(notes))
+    found = Recording(times[chosen] - begin, channels, values[chosen], origin, unknown, notes=tuple(notes), begin=begin)
     try:
         return found.holding(source.hold_out, begin), source
     except InputError as error:
@@ -138,6 +147,20 @@ def _window(source: FileSource, times: Array, begin: float, path: Path) -> Mask:
             f"{_FEWEST} are needed; the recording covers {_span(times)}"
         )
     return inside
+
+
+def _refuse_marks(column: Array, where: str) -> None:
+    """Refuse a number that programs write for a gap, such as -9999, where it is far from all others."""
+    known = column[np.isfinite(column)]
+    for mark in (known.min(), known.max()) if known.size else ():
+        rest = known[known != mark]
+        if abs(mark) not in _MARKS or len(rest) < _FEWEST:
+            continue
+        if min(abs(rest.min() - mark), abs(rest.max() - mark)) > _APART * np.ptp(rest):
+            raise InputError(
+                f"{where}: {mark:g} stands {len(known) - len(rest)} times, far from the other values "
+                f"({rest.min():.4g} to {rest.max():.4g}), as a mark of gaps does; leave such cells empty"
+            )
 
 
 def _mend(times: Array, columns: dict[str, Array], channels: tuple[Channel, ...]) -> list[str]:
@@ -212,12 +235,30 @@ def _findings(times: Array, values: Array, channels: tuple[Channel, ...]) -> lis
     for channel, signal in zip(channels, values.T, strict=True):
         if missing := int(np.isnan(signal).sum()):
             notes.append(f"{channel.place} {channel.quantity}: {missing} of {len(times)} samples are gaps")
+        notes += [f"{channel.place} {channel.quantity}: {held}" for held in _held(times, signal)]
         if count := _outliers(times, signal):
             notes.append(
                 f"{channel.place} {channel.quantity}: outliers, {count} samples beyond {_OUTLIER:g} standard "
                 "deviations of the noise; `loss: huber` lets them weigh less"
             )
     return notes
+
+
+def _held(times: Array, signal: Array) -> list[str]:
+    """Where a signal that changes with every sample stands still to the last digit, as a lost marker is written."""
+    known = np.isfinite(signal)
+    t, x = times[known], signal[known]
+    ends = np.flatnonzero(np.append(np.diff(x) != 0.0, True))
+    lengths = np.diff(np.append(-1, ends))
+    moving = lengths[lengths < _HELD]
+    if not len(moving) or np.mean(moving > 1) > _SELDOM:
+        return []
+    found = []
+    for k in [k for k in np.flatnonzero(lengths >= _HELD) if lengths[k] <= len(x) / 2][:1]:
+        begin = ends[k] - lengths[k] + 1
+        told = f"{lengths[k]} samples in a row are all {x[begin]:.6g} from {t[begin]:g} s on"
+        found.append(f"{told}; if a marker was lost there, leave the cells empty")
+    return found
 
 
 def _outliers(times: Array, signal: Array) -> int:

@@ -71,7 +71,7 @@ def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array
     if not flexible:
         return ModelError(None, None)
     finer = _finer(model.scene)
-    mesh = None if finer is None else _difference(model, point, predicted, finer)
+    mesh = None if finer is None else difference(model, point, predicted, finer)
     slender = {name: rod for name, rod in flexible.items() if not rod.shears}
     if not slender or model.engine.name in WITH_SHEAR:
         return ModelError(mesh, None)
@@ -89,14 +89,14 @@ def _softened(
 ) -> Array | None:
     """By order of magnitude: in bending a rod with shear moves like one of a lower Young's modulus."""
     softer = {f"bodies.{name}.youngs_modulus": 1.0 / (1.0 + slender_share(rod)) for name, rod in slender.items()}
-    return _difference(model, point, predicted, model.scene, softer)
+    return difference(model, point, predicted, model.scene, softer)
 
 
 def _sheared(model: ForwardModel, point: Array, predicted: Mapping[str, Array]) -> Array | None:
     """By twice as many rods with shear and rotary inertia; None where they cannot be had."""
     stout = with_shear(model.scene)
     finer = None if stout is None else _finer(stout)
-    return None if finer is None else _difference(replace(model, engine=GaussEngine()), point, predicted, finer)
+    return None if finer is None else difference(replace(model, engine=GaussEngine()), point, predicted, finer)
 
 
 def _finer(scene: Scene) -> Scene | None:
@@ -113,13 +113,14 @@ def _finer(scene: Scene) -> Scene | None:
         return None
 
 
-def _difference(
+def difference(
     model: ForwardModel,
     point: Array,
     predicted: Mapping[str, Array],
     scene: Scene,
     factors: Mapping[str, float] | None = None,
 ) -> Array | None:
+    """What another scene, or fields times factors, change of the residuals, (rows,); None where it cannot be run."""
     columns = []
     for name, recording in model.measurement.recordings.items():
         try:

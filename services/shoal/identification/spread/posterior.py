@@ -345,7 +345,8 @@ def _target(model: ForwardModel, point: Array, at: Linearisation, blocks: list[B
 
 def _freedom(parts: Array, at: Linearisation, blocks: list[Block]) -> float:
     """Of the whole covariance, from the shares (blocks, p, p) whose noise is not stated (Satterthwaite 1946)."""
-    stated = [b.known or (b.stated > 0 and n.variance <= b.stated**2) for b, n in zip(blocks, at.noise, strict=True)]
+    stated = [b.known or (b.stated > 0 and n.variance <= b.stated**2) for b, n in zip(blocks, at.noise, strict=False)]
+    stated += [False] * (len(at.noise) - len(blocks))
     shares = np.einsum("bij,ji->b", parts, np.linalg.inv(parts.sum(axis=0))) / parts.shape[1]
     doubt = sum(s**2 / n.freedom for s, n, sure in zip(shares, at.noise, stated, strict=True) if not sure)
     return float(1.0 / doubt) if doubt > 0.0 else np.inf

@@ -57,9 +57,10 @@ class Candidate:
         scene: Scene | None = None,
         alone: bool = False,
         factor: bool = False,
+        own: tuple[str, ...] = (),
     ) -> Candidate:
-        """One number between bounds, whose effect is measured at one other value."""
-        free = Parameter(path=path, lower=bounds[0], upper=bounds[1], scale=law)
+        """One number between bounds, whose effect is measured at one other value; own: of these recordings alone."""
+        free = Parameter(path=path, lower=bounds[0], upper=bounds[1], scale=law, own=own or False)
         probes, bases = np.array([[[probe]]]), np.array([[stated]])
         return cls(name, kind, (free,), (stated,), probes, bases, law, scene, alone, factor)
 

@@ -71,6 +71,9 @@ def of_data(model: ForwardModel) -> Iterator[Reading]:
     if "angle" in kinds:
         mirrored = _read(model, _scaled({"angle", "rate"}, -1.0))
         yield Reading("sense of the angles", "mirrored, it", mirrored, -1.0)
+    for one, other in combinations(model.measurement.recordings, 2):
+        if (changed := _files_exchanged(model, one, other)) is not None:
+            yield Reading(f"files of recordings {one} and {other}", "exchanged, they", changed, -1.0)
     yield from _of_columns(model, [*{c.name: c for run in runs for c in run.channels}.values()])
 
 
@@ -86,6 +89,16 @@ def _of_columns(model: ForwardModel, channels: list[Channel]) -> Iterator[Readin
     for one, other in pairs[:_PAIRS]:
         swapped = _read(model, _swapped(one.name, other.name))
         yield Reading(f"columns of {one.name} and {other.name}", "exchanged, they", swapped, -1.0)
+
+
+def _files_exchanged(model: ForwardModel, one: str, other: str) -> ForwardModel | None:
+    """With the samples of two recordings of which something different is known; None for others."""
+    runs = model.measurement.recordings
+    a, b = runs[one], runs[other]
+    if a.stated == b.stated or [c.name for c in a.channels] != [c.name for c in b.channels]:
+        return None
+    changed = {**runs, one: replace(b, stated=a.stated), other: replace(a, stated=b.stated)}
+    return model.aside(measurement=replace(model.measurement, recordings=changed))
 
 
 def _of_a_kind(one: Channel, other: Channel) -> bool:

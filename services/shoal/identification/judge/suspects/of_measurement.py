@@ -9,6 +9,7 @@ import numpy as np
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.problem import RESERVED
+from shoal.identification.recording.measurement import Recording
 
 _FACTORS = 2.0
 """Clock, scale and gravity are looked for within this factor."""
@@ -16,6 +17,8 @@ _LATE = 0.2
 _EARLY = 0.5
 """Of the record: how much may be missing after the release, and how long the machine may be held before it."""
 _STEP = 1e-4
+_MOST = 6
+"""Recordings that have candidates of their own."""
 _SENSORS = {
     "mounting": ({"ax", "ay"}, np.pi / 2),
     "bias_ax": ({"ax"}, 5.0),
@@ -30,30 +33,41 @@ _SENSORS = {
 
 
 def of_measurement(model: ForwardModel) -> Iterator[Candidate]:
-    """The candidates of a model's recordings, by what the first one states."""
-    first = model.measurement.first
-    channels = [c for recording in model.measurement.recordings.values() for c in recording.channels]
-    positions = any(channel.is_position for channel in channels)
-    reach = float(np.nanmax(np.abs(np.nan_to_num(first.values)))) + 1e-9
-    end = model.measurement.end
-    for name in ("clock", "scale") if positions else ("clock",):
-        stated = float(getattr(first.stated, name))
-        bounds, probe = (stated / _FACTORS, stated * _FACTORS), stated * (1 + _STEP)
-        yield Candidate.single(name, f"{RESERVED}.{name}", stated, bounds, probe, "measurement", law="log", factor=True)
-    shifts = {"tilt": np.pi / 2} | ({"x": reach, "y": reach} if positions else {})
-    shifts |= {
-        name: size for name, (quantities, size) in _SENSORS.items() if quantities & {c.quantity for c in channels}
-    }
-    for name, width in shifts.items():
-        stated = float(getattr(first.stated, name))
-        bounds, probe = (stated - width, stated + width), stated + _STEP * width
-        yield Candidate.single(name, f"{RESERVED}.{name}", stated, bounds, probe, "measurement")
-    stated = first.stated.delay
-    bounds = (stated - _EARLY * end, stated + _LATE * end)
-    yield Candidate.single("delay", f"{RESERVED}.delay", stated, bounds, stated + _STEP * end, "measurement")
+    """The candidates of a model's recordings, of all by what the first one states, then of each by itself."""
+    runs = model.measurement.recordings
+    yield from _of(list(runs.values()))
+    for name in list(runs)[:_MOST] if len(runs) > 1 else ():
+        yield from _of([runs[name]], name)
     axes = np.flatnonzero(model.scene.gravity)
     if len(axes) == 1 and (axes[0] == 1 or model.scene.dimensions == 3):
         size = model.scene.gravity[axes[0]]
         lower, upper = sorted((size / _FACTORS, size * _FACTORS))
         probe = size * (1 + _STEP)
         yield Candidate.single("gravity", f"gravity.{axes[0]}", size, (lower, upper), probe, "measurement", factor=True)
+
+
+def _of(runs: list[Recording], name: str | None = None) -> Iterator[Candidate]:
+    """What recordings state, by the first one; name: of the only one, whose own it then is."""
+    first, channels = runs[0], [channel for run in runs for channel in run.channels]
+    own, of = ((), "") if name is None else ((name,), f" of recording {name}")
+    positions = any(channel.is_position for channel in channels)
+    reach = float(np.nanmax(np.abs(np.nan_to_num(first.values)))) + 1e-9
+    end = max(float(run.times[-1]) for run in runs)
+    for field in ("clock", "scale") if positions else ("clock",):
+        stated = float(getattr(first.stated, field))
+        bounds, probe = (stated / _FACTORS, stated * _FACTORS), stated * (1 + _STEP)
+        path = f"{RESERVED}.{field}"
+        yield Candidate.single(field + of, path, stated, bounds, probe, "measurement", law="log", factor=True, own=own)
+    shifts = {"tilt": np.pi / 2} | ({"x": reach, "y": reach} if positions else {})
+    shifts |= {
+        field: size for field, (quantities, size) in _SENSORS.items() if quantities & {c.quantity for c in channels}
+    }
+    for field, width in shifts.items():
+        stated = float(getattr(first.stated, field))
+        bounds, probe = (stated - width, stated + width), stated + _STEP * width
+        yield Candidate.single(field + of, f"{RESERVED}.{field}", stated, bounds, probe, "measurement", own=own)
+    stated = first.stated.delay
+    bounds = (stated - _EARLY * end, stated + _LATE * end)
+    yield Candidate.single(
+        f"delay{of}", f"{RESERVED}.delay", stated, bounds, stated + _STEP * end, "measurement", own=own
+    )

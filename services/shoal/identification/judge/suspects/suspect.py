@@ -33,7 +33,7 @@ class Suspect:
     @property
     def words(self) -> str:
         """Its name as a sentence has it."""
-        return f"offset in {self.name}" if self.name in ("x", "y") else self.name
+        return f"offset in {self.name}" if self.name.split()[0] in ("x", "y") and self.kind != "data" else self.name
 
     def __str__(self) -> str:
         """In words, as a message names it."""
