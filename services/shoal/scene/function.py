@@ -28,15 +28,15 @@ class Function(Record):
 
     A table needs times that increase; `smooth` (the default) draws a cubic spline through it (not-a-knot, two
     continuous derivatives), otherwise straight lines. Outside its times a table keeps its end values.
-    noise: standard deviation of what each value of a table was measured with, smoothing: strength of the smoothing that
-    followed (`smoothing.smooth`, 0: none). Identification carries that noise to the intervals.
+    noise: standard deviation of what each value of a table was measured with, if it is known; smoothing: strength of
+    the smoothing that followed (`smoothing.smooth`, 0: none). Identification carries that noise to the intervals.
     """
 
     number: float | None = None
     expression: str | None = None
     table: tuple[tuple[float, float], ...] | None = None
     smooth: bool = True
-    noise: NonNegative = 0.0
+    noise: NonNegative | None = None
     smoothing: NonNegative = 0.0
 
     @model_validator(mode="before")
@@ -91,8 +91,9 @@ class Function(Record):
     @model_serializer
     def _as_written(self) -> Any:
         if self.table is not None:
-            told = {"noise": self.noise, "smoothing": self.smoothing}
-            return {"table": self.table, "smooth": self.smooth, **{name: x for name, x in told.items() if x}}
+            noise = {} if self.noise is None else {"noise": self.noise}
+            smoothing = {"smoothing": self.smoothing} if self.smoothing else {}
+            return {"table": self.table, "smooth": self.smooth, **noise, **smoothing}
         return self.number if self.number is not None else self.expression
 
     @property
@@ -146,11 +147,11 @@ class Function(Record):
             return self.table_slope(0.0, left=False)
         return 0.0 if self.number is not None else math.nan
 
-    def perturbed(self, rng: np.random.Generator) -> Function:
-        """A table measured with its noise once more, and smoothed again: what smoothing bends is bent once more too."""
+    def perturbed(self, noise: float, rng: np.random.Generator) -> Function:
+        """A table measured with noise once more, and smoothed again: what smoothing bends is bent once more too."""
         assert self.table is not None
         times, values = np.array(self.table).T
-        values = values + self.noise * rng.standard_normal(len(times))
+        values = values + noise * rng.standard_normal(len(times))
         values = smooth(times, values, self.smoothing) if self.smoothing else values
         return self.model_copy(update={"table": tuple(zip(times.tolist(), values.tolist(), strict=True))})
 

@@ -33,8 +33,8 @@ class Signal(Record):
     path: from the folder of the scene's file. time, column: their names; time_scale: seconds in a unit of the time,
     scale: SI units in a unit of the column. start: the time of the table [s] at which the motion begins. Rows with a
     gap are left out.
-    smooth: as of `Function`; what is drawn smoothly is freed of noise first, as far as its samples tell noise from
-    motion. noise: its standard deviation in SI units, else as its samples show; 0: none, the samples stay as they are
+    smooth, noise: as of `Function`; what is drawn smoothly, and states its noise in SI units, is freed of it first, as
+    far as its samples tell noise from motion
     """
 
     path: str
@@ -63,14 +63,13 @@ class Signal(Record):
         return {"smooth": self.smooth, **self._without_noise(rows)}
 
     def _without_noise(self, rows: np.ndarray) -> dict[str, Any]:
-        """Rows [t, value] as the table of a function, with what is known of their noise."""
-        if not self.smooth or self.noise == 0.0 or np.any(np.diff(rows[:, 0]) <= 0.0):
-            return {"table": rows.tolist(), "noise": self.noise or 0.0}
-        strength, seen = strength_of(rows[:, 0], rows[:, 1])
+        """Rows [t, value] as the table of a function, without noise that is stated: nobody's numbers change unasked."""
+        if not self.smooth or not self.noise or np.any(np.diff(rows[:, 0]) <= 0.0):
+            return {"table": rows.tolist(), "noise": self.noise}
+        strength, _ = strength_of(rows[:, 0], rows[:, 1])
         if strength:
             rows[:, 1] = smooth(rows[:, 0], rows[:, 1], strength)
-        noise = seen if self.noise is None else self.noise
-        return {"table": rows.tolist(), "noise": noise, "smoothing": strength}
+        return {"table": rows.tolist(), "noise": self.noise, "smoothing": strength}
 
     def _check_start(self, times: np.ndarray) -> None:
         """Refuse a motion of which the table tells nothing: times [s] of the motion.

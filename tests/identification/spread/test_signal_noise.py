@@ -11,7 +11,7 @@ from shoal.identification import Measurement, Problem, identify, measure
 from shoal.identification.evidence import evidence
 from shoal.identification.forward import ForwardModel
 from shoal.identification.spread.signal_noise import noisy_signals
-from shoal.scene import load_scene
+from shoal.scene import Scene, load_scene
 
 INERTIA, NOISE, ANGLE_NOISE = 0.1, 0.03, 1e-5
 ROWS = np.linspace(0.0, 1.0, 26)
@@ -64,7 +64,7 @@ def test_what_the_noise_of_a_torque_does_to_an_inertia_is_that_of_the_closed_for
     """The angle is the torque's two integrals over the inertia: both are linear in what each sample was off by."""
     problem = rotor(tmp_path, 0.2 * np.sin(5.0 * ROWS), NOISE)
     scene = problem.load_scene()
-    assert [(path, one.noise) for path, one in noisy_signals(scene)] == [("loads.motor.torque", NOISE)]
+    assert {path: noise for path, (_, noise) in noisy_signals(scene).items()} == {"loads.motor.torque": NOISE}
     model = ForwardModel(problem, scene, get_engine("gauss"), measure(problem, scene))
     near = evidence(model, np.log([INERTIA]))
     effects = swept(np.eye(len(ROWS)) * NOISE) / INERTIA
@@ -82,6 +82,31 @@ def test_an_inertia_is_within_its_interval_though_its_drive_was_measured_with_no
     assert found.verdict.trusted
     assert inertia.lower < INERTIA < inertia.upper
     assert "the noise of loads.motor.torque (0.03) widens the interval of inertia" in found.message
+
+
+@pytest.mark.parametrize(("stated", "size"), [({}, 1e-3), ({"noise": 2e-3}, 2e-3), ({"noise": 0.0}, None)])
+def test_the_samples_of_a_drive_show_their_noise_and_those_of_a_force_may_be_meant(stated: Any, size: Any) -> None:
+    times = np.linspace(0.0, 1.2, 240)
+    drawn = np.random.default_rng(1).standard_normal((2, len(times)))
+    angle = np.column_stack([times, 0.3 * np.sin(2.0 * times) + 1e-3 * drawn[0]]).tolist()
+    torque = {
+        "kind": "torque",
+        "at": {"body": "crank"},
+        "torque": {"table": np.column_stack([times, drawn[1]]).tolist()},
+    }
+    ground = {"body": "ground", "point": [0.0, 0.0]}
+    motor = {"kind": "driven-angle", "first": ground, "second": {"body": "crank"}, "angle": {"table": angle, **stated}}
+    scene = Scene.parse(
+        {
+            "name": "driven",
+            "bodies": {"crank": {"kind": "rigid-body", "mass": 1.0, "inertia": 1.0}},
+            "joints": {"pin": {"first": ground, "second": {"body": "crank"}}, "motor": motor},
+            "loads": {"random": torque},
+            "markers": {"tip": {"body": "crank"}},
+        }
+    )
+    found = {path: noise for path, (_, noise) in noisy_signals(scene).items()}
+    assert found == ({} if size is None else {"joints.motor.angle": pytest.approx(size, rel=0.1)})
 
 
 def test_a_drive_without_noise_costs_nothing(tmp_path: Path) -> None:
