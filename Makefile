@@ -53,8 +53,9 @@ kernels: setup
 	@echo "compiling the kernels (once)"
 	@$(BIN)/python -m shoal.mechanics.warm
 
+# Of two cores three processes leave hardly any idle: some tests wait for a server, a service or another's compilation.
 test: kernels  ## the tests
-	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal $(ARGS)
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist worksteal $(ARGS)
 
 lint: setup  ## style and format
 	@$(BIN)/ruff check

@@ -71,6 +71,7 @@ def test_stiff_director_rods_move_as_rigid_ones(kinds: tuple[str, str], loads: d
     check_stiff(kinds, loads, turned=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_shaft_that_friction_brakes_about_its_own_axis_runs_down(turned: bool) -> None:
     """A disc at its end turns by w J/c (1 - exp(-c t/J)); the shaft has 1e-4 of its inertia."""
