@@ -76,6 +76,7 @@ def test_artifacts_hold_the_full_trajectory_and_pictures(study: Any) -> None:
     assert {"convergence.png", "residuals.png", "trajectory.png", "report.html", "model"} <= of_study
 
 
+@pytest.mark.slow
 def test_windows_are_held_out_and_the_posterior_is_drawn_on_the_dashboard() -> None:
     """What the command line can do beside the fit, a flow can too; the data are Exudyn's."""
     wishes = {"hold_out": "0.3 to 0.4", "sample": "100", "methods": "least-squares"}
@@ -238,6 +239,7 @@ def test_a_study_is_repeated_from_its_run_alone(tmp_path: Path) -> None:
     assert set(rerun(first.run_id).different) == {"final/x"}
 
 
+@pytest.mark.slow
 def test_what_is_taken_from_the_library_is_kept_with_the_run(tmp_path: Path) -> None:
     """The problem, the scene that it names, and the recording: the library may change and be emptied."""
     machine = yaml.safe_load((files("shoal.scene") / "library" / "single-pendulum.yaml").read_text())

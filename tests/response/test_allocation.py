@@ -103,6 +103,7 @@ def test_deviations_of_distributions() -> None:
         assert allocation.effects[k] == pytest.approx(1 - passed(tight) / passed(np.ones(2)), rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_an_interval_and_a_deviation_together(target: float) -> None:
     """h + v / 2 - 1.25 at 0.5 s, v normal(5, 0.3 s), h in 0.025 -+ 0.075 w: P(> 1.9) = Phi(-(0.625 - 0.075 w) / 0.15 s)
@@ -160,6 +161,7 @@ def test_the_cheapest_factors_within_cones() -> None:
     assert max(one.used(found, beta) - one.room for one in cuts) < 1e-6
 
 
+@pytest.mark.slow
 def test_an_interval_that_reaches_beyond_the_limit() -> None:
     """The stated upper end passes it half of the times and more; narrower ones keep it."""
     found = uncertain(

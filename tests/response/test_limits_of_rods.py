@@ -64,6 +64,7 @@ def test_a_cantilever_under_its_weight() -> None:
         assert margin == pytest.approx(exact, abs=off * size), text
 
 
+@pytest.mark.slow
 def test_a_section_where_the_load_is_a_number_in_a_table() -> None:
     """A force at the tip, which a table states: at rest half of the rod bears it with F L / 2."""
     stated: dict[str, Any] = cantilever().model_dump(mode="json", exclude_unset=True)

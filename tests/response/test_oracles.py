@@ -36,6 +36,7 @@ def function(a: Array, b: Array, c: Array) -> Array:
     return np.asarray(np.exp(0.4 * a) + a * b**2 + np.sin(2 * c) * b)
 
 
+@pytest.mark.slow
 def test_chaos_beside_chaospys_pseudo_spectral_one() -> None:
     """Normal, uniform and beta parameters: moments and indices, by quadrature of order 9 there."""
     known = inputs(Normal(0.2, 0.8), Uniform(-1.0, 2.0), Frozen(stats.beta(2, 3, 0.5, 1.5)))

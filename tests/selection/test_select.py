@@ -94,6 +94,7 @@ def test_rods_with_damping_have_models_too() -> None:
     assert GaussEngine().simulate(fine, selection.trajectory.times).distance(selection.trajectory) <= 1e-3
 
 
+@pytest.mark.slow
 def test_rods_whose_strains_are_asked_for_are_made_of_elements() -> None:
     levels = select(_with_modulus(2e14), 1e-2, meshed=("AB",)).chosen.levels
     assert levels["OA"] == RIGID
@@ -144,6 +145,7 @@ def test_what_would_take_too_long_is_not_tried_and_not_met() -> None:
     assert "element steps, about" in selection.trajectory.message
 
 
+@pytest.mark.slow
 def test_where_no_theory_settles_it_is_told_of_both() -> None:
     """A rod so soft that its slender runs are rejected, and with shear is not settled by what the patience allows."""
     machine = draw(86)

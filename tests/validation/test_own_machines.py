@@ -74,6 +74,7 @@ ENGINE = "other: {kind: engine, engine: exudyn, tolerance: 1.0e-4}"
 AS_BEFORE = "still: {kind: as-before, tolerance: 1.0e-9}"
 
 
+@pytest.mark.slow
 def test_each_kind_of_expectation_is_met_by_a_right_machine_and_charted(arm: Callable[..., library.Entry]) -> None:
     entry = arm(VALUE, RECORDED, ENGINE, AS_BEFORE)
     night(1)

@@ -48,6 +48,7 @@ def test_what_a_surrogate_misses_of_runs_left_out_counts(method: str, width: flo
     assert not found.silent
 
 
+@pytest.mark.slow
 def test_the_night_tries_uncertain_bounds() -> None:
     lines = plan("uncertain-bounds", quick=True)
     assert [line.limit for line in lines] == [1e-5, 1e-9]

@@ -40,6 +40,7 @@ def answer(folder: Path, table: Array, columns: str = "t,shoulder,elbow", more: 
     return identify(load_problem(str(folder / "encoders.yaml")))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("columns", "signs", "told"),
     [

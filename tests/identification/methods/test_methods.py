@@ -94,6 +94,7 @@ def test_multi_start_draws_the_waterfall() -> None:
         assert np.all(model.fitness(np.clip(point + 0.01 * around, model.lower, model.upper)) > fitness)
 
 
+@pytest.mark.slow
 def test_multiple_shooting_holds_where_single_shooting_is_lost() -> None:
     """Over 5 s from a start that is off by a tenth of a radian; data by scipy, model by CasADi's own equations."""
     pytest.importorskip("casadi")

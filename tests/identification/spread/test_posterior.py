@@ -127,6 +127,7 @@ def product(fall: str) -> tuple[Problem, Measurement]:
     return problem, Measurement.single(TIMES, tuple(problem.channels), values, "closed form", noise=1.0)
 
 
+@pytest.mark.slow
 def test_a_bent_posterior_is_that_of_an_integral_over_a_grid(fall: str) -> None:
     problem, measurement = product(fall)
     found = sampled(problem, measurement, wanted=1500).posterior

@@ -147,6 +147,7 @@ def test_a_mass_hangs_from_its_spring() -> None:
     assert run.marker("mass") == pytest.approx(np.tile([0.0, -1.0 - 2.0 * 9.81 / 100.0], (len(run.times), 1)), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_what_is_stated_beside_is_near_the_place_of_rest_only() -> None:
     """A weight on a rope from the tip: it hangs straight below, wherever it was said to be."""
     found = {}

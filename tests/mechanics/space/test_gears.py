@@ -77,6 +77,7 @@ def test_bevel_gears_turn_by_their_teeth_and_with_the_inertia_of_both(integrator
     assert run.marker("two") == pytest.approx(two, abs=slack)
 
 
+@pytest.mark.slow
 def test_a_run_of_many_turns_is_verified_and_exudyn_goes_the_same_way() -> None:
     scene = bevel("1/40", solver={"duration": 8.0, "samples": 8})
     run = verified(get_engine("gauss"), scene)

@@ -210,6 +210,7 @@ def test_two_rods_welded_in_line_vibrate_as_one() -> None:
     assert both.frequencies == pytest.approx(one.frequencies, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_frames_of_all_angles_run_in_lanes_and_go_on() -> None:
     engine, scene = get_engine("gauss"), swinging(OBLIQUE)
     values = {"bodies.B.youngs_modulus": np.array([1e8, 2e8, 3e8]), "initial.B.rotation.0": np.array([0.3, 0.4, 1.5])}
