@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 Hearer = Callable[[bool], None]
 """Told whether the clock stands still."""
@@ -52,5 +52,4 @@ def heard(hear: Hearer) -> Iterator[None]:
     try:
         yield
     finally:
-        with suppress(ValueError):
-            _hearers.remove(hear)
+        _hearers.remove(hear)
