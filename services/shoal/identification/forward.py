@@ -21,6 +21,7 @@ from shoal.identification.loss import flatten, steepness
 from shoal.identification.parametrization import Parametrization
 from shoal.identification.placement import Placement, placement
 from shoal.identification.problem import Problem
+from shoal.identification.recording.clocks import by_clock
 from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.observation import Camera, observe, without_turns
@@ -33,10 +34,6 @@ from shoal.trajectory import Array, Status, Trajectory
 
 AT_ONCE = 2 * len(WIDE)
 """Lanes of a call where the time is limited: whole tiles, enough for two threads."""
-
-_HARDLY = 0.1
-"""Of their length: runs that differ by less are simulated at once, at the instants of all; so many of them, at most."""
-_PACES = 16
 
 _KEPT = ("parameters", "rows", "loss_scale", "_native", "_placements", "_accepted")
 """What models of the same scene, engine and measurement share."""
@@ -172,21 +169,13 @@ class ForwardModel:
         values |= {path: factor * values[path] for path, factor in factors.items() if path not in fixed}
         seen_by = self.parameters.measurement_values(points, name, recording.stated)
         seen = np.full((len(points), len(times), len(recording.channels)), np.nan)
-        pace = np.column_stack([seen_by.pop("clock"), seen_by.pop("delay")])
-        possible = self._possible(points, values, scene)
-        paces, own = _distinct(pace)
-        moments = np.maximum(times / paces[:, :1] + paces[:, 1:], 0.0)
-        for together in _alike(moments[:, -1]):
-            lanes = np.flatnonzero(np.logical_and(possible, np.isin(own, together)))
-            if not lanes.size:
-                continue
-            instants, shown = np.unique(moments[together], return_inverse=True)
+        clock, delay = seen_by.pop("clock"), seen_by.pop("delay")
+        for lanes, instants, rows in by_clock(times, clock, delay, self._possible(points, values, scene)):
             inputs = {path: numbers[lanes] for path, numbers in values.items()}
             shared = {path: float(x[0]) for path, x in inputs.items() if _same_in_all(path, x)}
             inputs = {path: x for path, x in inputs.items() if path not in shared}
             view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
             found = self._simulate(scene.with_values(shared) if shared else scene, inputs, instants, view, name)
-            rows = shown.reshape(len(together), -1)[np.searchsorted(together, own[lanes])]
             seen[lanes] = np.take_along_axis(found, rows[:, :, None], axis=1)
         return seen
 
@@ -291,9 +280,9 @@ class ForwardModel:
         stated = self.measurement.recordings[name].stated.known
         return self.scene.with_values({**stated, **{path: float(x[0]) for path, x in values.items()}})
 
-    def _possible(self, points: Array, values: dict[str, Array], scene: Scene) -> Array:
+    def _possible(self, points: Array, values: dict[str, Array], scene: Scene) -> npt.NDArray[np.bool_]:
         """Which points are scenes at all, (points,): inside the box all are, outside a mass may be negative."""
-        possible: Array = np.ones(len(points), dtype=bool)
+        possible: npt.NDArray[np.bool_] = np.ones(len(points), dtype=bool)
         outside = np.any((points < self.lower) | (points > self.upper), axis=1)
         doubtful = possible.copy() if self.problem.ties else outside
         for path, numbers in values.items() if np.any(doubtful) else ():
@@ -406,23 +395,6 @@ def _not_felt(recording: Recording) -> Recording:
     shown = [k for k, channel in enumerate(recording.channels) if not channel.is_felt]
     channels = tuple(recording.channels[k] for k in shown)
     return replace(recording, channels=channels, values=recording.values[:, shown], noise=recording.noise[shown])
-
-
-def _distinct(rows: Array) -> tuple[Array, npt.NDArray[np.intp]]:
-    """The rows that differ, and the number of each row among them; mostly they are all the same."""
-    if np.all(rows == rows[:1]):
-        return rows[:1], np.zeros(len(rows), dtype=np.intp)
-    found, numbers = np.unique(rows, axis=0, return_inverse=True)
-    return found, numbers.ravel()
-
-
-def _alike(ends: Array) -> Iterator[Array]:
-    """Numbers of runs by their ends [s], those together that hardly differ: by clocks in a difference, for instance."""
-    left = np.arange(len(ends))
-    while left.size:
-        near = np.abs(ends[left] - ends[left[0]]) <= _HARDLY * ends[left[0]]
-        yield left[near][:_PACES]
-        left = np.sort(np.concatenate([left[near][_PACES:], left[~near]]))
 
 
 def _same_in_all(path: str, numbers: Array) -> bool:

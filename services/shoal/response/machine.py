@@ -80,9 +80,9 @@ class Machine:
     def _some(self, values: Mapping[str, Array]) -> Answers:
         lanes = np.arange(len(next(iter(values.values()))))
         done, why = self._run(self.scene, values, lanes)
-        good, repeated = np.isin(lanes, [lane for lane, one in done.items() if one.good]), 0
+        repeated = 0
         for finer in FINER:
-            left = lanes[~good]
+            left = _left(lanes, done)
             if not left.size:
                 break
             if not repeated and not done:
@@ -95,16 +95,15 @@ class Machine:
                 why = str(error)
                 break
             done |= again
-            good = np.isin(lanes, [lane for lane, one in done.items() if one.good])
-        left = lanes[~good]
+        left = _left(lanes, done)
         if 0 < left.size <= ALONE and done and self.scene.solver.integrator == "auto":
             done |= self._alone(values, left)
-            good = np.isin(lanes, [lane for lane, one in done.items() if one.good])
         if not done:
             raise InputError(why)
         missing = np.full_like(next(iter(done.values())).values, np.nan)
         found = np.array([done[lane].values if lane in done else missing for lane in lanes.tolist()])
-        return Answers(found, good, repeated, "" if good.all() else why)
+        failed = _left(lanes, done)
+        return Answers(found, np.isin(lanes, failed, invert=True), repeated, why if failed.size else "")
 
     def _run(self, scene: Scene, values: Mapping[str, Array], lanes: IntArray) -> tuple[dict[int, _Lane], str]:
         """Some lanes, without those whose step is too long; why the first failed. Raises InputError."""
@@ -136,6 +135,11 @@ class _Lane(NamedTuple):
 
     values: Array
     good: bool
+
+
+def _left(lanes: IntArray, done: Mapping[int, _Lane]) -> IntArray:
+    """Lanes that have no run yet that may be believed."""
+    return lanes[[lane not in done or not done[lane].good for lane in lanes.tolist()]]
 
 
 def _smaller_steps(scene: Scene, finer: float) -> dict[str, float]:

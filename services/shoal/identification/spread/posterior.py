@@ -1,10 +1,5 @@
 """Draws from the posterior of the parameters about an answer, uniform within the bounds but for the problem's priors.
 
-The density is that of the misfit: a normal one where the size of the noise is stated, else Student's t, which is what
-remains of it when that size is integrated out. Residuals that are correlated, unequal or systematic make least squares
-know less than their sum of squares says. So its curvature is adjusted to the covariance that the intervals have
-(Ribatet, Cooley and Davison, Statistica Sinica 22, 2012); with white noise nothing changes.
-
 Sampled by emcee (Foreman-Mackey et al. 2013) in several ensembles that know nothing of each other: by independent draws
 from a distribution that is fitted to the posterior, and by differences of walkers, which follow shapes that it has not.
 Where draws about the answer, weighted by the density, are worth much, they tell that distribution and where walkers
@@ -14,7 +9,7 @@ begin; elsewhere a beginning of the chains does.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -24,18 +19,19 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
-from shoal.identification.spread.chances import student_above
 from shoal.identification.spread.covariance import Block
-from shoal.identification.spread.uncertainty import ABSORBED, LEVEL, Linearisation
+from shoal.identification.spread.density import Density, density
+from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.identification.spread.value import Value
+from shoal.identification.spread.walkers import ENSEMBLES, Independent, possible, sampler, weights
 from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
     import xarray as xr
     from emcee import EnsembleSampler
 
-ENSEMBLES, WALKERS = 4, 16
-"""Independent ensembles, and the least walkers in each: whole tiles of lanes, also of half of them."""
+WALKERS = 16
+"""The least in each ensemble: whole tiles of lanes, also of half of them."""
 MIXED = 1.01
 """R-hat up to which ensembles count as mixed."""
 _TRIED = 8
@@ -48,12 +44,6 @@ _AT_ONCE = 30
 """Steps between looks at the draws; every look waits longer than the last."""
 _MOST = 400_000
 """Draws after which the search for more ends."""
-_FREEDOM = 5.0
-"""Of the Student distribution of independent draws, whose tails should be heavier than those of the posterior."""
-_MOVES = {True: (0.75, 0.2, 0.05), False: (0.3, 0.6, 0.1)}
-"""Shares of independent draws, of differences of walkers, and of stretches, where the posterior is like what is drawn
-from about the answer, and elsewhere: more of the first mix faster there, but leave the tails of bent ones without their
-due."""
 _NEWS = 0.2
 """Of an interval: a difference to it that is worth a word."""
 
@@ -186,27 +176,27 @@ def posterior(
     from emcee.state import State
 
     begin = time.perf_counter()
-    target = _target(model, point, at, blocks, least)
+    target = density(model, point, at, blocks, least)
     walkers = ENSEMBLES * max(WALKERS, 2 * (len(point) + 1))
     rng = np.random.RandomState(np.random.MT19937(seed))
-    about = _Independent(point, target.spread)
+    about = Independent(point, target.spread)
     tried = about.draw(_TRIED * walkers, rng)
-    weights = _weights(target(tried) - about.log_density(tried))
-    alike = bool(weights @ weights * len(weights) <= 1.0 / _ALIKE)
+    shares = weights(target(tried) - about.log_density(tried))
+    alike = bool(shares @ shares * len(shares) <= 1.0 / _ALIKE)
     if alike:
-        end = State(tried[rng.choice(len(tried), walkers, p=weights)], random_state=rng.get_state())
-        near = _Independent.of(tried, about, weights)
+        end = State(tried[rng.choice(len(tried), walkers, p=shares)], random_state=rng.get_state())
+        near = Independent.of(tried, about, shares)
     else:
-        first = _sampler(target, about, walkers, alike)
-        end = first.run_mcmc(State(target.possible(about, walkers, rng), random_state=rng.get_state()), _BEGINNING)
-        near = _Independent.of(first.get_chain(discard=_BEGINNING // 2, flat=True), about)
-    sampler = _sampler(target, near, walkers, alike)
+        first = sampler(target, about, walkers, alike)
+        end = first.run_mcmc(State(possible(target, about, walkers, rng), random_state=rng.get_state()), _BEGINNING)
+        near = Independent.of(first.get_chain(discard=_BEGINNING // 2, flat=True), about)
+    chains = sampler(target, near, walkers, alike)
     more, found = _AT_ONCE, None
     try:
         while found is None or not (found.converged or len(found.flat) >= _MOST):
-            end = sampler.run_mcmc(end, more)
-            found = _told(model, target, sampler, wanted, seed, time.perf_counter() - begin)
-            more = max(more, sampler.iteration // 2)
+            end = chains.run_mcmc(end, more)
+            found = _told(model, target, chains, wanted, seed, time.perf_counter() - begin)
+            more = max(more, chains.iteration // 2)
     except TimeIsUp:
         if found is None:
             raise
@@ -230,165 +220,10 @@ def news(found: Posterior, values: Mapping[str, Value]) -> list[str]:
     return said
 
 
-class _Independent:
-    """Student's t about a centre, draws of which know nothing of where a walker is."""
-
-    def __init__(self, centre: Array, root: Array) -> None:
-        self.centre, self.root, self.inverse = centre, root, np.linalg.inv(root)
-
-    @classmethod
-    def of(cls, draws: Array, before: _Independent, weights: Array | None = None) -> _Independent:
-        """Of the mean and the covariance of draws (draws, parameters); that before where they have none."""
-        covariance = np.atleast_2d(np.cov(draws.T, aweights=weights))
-        try:
-            return cls(np.average(draws, axis=0, weights=weights), np.asarray(np.linalg.cholesky(covariance)))
-        except np.linalg.LinAlgError:
-            return before
-
-    def draw(self, count: int, rng: np.random.RandomState) -> Array:
-        """Points, (count, parameters)."""
-        normal = rng.standard_normal((count, len(self.centre)))
-        wide = np.sqrt(_FREEDOM / rng.chisquare(_FREEDOM, (count, 1)))
-        return np.asarray(self.centre + (normal * wide) @ self.root.T)
-
-    def log_density(self, points: Array) -> Array:
-        """Of points (count, parameters), but for a constant."""
-        away = np.sum(((points - self.centre) @ self.inverse.T) ** 2, axis=1)
-        return np.asarray(-(_FREEDOM + len(self.centre)) / 2 * np.log1p(away / _FREEDOM))
-
-    def propose(self, points: Array, rng: np.random.RandomState) -> tuple[Array, Array]:
-        """New points and the logarithm of the ratio of densities, as emcee wants it."""
-        fresh = self.draw(len(points), rng)
-        return fresh, self.log_density(points) - self.log_density(fresh)
-
-
-def _weights(logarithms: Array) -> Array:
-    """Of draws, which add up to 1, from their logarithms; all of the first draw where none can be simulated."""
-    most = float(np.max(logarithms))
-    if not np.isfinite(most):
-        return np.asarray(np.eye(len(logarithms))[0])
-    weights = np.exp(logarithms - most)
-    return np.asarray(weights / np.sum(weights))
-
-
-class _Target:
-    """The logarithm of the density that is sampled.
-
-    turned: what a step from the answer is multiplied by before it is simulated; size: variance by which the sum of
-    squares is divided; freedom: of Student's t, inf for a normal density; spread: root of the covariance
-    """
-
-    def __init__(
-        self,
-        model: ForwardModel,
-        point: Array,
-        least: float,
-        turned: Array,
-        size: float,
-        freedom: float,
-        spread: Array,
-    ) -> None:
-        self.model, self.point, self.least = model, point, least
-        self.turned, self.size, self.freedom, self.spread = turned, size, freedom, spread
-        self.lower, self.upper = model.box_at(point)
-        self.evaluations = self.failed = 0
-
-    def __call__(self, points: Array) -> Array:
-        """Of points (count, parameters); -inf outside the bounds and where nothing can be simulated."""
-        found = np.full(len(points), -np.inf)
-        inside = np.flatnonzero(np.all((points >= self.lower) & (points <= self.upper), axis=1))
-        if inside.size:
-            rows = self.model.uncounted(self.point + (points[inside] - self.point) @ self.turned.T)
-            rise = (np.sum(rows**2, axis=1) - self.least) / self.size
-            self.evaluations += len(inside)
-            self.failed += int(np.count_nonzero(~np.isfinite(rise)))
-            found[inside] = np.where(np.isfinite(rise), self._log(rise), -np.inf)
-        return found
-
-    def _log(self, rise: Array) -> Array:
-        if not np.isfinite(self.freedom):
-            return -rise / 2
-        return -(self.freedom + len(self.point)) / 2 * np.log1p(np.maximum(rise / self.freedom, -0.99))
-
-    def possible(self, near: _Independent, count: int, rng: np.random.RandomState) -> Array:
-        """So many points with a density, (count, parameters), from a distribution that narrows until it has some."""
-        points = np.empty((0, len(self.point)))
-        for attempt in range(30):
-            tried = self.point + (near.draw(count, rng) - self.point) * 0.8**attempt
-            points = np.concatenate([points, tried[np.isfinite(self(tried))]])
-            if len(points) >= count:
-                return points[:count]
-        raise InputError("sample: no parameters beside the answer can be simulated; nothing can be drawn")
-
-
-def _target(model: ForwardModel, point: Array, at: Linearisation, blocks: list[Block], least: float) -> _Target:
-    """The density whose curvature at the answer is that of its covariance, in scaled parameters that are known."""
-    across = at.unknown.shape[1] if at.unknown.size else 0
-    known = np.linalg.svd(at.unknown)[0][:, across:] if across else np.eye(len(point))
-    parts = known.T @ (at.parts / np.outer(at.scale, at.scale)) @ known
-    covariance = parts.sum(axis=0)
-    freedom = _freedom(parts, at, blocks)
-    lever = known.T @ (at.pseudo_inverse / at.scale[:, None])
-    alone = lever @ lever.T  # the inverse of the Gram matrix G of the Jacobian
-    covariance = covariance + (ABSORBED * at.systematic / _quantile(freedom)) ** 2 * alone
-    # M' G M / size = C^-1 with det M = 1: M is 1 if C is proportional to the inverse of G.
-    root = np.linalg.inv(np.linalg.cholesky(alone))
-    inner = _root(root @ covariance @ root.T, -0.5)
-    factor = float(np.linalg.det(inner)) ** (1.0 / len(inner))
-    outside = np.eye(len(point)) - known @ known.T
-    turned = known @ np.linalg.solve(root, inner @ root) / factor @ known.T + outside
-    wide = outside @ np.diag((model.upper - model.lower) / at.scale / np.sqrt(12.0)) @ outside
-    spread = known @ _root(covariance, 0.5) @ known.T + wide
-    turned, spread = at.scale[:, None] * turned / at.scale, at.scale[:, None] * spread
-    return _Target(model, point, least, turned, factor**-2, freedom, spread)
-
-
-def _freedom(parts: Array, at: Linearisation, blocks: list[Block]) -> float:
-    """Of the whole covariance, from the shares (blocks, p, p) whose noise is not stated (Satterthwaite 1946)."""
-    stated = [b.known or (b.stated > 0 and n.variance <= b.stated**2) for b, n in zip(blocks, at.noise, strict=False)]
-    stated += [False] * (len(at.noise) - len(blocks))
-    shares = np.einsum("bij,ji->b", parts, np.linalg.inv(parts.sum(axis=0))) / parts.shape[1]
-    doubt = sum(s**2 / n.freedom for s, n, sure in zip(shares, at.noise, stated, strict=True) if not sure)
-    return float(1.0 / doubt) if doubt > 0.0 else np.inf
-
-
-def _quantile(freedom: float) -> float:
-    return student_above(min(freedom, 1e9), 0.5 - LEVEL / 2)
-
-
-def _root(matrix: Array, power: float) -> Array:
-    """Of a symmetric positive matrix."""
-    values, vectors = np.linalg.eigh(matrix)
-    return np.asarray((vectors * np.maximum(values, 1e-300) ** power) @ vectors.T)
-
-
-def _sampler(target: Callable[[Array], Array], near: _Independent, walkers: int, alike: bool) -> EnsembleSampler:
-    from emcee import EnsembleSampler
-    from emcee.moves import DEMove, MHMove, StretchMove
-
-    # Halves are every other walker, so that each has its part of every ensemble, in order.
-    among = [_apart(move(randomize_split=False)) for move in (DEMove, StretchMove)]
-    moves = list(zip((MHMove(near.propose), *among), _MOVES[alike], strict=True))
-    return EnsembleSampler(walkers, len(near.centre), target, moves=moves, vectorize=True)
-
-
-def _apart(move: Any) -> Any:
-    """A move of emcee that looks at walkers of the same ensemble only."""
-    propose = move.get_proposal
-
-    def proposal(half: Array, others: list[Array], rng: np.random.RandomState) -> tuple[Array, Array]:
-        pairs = zip(np.split(half, ENSEMBLES), np.split(others[0], ENSEMBLES), strict=True)
-        found = [propose(mine, [theirs], rng) for mine, theirs in pairs]
-        return np.concatenate([fresh for fresh, _ in found]), np.concatenate([factor for _, factor in found])
-
-    move.get_proposal = proposal
-    return move
-
-
 def _told(
-    model: ForwardModel, target: _Target, sampler: EnsembleSampler, wanted: int, seed: int, wall: float
+    model: ForwardModel, target: Density, chains: EnsembleSampler, wanted: int, seed: int, wall: float
 ) -> Posterior:
-    chain = sampler.get_chain()
+    chain = chains.get_chain()
     points = chain.reshape(len(chain), ENSEMBLES, -1, chain.shape[-1]).swapaxes(0, 1)
     draws = model.parameters.to_values(points.reshape(-1, points.shape[-1])).reshape(points.shape)
     marginals = {name: _marginal(draws[..., k]) for k, name in enumerate(model.names)}
@@ -402,7 +237,7 @@ def _told(
         noise=law,
         wanted=wanted,
         converged=bool(mixed and worth >= wanted),
-        accepted=float(np.mean(sampler.acceptance_fraction)),
+        accepted=float(np.mean(chains.acceptance_fraction)),
         evaluations=target.evaluations,
         failed=target.failed,
         seed=seed,
@@ -412,8 +247,9 @@ def _told(
 
 def _marginal(draws: Array) -> Marginal:
     """Of one parameter's draws (ensembles, steps, walkers)."""
-    lower, median, upper = (float(x) for x in np.quantile(draws, [0.5 - LEVEL / 2, 0.5, 0.5 + LEVEL / 2]))
+    # Ranks are scipy's, which an identification without draws need not load.
     from shoal.identification.spread.mixing import bulk_size, r_hat, tail_size
 
+    lower, median, upper = (float(x) for x in np.quantile(draws, [0.5 - LEVEL / 2, 0.5, 0.5 + LEVEL / 2]))
     sizes = bulk_size(draws), tail_size(draws), r_hat(draws)
     return Marginal(float(draws.mean()), float(draws.std(ddof=1)), median, lower, upper, *sizes)

@@ -1,0 +1,102 @@
+"""How a density is sampled: by independent draws from a Student distribution, and by differences of walkers (emcee)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shoal.errors import InputError
+from shoal.trajectory import Array
+
+if TYPE_CHECKING:
+    from emcee import EnsembleSampler
+
+LogDensity = Callable[[Array], Array]
+"""The logarithm of a density at points (count, parameters), (count,); -inf where it has none."""
+
+ENSEMBLES = 4
+"""Independent ensembles, whose walkers look at each other only."""
+_FREEDOM = 5.0
+"""Of the Student distribution of independent draws, whose tails should be heavier than those of the posterior."""
+_MOVES = {True: (0.75, 0.2, 0.05), False: (0.3, 0.6, 0.1)}
+"""Shares of independent draws, of differences of walkers, and of stretches, where the posterior is like what is drawn
+from about the answer, and elsewhere: more of the first mix faster there, but leave the tails of bent ones without their
+due."""
+
+
+class Independent:
+    """Student's t about a centre, draws of which know nothing of where a walker is."""
+
+    def __init__(self, centre: Array, root: Array) -> None:
+        self.centre, self.root, self.inverse = centre, root, np.linalg.inv(root)
+
+    @classmethod
+    def of(cls, draws: Array, before: Independent, weights: Array | None = None) -> Independent:
+        """Of the mean and the covariance of draws (draws, parameters); that before where they have none."""
+        covariance = np.atleast_2d(np.cov(draws.T, aweights=weights))
+        try:
+            return cls(np.average(draws, axis=0, weights=weights), np.asarray(np.linalg.cholesky(covariance)))
+        except np.linalg.LinAlgError:
+            return before
+
+    def draw(self, count: int, rng: np.random.RandomState) -> Array:
+        """Points, (count, parameters)."""
+        normal = rng.standard_normal((count, len(self.centre)))
+        wide = np.sqrt(_FREEDOM / rng.chisquare(_FREEDOM, (count, 1)))
+        return np.asarray(self.centre + (normal * wide) @ self.root.T)
+
+    def log_density(self, points: Array) -> Array:
+        """Of points (count, parameters), but for a constant."""
+        away = np.sum(((points - self.centre) @ self.inverse.T) ** 2, axis=1)
+        return np.asarray(-(_FREEDOM + len(self.centre)) / 2 * np.log1p(away / _FREEDOM))
+
+    def propose(self, points: Array, rng: np.random.RandomState) -> tuple[Array, Array]:
+        """New points and the logarithm of the ratio of densities, as emcee wants it."""
+        fresh = self.draw(len(points), rng)
+        return fresh, self.log_density(points) - self.log_density(fresh)
+
+
+def weights(logarithms: Array) -> Array:
+    """Of draws, which add up to 1, from their logarithms; all of the first draw where none can be simulated."""
+    most = float(np.max(logarithms))
+    if not np.isfinite(most):
+        return np.asarray(np.eye(len(logarithms))[0])
+    shares = np.exp(logarithms - most)
+    return np.asarray(shares / np.sum(shares))
+
+
+def possible(density: LogDensity, near: Independent, count: int, rng: np.random.RandomState) -> Array:
+    """So many points with a density, (count, parameters), from a distribution that narrows until it has some."""
+    points = np.empty((0, len(near.centre)))
+    for attempt in range(30):
+        tried = near.centre + (near.draw(count, rng) - near.centre) * 0.8**attempt
+        points = np.concatenate([points, tried[np.isfinite(density(tried))]])
+        if len(points) >= count:
+            return points[:count]
+    raise InputError("sample: no parameters beside the answer can be simulated; nothing can be drawn")
+
+
+def sampler(density: LogDensity, near: Independent, walkers: int, alike: bool) -> EnsembleSampler:
+    """Of so many walkers; near: what independent draws are made from; alike: whether the density is like that."""
+    from emcee import EnsembleSampler
+    from emcee.moves import DEMove, MHMove, StretchMove
+
+    # Halves are every other walker, so that each has its part of every ensemble, in order.
+    among = [_apart(move(randomize_split=False)) for move in (DEMove, StretchMove)]
+    moves = list(zip((MHMove(near.propose), *among), _MOVES[alike], strict=True))
+    return EnsembleSampler(walkers, len(near.centre), density, moves=moves, vectorize=True)
+
+
+def _apart(move: Any) -> Any:
+    """A move of emcee that looks at walkers of the same ensemble only."""
+    propose = move.get_proposal
+
+    def proposal(half: Array, others: list[Array], rng: np.random.RandomState) -> tuple[Array, Array]:
+        pairs = zip(np.split(half, ENSEMBLES), np.split(others[0], ENSEMBLES), strict=True)
+        found = [propose(mine, [theirs], rng) for mine, theirs in pairs]
+        return np.concatenate([fresh for fresh, _ in found]), np.concatenate([factor for _, factor in found])
+
+    move.get_proposal = proposal
+    return move
