@@ -8,39 +8,15 @@ from __future__ import annotations
 from numba import njit
 
 from shoal.mechanics.elements import beam
-from shoal.mechanics.elements.batch import coefficient, coordinate, put, rest, together
+from shoal.mechanics.elements.batch import coefficient, put, rest, together
 from shoal.mechanics.elements.families import PLAN, Family
+from shoal.mechanics.elements.nodal import gather, part_of
 from shoal.mechanics.numerics.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Tile
 
 # Vectors of the work space: one of `batch`; scaled vectors; factors of nodal vectors; blocks (a_i, d_i) H (a_j, d_j);
 # behind these the ten numbers of H of every point.
 _X, _FACTOR, _BLOCK, _HESSIAN = 1, 11, 17, 10
-
-
-@njit(error_model="numpy", forceinline=True)
-def _gather(tile, vectors, family, number, lane, inverse, z, w):  # type: ignore[no-untyped-def]
-    """The scaled vectors X of elements, and d X/d (nodal vector), into w."""
-    order, side = vectors // 2, 2 * vectors
-    for component in range(2):
-        first = coordinate(tile, family, number, lane, side, component, z)
-        second = coordinate(tile, family, number, lane, side, vectors + component, z)
-        store(w, len(EIGHT) * (_X + component), (second - first) * inverse)
-        for node in range(2):
-            for j in range(1, order):
-                value = coordinate(tile, family, number, lane, side, 2 * (node * order + j) + component, z)
-                if j == 2:
-                    value = value / inverse
-                store(w, len(EIGHT) * (_X + 2 * (node * (order - 1) + j) + component), value)
-    for k in range(vectors):
-        factor = spread(EIGHT, 1.0)
-        if k == 0:
-            factor = -inverse
-        elif k == order:
-            factor = inverse
-        elif k % order == 2:
-            factor = 1.0 / inverse
-        store(w, len(EIGHT) * (_FACTOR + k), factor)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -130,19 +106,13 @@ def _sum(table, at, points, inner, i, j, w, hessian, block):  # type: ignore[no-
 
 
 @njit(error_model="numpy", forceinline=True)
-def _scaled(order, k):  # type: ignore[no-untyped-def]
-    """The scaled vector that a nodal vector is a part of."""
-    return 0 if k % order == 0 else (k if k < order else k - 1)
-
-
-@njit(error_model="numpy", forceinline=True)
 def _write(tile, vectors, number, lane, count, w, out, first):  # type: ignore[no-untyped-def]
     """From second derivatives in X to those in the nodal vectors, all entries, to the blocks of `count` elements."""
     order, side, inner = vectors // 2, 2 * vectors, vectors - 1
     for one in range(vectors):
-        i = _scaled(order, one)
+        i = part_of(order, one)
         for other in range(vectors):
-            j = _scaled(order, other)
+            j = part_of(order, other)
             low, high = min(i, j), max(i, j)
             block = _BLOCK + 4 * (low * inner - low * (low - 1) // 2 + high - low)
             factor = load(EIGHT, w, len(EIGHT) * (_FACTOR + one)) * load(EIGHT, w, len(EIGHT) * (_FACTOR + other))
@@ -167,7 +137,7 @@ def _blocks(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out: 
             if viscous:
                 eta = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 3)
                 ea, ei = ea * eta, ei * eta
-            _gather(tile, vectors, family, number, lane, inverse, z, w)
+            gather(tile, 2, vectors, family, number, lane, inverse, z, w, _X, _FACTOR)
             hessian, points = _BLOCK + 2 * inner * vectors, family.plan[PLAN * number + 1]
             table, at = family.table, side * family.plan[PLAN * number]
             for g in range(points):

@@ -26,9 +26,10 @@ from numba import njit
 
 from shoal.errors import InputError
 from shoal.mechanics.elements import beam
-from shoal.mechanics.elements.batch import add_sum, coefficient, coordinate, put, together
+from shoal.mechanics.elements.batch import add_sum, coefficient, put, together
 from shoal.mechanics.elements.element import Element
 from shoal.mechanics.elements.families import PLAN, Entry, Family
+from shoal.mechanics.elements.nodal import gather, part_of
 from shoal.mechanics.numerics.pointers import shift
 from shoal.mechanics.numerics.simd import EIGHT, load, root, spread, store
 from shoal.mechanics.numerics.tile import Array, Number, Tile
@@ -61,31 +62,6 @@ def bend(damped, flat, b, c, rate, turning, change, stiffness, eta):  # type: ig
 
 
 @njit(error_model="numpy", forceinline=True)
-def _gather(tile, vectors, family, number, lane, inverse, z, w):  # type: ignore[no-untyped-def]
-    """The scaled vectors X of elements, and d X/d (nodal vector), into w."""
-    order, side = vectors // 2, DIMENSIONS * vectors
-    for k in range(DIMENSIONS):
-        first = coordinate(tile, family, number, lane, side, k, z)
-        second = coordinate(tile, family, number, lane, side, DIMENSIONS * order + k, z)
-        store(w, len(EIGHT) * (_X + k), (second - first) * inverse)
-        for node in range(2):
-            for j in range(1, order):
-                value = coordinate(tile, family, number, lane, side, DIMENSIONS * (node * order + j) + k, z)
-                if j == 2:
-                    value = value / inverse
-                store(w, len(EIGHT) * (_X + DIMENSIONS * (node * (order - 1) + j) + k), value)
-    for k in range(vectors):
-        factor = spread(EIGHT, 1.0)
-        if k == 0:
-            factor = -inverse
-        elif k == order:
-            factor = inverse
-        elif k % order == 2:
-            factor = 1.0 / inverse
-        store(w, len(EIGHT) * (_FACTOR + k), factor)
-
-
-@njit(error_model="numpy", forceinline=True)
 def _point(table, at, inner, w):  # type: ignore[no-untyped-def]
     """p and c at a point of the table into w; returns A, B and C."""
     none = spread(EIGHT, 0.0)
@@ -112,7 +88,7 @@ def potential(tile: Tile, family: Family, z: Array, w: Array, energy: Array, row
             inverse = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 0)
             ea = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 1)
             ei = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 2)
-            _gather(tile, vectors, family, number, lane, inverse, z, w)
+            gather(tile, DIMENSIONS, vectors, family, number, lane, inverse, z, w, _X, _FACTOR)
             stretched, bent = spread(EIGHT, 0.0), spread(EIGHT, 0.0)
             for g in range(family.plan[PLAN * number + 1]):
                 at = 2 * vectors * (family.plan[PLAN * number] + g)
@@ -149,12 +125,6 @@ def _hessian(viscous, same, a, b, c, pm, pn, cm, cn, axial, bending):  # type: i
 
 
 @njit(error_model="numpy", forceinline=True)
-def _scaled(order, k):  # type: ignore[no-untyped-def]
-    """The scaled vector that a nodal vector is a part of."""
-    return 0 if k % order == 0 else (k if k < order else k - 1)
-
-
-@njit(error_model="numpy", forceinline=True)
 def _blocks(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out: Array, first: int) -> None:
     """Sum over the points of (a_i, d_i) H (a_j, d_j), component by component (m, n) of the nodal vectors."""
     vectors, side, table = family.side // DIMENSIONS, family.side, family.table
@@ -168,7 +138,7 @@ def _blocks(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out: 
             if viscous:
                 eta = coefficient(tile, family, number, lane, beam.COEFFICIENTS, 3)
                 ea, ei = ea * eta, ei * eta
-            _gather(tile, vectors, family, number, lane, inverse, z, w)
+            gather(tile, DIMENSIONS, vectors, family, number, lane, inverse, z, w, _X, _FACTOR)
             for m in range(DIMENSIONS):
                 for n in range(m, DIMENSIONS):
                     same = 1.0 if m == n else 0.0
@@ -190,7 +160,7 @@ def _blocks(tile: Tile, viscous: bool, family: Family, z: Array, w: Array, out: 
                                 store(w, place, load(EIGHT, w, place) + more)
                     for one in range(vectors):
                         for other in range(vectors):
-                            place = _SUM + inner * _scaled(order, one) + _scaled(order, other)
+                            place = _SUM + inner * part_of(order, one) + part_of(order, other)
                             value = load(EIGHT, w, len(EIGHT) * place) * load(EIGHT, w, len(EIGHT) * (_FACTOR + one))
                             value = value * load(EIGHT, w, len(EIGHT) * (_FACTOR + other))
                             row, column = DIMENSIONS * one + m, DIMENSIONS * other + n
