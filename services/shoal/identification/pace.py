@@ -10,8 +10,7 @@ from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
 from shoal.identification.methods.least_squares import descend
 from shoal.identification.methods.outcome import Outcome
-from shoal.scene import Rod
-from shoal.selection.levels import FRAMED
+from shoal.scene import FRAMED, Rod
 from shoal.trajectory import Array
 
 _OF_NOISE = 0.1

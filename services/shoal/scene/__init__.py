@@ -1,6 +1,6 @@
 """What a user states: bodies, joints, loads, markers, initial state, gravity and solver settings, in SI units."""
 
-from shoal.scene.bodies import Body, Rod
+from shoal.scene.bodies import FRAMED, Body, Rod
 from shoal.scene.function import Function
 from shoal.scene.initial import InitialState
 from shoal.scene.joints import (
@@ -31,6 +31,7 @@ from shoal.scene.solids import ModalBody, PointMass, RigidBody
 from shoal.scene.solver import Solver
 
 __all__ = [
+    "FRAMED",
     "GROUND",
     "JOINT_KINDS",
     "LOAD_KINDS",

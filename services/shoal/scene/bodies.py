@@ -21,6 +21,8 @@ Law = Literal["plane-stress", "lame", "enhanced", "two-point"]
 End = Literal["pinned", "clamped", "free"]
 SectionName = Literal["rectangle", "round", "tube", "i-beam"]
 
+FRAMED = ("rigid", "modal")
+"""Elements of a rod that moves with a frame: no element limits its step, and no section of it has a strain."""
 _SHEARS = {
     "rigid": False,
     "ancf-cable": False,

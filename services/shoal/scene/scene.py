@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 from shoal.errors import InputError
 from shoal.scene import joints as joint_types
 from shoal.scene.amplitudes import check_amplitudes, check_place
-from shoal.scene.bodies import Body
+from shoal.scene.bodies import FRAMED, Body
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.ended import End
 from shoal.scene.expect import Expectation, ExpectedValue
@@ -112,7 +112,7 @@ class Scene(Record):
                 self._check_attachment(f"joints.{name}.{field}", side)
             if not isinstance(joint, joint_types.Coupling) and joint.first.body == joint.second.body:
                 body = self.bodies.get(joint.first.body)
-                if body is None or body.element in ("rigid", "modal"):
+                if body is None or body.element in FRAMED:
                     raise ValueError(
                         f"joints.{name}: joins {joint.first.body!r} to itself; a joint needs two bodies, or two places "
                         "of a flexible rod"

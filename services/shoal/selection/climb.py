@@ -10,9 +10,9 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics.simulate import STEP_MARGIN, stable_step
-from shoal.scene import Scene
+from shoal.scene import FRAMED, Scene
 from shoal.selection.beyond import torn
-from shoal.selection.levels import FRAMED, REFINEMENTS, SHEARS, Level, Levels, apply, coarsest, words
+from shoal.selection.levels import REFINEMENTS, SHEARS, Level, Levels, apply, coarsest, words
 from shoal.selection.run import Rung, distance, flexible_scene, run
 from shoal.selection.work import INTEGRATOR, Forecast
 from shoal.trajectory import Array

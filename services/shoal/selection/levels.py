@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.scene import Rod, Scene
+from shoal.scene import FRAMED, Rod, Scene
 from shoal.scene.dimensions import is_flat
 
 _SHORT = {"ancf-cable": "cable", "ancf-quintic": "quintic", "ancf-full": "full", "simo-reissner": "reissner"}
@@ -95,9 +95,6 @@ LADDERS = {
     "director-rod": (RIGID, *(Level("director-rod", n) for n in COUNTS)),
 }
 """From coarse to fine, by the element whose limit is the truth."""
-
-FRAMED = ("rigid", "modal")
-"""Levels of a rod that moves with a frame: no element limits their step, and no section has a strain."""
 
 FEWEST = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 """Numbers with which refinements may begin; all that follow by doubling are among COUNTS."""

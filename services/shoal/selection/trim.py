@@ -10,8 +10,9 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.mechanics.numerics.alike import FEW
 from shoal.mechanics.simulate import STEP_MARGIN
+from shoal.scene import FRAMED
 from shoal.selection.climb import PACE, TELL, Runs, Yardstick
-from shoal.selection.levels import FRAMED, LADDERS, Level, Levels, below
+from shoal.selection.levels import LADDERS, Level, Levels, below
 from shoal.selection.run import Rung, distance
 
 WITHIN = 0.9

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from shoal.mechanics.simulate import stable_step
-from shoal.scene import Rod, Scene
+from shoal.scene import FRAMED, Rod, Scene
 from shoal.selection.levels import SHEARS, Level, Levels, apply
 
 INTEGRATOR = "leapfrog"
@@ -91,4 +91,4 @@ def _rows(level: Level) -> int:
 
     Those of directors are part of WEIGHT.
     """
-    return 1 + level.modes if level.element in ("rigid", "modal") else 0
+    return 1 + level.modes if level.element in FRAMED else 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shoal.errors import InputError
 from shoal.identification.recording.source import ACCELERATIONS, IN_SPACE, RATES, STRAIN, Channel
-from shoal.scene import Rod, Scene
+from shoal.scene import FRAMED, Rod, Scene
 from shoal.scene.joints import DrivenAngle
 
 _BENT = ("curvature", "side_curvature", "twist")
@@ -59,7 +59,7 @@ def has_axes(scene: Scene, body: str) -> bool:
 
 def takes_gauges(scene: Scene, rod: Rod) -> bool:
     """Whether the strain of a rod is told: of straight ones of elements, in space of director rods."""
-    told = rod.element == "director-rod" if scene.dimensions == 3 else rod.element not in ("rigid", "modal")
+    told = rod.element == "director-rod" if scene.dimensions == 3 else rod.element not in FRAMED
     return told and not any(getattr(rod, field) for field in _BENT)
 
 

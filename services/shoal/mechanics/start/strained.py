@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from shoal.errors import InputError
 from shoal.mechanics.joints import Apart, Geared, Turned, of_scene
-from shoal.scene import Scene, Weld
+from shoal.scene import FRAMED, Scene, Weld
 
 
 def gives_way(scene: Scene) -> bool:
     """Whether a machine starts with elastic rods strained, so that their joints need not close without strain."""
-    elastic = any(body.element not in ("rigid", "modal") for body in scene.bodies.values())
+    elastic = any(body.element not in FRAMED for body in scene.bodies.values())
     return scene.initial_from is not None and elastic
 
 
