@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from shoal.errors import InputError
 
@@ -31,3 +34,28 @@ def read_estimate(path: Path, asked: str, part: str) -> dict[str, Any]:
     if not isinstance(data.get(part), dict) or not isinstance(data.get("left_out"), dict):
         raise InputError(f"{asked}: {path} holds no `{part}`, an older version wrote it; identify once more")
     return data
+
+
+def checked_joint(told: Mapping[str, Any], asked: str, source: Path | str) -> dict[str, Any]:
+    """The part `joint` of an estimate, or of its draws, with its numbers as numbers and the covariance as an array.
+
+    asked, source: what the file was named in, and the file, which begin every refusal. Raises InputError.
+    """
+    try:
+        known: dict[str, dict[str, Any]] = {
+            str(name): {
+                "path": None if one["path"] is None else str(one["path"]),
+                "value": float(one["value"]),
+                "logarithmic": bool(one["logarithmic"]),
+                "known": bool(one["known"]),
+            }
+            for name, one in told["parameters"].items()
+        }
+        covariance = np.array(told["covariance"], dtype=float).reshape(len(known), len(known))
+        if not np.isfinite(covariance).all() or not np.isfinite([one["value"] for one in known.values()]).all():
+            raise ValueError
+        ties = {str(at): str(text) for at, text in told["ties"].items()}
+        constants = {str(name): float(x) for name, x in told["constants"].items()}
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise InputError(f"{asked}: {source}: its `joint` does not hold finite values and their covariance") from None
+    return {"parameters": known, "covariance": covariance, "ties": ties, "constants": constants}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shoal.errors import InputError
-from shoal.estimated import read_estimate
+from shoal.estimated import checked_joint, read_estimate
 from shoal.scene import expression
 
 if TYPE_CHECKING:
@@ -27,12 +27,14 @@ class Carried:
     """What an estimate found, for use elsewhere.
 
     values: by path in the scene, ties evaluated; parameters: by name; left: what is not carried, and why
+    uncertainties: by how much fields are off together, a standard deviation along each direction of what is left open
     source: where it comes from; trusted: whether its verdict is an answer
     """
 
     values: Mapping[str, float]
     parameters: Mapping[str, float] = field(default_factory=dict)
     left: Mapping[str, str] = field(default_factory=dict)
+    uncertainties: tuple[Mapping[str, float], ...] = ()
     source: str = "values"
     trusted: bool = True
 
@@ -59,7 +61,8 @@ class Carried:
     ) -> tuple[Problem, dict[str, Any], list[str]]:
         """A problem that starts from them, the fields of its scene to set, `values` among them, and notes.
 
-        What the problem seeks becomes its start, within its bounds; what it ties it computes. Raises InputError.
+        What the problem seeks becomes its start, within its bounds; what it ties it computes. What is set is known as
+        well as it was found, unless the problem says how well. Raises InputError.
         """
         sought, started, notes = dict(problem.parameters), [], self.notes()
         for name, parameter in problem.parameters.items():
@@ -79,12 +82,42 @@ class Carried:
         self_named.set_in(problem.load_scene())
         if started:
             notes.append(f"{self.source}: the search starts from {', '.join(started)}")
+        changed = problem.model_copy(update={"parameters": sought})
         if fixed:
-            listed = ", ".join(f"{path} = {number:.6g}" for path, number in fixed.items())
+            there = {path for path in fixed if path not in problem.uncertain}
+            together = [{p: x for p, x in entry.items() if p in there and x} for entry in self.uncertainties]
+            all_ = (*problem.uncertainties, *(entry for entry in together if entry))
+            changed = changed.model_copy(update={"uncertainties": all_})
+            sizes = changed.uncertain
+            listed = ", ".join(
+                f"{path} = {number:.6g}" + (f" +- {sizes[path]:.2g}" if path in sizes else "")
+                for path, number in fixed.items()
+            )
             notes.append(f"{self.source}: taken as known: {listed}")
         if not started and not fixed and self.values:
             notes.append(f"{self.source}: nothing of it is used")
-        return problem.model_copy(update={"parameters": sought}), {**fixed, **(values or {})}, notes
+        return changed, {**fixed, **(values or {})}, notes
+
+
+def _uncertainties(joint: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
+    """Of a joint distribution, see `joint`: what the fields of a scene change along its independent directions."""
+    known, covariance = joint["parameters"], joint["covariance"]
+    size = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    whole = np.where(size > 0.0, size, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(whole, whole))
+    moves = (size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))).T
+
+    def fields(move: Array) -> dict[str, float]:
+        numbers = {
+            name: one["value"] * float(np.exp(d / one["value"])) if one["logarithmic"] else one["value"] + float(d)
+            for (name, one), d in zip(known.items(), move, strict=True)
+        }
+        named = numbers | joint["constants"]
+        tied = {path: float(expression.evaluate(text, named)) for path, text in joint["ties"].items()}
+        return {one["path"]: numbers[name] for name, one in known.items() if one["path"]} | tied
+
+    sides = [(fields(move), fields(-move)) for move in moves]
+    return tuple({path: (up[path] - down[path]) / 2 for path in up} for up, down in sides)
 
 
 def fitted(parameters: Parametrization, point: Array) -> tuple[dict[str, float], dict[str, str]]:
@@ -144,7 +177,12 @@ def of_estimate(estimate: Estimate) -> Carried:
     """What an estimate carries."""
     known = {name: value.value for name, value in estimate.parameters.items()}
     return Carried(
-        estimate.values, known, estimate.left_out, f"estimate of {estimate.problem}", estimate.verdict.trusted
+        estimate.values,
+        known,
+        estimate.left_out,
+        _uncertainties(checked_joint(estimate.joint, "values", estimate.problem)),
+        f"estimate of {estimate.problem}",
+        estimate.verdict.trusted,
     )
 
 
@@ -168,7 +206,8 @@ def read_values(path: Path | str) -> Carried:
     }
     numbers = {str(name): float(number) for name, number in values.items()}
     reasons = {str(name): str(why) for name, why in left.items()}
-    return Carried(numbers, known, reasons, path.name, data.get("status") == "ok")
+    uncertainties = _uncertainties(checked_joint(data["joint"], "values", path)) if "joint" in data else ()
+    return Carried(numbers, known, reasons, uncertainties, path.name, data.get("status") == "ok")
 
 
 def _is_number(value: Any) -> bool:

@@ -95,7 +95,7 @@ def conclude(
         judgement.message or outcome.message,
         *(_of_laws(model, near, known.laws, values) if fits else []),
         *remarks(values, known.profiled, known.bent(model), near.tests, near.mesh if limits else None, near.theory),
-        near.signals.sentence(near.at, model.names),
+        *(one.sentence(near.at, model.names) for one in near.given),
         *([undrawn] if drawn is None else [drawn.sentence(), *news(drawn, values)]),
         "the draws are about the first of them alone" * (drawn is not None and judgement.verdict is Verdict.AMBIGUOUS),
         *(one.sentence(named=len(measurement.recordings) > 1) for one in foretold),

@@ -10,9 +10,11 @@ from shoal.identification.deadline import unless_late
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.spread.covariance import Block, blocks_of
+from shoal.identification.spread.given import Given
 from shoal.identification.spread.model_error import Corrections, ModelError, model_error, rms_of
 from shoal.identification.spread.sensitivity import Sensitivity, believed
-from shoal.identification.spread.signal_noise import NONE, SignalNoise, signal_noise
+from shoal.identification.spread.signal_noise import signal_noise
+from shoal.identification.spread.uncertain_fields import uncertain_fields
 from shoal.identification.spread.uncertainty import Linearisation, linearise
 from shoal.trajectory import Array
 
@@ -29,7 +31,7 @@ class Evidence:
     blocks: the series of the residuals
     at: the linearisation, with what the model, not the noise, leaves
     error: of the model itself; mesh, theory: sizes of its parts, root mean squares
-    signals: what the noise of measured signals does
+    given: what is taken as known and is not quite: noise of measured signals, fields of the scene
     """
 
     point: Array
@@ -44,7 +46,7 @@ class Evidence:
     mesh: float | None
     theory: float | None
     tests: ResidualTests
-    signals: SignalNoise
+    given: list[Given]
 
     @property
     def known(self) -> bool:
@@ -68,20 +70,29 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
         seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
     blocks = blocks_of(model, len(seen.residual))
     at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks, seen.error)
-    error, signals = ModelError(None, None), NONE
+    error, given = ModelError(None, None), list[Given]()
     if possible and looked is not None:
         error = unless_late(lambda: model_error(model, point, predicted, seen.residual), error)
-        signals = unless_late(lambda: signal_noise(model, point, predicted, seen.residual), signals)
+        found = unless_late(lambda: _given(model, point, predicted, seen.residual), None)
+        given, looked = found or [], None if found is None else looked
     parts = (_size(model, error.mesh), _size(model, error.theory))
-    driven = signals.left(seen.jacobian, at.pseudo_inverse)
-    limit = float(np.linalg.norm([parts[0] or 0.0, parts[1] or 0.0, driven]))
+    unshown = [one.left(seen.jacobian, at.pseudo_inverse) for one in given]
+    limit = float(np.linalg.norm([parts[0] or 0.0, parts[1] or 0.0, *unshown]))
     refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
     tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined)
     told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
-    at = signals.spread(replace(at, systematic=tests.excess * told))
+    at = replace(at, systematic=tests.excess * told)
+    for one in given:
+        at = one.spread(at)
     return Evidence(
-        point, predicted, residual, seen, looked is not None, possible, blocks, at, error, *parts, tests, signals
+        point, predicted, residual, seen, looked is not None, possible, blocks, at, error, *parts, tests, given
     )
+
+
+def _given(model: ForwardModel, point: Array, predicted: dict[str, Array], residual: Array) -> list[Given]:
+    """What is taken as known and is not quite, where there is any. Raises TimeIsUp."""
+    both = signal_noise(model, point, predicted, residual), uncertain_fields(model, point, predicted)
+    return [one for one in both if one is not None]
 
 
 def _size(model: ForwardModel, rows: Array | None) -> float | None:

@@ -10,7 +10,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from shoal.errors import InputError
 from shoal.identification.bounds import accepts, possible_bound
@@ -110,6 +110,11 @@ class Parameter(Record):
         return (self.path or "").startswith(RESERVED + ".")
 
 
+def _apart(given: Any) -> Any:
+    """Uncertainties that are stated field by field, as many that are independent of each other."""
+    return [{path: size} for path, size in given.items()] if isinstance(given, Mapping) else given
+
+
 class Problem(Record):
     """What to identify. `values` replace fields of the scene; `noise` is the standard deviation of a channel.
 
@@ -117,6 +122,8 @@ class Problem(Record):
     ties: path -> expression in parameters and constants, for fields that depend on parameters
     constants: name -> field of the scene, for use in `ties` and `quantities`
     quantities: expressions in parameters and constants that the answer reports with their uncertainty
+    uncertainties: standard deviations of fields of the scene that are taken as known, in SI units; as a list, each
+        entry tells by how much fields are off together, and the entries are independent of each other
     loss: how a deviation counts; all but `squares` let outliers weigh less
     """
 
@@ -133,6 +140,7 @@ class Problem(Record):
     loss: Literal["squares", "huber", "soft-l1", "cauchy"] = "squares"
     constants: dict[str, str] = {}
     quantities: dict[str, str] = {}
+    uncertainties: Annotated[tuple[dict[str, float], ...], BeforeValidator(_apart)] = ()
     method: str = "auto"
 
     @model_validator(mode="after")
@@ -151,6 +159,9 @@ class Problem(Record):
         for name, path in self.constants.items():
             if path in fitted:
                 raise ValueError(f"constants.{name}: {path} is not constant; it is sought or tied")
+        for path in self.uncertain:
+            if path in fitted:
+                raise ValueError(f"uncertainties: {path} is sought or tied, not known")
         used = {name for text in self.ties.values() for name in expression.names(text)}
         for name, parameter in self.parameters.items():
             if parameter.path is None and name not in used:
@@ -183,6 +194,12 @@ class Problem(Record):
         return self
 
     @property
+    def uncertain(self) -> dict[str, float]:
+        """Fields of the scene that are taken as known, and the standard deviation of each, in SI units."""
+        paths = {path: None for entry in self.uncertainties for path in entry}
+        return {path: math.hypot(*(entry.get(path, 0.0) for entry in self.uncertainties)) for path in paths}
+
+    @property
     def sources(self) -> dict[str, EngineSource | FileSource]:
         """Where the data come from, by the name of the recording."""
         return self.recordings or ({"recording": self.source} if self.source is not None else {})
@@ -202,10 +219,24 @@ class Problem(Record):
                 scene.value(path)
             except InputError as error:
                 raise InputError(f"{self.name}: ties or constants: {error}") from None
+        self._check_uncertain(scene)
         for source in self.sources.values():
             if channels := self.channels_of(source):
                 self.check_channels(channels, scene, self.name)
         return scene
+
+    def _check_uncertain(self, scene: Scene) -> None:
+        """Whether what is uncertain are numbers of the scene. Raises InputError."""
+        for path, size in self.uncertain.items():
+            where = f"{self.name}: uncertainties"
+            try:
+                value = scene.value(path)
+            except InputError as error:
+                raise InputError(f"{where}: {error}") from None
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise InputError(f"{where}: {path} is {str(value)[:40]!r}, no number that could be off")
+            if not size > 0.0:
+                raise InputError(f"{where}: {path}: needs a standard deviation above 0, found {size:g}")
 
     def _check_gears(self, scene: Scene) -> None:
         """Refuse a gear's ratio that is sought, or tied to what is. Raises InputError."""

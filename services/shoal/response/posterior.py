@@ -17,7 +17,7 @@ import numpy as np
 from scipy import special, stats
 
 from shoal.errors import InputError
-from shoal.estimated import read_estimate
+from shoal.estimated import checked_joint, read_estimate
 from shoal.response.inputs import Joint, Parameter
 from shoal.response.marginals import Frozen, Marginal, Normal
 from shoal.scene import Scene
@@ -73,7 +73,7 @@ def _estimate(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
         raise InputError(
             f"vary: {path}: its verdict is {data['verdict']!r}: the spread of its values cannot be trusted"
         )
-    return _checked(data["joint"], path), data["left_out"]
+    return checked_joint(data["joint"], "vary", path), data["left_out"]
 
 
 def _draws(path: Path) -> tuple[dict[str, Any], dict[str, str], dict[str, Array]]:
@@ -99,29 +99,7 @@ def _draws(path: Path) -> tuple[dict[str, Any], dict[str, str], dict[str, Array]
     if draws and count < LEAST:
         raise InputError(f"vary: {path}: needs at least {LEAST} draws, found {count}")
     step = -(-count // DRAWS)
-    return _checked(told, path), left, {name: of[::step] for name, of in draws.items()}
-
-
-def _checked(told: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """Raises InputError."""
-    try:
-        known: dict[str, dict[str, Any]] = {
-            str(name): {
-                "path": None if one["path"] is None else str(one["path"]),
-                "value": float(one["value"]),
-                "logarithmic": bool(one["logarithmic"]),
-                "known": bool(one["known"]),
-            }
-            for name, one in told["parameters"].items()
-        }
-        covariance = np.array(told["covariance"], dtype=float).reshape(len(known), len(known))
-        if not np.isfinite(covariance).all() or not np.isfinite([one["value"] for one in known.values()]).all():
-            raise ValueError
-        ties = {str(at): str(text) for at, text in told["ties"].items()}
-        constants = {str(name): float(x) for name, x in told["constants"].items()}
-    except (KeyError, TypeError, ValueError, AttributeError):
-        raise InputError(f"vary: {path}: its `joint` does not hold finite values and their covariance") from None
-    return {"parameters": known, "covariance": covariance, "ties": ties, "constants": constants}
+    return checked_joint(told, "vary", path), left, {name: of[::step] for name, of in draws.items()}
 
 
 def _normal(told: Mapping[str, Any], source: str) -> tuple[list[Marginal], Array]:

@@ -115,4 +115,4 @@ def test_a_drive_without_noise_costs_nothing(tmp_path: Path) -> None:
     nothing = Measurement.single(TIMES, tuple(problem.channels), np.zeros((len(TIMES), 1)), "nothing", noise=1.0)
     near = evidence(ForwardModel(problem, scene, get_engine("gauss"), nothing), np.log([INERTIA]))
     assert len(near.at.parts) == len(near.blocks)
-    assert len(near.signals.moved) == 0
+    assert near.given == []

@@ -1,0 +1,113 @@
+"""What is taken as known with a standard deviation is in the intervals of what is sought."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from shoal.errors import InputError
+from shoal.identification import Problem, identify
+from shoal.identification.carried import of_estimate, read_values
+
+MASS, OTHER, STIFFNESS, NOISE = 2.0, 30.0, 50.0, 1e-5
+SPEED_SQUARED = (OTHER + STIFFNESS) / MASS
+TIMES = np.linspace(0.02, 2.0, 100)
+
+
+def oscillator(folder: Path, uncertainties: Any = ()) -> Problem:
+    """A mass between two springs of no length, at rest 0.1 m aside; the stiffness of the second one is sought."""
+    places = 0.1 * np.cos(np.sqrt(SPEED_SQUARED) * TIMES)
+    places = places + NOISE * np.random.default_rng(1).standard_normal(len(places))
+    np.savetxt(folder / "run.csv", np.column_stack([TIMES, places]), delimiter=",", header="t,x", comments="")
+    spring = {
+        "kind": "spring",
+        "first": {"body": "ground", "point": [0.0, 0.0]},
+        "second": {"body": "m"},
+        "length": 0.0,
+    }
+    scene = {
+        "name": "oscillator",
+        "gravity": [0.0, 0.0],
+        "bodies": {"m": {"kind": "point-mass", "mass": MASS}},
+        "joints": {
+            "way": {"kind": "slider", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "m"}}
+        },
+        "loads": {"known": {**spring, "stiffness": OTHER}, "sought": {**spring, "stiffness": STIFFNESS}},
+        "initial": {"m": {"position": [0.1, 0.0]}},
+        "markers": {"m": {"body": "m"}},
+        "solver": {"duration": 2.0},
+    }
+    (folder / "oscillator.yaml").write_text(yaml.safe_dump(scene))
+    return Problem.parse(
+        {
+            "name": "oscillator",
+            "scene": str(folder / "oscillator.yaml"),
+            "parameters": {"k": {"path": "loads.sought.stiffness", "lower": 5.0, "upper": 500.0, "start": 40.0}},
+            "channels": [{"marker": "m", "quantity": "x", "column": "x", "noise": NOISE}],
+            "source": {"kind": "file", "path": str(folder / "run.csv"), "start": 0.0},
+            "uncertainties": uncertainties,
+            "method": "least-squares",
+        },
+        "oscillator",
+    )
+
+
+@pytest.mark.parametrize(
+    ("uncertainties", "expected"),
+    [
+        # k = omega^2 m - k_known to first order, and omega is what the recording tells.
+        ({"bodies.m.mass": 0.1}, SPEED_SQUARED * 0.1),
+        ({"bodies.m.mass": 0.02}, SPEED_SQUARED * 0.02),
+        ({"bodies.m.mass": 0.02, "loads.known.stiffness": 0.5}, np.hypot(SPEED_SQUARED * 0.02, 0.5)),
+        ([{"bodies.m.mass": 0.02, "loads.known.stiffness": -0.5}], SPEED_SQUARED * 0.02 + 0.5),
+        ([{"bodies.m.mass": 0.02, "loads.known.stiffness": SPEED_SQUARED * 0.02}], 0.0),
+    ],
+)
+def test_a_stiffness_is_known_as_well_as_the_mass_and_the_other_spring(
+    uncertainties: Any, expected: float, tmp_path: Path
+) -> None:
+    found = identify(oscillator(tmp_path, uncertainties))
+    alone = identify(oscillator(tmp_path)).parameters["k"].std
+    known = found.parameters["k"]
+    assert found.verdict.trusted
+    assert known.std == pytest.approx(np.hypot(expected, alone), rel=2e-3)
+    assert known.upper - known.lower == pytest.approx(2 * 1.96 * known.std, rel=0.05)
+    assert ("what is uncertain of bodies.m.mass (" in found.message) == (expected > 0.0)
+
+
+def test_what_an_estimate_leaves_open_goes_on_into_what_is_sought_beside_it(tmp_path: Path) -> None:
+    """Two machines share the spring; of the second the mass is sought: m = (k_known + k)/omega^2."""
+    first = identify(oscillator(tmp_path, {"bodies.m.mass": 0.02}))
+    later = oscillator(tmp_path).model_dump(mode="json")
+    later |= {"name": "later", "parameters": {"m": {"path": "bodies.m.mass", "lower": 0.2, "upper": 20.0}}}
+    later["uncertainties"] = []
+    second = Problem.parse(later, "later")
+    expected = first.parameters["k"].std / SPEED_SQUARED
+    found = identify(second, fitted=of_estimate(first))
+    assert found.parameters["m"].std == pytest.approx(expected, rel=5e-3)
+    assert "taken as known: loads.sought.stiffness = 50" in " ".join(found.notes)
+    assert "+- 0.8" in " ".join(found.notes)
+    (tmp_path / "first.json").write_text(json.dumps(first.to_json()))
+    again = identify(second, fitted=read_values(tmp_path / "first.json"))
+    assert again.parameters["m"].std == pytest.approx(found.parameters["m"].std, rel=1e-9)
+    stated = Problem.parse(later | {"uncertainties": {"loads.sought.stiffness": 0.1}}, "later")
+    closer = identify(stated, fitted=of_estimate(first))
+    assert closer.parameters["m"].std == pytest.approx(0.1 / SPEED_SQUARED, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("uncertainties", "words"),
+    [
+        ({"loads.sought.stiffness": 1.0}, "loads.sought.stiffness is sought or tied, not known"),
+        ({"bodies.m.weight": 1.0}, "bodies.m.weight"),
+        ({"bodies.m.mass": 0.0}, "bodies.m.mass: needs a standard deviation above 0, found 0"),
+        ({"bodies.m.kind": 1.0}, "bodies.m.kind is 'point-mass', no number that could be off"),
+        ({"bodies.m.mass": True}, "uncertainties"),
+        ({"bodies.m.mass": "much"}, "uncertainties"),
+    ],
+)
+def test_uncertainties_that_cannot_be_are_refused_by_name(uncertainties: Any, words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=words):
+        oscillator(tmp_path, uncertainties).load_scene()
