@@ -10,6 +10,7 @@ from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.fits import Together, groups_of
 from shoal.identification.judge.suspects.of_measurement import of_measurement
 from shoal.identification.judge.suspects.shaken import shaken
+from shoal.identification.judge.suspects.size import size_of
 from shoal.identification.methods.least_squares import descend, differentiate, least_squares
 from shoal.identification.recording.observation import observe
 from shoal.scene import Scene
@@ -130,3 +131,21 @@ def test_runs_of_different_clocks_are_those_of_each() -> None:
     points = np.array([[-0.9, np.log(value)] for value in (1.0, 1.04, 0.97, 1.9, 1.0)])
     one_by_one = np.concatenate([free.uncounted(point[None]) for point in points])
     assert np.max(np.abs(free.uncounted(points) - one_by_one)) < 1e-8
+
+
+def test_a_point_that_slides_reaches_as_far_as_it_starts() -> None:
+    """Nothing of it has a length, by which a recording in millimetres was compared with it: a division by zero."""
+    ground, point = {"body": "ground", "point": [0.0, 0.0]}, {"body": "m"}
+    scene = Scene.parse(
+        {
+            "name": "oscillator",
+            "gravity": [0.0, 0.0],
+            "bodies": {"m": {"kind": "point-mass", "mass": 2.0}},
+            "joints": {"way": {"kind": "slider", "first": ground, "second": point}},
+            "loads": {"k": {"kind": "spring", "first": ground, "second": point, "stiffness": 80.0, "length": 0.0}},
+            "initial": {"m": {"position": [0.1, 0.0]}},
+            "markers": {"m": {"body": "m"}},
+        },
+        "oscillator",
+    )
+    assert size_of(scene).reach == pytest.approx(0.1)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shoal.mechanics.reach import span
 from shoal.scene import Scene
 from shoal.scene.joints import places
 
@@ -38,4 +39,6 @@ def size_of(scene: Scene) -> Size:
     ]
     mass = sum(float(body.mass) for body in scene.bodies.values())
     gravity = float(np.linalg.norm(scene.gravity)) or _EARTH
-    return Size(mass, max([*lengths, 1e-3]), sum(lengths) + max(ground, default=0.0), gravity)
+    # A point on a slider has no extent; how far its start or its spring is tells how far it goes.
+    reach = sum(lengths) + max(ground, default=0.0) or span(scene)
+    return Size(mass, max([*lengths, 1e-3]), reach, gravity)
