@@ -45,7 +45,7 @@ class Trajectory:
     energy_drift: largest |E(t) + dissipated - E(0)| relative to the largest kinetic energy plus
         the size of the elastic one, (lanes,)
     constraint_drift: largest violation of a position constraint, relative to the machine's size, (lanes,)
-    steps: time steps taken by each lane; wall_s: wall-clock time of the whole call [s]
+    steps: time steps taken by each lane; wall_s: wall-clock time of the whole call [s], less that of compiling kernels
     model: what was computed, for the record (unknowns, elements, integrator, step, ...)
     velocities: of the markers [m/s], (samples, markers, d, lanes); rates: of the angles [rad/s],
         (samples, markers, lanes); None where the engine does not tell them

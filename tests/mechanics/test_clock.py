@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from numba import njit
 from shoal.identification.deadline import Deadline
-from shoal.mechanics import clock, compilation
+from shoal.mechanics import clock, compilation, warm
 
 
 @pytest.fixture
@@ -72,3 +73,23 @@ def test_numba_stops_it() -> None:
         assert doubled(2.0) == 4.0
         assert doubled(3.0) == 6.0
     assert heard == [True, False]
+
+
+def test_it_stands_still_while_other_processes_compile(at: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a command says a search took is not the minute in which its kernels were compiled."""
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, workers: int, _context: object) -> None:
+            super().__init__(workers)
+
+    def compiles(kernel: warm.Kernel) -> str:
+        at[0] += 40.0
+        return kernel.name
+
+    monkeypatch.setattr(warm, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(warm, "_compile", compiles)
+    monkeypatch.setattr(warm.Kernel, "cached", False)
+    begin, said = clock.now(), list[str]()
+    warm.ahead([warm.Kernel("loop", ())], said.append)
+    assert clock.now() == begin
+    assert "loop (1 of 1" in said[1]

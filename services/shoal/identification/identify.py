@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import time
 from collections.abc import Callable, Mapping
 from contextlib import closing, nullcontext
 from dataclasses import replace
@@ -30,6 +29,7 @@ from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.plausible import check_constant
 from shoal.identification.recording.source import EngineSource
 from shoal.identification.spread.posterior import require_sampler
+from shoal.mechanics import clock
 from shoal.memory import Memory
 from shoal.versions import versions
 
@@ -96,9 +96,9 @@ def identify(
     if checkpoint is not None:
         model.memory = Memory(checkpoint, _fingerprint(model, name, seed, tolerance))
     with nullcontext() if model.memory is None else closing(model.memory):
-        begin = time.perf_counter()
+        begin = clock.now()
         model, outcome, stages = _search(model, search, np.random.default_rng(seed), tolerance, paces, progress)
-        wall = time.perf_counter() - begin
+        wall = clock.now() - begin
         estimate = conclude(model, outcome, name, seed, wall, stages, wishes)
         return replace(estimate, notes=[*notes, *estimate.notes])
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import UnstableStepError
-from shoal.mechanics import plane
+from shoal.mechanics import clock, plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
 from shoal.mechanics.assembly.space import start as spatial
@@ -82,7 +81,7 @@ class Machine:
 
         For threads and seek see `simulate`. Raises UnstableStepError if the step is beyond the stability limit.
         """
-        begin = time.perf_counter() if begin is None else begin
+        begin = clock.now() if begin is None else begin
         end = float(times[-1])
         if end > 0:
             check_step(self.scene, self.choice)
@@ -145,7 +144,7 @@ class Machine:
             energy_drift=numbers[ENERGY_DRIFT],
             constraint_drift=numbers[CONSTRAINT_DRIFT],
             steps=int(largest[STEPS]),
-            wall_s=time.perf_counter() - begin,
+            wall_s=clock.now() - begin,
             message=message,
             model=facts,
             end=ended,

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
 import numpy as np
 
-from shoal.mechanics import notes
+from shoal.mechanics import clock, notes
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import Work
 from shoal.mechanics.gates import Seek
@@ -51,7 +50,7 @@ def simulate(
     whole: whether the trajectory tells its states.
     Raises InputError if the scene cannot be modelled or its step is beyond the stability limit.
     """
-    begin, end = time.perf_counter(), float(times[-1])
+    begin, end = clock.now(), float(times[-1])
     if not values:
         return machine(scene, end).run(times, threads=threads, seek=seek, begin=begin, whole=whole)
     lanes = len(next(iter(values.values())))

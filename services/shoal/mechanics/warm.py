@@ -19,7 +19,7 @@ import numpy as np
 from numba import config
 
 from shoal.errors import ShoalError
-from shoal.mechanics import gates
+from shoal.mechanics import clock, gates
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.compilation import SECONDS, described
 from shoal.mechanics.dynamics import work_space
@@ -113,7 +113,7 @@ def ahead(wanted: Iterable[Kernel], note: Note) -> None:
     cores = f"{workers} cores" if workers > 1 else "one core"
     note(f"compiling {len(missing)} kernels for this machine, once: about {wait:.0f} s on {cores}")
     try:
-        with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+        with clock.stopped(), ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
             for number, done in enumerate(as_completed([pool.submit(_compile, one) for one in missing]), 1):
                 note(f"  {done.result()} ({number} of {len(missing)}, {time.perf_counter() - begin:.0f} s so far)")
     except (OSError, NotImplementedError, BrokenProcessPool) as error:

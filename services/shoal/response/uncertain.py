@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -105,7 +104,7 @@ def uncertain(
     same study goes on; time_limit [s]: after which, compiling aside, it ends with what is known; progress: is told how
     many runs there are. Raises InputError, ComputationError.
     """
-    begin = time.perf_counter()
+    begin = clock.now()
     end = None if time_limit is None else clock.now() + time_limit
     wanted = load_scene(scene) if isinstance(scene, str) else scene
     wanted = wanted.with_values(values) if values else wanted
@@ -194,7 +193,7 @@ def uncertain(
         repeated=answer.runs.repeated,
         failed=answer.runs.failed,
         seed=seed,
-        wall_s=time.perf_counter() - begin,
+        wall_s=clock.now() - begin,
         horizon=min(answer.horizon, float(when[-1])),
         bounds=bounds,
         statistics=statistics,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -13,6 +12,7 @@ from shoal.engines.contract import sampling_times
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import left_out, softer
 from shoal.errors import ComputationError, InputError
+from shoal.mechanics import clock
 from shoal.scene import Rod, Scene
 from shoal.selection.beyond import folded
 from shoal.selection.climb import PATIENCE, YARDSTICK, Progress, Runs, climb, settled
@@ -116,7 +116,7 @@ def select(
         raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
     if not patience > 0:
         raise InputError(f"patience: needs a time above 0 s, found {patience:g}")
-    begin = time.perf_counter()
+    begin = clock.now()
     asked = sampling_times(scene, times)
     scene = scene.with_values({"solver.duration": float(asked[-1])}) if asked[-1] > 0 else scene
     limits, closed, counts = _open(scene)
@@ -131,7 +131,7 @@ def select(
     elif may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
         stout = {rod: SHEARS if limit == SLENDER else limit for rod, limit in limits.items()}
         found = _of_both(found, _of_theory(task, stout))
-    return replace(found, wall_s=time.perf_counter() - begin)
+    return replace(found, wall_s=clock.now() - begin)
 
 
 class _Task(NamedTuple):

@@ -25,6 +25,8 @@ from shoal.trajectory import Array
 
 _FAR = 2.0
 """Times the interval: a friction that may be so much farther off with another law beside it is told."""
+_ALIKE = 1e-3
+"""Of a friction: nobody who knows it so well asks for more."""
 
 
 @dataclass(frozen=True)
@@ -75,11 +77,12 @@ def sentences(laws: list[OtherLaw], values: dict[str, Value], there: Callable[[O
     wide: dict[tuple[str, str], dict[str, Value]] = {}
     for law in laws:
         known, other = values[law.sought], there(law)
-        if known.identifiable and abs(other.value - known.value) > _FAR * (known.upper - known.lower) / 2:
+        least = max(_FAR * (known.upper - known.lower) / 2, _ALIKE * abs(known.value))
+        if known.identifiable and abs(other.value - known.value) > least:
             wide.setdefault((law.sought, law.joint), {})[RESISTING[law.field]] = other
     return [
         f"should {joint} have {' or '.join(others)} as well, which may not show here, {sought} is only known to be "
-        "from {:.3g} to {:.3g}".format(*_whole([values[sought], *others.values()]))
+        "from {:.4g} to {:.4g}".format(*_whole([values[sought], *others.values()]))
         for (sought, joint), others in wide.items()
     ]
 

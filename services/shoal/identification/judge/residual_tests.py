@@ -26,6 +26,8 @@ _NO_FIT = 0.05
 """Of the signal: a systematic residual above this is a wrong model, one below it an imperfect one."""
 _HARDLY = 0.3
 """Of the signal: a residual above this that is not white is none of a right model, whatever the noise may be."""
+_ROUND_OFF = 1e-9
+"""Of the signal: digits of a table, and no noise."""
 _MOSTLY = 0.5
 """Of the signal: a residual above this may be noise, but nobody said so."""
 _OUTLIER = 5.0
@@ -45,7 +47,8 @@ class ResidualTests:
     mesh: the model's own error, 0 if unknown; chance_of_size: that noise of this size and correlation leaves such a
     residual (chi-square); chance_of_white: that white noise is so correlated (Ljung and Box 1978), by the worst channel
     excess: size of what is systematic in it, 0 where the residual is white
-    refined: size of the residual that a finer mesh and theory would leave
+    refined: size of the residual that a finer mesh and theory would leave; chance_of_white is of that one, and
+    chance_as_it_is of the residual itself
     outliers: beyond five robust standard deviations of their channel; rows: how many there are
     unit: of the sizes; empty where channels of different units are taken together, whose sizes mean something only
     against each other
@@ -63,6 +66,7 @@ class ResidualTests:
     unit: str = ""
     excess: float = 0.0
     refined: float = np.inf
+    chance_as_it_is: float = 1.0
 
     @property
     def explained(self) -> float:
@@ -124,9 +128,18 @@ class ResidualTests:
         found = [f"size: {size}{against}"]
         if self.signal > 0:
             found[0] += f", {_digits(100 * self.size / self.signal, 1)} % of the spread of the data"
-        found.append("correlation: none, like white noise" if self.white else "correlation: not white noise")
+        found.append(f"correlation: {self._correlation()}")
         found.append(f"outliers: {self.outliers} of {self.rows} samples" if self.outliers else "outliers: none")
         return found
+
+    def _correlation(self) -> str:
+        if self.size < _ROUND_OFF * self.signal:
+            return "that of round-off"
+        if not self.white:
+            return "not white noise"
+        if self.chance_as_it_is > _DOUBT:
+            return "none, like white noise"
+        return "that of the model's own error, without which it is like white noise"
 
     def to_json(self) -> dict[str, Any]:
         """All fields, and what follows from them."""
@@ -161,8 +174,7 @@ def residual_tests(
     independent = sum(len(b.rows) * (1.0 - n.rho**2) / (1.0 + n.rho**2) for b, n in measured) - len(model.names)
     freedom = max(1.0, independent)
     beyond = min(size, smaller) / max(float(np.hypot(seen, mesh)), 1e-300)
-    whiteness = [ljung_box(left[block.rows]) for block, _ in measured]
-    white = min(1.0, min(whiteness) * len(whiteness))
+    white, as_it_is = (_chance_of_white(rows_, [b for b, _ in measured]) for rows_ in (left, counted * residual))
     return ResidualTests(
         size=size,
         noise=seen,
@@ -177,7 +189,14 @@ def residual_tests(
         unit=of_channels(model.measurement),
         excess=0.0 if white > _DOUBT else _excess([left[block.rows] for block, _ in measured], seen, mesh),
         refined=smaller,
+        chance_as_it_is=as_it_is,
     )
+
+
+def _chance_of_white(residual: Array, blocks: list[Block]) -> float:
+    """By the worst channel of a residual (rows,), as there are so many (Bonferroni)."""
+    chances = [ljung_box(residual[block.rows]) for block in blocks]
+    return min(1.0, min(chances) * len(chances))
 
 
 def _excess(residuals: list[Array], noise: float, mesh: float) -> float:

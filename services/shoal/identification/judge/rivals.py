@@ -42,7 +42,8 @@ def valley(model: ForwardModel, outcome: Outcome, at: Linearisation) -> tuple[Ou
     """The outcome without those minima that lie in its own valley, and these, (parameters,) each. Raises TimeIsUp."""
     limit = as_good(model, outcome, at)
     same = [point for point in rivals_of(model, outcome, at) if connected(model, outcome.point, point, limit)]
-    minima = [end for end in outcome.minima if all(apart(model, end[0], point) for point in same)]
+    here = [outcome.point, *same]
+    minima = [end for end in outcome.minima if all(apart(model, end[0], point) for point in here)]
     return replace(outcome, minima=minima), same
 
 

@@ -8,7 +8,6 @@ begin; elsewhere a beginning of the chains does.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -24,6 +23,7 @@ from shoal.identification.spread.density import Density, density
 from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.identification.spread.value import Value
 from shoal.identification.spread.walkers import ENSEMBLES, Independent, possible, sampler, weights
+from shoal.mechanics import clock
 from shoal.trajectory import Array, plain
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def posterior(
     require_sampler()
     from emcee.state import State
 
-    begin = time.perf_counter()
+    begin = clock.now()
     target = density(model, point, at, blocks, least)
     walkers = ENSEMBLES * max(WALKERS, 2 * (len(point) + 1))
     rng = np.random.RandomState(np.random.MT19937(seed))
@@ -195,7 +195,7 @@ def posterior(
     try:
         while found is None or not (found.converged or len(found.flat) >= _MOST):
             end = chains.run_mcmc(end, more)
-            found = _told(model, target, chains, wanted, seed, time.perf_counter() - begin)
+            found = _told(model, target, chains, wanted, seed, clock.now() - begin)
             more = max(more, chains.iteration // 2)
     except TimeIsUp:
         if found is None:
