@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,12 +22,17 @@ if TYPE_CHECKING:
     from shoal.trajectory import Array
 
 
+_NOTHING: dict[str, Any] = {"parameters": {}, "covariance": np.zeros((0, 0)), "ties": {}, "constants": {}}
+"""A joint distribution of nothing."""
+
+
 @dataclass(frozen=True)
 class Carried:
     """What an estimate found, for use elsewhere.
 
     values: by path in the scene, ties evaluated; parameters: by name; left: what is not carried, and why
     uncertainties: by how much fields are off together, a standard deviation along each direction of what is left open
+    unknown: fields whose values the recording did not tell
     source: where it comes from; trusted: whether its verdict is an answer
     """
 
@@ -35,6 +40,7 @@ class Carried:
     parameters: Mapping[str, float] = field(default_factory=dict)
     left: Mapping[str, str] = field(default_factory=dict)
     uncertainties: tuple[Mapping[str, float], ...] = ()
+    unknown: tuple[str, ...] = ()
     source: str = "values"
     trusted: bool = True
 
@@ -43,6 +49,8 @@ class Carried:
         notes = []
         if not self.trusted:
             notes.append(f"{self.source}: the verdict on these values is that they cannot be trusted")
+        if self.unknown:
+            notes.append(f"{self.source}: not known from what was measured: {', '.join(self.unknown)}")
         if self.left:
             notes.append(f"{self.source}: left out: {', '.join(f'{name} ({why})' for name, why in self.left.items())}")
         return notes
@@ -62,9 +70,9 @@ class Carried:
         """A problem that starts from them, the fields of its scene to set, `values` among them, and notes.
 
         What the problem seeks becomes its start, within its bounds; what it ties it computes. What is set is known as
-        well as it was found, unless the problem says how well. Raises InputError.
+        well as it was found, unless the problem says how well. Raises InputError, also where it was not found at all.
         """
-        sought, started, notes = dict(problem.parameters), [], self.notes()
+        sought, started, notes = dict(problem.parameters), [], replace(self, unknown=()).notes()
         for name, parameter in problem.parameters.items():
             known = self.parameters.get(name) if parameter.path is None else self.values.get(parameter.path)
             if known is None or (parameter.path or "") in (values or {}):
@@ -78,8 +86,12 @@ class Carried:
             started.append(name)
         fitted = {parameter.path for parameter in problem.parameters.values()} | {*problem.ties}
         fixed = {p: x for p, x in self.values.items() if p not in fitted and p not in (values or {})}
-        self_named = Carried(fixed, source=self.source)
-        self_named.set_in(problem.load_scene())
+        if unknown := [path for path in self.unknown if path in fixed]:
+            raise InputError(
+                f"values: {self.source}: {', '.join(unknown)}: not known from what was measured; this problem takes "
+                "it as known; seek it here too, or state it (--set)"
+            )
+        Carried(fixed, source=self.source).set_in(problem.load_scene())
         if started:
             notes.append(f"{self.source}: the search starts from {', '.join(started)}")
         changed = problem.model_copy(update={"parameters": sought})
@@ -97,6 +109,13 @@ class Carried:
         if not started and not fixed and self.values:
             notes.append(f"{self.source}: nothing of it is used")
         return changed, {**fixed, **(values or {})}, notes
+
+
+def _unknown(joint: Mapping[str, Any]) -> tuple[str, ...]:
+    """Fields of a scene that a joint distribution, see `joint`, says nothing of."""
+    open_ = {name: one["path"] for name, one in joint["parameters"].items() if not one["known"]}
+    tied = [path for path, text in joint["ties"].items() if expression.names(text) & {*open_}]
+    return (*(path for path in open_.values() if path), *tied)
 
 
 def _uncertainties(joint: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
@@ -176,11 +195,13 @@ def joint(parameters: Parametrization, point: Array, covariance: Array, values: 
 def of_estimate(estimate: Estimate) -> Carried:
     """What an estimate carries."""
     known = {name: value.value for name, value in estimate.parameters.items()}
+    told = checked_joint(estimate.joint, "values", estimate.problem)
     return Carried(
         estimate.values,
         known,
         estimate.left_out,
-        _uncertainties(checked_joint(estimate.joint, "values", estimate.problem)),
+        _uncertainties(told),
+        _unknown(told),
         f"estimate of {estimate.problem}",
         estimate.verdict.trusted,
     )
@@ -206,8 +227,9 @@ def read_values(path: Path | str) -> Carried:
     }
     numbers = {str(name): float(number) for name, number in values.items()}
     reasons = {str(name): str(why) for name, why in left.items()}
-    uncertainties = _uncertainties(checked_joint(data["joint"], "values", path)) if "joint" in data else ()
-    return Carried(numbers, known, reasons, uncertainties, path.name, data.get("status") == "ok")
+    told = checked_joint(data["joint"], "values", path) if "joint" in data else _NOTHING
+    trusted = data.get("status") == "ok"
+    return Carried(numbers, known, reasons, _uncertainties(told), _unknown(told), path.name, trusted)
 
 
 def _is_number(value: Any) -> bool:

@@ -117,6 +117,24 @@ def test_uncertainties_that_cannot_be_are_refused_by_name(uncertainties: Any, wo
         oscillator(tmp_path, uncertainties).load_scene()
 
 
+def test_what_a_recording_did_not_tell_is_not_taken_as_known(tmp_path: Path) -> None:
+    """A swing tells the ratio of stiffness and mass alone, with two values of which neither is known."""
+    plain = oscillator(tmp_path).model_dump(mode="json")
+    mass = {"m": {"path": "bodies.m.mass", "lower": 0.2, "upper": 20.0, "start": 1.0}}
+    both = plain | {"values": {"loads.known.stiffness": 1e-9}, "parameters": plain["parameters"] | mass}
+    first = of_estimate(identify(Problem.parse(both, "both")))
+    unknown = "loads.sought.stiffness, bodies.m.mass"
+    assert first.notes()[0].endswith(f"not known from what was measured: {unknown}")
+    start = {"x": {"path": "initial.m.position.0", "lower": 0.05, "upper": 0.2, "start": 0.09}}
+    later = Problem.parse(plain | {"parameters": start}, "later")
+    with pytest.raises(InputError, match=f"{unknown}: not known from what was measured"):
+        first.into(later)
+    stated = {"loads.sought.stiffness": STIFFNESS, "bodies.m.mass": MASS}
+    assert identify(later, values=stated, fitted=first).parameters["x"].value == pytest.approx(0.1, abs=1e-5)
+    again = first.into(Problem.parse(both, "both"))[0]
+    assert again.parameters["m"].start == first.parameters["m"]
+
+
 @pytest.mark.slow
 def test_intervals_hold_the_truth_of_machines_that_are_off(tmp_path: Path) -> None:
     """Mass and known spring are off at random in each of 60 machines, and what is found goes on to another one.
