@@ -96,7 +96,7 @@ def _overlay(answer: Answer) -> Drawn:
     alt = f"Measured values as circles with the fitted model as a line. Overall, {follows(answer.estimate)}."
     what = "fitted" if answer.estimate.prediction else "measured"
     grey = f" Where nothing was {what} it is grey." if any(gaps(one) for one in signals(answer.estimate)) else ""
-    return Drawn("overlay", figure, alt, f"The fitted model (red) over the data.{grey}")
+    return Drawn("overlay", figure, alt, f"The fitted model (red-orange) over the data.{grey}")
 
 
 def _poses(answer: Answer, found: Motion) -> Drawn:

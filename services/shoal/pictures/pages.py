@@ -16,11 +16,11 @@ from shoal.versions import versions
 _SPEEDS = {
     "five times real time": 5.0,
     "real time": 1.0,
-    "a half": 0.5,
-    "a fifth": 0.2,
-    "a tenth": 0.1,
-    "a fiftieth": 0.02,
-    "a two-hundredth": 0.005,
+    "half of real time": 0.5,
+    "a fifth of real time": 0.2,
+    "a tenth of real time": 0.1,
+    "1/50 of real time": 0.02,
+    "1/200 of real time": 0.005,
 }
 _SHOWN = 5.0
 """Seconds that a motion should take on the screen."""
@@ -47,7 +47,7 @@ def render(template: str, **content: Any) -> str:
 
 def animation(found: Motion, what: str) -> dict[str, Any]:
     """What the macro `animation` takes; what: the machine in words."""
-    shown = [f"{what} (blue) with its markers (red)"]
+    shown = [f"{what} (blue) with its markers (red-orange)"]
     if found.measured:
         shown.append("the measured places (black circles)")
     if found.behind:

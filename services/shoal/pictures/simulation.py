@@ -105,11 +105,12 @@ def _end(trajectory: Trajectory, name: str) -> list[str]:
 def _poses(trajectory: Trajectory, scene: Scene, moving: Motion) -> Drawn:
     until = f"until {moving.times[-1]:.3g} s"
     alt = f"The bodies {', '.join(moving.outlines)} at several instants {until}, later ones darker."
+    colour = "red-orange " if moving.up is not None else ""
     return Drawn(
         "poses",
         poses(moving, ends(scene.name, moving) if trajectory.ok else rejected(scene.name, trajectory)),
         alt if moving.up is None else f"From the front, above, right and a corner: {alt}",
-        f"The later, the darker; the thin {'red ' if moving.up is not None else ''}lines are the paths of the markers.",
+        f"The later, the darker; the thin {colour}lines are the paths of the markers.",
     )
 
 
