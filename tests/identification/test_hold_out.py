@@ -16,6 +16,7 @@ from shoal.identification.recording.measurement import Recording
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.identification.spread import prediction
 from shoal.identification.spread.covariance import Noise
+from shoal.identification.spread.stated_error import stated
 from shoal.identification.spread.uncertainty import Linearisation
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -112,7 +113,7 @@ def test_the_stated_limit_is_what_95_of_100_errors_stay_below(rho: float) -> Non
     root = np.array([[0.02, 0.0], [0.01, 0.03]])
     noise = Noise(0.03**2, rho, 1e9)
     at = Linearisation(np.empty((2, 0)), np.zeros((2, 5)), np.ones(2), (root @ root.T)[None], (noise,))
-    told = prediction._stated(slopes, at, 0, 1.0, 0.95)
+    told = stated(slopes, at, 0, 1.0, 0.95)
     white = rng.standard_normal((20_000, 80))
     errors = white.copy()
     for k in range(1, 80):
@@ -121,7 +122,7 @@ def test_the_stated_limit_is_what_95_of_100_errors_stay_below(rho: float) -> Non
     rms = np.sqrt(np.mean(errors**2, axis=1))
     assert told.expected == pytest.approx(np.sqrt(np.mean(rms**2)), rel=0.02)
     assert np.mean(rms < told.limit) == pytest.approx(0.95, abs=0.015)
-    surely = prediction._stated(slopes, at, 0, 1.0, 1.0 - prediction._REFUTES)
+    surely = stated(slopes, at, 0, 1.0, 1.0 - prediction._REFUTES)
     assert np.mean(rms > surely.limit) < 1e-3
     np.testing.assert_array_equal(surely.half, told.half)
     np.testing.assert_allclose(np.mean(np.abs(errors) < told.half, axis=0), 0.95, atol=0.01)

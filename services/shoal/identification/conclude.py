@@ -82,7 +82,10 @@ def conclude(
         return conclude(searched, _moved(outcome, better), method, seed, wall, stages, wishes, rounds - 1)
     point, at, measurement = near.point, near.at, model.measurement
     foretold: list[Prediction] = unless_late(
-        lambda: predictions(model, point, near.seen if near.known else None, at, near.blocks, near.error), []
+        lambda: predictions(
+            model, point, near.seen if near.known else None, near.beside, near.blocks, near.error, near.fields
+        ),
+        [],
     )
     fits, judgement = judgement.verdict.trusted, _refuted(judgement, foretold)
     drawn, undrawn = _drawn(model, near, judgement, wishes.sample, seed)
@@ -95,7 +98,7 @@ def conclude(
         judgement.message or outcome.message,
         *(_of_laws(model, near, known.laws, values) if fits else []),
         *remarks(values, known.profiled, known.bent(model), near.tests, near.mesh if limits else None, near.theory),
-        *(one.sentence(near.at, model.names) for one in near.given),
+        *(one.sentence(near.at, model.names) for one in (*near.given, near.fields) if one is not None),
         *([undrawn] if drawn is None else [drawn.sentence(), *news(drawn, values)]),
         "the draws are about the first of them alone" * (drawn is not None and judgement.verdict is Verdict.AMBIGUOUS),
         *(one.sentence(named=len(measurement.recordings) > 1) for one in foretold),

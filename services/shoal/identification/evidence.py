@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -29,9 +30,10 @@ class Evidence:
     looked: whether there was time for derivatives
     possible: whether the point can be simulated
     blocks: the series of the residuals
-    at: the linearisation, with what the model, not the noise, leaves
+    beside: the linearisation, with what the model, not the noise, leaves, and with what is `given`
+    at: the same with what uncertain `fields` of the scene add
     error: of the model itself; mesh, theory: sizes of its parts, root mean squares
-    given: what is taken as known and is not quite: noise of measured signals, fields of the scene
+    given: what is taken as known and is not quite, such as the noise of measured signals
     """
 
     point: Array
@@ -41,12 +43,14 @@ class Evidence:
     looked: bool
     possible: bool
     blocks: list[Block]
+    beside: Linearisation
     at: Linearisation
     error: ModelError
     mesh: float | None
     theory: float | None
     tests: ResidualTests
     given: list[Given]
+    fields: Given | None
 
     @property
     def known(self) -> bool:
@@ -70,29 +74,30 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
         seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
     blocks = blocks_of(model, len(seen.residual))
     at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks, seen.error)
-    error, given = ModelError(None, None), list[Given]()
+    error, given, fields = ModelError(None, None), list[Given](), None
     if possible and looked is not None:
         error = unless_late(lambda: model_error(model, point, predicted, seen.residual), error)
         found = unless_late(lambda: _given(model, point, predicted, seen.residual), None)
-        given, looked = found or [], None if found is None else looked
+        (given, fields), looked = found or (given, fields), None if found is None else looked
     parts = (_size(model, error.mesh), _size(model, error.theory))
-    unshown = [one.left(seen.jacobian, at.pseudo_inverse) for one in given]
+    unshown = [one.left(seen.jacobian, at.pseudo_inverse) for one in (*given, fields) if one is not None]
     limit = float(np.linalg.norm([parts[0] or 0.0, parts[1] or 0.0, *unshown]))
     refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
     tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined)
     told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
     at = replace(at, systematic=tests.excess * told)
-    for one in given:
-        at = one.spread(at)
-    return Evidence(
-        point, predicted, residual, seen, looked is not None, possible, blocks, at, error, *parts, tests, given
-    )
+    beside = reduce(lambda so_far, one: one.spread(so_far), given, at)
+    at = beside if fields is None else fields.spread(beside)
+    known = point, predicted, residual, seen, looked is not None, possible, blocks, beside, at, error
+    return Evidence(*known, *parts, tests, given, fields)
 
 
-def _given(model: ForwardModel, point: Array, predicted: dict[str, Array], residual: Array) -> list[Given]:
-    """What is taken as known and is not quite, where there is any. Raises TimeIsUp."""
-    both = signal_noise(model, point, predicted, residual), uncertain_fields(model, point, predicted)
-    return [one for one in both if one is not None]
+def _given(
+    model: ForwardModel, point: Array, predicted: dict[str, Array], residual: Array
+) -> tuple[list[Given], Given | None]:
+    """What is taken as known and is not quite, and the uncertain fields, where there are any. Raises TimeIsUp."""
+    signals = signal_noise(model, point, predicted, residual)
+    return [] if signals is None else [signals], uncertain_fields(model, point, predicted)
 
 
 def _size(model: ForwardModel, rows: Array | None) -> float | None:

@@ -117,6 +117,16 @@ def test_uncertainties_that_cannot_be_are_refused_by_name(uncertainties: Any, wo
         oscillator(tmp_path, uncertainties).load_scene()
 
 
+def test_a_window_is_predicted_as_well_whatever_the_mass(tmp_path: Path) -> None:
+    """The frequency is what was recorded: a stiffness that follows the mass changes nothing of what comes later."""
+    sure, unsure = (
+        identify(oscillator(tmp_path, uncertainties), hold_out=[(1.5, 2.0)]).prediction[0]
+        for uncertainties in ((), {"bodies.m.mass": 0.2})
+    )
+    assert sure.inside
+    assert unsure.channels[0].limit == pytest.approx(sure.channels[0].limit, rel=0.02)
+
+
 def test_what_a_recording_did_not_tell_is_not_taken_as_known(tmp_path: Path) -> None:
     """A swing tells the ratio of stiffness and mass alone, with two values of which neither is known."""
     plain = oscillator(tmp_path).model_dump(mode="json")

@@ -9,7 +9,6 @@ too small, that of the window is made larger in proportion.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,11 +18,14 @@ import numpy.typing as npt
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.measurement import Held
 from shoal.identification.recording.units import of_channel
-from shoal.identification.spread.chances import chi_square_above
-from shoal.identification.spread.covariance import Block
+from shoal.identification.spread.covariance import Block, Noise
+from shoal.identification.spread.given import Given
+from shoal.identification.spread.left_out import allowance
 from shoal.identification.spread.model_error import ModelError, model_error
 from shoal.identification.spread.sensitivity import AGREED, Sensitivity, sensitivity
-from shoal.identification.spread.uncertainty import ABSORBED, LEVEL, Linearisation, linearise, quantile
+from shoal.identification.spread.stated_error import Fit, block_of, stated, unevenness
+from shoal.identification.spread.uncertain_fields import EXACT, uncertain_fields
+from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.trajectory import Array, plain
 
 Mask = npt.NDArray[np.bool_]
@@ -33,12 +35,6 @@ _REFUTES = 1e-4
 windows, all of them together, less than once in a thousand times."""
 _HIDDEN = 1e-3
 """Share of a derivative along directions that the data leave open, from which on a prediction is not known."""
-_PARTS = np.array([1.0, 1.25, 1.5, 1.75, 2.0])
-"""Lengths of a window from the end of the fit to where parts are left out that try the stated error."""
-_FEWEST_PARTS = 4
-"""Of a fit, at least, in which the size of its residual is compared."""
-_MOST = 0.5
-"""Of a fit: no longer part is left out."""
 
 
 @dataclass(frozen=True)
@@ -128,16 +124,6 @@ class Prediction:
         )
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """What was fitted: rows (weighted) with their blocks, and what follows from them."""
-
-    seen: Sensitivity
-    blocks: list[Block]
-    at: Linearisation
-    sizes: Array
-
-
 def predictions(
     model: ForwardModel,
     point: Array,
@@ -145,9 +131,13 @@ def predictions(
     at: Linearisation,
     blocks: list[Block],
     error: ModelError,
+    fields: Given | None,
 ) -> list[Prediction]:
-    """Every window of every recording at an answer; seen: None where its neighbourhood is not known. Not counted."""
-    fit = None if seen is None else _Fit(seen, blocks, at, model.sizes(point))
+    """Every window of every recording at an answer; seen: None where its neighbourhood is not known. Not counted.
+
+    at: without what uncertain fields of the scene add, `fields`, which change a window in more ways than by the answer
+    """
+    fit = None if seen is None else Fit(seen, blocks, at, model.sizes(point), fields)
     return [
         _predicted(model, point, name, held, fit, error)
         for name, recording in model.measurement.recordings.items()
@@ -156,7 +146,7 @@ def predictions(
 
 
 def _predicted(
-    model: ForwardModel, point: Array, name: str, held: Held, fit: _Fit | None, error: ModelError
+    model: ForwardModel, point: Array, name: str, held: Held, fit: Fit | None, error: ModelError
 ) -> Prediction:
     channels = model.measurement.recordings[name].channels
     window = _of_window(model, name, held)
@@ -167,7 +157,7 @@ def _predicted(
     )
     half, (expected, limit, most) = np.full_like(off, np.nan), np.full((3, len(channels)), np.nan)
     windows = sum(len(recording.held) for recording in model.measurement.recordings.values())
-    allowance, why = 1.0, ""
+    larger, why = 1.0, ""
     there = None if fit is None else sensitivity(window, point)
     if not np.all(np.isfinite(predicted)):
         why = "with no simulation that succeeds"
@@ -183,29 +173,30 @@ def _predicted(
             why = "without a stated error, as it depends on what the fit leaves open"
         else:
             bias = _bias(window, point, predicted, there, fit, error)[mine]
-            allowance = _allowance(model, name, held, fit) if fit.at.systematic > 0.0 else 1.0
+            larger = allowance(model, name, held, fit) if fit.at.systematic > 0.0 else 1.0
+            slopes, spread = _with_fields(window, point, slopes, there, fit, mine)
             for k in range(len(channels)):
                 rows = window.rows.channel[mine] == k
                 if not np.any(rows):
                     continue
-                block = _block(model, number, k, fit)
+                block = block_of(model, number, k, fit)
                 if block is None:
                     continue
                 weight = float(model.rows.weight[fit.blocks[block].rows[0]])
                 level = 1.0 - (1.0 - LEVEL) / len(channels)
-                uneven = _unevenness(fit.seen.residual[fit.blocks[block].rows], int(np.sum(rows)))
+                uneven = unevenness(fit.seen.residual[fit.blocks[block].rows], int(np.sum(rows)))
                 sure = 1.0 - _REFUTES / len(channels) / windows
-                told, surely = (_stated(slopes[rows], fit.at, block, weight, p, uneven) for p in (level, sure))
+                told, surely = (stated(slopes[rows], spread, block, weight, p, uneven) for p in (level, sure))
                 extra = float(np.sqrt(np.mean(bias[rows] ** 2)))
-                expected[k], limit[k] = told.expected, allowance * told.limit + extra
-                most[k] = allowance * surely.limit + extra
-                half[np.isfinite(held.values[:, k]), k] = allowance * told.half + np.abs(bias[rows])
+                expected[k], limit[k] = told.expected, larger * told.limit + extra
+                most[k] = larger * surely.limit + extra
+                half[np.isfinite(held.values[:, k]), k] = larger * told.half + np.abs(bias[rows])
     told_of = [
         Foretold(c.name, c.place, c.quantity, of_channel(c), *map(float, numbers))
         for c, *numbers in zip(channels, rms, expected, limit, most, strict=True)
         if np.isfinite(numbers[0])
     ]
-    return Prediction(name, held.window, told_of, held.times, held.values, predicted, half, allowance, why)
+    return Prediction(name, held.window, told_of, held.times, held.values, predicted, half, larger, why)
 
 
 def _of_window(model: ForwardModel, name: str, held: Held) -> ForwardModel:
@@ -226,19 +217,8 @@ def _hidden(slopes: Array, at: Linearisation) -> bool:
     return bool(np.linalg.norm(slopes @ at.unknown) > _HIDDEN * max(float(np.linalg.norm(slopes)), 1e-300))
 
 
-def _block(model: ForwardModel, recording: int, channel: int, fit: _Fit) -> int | None:
-    """The number of the block of a channel."""
-    rows = model.rows
-    for number, block in enumerate(fit.blocks):
-        if not block.known and len(block.rows):
-            first = block.rows[0]
-            if rows.recording[first] == recording and rows.channel[first] == channel:
-                return number
-    return None
-
-
 def _bias(
-    window: ForwardModel, point: Array, predicted: Array, there: Sensitivity, fit: _Fit, error: ModelError
+    window: ForwardModel, point: Array, predicted: Array, there: Sensitivity, fit: Fit, error: ModelError
 ) -> Array:
     """What a finer mesh and a fuller theory would change of the prediction, by size, (rows,), in SI units."""
     rows = len(window.rows.time)
@@ -253,133 +233,23 @@ def _bias(
     return found / window.rows.weight
 
 
-@dataclass(frozen=True)
-class _Stated:
-    """Of one channel: expected RMS, what it stays below, and the half width of the band, (samples,)."""
+def _with_fields(
+    window: ForwardModel, point: Array, slopes: Array, there: Sensitivity, fit: Fit, mine: Mask
+) -> tuple[Array, Linearisation]:
+    """Derivatives in the window (samples, parameters) and their spread, with uncertain fields beside the parameters.
 
-    expected: float
-    limit: float
-    half: Array
-
-
-def _unevenness(residual: Array, count: int) -> float:
-    """Variance of the mean square of so many neighbouring residuals, relative to its square, as parts of the fit show.
-
-    Noise that is larger at times, or has outliers, makes it larger than its memory does.
+    Each direction of these is one more parameter, of variance one, that changes what it changes of the window less what
+    the answer follows of it.
     """
-    length = min(count, len(residual) // _FEWEST_PARTS)
-    power = float(np.mean(residual**2)) if len(residual) else 0.0
-    if length < 1 or power <= 0.0:
-        return 0.0
-    parts = [np.mean(residual[k : k + length] ** 2) for k in range(0, len(residual) - length + 1, max(1, length // 2))]
-    return float(np.var(parts, ddof=1)) / power**2
-
-
-def _stated(slopes: Array, at: Linearisation, block: int, weight: float, level: float, uneven: float = 0.0) -> _Stated:
-    """What an estimate says of an RMS over samples with derivatives (samples, parameters), all in SI units.
-
-    The mean square of the error is a sum of squares of normal numbers with different variances: by its mean and its
-    variance it is taken for a multiple of chi-square (Satterthwaite 1946). What is systematic adds to it.
-    uneven: relative variance of the mean square that the fit shows, where it is more than that of such noise
-    """
-    noise, count = at.noise[block], len(slopes)
-    variance = noise.variance / weight**2
-    root = np.linalg.cholesky(at.covariance + 1e-14 * np.diag(np.maximum(np.diag(at.covariance), 1e-300)))
-    power = np.linalg.svd(slopes @ root, compute_uv=False) ** 2 / count
-    independent = max(1.0, count * (1.0 - noise.rho**2) / (1.0 + noise.rho**2))
-    mean = variance + float(np.sum(power))
-    spread = variance**2 * max(1.0 / independent, 0.5 * uneven) + float(np.sum(power**2))
-    freedom = mean**2 / spread
-    shares = np.maximum(np.einsum("ni,bij,nj->b", slopes, at.parts, slopes) / count, 0.0)
-    shares[block] += variance
-    normal = np.sqrt(chi_square_above(1.0, 1.0 - level))
-    doubt = quantile(shares, at.noise, level) / normal
-    lever = slopes @ at.pseudo_inverse
-    follows = ABSORBED * at.systematic
-    systematic = follows * float(np.linalg.svd(lever, compute_uv=False)[0]) / np.sqrt(count)
-    above = chi_square_above(freedom, 1.0 - level) / freedom * mean * doubt**2
-    each = variance + np.einsum("ni,ij,nj->n", slopes, at.covariance, slopes)
-    half = np.hypot(quantile(shares, at.noise) * np.sqrt(each), follows * np.linalg.norm(lever, axis=1))
-    return _Stated(float(np.sqrt(mean)), float(np.hypot(np.sqrt(above), systematic)), half)
-
-
-def _allowance(model: ForwardModel, name: str, held: Held, fit: _Fit) -> float:
-    """By what the stated error has to be made larger so that it holds for parts of the fit that are left out of it."""
-    number = list(model.measurement.recordings).index(name)
-    found = 1.0
-    for left_out, kept in _parts(model, number, held, len(fit.seen.residual)):
-        found = max(found, _too_small(model, number, left_out, kept, fit))
-    return found
-
-
-def _parts(model: ForwardModel, number: int, held: Held, count: int) -> Iterator[tuple[Mask, Mask]]:
-    """Rows that are left out, and rows that are fitted instead, (rows,) each, as far from each other as the window is.
-
-    Beyond the end (or before the beginning) of what was fitted nothing behind a part is fitted either.
-    """
-    rows = model.rows
-    times = rows.time[rows.recording == number]
-    first, last = float(times.min()), float(times.max())
-    begin, end = float(held.times[0]), float(held.times[-1])
-    length = min(max(end - begin, 0.0), _MOST * (last - first))
-    if length <= 0.0:
-        return
-    priors = np.zeros(count - len(rows.time), dtype=bool)
-    for part in _PARTS:
-        if begin >= last:
-            low = last - part * length
-            if low < first + _MOST * _MOST * (last - first):
-                return
-            ahead = rows.time > low
-        elif end <= first:
-            low = first + (part - 1.0) * length
-            ahead = rows.time < low + length
-        else:
-            low = first + (part - 1.0) * (last - first - length)
-            ahead = (rows.time > low) & (rows.time < low + length)
-        mine = rows.recording == number
-        out = mine & (rows.time > low) & (rows.time <= low + length + 1e-12)
-        if np.any(out):
-            yield np.append(out, priors), np.append(~(mine & (ahead | out)), ~priors)
-
-
-def _too_small(model: ForwardModel, number: int, out: Mask, kept: Mask, fit: _Fit) -> float:
-    """How much larger than stated the error of a part is that was left out, to first order; 1 where it cannot be told.
-
-    A fit of the rest moves from the answer by a Gauss-Newton step.
-    """
-    place = np.cumsum(kept) - 1
-    blocks = []
-    for block in fit.blocks:
-        rows = block.rows[kept[block.rows]]
-        if not len(rows):
-            return 1.0
-        if block.known:
-            blocks.append(replace(block, rows=place[rows]))
-            continue
-        gaps = np.diff(model.rows.time[rows])
-        gaps = gaps / np.median(gaps) if len(gaps) else gaps
-        blocks.append(replace(block, rows=place[rows], gaps=gaps))
-    jacobian, residual, error = fit.seen.jacobian[kept], fit.seen.residual[kept], fit.seen.error[kept]
-    if not np.all(np.isfinite(jacobian)) or np.count_nonzero(kept) <= 2 * len(fit.sizes):
-        return 1.0
-    first = linearise(jacobian, residual, fit.sizes, blocks, error)
-    if first.unknown.size > fit.at.unknown.size:
-        return 1.0
-    step = first.pseudo_inverse @ residual
-    left = residual - jacobian @ step
-    at = linearise(jacobian, left, fit.sizes, blocks, error)
-    share = float(np.linalg.norm(left) / max(float(np.linalg.norm(fit.seen.residual)), 1e-300))
-    at = replace(at, systematic=fit.at.systematic * share)
-    worst = 1.0
-    for channel in range(len(list(model.measurement.recordings.values())[number].channels)):
-        rows = np.flatnonzero(out[: len(model.rows.time)] & (model.rows.channel == channel))
-        mine = _block(model, number, channel, fit)
-        if not len(rows) or mine is None:
-            continue
-        weight = float(model.rows.weight[rows[0]])
-        slopes = fit.seen.jacobian[rows] / weight
-        off = (fit.seen.residual[rows] - fit.seen.jacobian[rows] @ step) / weight
-        told = _stated(slopes, at, mine, weight, LEVEL, _unevenness(left[blocks[mine].rows], len(rows)))
-        worst = max(worst, float(np.sqrt(np.mean(off**2))) / max(told.limit, 1e-300))
-    return worst
+    seen = {name: window.observe(point[None], name)[0] for name in window.measurement.recordings} if fit.fields else {}
+    later = uncertain_fields(window, point, seen) if seen else None
+    if fit.fields is None or later is None:
+        return slopes, fit.at
+    rows, at, count = len(window.rows.time), fit.at, len(later.moved)
+    followed = (fit.fields.moved @ at.pseudo_inverse.T) @ there.jacobian[:rows].T
+    direct = ((later.moved[:, :rows] - followed) / window.rows.weight)[:, mine]
+    parts = np.pad(at.parts, [(0, 1), (0, count), (0, count)])
+    parts[-1, -count:, -count:] = np.eye(count)
+    pseudo_inverse = np.pad(at.pseudo_inverse, [(0, count), (0, 0)])
+    noise = (*at.noise, Noise(0.0, 0.0, EXACT))
+    return np.hstack([slopes, direct.T]), replace(at, parts=parts, pseudo_inverse=pseudo_inverse, noise=noise)
