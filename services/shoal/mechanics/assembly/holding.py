@@ -6,8 +6,8 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import joints, plane
-from shoal.mechanics.affine import fixed
 from shoal.mechanics.assembly.coordinates import Placement
+from shoal.mechanics.assembly.distances import keep_distance, keep_sum
 from shoal.mechanics.assembly.groups import is_stiff, kept_rotation
 from shoal.mechanics.frames import BeamFrame
 from shoal.mechanics.joints import Along, Apart, Geared, Meet, Sum, Turned
@@ -37,18 +37,9 @@ def _keep(scene: Scene, name: str, condition: Meet | Along | Apart | Sum, result
             line = result.direction(scene, condition.first).turned(plane.rotation(condition.direction))
             terms.cross(name, line, result.gap(scene, condition), 1)
     elif isinstance(condition, Apart):
-        gap = result.gap(scene, condition)
-        if condition.length is None:
-            terms.dot(name, gap, gap, 2, -sum(result.start_of(gap)[0] ** 2))
-        else:
-            terms.dot(name, gap, gap, 2, drive=condition.length.through("square", "neg"))
+        keep_distance(scene, name, condition, result)
     elif isinstance(condition, Sum):
-        axes = np.eye(plane.DIMENSIONS)
-        total = fixed(plane.vector(0.0, 0.0))
-        for term in condition.terms:
-            onto_first = np.outer(axes[0], term.factor * axes["xyz".index(term.axis)])
-            total = total + result.point(scene, term.at).turned(onto_first)
-        terms.dot(name, fixed(axes[0][:, None]), total, 1, drive=condition.value.through("neg"))
+        keep_sum(scene, name, condition, result)
     elif not isinstance(condition, Meet):  # which is shared, or a constraint where its loop closes
         raise joints.unknown(condition)
     elif condition.within or condition.held:

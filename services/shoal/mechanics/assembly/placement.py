@@ -8,11 +8,8 @@ a constraint: closed loops, lines that move, distances, driven motion, slopes of
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from shoal.errors import InputError
 from shoal.mechanics import joints, plane
 from shoal.mechanics.affine import combined, fixed
 from shoal.mechanics.assembly.coordinates import Placement
@@ -20,14 +17,14 @@ from shoal.mechanics.assembly.groups import (
     JointPoint,
     Orientations,
     joint_points,
-    moving,
     orientations,
     rotated,
     transposed,
 )
 from shoal.mechanics.assembly.holding import hold
 from shoal.mechanics.assembly.modal import place_modal
-from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
+from shoal.mechanics.assembly.order import next_body, place_driver
+from shoal.mechanics.assembly.pose import Pose, arm
 from shoal.mechanics.assembly.rods import place_rod, rod_axis
 from shoal.mechanics.assembly.space.start import place_started
 from shoal.mechanics.frames import Place, PointFrame, RigidFrame
@@ -35,7 +32,7 @@ from shoal.mechanics.joints import Along, Meet
 from shoal.mechanics.modal.modes import bent
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.start.start import started
-from shoal.scene import GROUND, Function, PointMass, Rod, Scene
+from shoal.scene import GROUND, PointMass, Rod, Scene
 
 
 def place(scene: Scene) -> Placement:
@@ -47,14 +44,14 @@ def place(scene: Scene) -> Placement:
     result = Placement(scene, failed)
     points, turning = joint_points(scene), orientations(scene)
     for name, path in scene.ground_points.items():
-        _place_driver(name, path.x, path.y, points, result)
+        place_driver(name, (path.x, path.y), points, result)
     touching: dict[str, list[JointPoint]] = {name: [] for name in scene.bodies}
     for point in points:
         for owner in {owner for owner, _ in point.places} & touching.keys():
             touching[owner].append(point)
     waiting = list(scene.bodies)
     while waiting:
-        name = _next(stated, waiting, touching, result)
+        name = next_body(stated, waiting, touching, lambda one: _rail(stated, one, result) is not None)
         waiting.remove(name)
         mine = touching[name]
         pose = _pose(scene, name, mine, turning, result)
@@ -74,34 +71,6 @@ def place(scene: Scene) -> Placement:
             result.terms.cross(joint, fixed(direction), point.where - fixed(base), 1)
     hold(scene, result)
     return result
-
-
-def _place_driver(name: str, x: Function, y: Function, points: list[JointPoint], result: Placement) -> None:
-    """A moving point of the ground is a vector that constraints drive."""
-    begin = np.array([value_and_rate(x), value_and_rate(y)])
-    vector = result.new_vector(begin[:, :1], begin[:, 1:])
-    result.drivers[moving(name)] = vector
-    result.terms.vanish(f"{GROUND}.{name}", vector, (x.through("neg"), y.through("neg")))
-    for point in points:
-        if point.touches(moving(name)):
-            if point.where is not None:
-                raise InputError(f"joints.{point.name}: joins the moving point {name} to a fixed one")
-            point.where = vector
-
-
-def _next(scene: Scene, waiting: list[str], touching: dict[str, list[JointPoint]], result: Placement) -> str:
-    """The next body whose start is known: by a joint point, by its own field, by a slider's line."""
-    known: list[Callable[[str], bool]] = [
-        lambda name: any(point.where is not None for point in touching[name]),
-        lambda name: scene.start(name).position is not None,
-        lambda name: any(point.line for point in touching[name]),
-        lambda name: _rail(scene, name, result) is not None,
-    ]
-    for is_known in known:
-        for name in waiting:
-            if is_known(name):
-                return name
-    return waiting[0]
 
 
 def _rail(scene: Scene, name: str, result: Placement) -> tuple[Array, Array, Place] | None:

@@ -10,6 +10,7 @@ from shoal.errors import InputError
 from shoal.mechanics import joints
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
+from shoal.mechanics.assembly.distances import keep_distance, keep_sum
 from shoal.mechanics.assembly.groups import is_stiff
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.frames import BeamFrame, RigidFrame
@@ -90,18 +91,9 @@ def _keep(scene: Scene, name: str, condition: Any, result: SpatialPlacement) -> 
         terms.dot(name, a, b, 0, drive=condition.angle.through("cos", "neg"))
         terms.dot(name, ahead, b, 0, drive=condition.angle.through("sin", "neg"))
     elif isinstance(condition, Apart):
-        gap = result.gap(scene, condition)
-        if condition.length is None:
-            terms.dot(name, gap, gap, 2, -sum(result.start_of(gap)[0] ** 2))
-        else:
-            terms.dot(name, gap, gap, 2, drive=condition.length.through("square", "neg"))
+        keep_distance(scene, name, condition, result)
     elif isinstance(condition, Sum):
-        axes = np.eye(3)
-        total = fixed(np.zeros((3, 1)))
-        for term in condition.terms:
-            onto_first = np.outer(axes[0], term.factor * axes["xyz".index(term.axis)])
-            total = total + result.point(scene, term.at).turned(onto_first)
-        terms.dot(name, fixed(axes[0][:, None]), total, 1, drive=condition.value.through("neg"))
+        keep_sum(scene, name, condition, result)
     else:
         raise joints.unknown(condition)
 

@@ -9,18 +9,18 @@ Garcia de Jalon and Bayo, Kinematic and dynamic simulation of multibody systems,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
 
-from shoal.errors import InputError
 from shoal.mechanics import joints, reach
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.affine import Affine, combined, fixed
-from shoal.mechanics.assembly.groups import JointPoint, is_stiff, moving, rotated, transposed
-from shoal.mechanics.assembly.pose import Pose, arm, value_and_rate
+from shoal.mechanics.assembly.groups import JointPoint, is_stiff, rotated, transposed
+from shoal.mechanics.assembly.order import next_body, place_driver
+from shoal.mechanics.assembly.pose import Pose, arm
 from shoal.mechanics.assembly.space.axes import JointAxis
 from shoal.mechanics.assembly.space.coordinates import SpatialPlacement
 from shoal.mechanics.assembly.space.hinges import make_axes
@@ -32,7 +32,7 @@ from shoal.mechanics.frames import Place, PointFrame, RigidFrame
 from shoal.mechanics.joints import Aligned, Along, InPlane, Meet, Square, Turned
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.plane import vector
-from shoal.scene import GROUND, Attachment, Function, PointMass, Rod, Scene
+from shoal.scene import GROUND, Attachment, PointMass, Rod, Scene
 
 APART = 0.3
 """Sine of the angle between a vector and the span of those chosen before it, from which it is chosen too."""
@@ -42,11 +42,11 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
     """Give every body its coordinates and a state that joints need not agree with yet. Raises InputError."""
     result = SpatialPlacement(scene)
     for name, path in scene.ground_points.items():
-        _place_driver(name, (path.x, path.y, path.z), result)
+        place_driver(name, (path.x, path.y, path.z), result.points, result)
     touching = {name: [point for point in result.points if point.touches(name)] for name in scene.bodies}
     waiting = list(scene.bodies)
     while waiting:
-        name = _next(scene, waiting, touching, result)
+        name = next_body(scene, waiting, touching, lambda one: next(_guides(scene, one, result), None) is not None)
         waiting.remove(name)
         pose = _pose(scene, name, touching[name], result)
         result.poses[name] = pose
@@ -72,33 +72,6 @@ def place_in_space(scene: Scene) -> SpatialPlacement:
     make_axes(scene, result)
     result.terms.settle(reach.span(scene))
     return result
-
-
-def _place_driver(name: str, path: tuple[Function, ...], result: SpatialPlacement) -> None:
-    begin = np.array([value_and_rate(f) for f in path])
-    vector_of_point = result.new_vector(begin[:, :1], begin[:, 1:])
-    result.drivers[moving(name)] = vector_of_point
-    result.terms.vanish(f"{GROUND}.{name}", vector_of_point, tuple(f.through("neg") for f in path))
-    for point in result.points:
-        if point.touches(moving(name)):
-            if point.where is not None:
-                raise InputError(f"joints.{point.name}: joins the moving point {name} to a fixed one")
-            point.where = vector_of_point
-
-
-def _next(scene: Scene, waiting: list[str], touching: dict[str, list[JointPoint]], result: SpatialPlacement) -> str:
-    """The next body whose place is known: by a joint point, by its own field, by a line."""
-    known: list[Callable[[str], bool]] = [
-        lambda name: any(point.where is not None for point in touching[name]),
-        lambda name: scene.start(name).position is not None,
-        lambda name: any(point.line for point in touching[name]),
-        lambda name: next(_guides(scene, name, result), None) is not None,
-    ]
-    for is_known in known:
-        for name in waiting:
-            if is_known(name):
-                return name
-    return waiting[0]
 
 
 def _pose(scene: Scene, name: str, mine: list[JointPoint], result: SpatialPlacement) -> Pose:
