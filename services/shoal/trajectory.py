@@ -32,7 +32,7 @@ class Status(StrEnum):
     FAILED = "failed"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """Motion of one or more lanes (scenes that differ in numbers only), sampled at `times`.
 

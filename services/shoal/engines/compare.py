@@ -19,7 +19,7 @@ COMPARED = ("gauss", "exudyn", "casadi", "tree")
 """Four derivations of the same equations. The first three that can run a scene are compared unless others are named."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """Trajectories by engine; engines that cannot run the scene are in `refused` with their reason."""
 

@@ -37,7 +37,7 @@ class SpotCheck:
         return f"estimated error at the markers, largest of {self.looked_at} points: {known or 'unknown'}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sweep:
     """Marker positions and displacements from the start at `time` [s] over a grid.
 

@@ -35,7 +35,7 @@ TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
 """Of the adaptive integrator for rigid machines, from coarse to fine."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Selection:
     """The chosen model and how it was found.
 

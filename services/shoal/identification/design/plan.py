@@ -35,7 +35,7 @@ _ENOUGH = 0.1
 """Relative difference of the sensitivities by two steps: who compares sensors wants no more digits."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Design:
     """Sensors, the best first, at the duration [s] and rate [1/s] of today.
 

@@ -33,7 +33,7 @@ COARSE = 0.5
 """An eigenvalue whose mesh error is above this part of it is not known."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mode:
     """One small motion, shape * exp(eigenvalue * t).
 
@@ -79,7 +79,7 @@ class Mode:
         return "oscillating" if self.eigenvalue.imag > 0 else "creeping"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Modes:
     """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
 
