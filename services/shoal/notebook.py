@@ -77,7 +77,7 @@ def prepare(scene: Scene | str, *, values: Values | None = None) -> Prepared:
     """
     from shoal.engines.prepared import Prepared
 
-    return Prepared(_scene(scene, values))
+    return Prepared(_scene(scene, values).model_copy(deep=True))
 
 
 def select(

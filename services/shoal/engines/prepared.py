@@ -128,7 +128,8 @@ class _Asked:
 
 @lru_cache(maxsize=32)
 def _prepared(asked: _Asked) -> Prepared:
-    return Prepared(asked.scene, asked.key[-1])
+    # What is kept does not change with the mappings of a scene that somebody else holds.
+    return Prepared(asked.scene.model_copy(deep=True), asked.key[-1])
 
 
 def _of_lanes(value: Any) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable
+import pickle
+from collections.abc import Hashable, Mapping
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
@@ -184,12 +185,13 @@ def load_scene(name: str) -> Scene:
     """
     if (data := parametric(name)) is not None:
         return Scene.parse(data, name)
-    return _built_in(name) if name in built_in_scenes() else _read(located("scenes", name))
+    # Whoever edits the mappings of a scene edits his own; of all copies this one costs least.
+    return pickle.loads(_built_in(name)) if name in built_in_scenes() else _read(located("scenes", name))
 
 
 @cache
-def _built_in(name: str) -> Scene:
-    return _read(name)
+def _built_in(name: str) -> bytes:
+    return pickle.dumps(_read(name))
 
 
 def _read(name: str) -> Scene:
