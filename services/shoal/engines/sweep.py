@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory, plain
 
 LONE = 4
+if TYPE_CHECKING:
+    import pandas as pd
+
 """So many of the points that failed are tried alone."""
 
 
@@ -81,6 +84,12 @@ class Sweep:
         return table
 
     def to_json(self) -> dict[str, Any]:
+    def to_pandas(self) -> pd.DataFrame:
+        """The same as a table."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows())
+
         """The object that `shoal sweep --json` prints."""
         return {
             "status": "ok" if self.ok else "failed",

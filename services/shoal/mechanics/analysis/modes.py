@@ -8,7 +8,7 @@ equilibrium these are the motions relative to its fall. Dry friction is left out
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,9 @@ from shoal.scene import Scene
 from shoal.trajectory import plain
 
 Complex = npt.NDArray[np.complex128]
+if TYPE_CHECKING:
+    import pandas as pd
+
 COARSE = 0.5
 """An eigenvalue whose mesh error is above this part of it is not known."""
 
@@ -130,6 +133,23 @@ class Modes:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, which `shoal modes --json` prints."""
+    def to_pandas(self) -> pd.DataFrame:
+        """A row a mode, lowest first: kind, frequencies [Hz], damping ratio, growth [1/s], relative mesh error."""
+        import pandas as pd
+
+        rows = [
+            {
+                "kind": mode.kind,
+                "frequency": mode.frequency,
+                "damped_frequency": mode.damped_frequency,
+                "damping_ratio": mode.damping_ratio,
+                "growth": mode.eigenvalue.real,
+                "mesh_error": self.mesh_errors[number] if self.mesh_errors else np.nan,
+            }
+            for number, mode in enumerate(self.modes)
+        ]
+        return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="mode"))
+
         status, why = self.verdict
         return {
             "status": status,
