@@ -28,6 +28,7 @@ from shoal.identification.spread.sensitivity import sensitivity
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
+ABOUT = ("answer", "start")
 _DURATIONS = (0.25, 0.5, 1.0, 1.5, 2.0)
 _RATES = (0.25, 0.5, 1.0, 2.0)
 _COURSE = 40

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from shoal.arguments import check, one_of
 from shoal.errors import ComputationError
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.balance import BALANCED, Balance
@@ -28,10 +29,11 @@ from shoal.mechanics.reach import span
 from shoal.scene import Scene
 from shoal.trajectory import plain
 
-Complex = npt.NDArray[np.complex128]
 if TYPE_CHECKING:
     import pandas as pd
 
+Complex = npt.NDArray[np.complex128]
+ABOUT = ("equilibrium", "start")
 COARSE = 0.5
 """An eigenvalue whose mesh error is above this part of it is not known."""
 
@@ -131,8 +133,6 @@ class Modes:
         """Frequencies without damping [Hz], (modes,)."""
         return np.array([mode.frequency for mode in self.modes])
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain data, which `shoal modes --json` prints."""
     def to_pandas(self) -> pd.DataFrame:
         """A row a mode, lowest first: kind, frequencies [Hz], damping ratio, growth [1/s], relative mesh error."""
         import pandas as pd
@@ -150,6 +150,8 @@ class Modes:
         ]
         return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="mode"))
 
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, which `shoal modes --json` prints."""
         status, why = self.verdict
         return {
             "status": status,
@@ -190,6 +192,8 @@ def modes(
 
     Raises InputError if the scene cannot be modelled, ComputationError if there is no equilibrium or it is singular.
     """
+    one_of("about", about, ABOUT)
+    check(time=time, count=count)
     if about == "equilibrium":
         equilibrium = statics(scene, time, leave_unstable=leave_unstable)
         if not equilibrium.balanced:
