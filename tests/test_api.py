@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -128,3 +130,92 @@ def test_each_kind_of_result_has_a_picture(motion: shoal.Trajectory, estimate: E
         assert (tmp_path / f"{k}.png").read_bytes().startswith(b"\x89PNG")
     with pytest.raises(InputError, match="no picture of a int"):
         shoal.plot(3)
+
+
+FIELDS = {
+    "name": "mine",
+    "bodies": {"rod": {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 2700.0}},
+    "joints": {"O": {"first": {"body": "ground", "point": [0, 0]}, "second": {"body": "rod", "point": "start"}}},
+    "markers": {"tip": {"body": "rod", "point": "end"}},
+}
+
+
+def test_a_scene_is_an_object_its_fields_or_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(json.dumps(FIELDS))
+    found = [
+        shoal.simulate(one, TIMES, verify=False).points  # type: ignore[arg-type]
+        for one in (shoal.Scene.parse(FIELDS), FIELDS, file, str(file))
+    ]
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
+    assert shoal.load_scene(file).name == "mine"
+
+
+def test_a_problem_is_an_object_its_fields_or_a_file(problem: shoal.Problem, tmp_path: Path) -> None:
+    fields = problem.model_dump(mode="json", exclude_unset=True)
+    file = tmp_path / "mine.yaml"
+    file.write_text(json.dumps(fields))
+    plans = [shoal.design(one, noise=1e-3, duration=1.0, rate=20.0, about="start") for one in (problem, fields, file)]  # type: ignore[arg-type]
+    assert [plan.to_json() for plan in plans[1:]] == [plans[0].to_json()] * 2
+
+
+def test_values_may_be_of_numpy() -> None:
+    by_list = shoal.simulate("single-pendulum", TIMES, values={"gravity": [0.0, -9.0]}, verify=False)
+    by_array = shoal.simulate("single-pendulum", TIMES, values={"gravity": np.array([0.0, -9.0])}, verify=False)
+    np.testing.assert_array_equal(by_array.points, by_list.points)
+
+
+def test_who_edits_a_scene_edits_no_other() -> None:
+    """Neither one that is loaded by the same name later, nor what was kept of an equal one."""
+    mine, before = shoal.load_scene("single-pendulum"), shoal.simulate("single-pendulum", TIMES, verify=False)
+    shoal.simulate(mine, TIMES, verify=False)
+    prepared = shoal.prepare(mine)
+    mine.initial["OA"] = mine.initial["OA"].model_copy(update={"angle": 0.7})
+    mine.markers["Q"] = mine.markers["A"]
+    assert list(shoal.load_scene("single-pendulum").markers) == ["A"]
+    for again in (shoal.simulate("single-pendulum", TIMES, verify=False), prepared(times=TIMES)):
+        np.testing.assert_array_equal(again.points, before.points)
+    other = [*TIMES, 7.0]
+    longer = shoal.simulate("single-pendulum", other, verify=False).points[:3]
+    np.testing.assert_allclose(longer, before.points, rtol=0, atol=1e-8)
+
+
+def test_the_times_of_a_motion_are_its_own() -> None:
+    times = np.array(TIMES)
+    found = shoal.prepare("single-pendulum")(times=times), shoal.simulate("single-pendulum", times, verify=False)
+    times[:] = 7.0
+    assert [motion.times.tolist() for motion in found] == [TIMES, TIMES]
+
+
+def test_results_compare_as_the_objects_that_they_are(motion: shoal.Trajectory, estimate: Estimate) -> None:
+    """Their arrays have no truth value; == and hash raised ValueError and TypeError."""
+    scene = shoal.load_scene("single-pendulum")
+    swept = shoal.sweep(scene, {"initial.OA.angle": [0.0, 0.5]}, 0.5)
+    results = [motion, estimate, shoal.modes(scene), shoal.statics(scene), swept, shoal.select(scene, 1e-3)]
+    for one in results:
+        assert one == one
+        assert one != copy.copy(one)
+    assert len({*results}) == len(results)
+
+
+def test_a_marker_that_is_not_there_is_named(motion: shoal.Trajectory) -> None:
+    with pytest.raises(InputError, match="marker: no marker 'Z'; there are A"):
+        motion.marker("Z")
+    with pytest.raises(InputError, match="marker: no marker 'Z'; there are A"):
+        motion.angle("Z")
+
+
+def test_sweeps_and_modes_are_tables_too() -> None:
+    swept = shoal.sweep("single-pendulum", {"initial.OA.angle": [0.0, 0.5]}, 0.5)
+    table = swept.to_pandas()
+    np.testing.assert_array_equal(table[["A.x", "A.y"]].to_numpy(), swept.positions["A"])
+    found = shoal.modes("single-pendulum")
+    modes = found.to_pandas()
+    assert (modes.index.tolist(), modes["kind"].tolist()) == ([1], ["oscillating"])
+    np.testing.assert_array_equal(modes["frequency"], found.frequencies)
+
+
+def test_the_library_is_there_and_the_package_says_its_types() -> None:
+    assert callable(shoal.library.entries)
+    assert Path(shoal.__file__).with_name("py.typed").exists()

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from shoal import library
     from shoal.client import Client
     from shoal.identification import Estimate, Measurement, Problem, Recording, load_problem, problem_names
     from shoal.notebook import (
@@ -40,6 +41,7 @@ __all__ = [
     "design",
     "export",
     "identify",
+    "library",
     "load_problem",
     "load_scene",
     "modes",
@@ -64,6 +66,11 @@ def __getattr__(name: str) -> Any:
         from shoal.client import Client
 
         return Client
+    if name == "library":
+        # `from shoal import` would ask here again.
+        import shoal.library as library
+
+        return library
     from shoal import notebook, scene, trajectory
 
     for place in (notebook, scene, trajectory):

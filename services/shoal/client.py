@@ -16,15 +16,18 @@ import numpy as np
 import orjson
 
 from shoal import notebook
+from shoal.arguments import told
 from shoal.engines.remote import RemoteEngine
 from shoal.errors import ComputationError, InputError
-from shoal.identification import Estimate, Problem, load_problem
+from shoal.identification import Estimate
 from shoal.identification.carried import carried
+from shoal.identification.problem import as_problem
 from shoal.identification.recording.reading import YAML, described
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.identification.recording.unit_line import with_units
 from shoal.response.read import by_name
-from shoal.scene import Scene, load_scene
+from shoal.scene.load import as_scene
+from shoal.scene.paths import unwrapped
 from shoal.shelf import NAME
 from shoal.table import Table, load_table
 from shoal.trajectory import Array
@@ -116,7 +119,10 @@ class Client:
         return self.result(job)
 
     def _answer(self, method: str, path: str, content: Answer | None = None) -> Any:
-        body = None if content is None else orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
+        try:
+            body = None if content is None else orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
+        except TypeError as error:
+            raise InputError(f"{path}: an argument cannot be sent: {error}") from None
         found = self._service.ask(method, path, body)
         try:
             return unpacked(found)
@@ -140,29 +146,34 @@ class Client:
             found = carried(values)
             given["values"] = found.values
             if "problem" in given:
-                given["problem"], given["values"], _ = found.into(_loaded(given["problem"]))
+                given["problem"], given["values"], _ = found.into(as_problem(given["problem"]))
         if "problem" in given:
             given["problem"], given["recordings"] = _problem(given["problem"], given.pop("data", None))
         if operation == "uncertain":
             given["vary"] = by_name(given["vary"])
         if (pairs := given.get("correlations")) is not None:
             given["correlations"] = [[*pair, value] for pair, value in pairs.items()]
-        stated = {name: _plain(value) for name, value in given.items() if value is not None}
+        measured = given.pop("recordings", None)  # the only numbers that may be missing
+        stated = {name: _plain(value, name) for name, value in given.items() if value is not None}
+        if measured is not None:
+            stated["recordings"] = measured
         return {**stated, "objects": True}
 
 
-def _scene(given: Scene | str) -> Any:
-    if isinstance(given, str) and Path(given).suffix not in YAML:
-        return given
-    scene = load_scene(given) if isinstance(given, str) else given
-    return scene.model_dump(mode="json")
+def _scene(given: notebook.Stated) -> Any:
+    return given if _is_name(given) else as_scene(given).model_dump(mode="json")
 
 
-def _problem(given: Problem | str, data: Any) -> tuple[Any, Answer]:
+def _is_name(given: Any) -> bool:
+    """Whether it is that of something the service knows."""
+    return isinstance(given, str) and Path(given).suffix not in YAML
+
+
+def _problem(given: notebook.StatedProblem, data: Any) -> tuple[Any, Answer]:
     """A problem, with its scene, and its recordings by name. Raises InputError."""
-    if isinstance(given, str) and Path(given).suffix not in YAML:
+    if _is_name(given):
         return given, {name: _recording(FileSource(), one)[1] for name, one in _by_name(data).items()}
-    problem = _loaded(given)
+    problem = as_problem(given)
     stated = {**problem.model_dump(mode="json", exclude_unset=True), "scene": _scene(problem.scene)}
     found = _by_name(data, next(iter(problem.sources)))
     for name, source in problem.sources.items():
@@ -173,10 +184,6 @@ def _problem(given: Problem | str, data: Any) -> tuple[Any, Answer]:
             else:
                 stated["source"] = fields
     return stated, found
-
-
-def _loaded(given: Problem | str) -> Problem:
-    return load_problem(given) if isinstance(given, str) else given
 
 
 def _by_name(data: Any, single: str = "recording") -> Answer:
@@ -193,6 +200,8 @@ def _recording(source: FileSource, given: Any, channels: tuple[Channel, ...] | N
     """
     frames = None
     if not isinstance(given, str | Path):
+        if not hasattr(given, "columns"):
+            raise InputError(f"data: needs a file or a table (a DataFrame), by name for several, found {told(given)}")
         columns = {str(name): given[name].to_numpy(dtype=float) for name in given.columns}
     elif isinstance(given, str) and NAME.fullmatch(given.partition("@")[0]) and not Path(given).exists():
         return source.model_dump(mode="json", exclude_unset=True, exclude={"path"}), given
@@ -227,9 +236,13 @@ def _numbers(table: Table) -> dict[str, Array]:
     return found
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, field: str) -> Any:
+    """As JSON has it. Raises InputError for numbers that are not finite, which JSON would write as null."""
+    value = unwrapped(value)
     if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
+        return {key: _plain(one, f"{field}.{key}") for key, one in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(one) for one in value]
+        return [_plain(one, field) for one in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        raise InputError(f"{field}: needs a finite number, found {value}")
     return str(value) if isinstance(value, Path) else value

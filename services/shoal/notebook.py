@@ -1,6 +1,6 @@
 """What `import shoal` offers: the main commands as functions, with answers that a notebook shows.
 
-A scene or problem is given as an object, as the name of a built-in one, or as the path of a YAML file.
+A scene or problem is given as an object, as a mapping of its fields, by its name, or as the path of a YAML file.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from shoal.arguments import check_estimated, numbers, one_of, told
 from shoal.errors import InputError
-from shoal.scene import Scene, load_scene
+from shoal.scene import Scene
+from shoal.scene.load import as_scene
 from shoal.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -35,14 +37,18 @@ if TYPE_CHECKING:
     from shoal.response import Response
     from shoal.selection import Selection
 
+Stated: TypeAlias = Scene | Mapping[str, Any] | str | Path
+"""A scene, its fields as a mapping, the name of one, or a YAML file."""
+StatedProblem: TypeAlias = "Problem | Mapping[str, Any] | str | Path"
+"""A problem likewise."""
 Values: TypeAlias = "Mapping[str, Any] | Estimate | str | Path"
 """Fields of a scene by dotted path, or what was found before: an estimate, or the JSON file of one."""
 Times = Sequence[float] | npt.NDArray[np.float64]
-Data: TypeAlias = "str | Path | pd.DataFrame | Mapping[str, str] | None"
+Data: TypeAlias = "str | Path | pd.DataFrame | Mapping[str, str | Path | pd.DataFrame] | None"
 
 
 def simulate(
-    scene: Scene | str,
+    scene: Stated,
     times: Times | None = None,
     *,
     values: Values | None = None,
@@ -53,13 +59,14 @@ def simulate(
     """Simulate a scene; its `status` says whether the motion can be trusted.
 
     times: sampling instants [s], else the scene's own; values: fields of the scene to set, by dotted path;
-    engine: gauss, exudyn, exudyn-ge, casadi or the address of a service; tolerance: error [m] that the markers may
-    have, for which the cheapest model is found (see `select`); verify: estimate the error by a second run.
-    Raises InputError.
+    engine: gauss, exudyn, exudyn-ge, casadi, tree, mujoco or the address of a service; tolerance: error [m] that the
+    markers may have, for which the cheapest model is found (see `select`); verify: estimate the error by a second run,
+    which a tolerance cannot do without. Raises InputError.
     """
     from shoal.engines import get_engine
     from shoal.engines.verification import verified
 
+    check_estimated(tolerance, verify)
     wanted = _scene(scene, values)
     if tolerance is not None:
         if engine != "gauss":
@@ -69,7 +76,7 @@ def simulate(
     return verified(chosen, wanted, times) if verify else chosen.simulate(wanted, times)
 
 
-def prepare(scene: Scene | str, *, values: Values | None = None) -> Prepared:
+def prepare(scene: Stated, *, values: Values | None = None) -> Prepared:
     """A scene for a loop of your own: call what comes back with values and times, as often as you like.
 
     It gives what `simulate` gives without its second runs (`verify=False`), to the last bit, in a fraction of the time
@@ -77,12 +84,10 @@ def prepare(scene: Scene | str, *, values: Values | None = None) -> Prepared:
     """
     from shoal.engines.prepared import Prepared
 
-    return Prepared(_scene(scene, values))
+    return Prepared(_scene(scene, values).model_copy(deep=True))
 
 
-def select(
-    scene: Scene | str, tolerance: float, times: Times | None = None, *, values: Values | None = None
-) -> Selection:
+def select(scene: Stated, tolerance: float, times: Times | None = None, *, values: Values | None = None) -> Selection:
     """The cheapest model whose estimated error at the markers is below a tolerance [m]. Raises InputError."""
     from shoal.selection import select
 
@@ -90,7 +95,7 @@ def select(
 
 
 def sweep(
-    scene: Scene | str,
+    scene: Stated,
     vary: Mapping[str, Times],
     time: float | None = None,
     *,
@@ -106,13 +111,12 @@ def sweep(
     from shoal.engines.spot_checks import spot_checked
     from shoal.engines.sweep import sweep
 
-    grid = {path: np.asarray(lanes, dtype=float) for path, lanes in vary.items()}
-    found = sweep(_scene(scene, values), grid, get_engine(engine), time)
+    found = sweep(_scene(scene, values), vary, get_engine(engine), time)
     return spot_checked(found, get_engine(engine)) if verify else found
 
 
 def uncertain(
-    scene: Scene | str,
+    scene: Stated,
     vary: Mapping[str, Any] | Sequence[str],
     times: Times | None = None,
     *,
@@ -130,7 +134,7 @@ def uncertain(
     limit_runs: int = 5_000,
     allocate: bool = False,
     costs: Mapping[str, float] | None = None,
-    target: float = 1e-3,
+    target: float | None = None,
     checkpoint: Path | str | None = None,
     time_limit: float | None = None,
     verify: bool = True,
@@ -145,9 +149,9 @@ def uncertain(
     degree, count: of a method that has one; most: runs that may be made; verify: estimate mesh and step errors of
     extremal runs; limits: what must not happen, such as "B.y < -1.2"; limit_method: auto, form, importance, subset or
     monte-carlo; limit_runs: for each of their probabilities; allocate: look for the widest tolerances that keep the
-    limit, with `costs` (by path, else 1) of tightening each; target: probability of passing it that is allowed;
-    checkpoint: file that keeps the runs, from which the same study goes on; time_limit [s]: after which it ends with
-    what is known; progress: is told how many runs there are. Raises InputError, ComputationError.
+    limit, with `costs` (by path, else 1) of tightening each; target: probability of passing it that is allowed, else
+    0.001; checkpoint: file that keeps the runs, from which the same study goes on; time_limit [s]: after which it ends
+    with what is known; progress: is told how many runs there are. Raises InputError, ComputationError.
     """
     from shoal.response import uncertain
 
@@ -178,7 +182,7 @@ def uncertain(
 
 
 def compare(
-    scene: Scene | str,
+    scene: Stated,
     engines: Sequence[str] | None = None,
     times: Times | None = None,
     *,
@@ -194,7 +198,7 @@ def compare(
 
 
 def statics(
-    scene: Scene | str,
+    scene: Stated,
     time: float = 0.0,
     *,
     values: Values | None = None,
@@ -204,13 +208,14 @@ def statics(
     """Where a scene comes to rest, and whether it is stable there. Raises InputError.
 
     time: what is applied stands as it is then [s]; values: fields of the scene to set, by dotted path; verify: estimate
-    the error of the mesh by a second run on twice as many elements; tolerance: double the elements of the rods until
-    the error at the markers is below [m]
+    the error of the mesh by a second run on twice as many elements, which a tolerance cannot do without; tolerance:
+    double the elements of the rods until the error at the markers is below [m]
     """
     from shoal.mechanics.analysis.mesh_error import of_equilibrium
     from shoal.mechanics.analysis.settled import settled
     from shoal.mechanics.analysis.statics import statics
 
+    check_estimated(tolerance, verify)
     wanted = _scene(scene, values)
     if tolerance is not None:
         return settled(wanted, tolerance, time)
@@ -219,7 +224,7 @@ def statics(
 
 
 def modes(
-    scene: Scene | str,
+    scene: Stated,
     *,
     count: int = 10,
     about: Literal["equilibrium", "start"] = "equilibrium",
@@ -240,7 +245,7 @@ def modes(
 
 
 def export(
-    scene: Scene | str,
+    scene: Stated,
     to: Literal["exudyn", "mjcf"],
     file: str | Path | None = None,
     *,
@@ -262,9 +267,7 @@ def export(
     return found
 
 
-def reactions(
-    scene: Scene | str, times: Times, *, values: Values | None = None, verify: bool = True
-) -> list[Reactions]:
+def reactions(scene: Stated, times: Times, *, values: Values | None = None, verify: bool = True) -> list[Reactions]:
     """Forces and torques in the joints of a scene at times [s] of its motion. Raises InputError, ComputationError.
 
     values: fields of the scene to set, by dotted path; verify: estimate their errors by runs with other steps
@@ -272,11 +275,11 @@ def reactions(
     from shoal.mechanics.analysis.reactions import reactions
     from shoal.mechanics.analysis.reactions_verified import verified
 
-    return (verified if verify else reactions)(_scene(scene, values), [float(t) for t in times])
+    return (verified if verify else reactions)(_scene(scene, values), numbers("times", times, "times in s").tolist())
 
 
 def identify(
-    problem: Problem | str,
+    problem: StatedProblem,
     data: Data = None,
     *,
     method: str | None = None,
@@ -293,7 +296,7 @@ def identify(
     """Find the parameters of a problem from measured motion.
 
     data: a file, or a table whose columns are those that the problem's channels name, instead of the problem's own
-    recording; for several recordings a mapping from their names to files; method: one of `METHODS`, else the problem's;
+    recording; for several recordings a mapping from their names to these; method: one of `METHODS`, else the problem's;
     values: fields of the scene to set, or an estimate or its JSON file: what is sought starts from there, what else it
     found is set; tolerance: error [m] that the model may have, for which it is chosen;
     time_limit: of all of it [s]; profiles: the profile likelihood of every parameter; bootstrap: how many draws;
@@ -315,7 +318,7 @@ def identify(
 
 
 def design(
-    problem: Problem | str,
+    problem: StatedProblem,
     data: Data = None,
     *,
     about: Literal["answer", "start"] | None = None,
@@ -335,8 +338,10 @@ def design(
     its data; parameter: to be sharpened, else the weakest. Raises InputError, ComputationError where no answer can be
     trusted.
     """
-    from shoal.identification.design import about_answer, about_start, has_data
+    from shoal.identification.design import ABOUT, about_answer, about_start, has_data
 
+    if about is not None:
+        one_of("about", about, ABOUT)
     (stated, carried), wanted = _values(values), _problem(problem)
     if carried is not None:
         wanted, stated, _ = carried.into(wanted)
@@ -356,8 +361,8 @@ def plot(result: Scene | Trajectory | Equilibrium | Estimate | Sweep | Compariso
     return plot(result)
 
 
-def _scene(given: Scene | str, values: Values | None) -> Scene:
-    scene = load_scene(given) if isinstance(given, str) else given
+def _scene(given: Stated, values: Values | None) -> Scene:
+    scene = as_scene(given)
     stated, carried = _values(values)
     if carried is not None:
         return carried.set_in(scene)
@@ -373,24 +378,30 @@ def _values(given: Values | None) -> tuple[Mapping[str, Any] | None, Carried | N
     return None, carried(given)
 
 
-def _problem(given: Problem | str) -> Problem:
-    from shoal.identification import load_problem
+def _problem(given: StatedProblem) -> Problem:
+    from shoal.identification.problem import as_problem
 
-    return load_problem(given) if isinstance(given, str) else given
+    return as_problem(given)
 
 
 @contextmanager
 def _files(data: Data) -> Iterator[str | Mapping[str, str] | None]:
-    """Recordings as files, that of a table for as long as the block lasts."""
-    if data is None or isinstance(data, Mapping):
-        yield data
-    elif isinstance(data, str | Path):
-        yield str(data)
-    else:
-        with TemporaryDirectory(prefix="shoal-") as folder:
-            table = Path(folder) / "table.csv"
-            data.to_csv(table, index=False)
-            yield str(table)
+    """Recordings as files, those of tables for as long as the block lasts. Raises InputError."""
+    with TemporaryDirectory(prefix="shoal-") as folder:
+        if isinstance(data, Mapping):
+            yield {name: _file(one, Path(folder) / f"{k}.csv") for k, (name, one) in enumerate(data.items())}
+        else:
+            yield None if data is None else _file(data, Path(folder) / "table.csv")
+
+
+def _file(data: Any, table: Path) -> str:
+    """The file of a recording; that of a table is written. Raises InputError."""
+    if isinstance(data, str | Path):
+        return str(data)
+    if not hasattr(data, "to_csv"):
+        raise InputError(f"data: needs a file or a table (a DataFrame), by name for several, found {told(data)}")
+    data.to_csv(table, index=False)
+    return str(table)
 
 
 def _html(result: Any) -> str:

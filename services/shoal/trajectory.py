@@ -32,7 +32,7 @@ class Status(StrEnum):
     FAILED = "failed"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """Motion of one or more lanes (scenes that differ in numbers only), sampled at `times`.
 
@@ -91,12 +91,18 @@ class Trajectory:
         return f"Trajectory({', '.join(self.markers)}; {len(self.times)} samples, {self.engine}, {what})"
 
     def marker(self, name: str, lane: int = 0) -> Array:
-        """Path of one marker [m], (samples, d)."""
-        return self.points[:, self.markers.index(name), :, lane]
+        """Path of one marker [m], (samples, d). Raises InputError."""
+        return self.points[:, self._place(name), :, lane]
 
     def angle(self, name: str, lane: int = 0) -> Array:
-        """Direction at one marker [rad], (samples,)."""
-        return self.angles[:, self.markers.index(name), lane]
+        """Direction at one marker [rad], (samples,). Raises InputError."""
+        return self.angles[:, self._place(name), lane]
+
+    def _place(self, name: str) -> int:
+        """Of a marker among the others."""
+        if name not in self.markers:
+            raise InputError(f"marker: no marker {name!r}; there are {', '.join(self.markers)}")
+        return self.markers.index(name)
 
     def distance(self, other: Trajectory) -> float:
         """Largest distance of a marker from where it is in another run of the same scene, over all times [m]."""

@@ -162,7 +162,7 @@ def test_a_prior_counts() -> None:
     ("changes", "options", "word"),
     [
         ({"noise": None}, {}, "noise: elbow states none"),
-        ({}, {"noise": -1.0}, "noise: -1 is no standard deviation"),
+        ({}, {"noise": -1.0}, "noise: -1.0 is no standard deviation"),
         ({}, {"parameter": "mass"}, "parameter: no parameter 'mass'"),
         ({}, {"duration": 1e5}, "at most 1000 in all"),
         ({}, {"at": {"theta1": 0.0}}, "at: no value for theta2"),

@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field
 
 from shoal.api.schemas import Asked, BuiltIn, Fields, Motion, Path, RecordingName, Table
+from shoal.scene.record import limited
 
 Times = list[float]
 Positive = Annotated[float, Field(gt=0)]
@@ -118,7 +119,7 @@ class Sweep(OfScene):
     """
 
     vary: Annotated[dict[Path, Some], Field(min_length=1)]
-    time: Annotated[float, Field(ge=0)] | None = None
+    time: Annotated[float, limited("time")] | None = None
     verify: bool = True
 
     @property
@@ -150,19 +151,19 @@ class Uncertain(OfScene):
     correlations: Annotated[list[tuple[Path, Path, float]], Field(max_length=1000)] = []
     times: Some | None = None
     method: BuiltIn = "auto"
-    gap: Annotated[float, Field(gt=0, le=1)] | None = None
+    gap: Annotated[float, limited("gap")] | None = None
     tolerance: Positive | None = None
     verify: bool = True
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
-    degree: Annotated[int, Field(ge=1, le=40)] | None = None
-    count: Annotated[int, Field(ge=1)] | None = None
-    most: Annotated[int, Field(ge=3, le=20_000)] = 2_000
+    seed: Annotated[int, limited("seed", le=2**32 - 1)] = 0
+    degree: Annotated[int, limited("degree")] | None = None
+    count: Annotated[int, limited("count")] | None = None
+    most: Annotated[int, limited("most", le=20_000)] = 2_000
     limits: Annotated[list[Annotated[str, Field(max_length=200)]], Field(max_length=10)] = []
     limit_method: BuiltIn = "auto"
-    limit_runs: Annotated[int, Field(ge=100, le=20_000)] = 5_000
+    limit_runs: Annotated[int, limited("limit_runs", le=20_000)] = 5_000
     allocate: bool = False
     costs: dict[Path, Positive] | None = None
-    target: Annotated[float, Field(gt=0, lt=0.5)] = 1e-3
+    target: Annotated[float, limited("target")] = 1e-3
     time_limit: Positive | None = None
 
     @property
@@ -192,14 +193,14 @@ class AtRest(OfScene):
 class Statics(AtRest):
     """Where a scene comes to rest, with what is applied as it is at `time` [s], and whether it is stable there."""
 
-    time: Annotated[float, Field(ge=0)] = 0.0
+    time: Annotated[float, limited("time")] = 0.0
     tolerance: Positive | None = None
 
 
 class Modes(AtRest):
     """The `count` lowest eigenfrequencies and their shapes, about the equilibrium or the start."""
 
-    count: Annotated[int, Field(ge=1, le=1000)] = 10
+    count: Annotated[int, limited("count", le=1000)] = 10
     about: Literal["equilibrium", "start"] = "equilibrium"
 
 
@@ -235,12 +236,12 @@ class Identify(OfProblem):
     follows: ClassVar[tuple[str, ...]] = ("iteration", "best", "mean", "evaluations")
 
     method: BuiltIn | None = None
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+    seed: Annotated[int, limited("seed", le=2**32 - 1)] = 0
     tolerance: Positive | None = None
     time_limit: Positive | None = None
     profiles: bool = False
-    bootstrap: Annotated[int, Field(ge=0, le=10_000)] = 0
-    sample: Annotated[int, Field(ge=0, le=100_000)] = 0
+    bootstrap: Annotated[int, limited("bootstrap", le=10_000)] = 0
+    sample: Annotated[int, limited("sample", le=100_000)] = 0
     hold_out: list[Window] | dict[RecordingName, list[Window]] | None = None
 
 

@@ -17,6 +17,7 @@ from shoal.api.content import problem_of, scene_of, written
 from shoal.api.limits import check_end, check_grid, check_lanes, check_scene, within
 from shoal.api.operations import OfProblem, OfScene, Request, Simulate
 from shoal.api.settings import Settings
+from shoal.arguments import check_estimated
 from shoal.engines.contract import Engine
 from shoal.engines.spot_checks import spot_check
 from shoal.engines.verification import verified
@@ -123,6 +124,7 @@ def told(found: Any) -> Any:
 def _simulated(bench: Bench, request: Simulate, scene: Scene, bounded: bool, note: Note) -> bytes:
     """The motion of a scene, or of one per lane. bounded: whether it takes as many steps as the service computes."""
     times, engine = request.times, bench.engine
+    check_estimated(request.tolerance, request.verify)
     if request.tolerance is not None:
         selection = notebook.select(scene, request.tolerance, times)
         return _motion(request, selection.trajectory, selection.to_json())

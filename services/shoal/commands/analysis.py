@@ -39,7 +39,7 @@ def statics(
 
 @click.command()
 @click.argument("scene")
-@click.option("--count", default=10, show_default=True, type=click.IntRange(min=1), help="How many, lowest first.")
+@click.option("--count", default=10, show_default=True, type=options.limited("count"), help="How many, lowest first.")
 @click.option("--about", default="equilibrium", show_default=True, type=click.Choice(["equilibrium", "start"]))
 @options.values
 @options.verify

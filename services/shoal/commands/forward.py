@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from shoal.arguments import check_estimated
 from shoal.commands import options
 from shoal.commands.options import Out, Times, Values
 from shoal.errors import InputError, check_trusted
@@ -52,6 +53,7 @@ def simulate(
     stated, selection = wanted.name, None
     if patience is not None and tolerance is None:
         raise InputError("--patience: is that of a search; state --tolerance as well")
+    check_estimated(tolerance, verify)
     if tolerance is not None:
         from shoal.selection import select
         from shoal.selection.climb import PATIENCE

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     help="Seconds of the recording that are predicted instead of fitted (repeatable).",
 )
 @options.method
-@click.option("--seed", default=0, show_default=True, help="Seed of the random numbers.")
+@click.option("--seed", type=options.limited("seed"), default=0, show_default=True, help="Seed of the random numbers.")
 @options.engine
 @options.set_only
 @options.fitted
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--time-limit",
-    type=click.FloatRange(min=0, min_open=True),
+    type=options.limited("time_limit"),
     metavar="SECONDS",
     help="End after this time with what is known.",
 )
@@ -57,11 +57,11 @@ if TYPE_CHECKING:
 )
 @click.option("--profiles", is_flag=True, help="Intervals by the profile likelihood as well.")
 @click.option(
-    "--bootstrap", type=click.IntRange(min=0), default=0, metavar="N", help="Refit so many resampled data sets."
+    "--bootstrap", type=options.limited("bootstrap"), default=0, metavar="N", help="Refit so many resampled data sets."
 )
 @click.option(
     "--sample",
-    type=click.IntRange(min=0),
+    type=options.limited("sample"),
     default=0,
     is_flag=False,
     flag_value=1000,

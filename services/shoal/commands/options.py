@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from shoal.arguments import LIMITS
 from shoal.errors import InputError
 
 if TYPE_CHECKING:
@@ -123,6 +124,14 @@ def windows(
     if "" in found and len(found) > 1:
         raise click.BadParameter("NAME=FROM:TO is needed for all of several recordings")
     return found.get("", found or None)
+
+
+def limited(name: str) -> click.IntRange | click.FloatRange:
+    """The type of an option that is an argument of `LIMITS`; that a number is finite is seen by what computes."""
+    limit = LIMITS[name]
+    open_ = {"min_open": limit.gt is not None, "max_open": limit.lt is not None}
+    ends: Any = (limit.ge if limit.gt is None else limit.gt), (limit.le if limit.lt is None else limit.lt)
+    return click.IntRange(*ends, **open_) if limit.whole else click.FloatRange(*ends, **open_)
 
 
 class Once(click.Option):

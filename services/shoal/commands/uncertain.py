@@ -43,15 +43,20 @@ def _ways() -> str:
 @click.option("--method", cls=options.LateHelp, told=_methods, default="auto", show_default=True, metavar="NAME")
 @click.option(
     "--gap",
-    type=click.FloatRange(0, 1, min_open=True),
+    type=options.limited("gap"),
     metavar="SHARE",
     help="Go on until outer and attained bounds differ by this share of the width.",
 )
 @click.option(
-    "--runs", "most", type=click.IntRange(3), default=20_000, show_default=True, help="Most runs that may be made."
+    "--runs",
+    "most",
+    type=options.limited("most"),
+    default=20_000,
+    show_default=True,
+    help="Most runs that may be made.",
 )
-@click.option("--degree", type=click.IntRange(1, 40), help="Of a method that has one (default: its own).")
-@click.option("--count", type=click.IntRange(1), help="Runs of a method that samples (default: its own).")
+@click.option("--degree", type=options.limited("degree"), help="Of a method that has one (default: its own).")
+@click.option("--count", type=options.limited("count"), help="Runs of a method that samples (default: its own).")
 @click.option(
     "--limit",
     "limits",
@@ -61,15 +66,17 @@ def _ways() -> str:
 )
 @click.option("--limit-method", cls=options.LateHelp, told=_ways, default="auto", show_default=True, metavar="NAME")
 @click.option(
-    "--limit-runs", type=click.IntRange(100), default=5_000, show_default=True, help="Runs for each probability."
+    "--limit-runs",
+    type=options.limited("limit_runs"),
+    default=5_000,
+    show_default=True,
+    help="Runs for each probability.",
 )
 @click.option("--allocate", is_flag=True, help="Look for the widest tolerances that keep the limit.")
 @click.option(
     "--target",
-    type=click.FloatRange(0, 0.5, True, True),
-    default=1e-3,
-    show_default=True,
-    help="With --allocate: the probability of passing the limit.",
+    type=options.limited("target"),
+    help="With --allocate: the probability of passing the limit (default 0.001).",
 )
 @click.option(
     "--cost",
@@ -88,7 +95,7 @@ def _ways() -> str:
 @click.option("--worst-of", default="", metavar="LIMIT|BOUND", help="Which: a limit, or MARKER.QUANTITY.lower, .upper.")
 @click.option(
     "--time-limit",
-    type=click.FloatRange(min=0, min_open=True),
+    type=options.limited("time_limit"),
     metavar="SECONDS",
     help="End after this time with what is known by then.",
 )
@@ -101,7 +108,7 @@ def _ways() -> str:
 @options.values
 @options.at
 @click.option("--tolerance", type=float, metavar="METRES", help="Use the cheapest model whose errors stay below.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--seed", type=options.limited("seed"), default=0, show_default=True)
 @options.verify
 @options.as_json
 @options.out(".html", ".nc", ".csv", ".json", ".png")
@@ -118,7 +125,7 @@ def uncertain(
     limit_method: str,
     limit_runs: int,
     allocate: bool,
-    target: float,
+    target: float | None,
     costs: tuple[str, ...],
     worst_file: Path | None,
     worst_of: str,

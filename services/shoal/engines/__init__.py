@@ -67,11 +67,11 @@ def _remote(url: str) -> Engine:
 
 def get_engine(name: str) -> Engine:
     """The engine of that name, or the one that a service at an http(s) address runs. Raises InputError."""
-    if name.startswith(("http://", "https://")):
+    if name in ENGINES:
+        return ENGINES[name]()
+    if str(name).startswith(("http://", "https://")):
         return _remote(name)
-    if name not in ENGINES:
-        raise InputError(f"engine: no engine {name!r}; there are {', '.join(ENGINES)}, or the address of a service")
-    return ENGINES[name]()
+    raise InputError(f"engine: no engine {name!r}; there are {', '.join(ENGINES)}, or the address of a service")
 
 
 __all__ = ["ENGINES", "get_engine"]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.arguments import told
 from shoal.engines import get_engine
 from shoal.engines.capabilities import able
 from shoal.errors import InputError
@@ -19,7 +20,7 @@ COMPARED = ("gauss", "exudyn", "casadi", "tree")
 """Four derivations of the same equations. The first three that can run a scene are compared unless others are named."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """Trajectories by engine; engines that cannot run the scene are in `refused` with their reason."""
 
@@ -85,6 +86,8 @@ def compare(
 
     Raises InputError for an unknown engine, or if the scene suits none.
     """
+    if engines is not None and (isinstance(engines, str) or not engines):
+        raise InputError(f"engines: needs a list of one or more names, found {told(engines)}")
     chosen = {name: get_engine(name) for name in (compared(scene) if engines is None else engines)}
     trajectories: dict[str, Trajectory] = {}
     refused: dict[str, str] = {}

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from shoal.arguments import numbers
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
@@ -59,13 +60,10 @@ class Engine(Protocol):
 
 
 def sampling_times(scene: Scene, times: Sequence[float] | Array | None) -> Array:
-    """Requested instants [s] as an increasing array, or the scene's own. Raises InputError."""
+    """Requested instants [s] as an increasing array of its own, or the scene's own. Raises InputError."""
     if times is None:
         return np.linspace(0.0, scene.solver.duration, scene.solver.samples + 1)[1:]
-    wanted = np.asarray(times, dtype=float)
-    if wanted.ndim != 1 or wanted.size == 0 or not np.all(np.isfinite(wanted)):
-        found = np.array2string(wanted, threshold=8, separator=", ")
-        raise InputError(f"times: needs a list of one or more finite times in s, found {found}")
+    wanted = numbers("times", times, "times in s")
     if wanted[0] < 0:
         raise InputError(f"times: must start at or after 0 s, found {wanted[0]:g}")
     if np.any(falls := np.diff(wanted) <= 0):
@@ -81,7 +79,8 @@ def check_lanes(
 
     accepted: the extremes of earlier calls, by path, which these widen; what lies between them is accepted too.
     """
-    sizes = {path: np.asarray(lanes).size for path, lanes in values.items()}
+    values = {path: numbers(path, lanes) for path, lanes in values.items()}
+    sizes = {path: lanes.size for path, lanes in values.items()}
     if len(set(sizes.values())) != 1:
         raise InputError(f"lanes: every path needs as many numbers as the others, found {sizes}")
     known, count = {} if accepted is None else accepted, next(iter(sizes.values()))
@@ -97,7 +96,7 @@ def check_lanes(
                     raise
                 # What cannot be beside the other numbers of the scene may be beside those of its lane.
                 for k in range(count):
-                    scene.with_values({name: float(np.ravel(numbers)[k]) for name, numbers in values.items()})
+                    scene.with_values({name: float(column[k]) for name, column in values.items()})
                 return count
             known[path] = min(low, least), max(high, most)
     return count

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.arguments import numbers
 from shoal.engines import swarm_motion
 from shoal.engines.capabilities import check_acceleration
 from shoal.engines.contract import check_lanes, sampling_times
@@ -17,6 +18,7 @@ from shoal.mechanics.machine import Machine
 from shoal.mechanics.persist import persist
 from shoal.mechanics.simulate import machine, simulate
 from shoal.scene import Scene
+from shoal.scene.paths import unwrapped
 from shoal.trajectory import Array, Trajectory
 
 KEPT = 16
@@ -39,7 +41,7 @@ class Prepared:
         self.scene = scene
         self._threads = threads
         self._instants = sampling_times(scene, None)
-        self._checked: dict[tuple[tuple[int, ...], bytes], None] = {}
+        self._checked: dict[tuple[str, tuple[int, ...], bytes], Array] = {}
         self._accepted: dict[str, tuple[float, float]] = {}
         self._machines: dict[tuple[float, bool], Machine] = {}
         self._set: dict[str, Prepared] = {}
@@ -67,7 +69,7 @@ class Prepared:
         """
         lanes = {path: value for path, value in values.items() if _of_lanes(value)} if values else {}
         if values and len(lanes) < len(values):
-            return self._with({path: value for path, value in values.items() if path not in lanes})(
+            return self._with({path: unwrapped(value) for path, value in values.items() if path not in lanes})(
                 lanes, times, whole=whole
             )
         wanted = self._wanted(times)
@@ -96,13 +98,13 @@ class Prepared:
     def _wanted(self, times: Sequence[float] | Array | None) -> Array:
         if times is None:
             return self._instants.copy()
-        wanted = np.asarray(times, dtype=float)
-        key = wanted.shape, wanted.tobytes()
-        if key not in self._checked:
-            sampling_times(self.scene, wanted)
-            self._checked[key] = None
+        given = times if type(times) is np.ndarray else numbers("times", times, "times in s")
+        key = given.dtype.str, given.shape, given.tobytes()
+        wanted = self._checked.get(key)
+        if wanted is None:
+            wanted = self._checked[key] = sampling_times(self.scene, given)
             _forget(self._checked)
-        return wanted
+        return wanted.copy()
 
     def _machine(self, scene: Scene, end: float) -> Machine:
         key = max(end, scene.solver.duration), end > 0
@@ -128,7 +130,8 @@ class _Asked:
 
 @lru_cache(maxsize=32)
 def _prepared(asked: _Asked) -> Prepared:
-    return Prepared(asked.scene, asked.key[-1])
+    # What is kept does not change with the mappings of a scene that somebody else holds.
+    return Prepared(asked.scene.model_copy(deep=True), asked.key[-1])
 
 
 def _of_lanes(value: Any) -> bool:

@@ -20,6 +20,7 @@ import numpy as np
 import orjson
 from httpx_retries import Retry, RetryTransport
 
+from shoal.arguments import numbers
 from shoal.engines.contract import Capabilities
 from shoal.errors import ComputationError, InputError
 from shoal.scene import Scene
@@ -78,7 +79,7 @@ class RemoteEngine:
         self, scene: Scene, values: Mapping[str, Array], times: Sequence[float] | Array | None = None
     ) -> Trajectory:
         """Run one scene per lane; see `Engine`. Raises ComputationError if the service cannot be had."""
-        lanes = {path: np.ravel(np.asarray(column, dtype=float)).tolist() for path, column in values.items()}
+        lanes = {path: numbers(path, column).tolist() for path, column in values.items()}
         return self._simulate(scene, lanes, times)
 
     def _simulate(
@@ -86,7 +87,7 @@ class RemoteEngine:
     ) -> Trajectory:
         request = {
             "scene": scene.model_dump(mode="json"),
-            "times": None if times is None else np.asarray(times, dtype=float).tolist(),
+            "times": None if times is None else numbers("times", times, "times in s").tolist(),
             "lanes": lanes,
             "verify": False,
         }

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shoal.arguments import check, mapping, numbers
 from shoal.engines.contract import Engine, sampling_times
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory, plain
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LONE = 4
 """So many of the points that failed are tried alone."""
@@ -37,7 +41,7 @@ class SpotCheck:
         return f"estimated error at the markers, largest of {self.looked_at} points: {known or 'unknown'}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sweep:
     """Marker positions and displacements from the start at `time` [s] over a grid.
 
@@ -80,6 +84,12 @@ class Sweep:
             table.append(plain({**row, "status": str(status)}))
         return table
 
+    def to_pandas(self) -> pd.DataFrame:
+        """The same as a table."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows())
+
     def to_json(self) -> dict[str, Any]:
         """The object that `shoal sweep --json` prints."""
         return {
@@ -93,8 +103,13 @@ class Sweep:
         }
 
 
-def sweep(scene: Scene, vary: Mapping[str, Array], engine: Engine, time: float | None = None) -> Sweep:
+def sweep(
+    scene: Scene, vary: Mapping[str, Sequence[float] | Array], engine: Engine, time: float | None = None
+) -> Sweep:
     """Simulate the full grid of the values in `vary` (path -> values). Raises InputError."""
+    check(time=time)
+    fields = mapping("vary", vary, "fields with their values")
+    vary = {path: numbers(f"vary: {path}", axis) for path, axis in fields.items()}
     (instant,) = sampling_times(scene, [scene.solver.duration if time is None else time]).tolist()
     axes = np.meshgrid(*vary.values(), indexing="ij")
     grid = {path: axis.ravel() for path, axis in zip(vary, axes, strict=True)}

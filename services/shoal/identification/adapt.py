@@ -39,7 +39,6 @@ class Stage:
     tolerance: float
     error: float
     evaluations: int
-    selection_s: float
 
 
 def coarse_to_fine(
@@ -98,4 +97,4 @@ def _chosen(model: ForwardModel, point: Array, tolerance: float) -> tuple[Forwar
 
 def _stage(selection: Selection, evaluations: int) -> Stage:
     chosen = selection.chosen
-    return Stage(chosen.name, selection.tolerance, chosen.error, evaluations, selection.wall_s)
+    return Stage(chosen.name, selection.tolerance, chosen.error, evaluations)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shoal.arguments import told
 from shoal.errors import InputError
 from shoal.estimated import checked_joint, read_estimate
 from shoal.scene import expression
@@ -209,7 +210,15 @@ def of_estimate(estimate: Estimate) -> Carried:
 
 def carried(found: Estimate | Path | str) -> Carried:
     """What an estimate carries, or the JSON file of one. Raises InputError."""
-    return read_values(found) if isinstance(found, str | Path) else of_estimate(found)
+    from shoal.identification.estimate import Estimate
+
+    if isinstance(found, str | Path):
+        return read_values(found)
+    if not isinstance(found, Estimate):
+        raise InputError(
+            f"values: needs fields of a scene by path, an estimate or the JSON file of one, found {told(found)}"
+        )
+    return of_estimate(found)
 
 
 def read_values(path: Path | str) -> Carried:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """Result of an identification. fitness: mean squared deviation; rms: per observed thing (position or angle).
 

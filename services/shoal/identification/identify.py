@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.arguments import check
 from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification.adapt import Stage, Stopped, coarse_to_fine
@@ -67,12 +68,11 @@ def identify(
     wishes: what is to be known beyond the answer;
     progress: is told how the search goes. Raises InputError, ComputationError.
     """
+    check(seed=seed, tolerance=tolerance, time_limit=time_limit, bootstrap=wishes.bootstrap, sample=wishes.sample)
     name = method or problem.method
     search = get_method(name)
     if tolerance is not None and engine != "gauss":
         raise InputError(f"tolerance: models are chosen for engine gauss only, found engine {engine!r}")
-    if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0):
-        raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
     if wishes.sample:
         require_sampler()
     notes: list[str] = []

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from shoal.arguments import told
 from shoal.errors import InputError
 from shoal.identification.bounds import accepts, possible_bound
 from shoal.identification.recording.sensor_checks import check_felt
@@ -19,6 +20,7 @@ from shoal.identification.recording.source import IN_SPACE, Channel, EngineSourc
 from shoal.scene import Scene, expression, load_scene
 from shoal.scene.joints import Gear
 from shoal.scene.load import names, read_named
+from shoal.scene.paths import unwrapped
 from shoal.scene.record import Positive, Record, one_line
 from shoal.scene.scene import Name
 from shoal.shelf import NAME, located, shelf
@@ -333,11 +335,28 @@ def built_in_problems() -> list[str]:
     return names(problem_library())
 
 
-def load_problem(name: str) -> Problem:
+def as_problem(given: Problem | Mapping[str, Any] | str | Path) -> Problem:
+    """A problem as it is, by its fields, or as `load_problem` takes it; files that fields name are found from here.
+
+    Raises InputError.
+    """
+    if isinstance(given, Problem):
+        return given
+    if isinstance(given, Mapping):
+        return Problem.parse(unwrapped(given), "problem")
+    if not isinstance(given, str | Path):
+        raise InputError(
+            f"problem: needs a problem, its fields, a name or the path of a YAML file, found {told(given)}"
+        )
+    return load_problem(given)
+
+
+def load_problem(name: str | Path) -> Problem:
     """The problem of that name, built-in or of one's own library, or the one in that YAML file. Raises InputError.
 
     What a YAML file names is beside it, or a name of the library.
     """
+    name = str(name)
     name = name if name in built_in_problems() else located("problems", name)
     problem = Problem.parse(read_named(name, problem_library(), "problem", problem_names()), name)
     if not Path(name).suffix:

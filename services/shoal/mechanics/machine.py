@@ -212,7 +212,7 @@ class Machine:
         """The start as it is used, what of it was stated otherwise, and joints whose forces are not unique."""
         scene, model = self.scene, self.model
         if scene.dimensions == 3:
-            used = spatial.begun(model.frames, model.scene, *np.split(begun, 2))
+            used = spatial.begun(model.frames, *np.split(begun, 2))
             redundant = redundant_in_space(scene, begun[: model.unknowns])
             told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
             return dict(plain(told))

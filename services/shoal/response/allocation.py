@@ -51,7 +51,7 @@ class Reached:
     evaluations: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Allocation:
     """The cheapest tolerances that keep a limit.
 

@@ -51,7 +51,7 @@ class Ends:
     at_upper: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Boxes:
     """names: of the intervals; mean, std, quantiles: of every column; gap: the largest distance between outer bounds
     and extremes within the horizon, as a share of the scatter (the largest spread of the mean and deviation together);

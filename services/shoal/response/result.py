@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 BOUNDS = "lower", "upper", "lower_outer", "upper_outer"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bounds:
     """Of every column. lower, upper: attained by runs or, at long times, by runs at the arguments named, to within the
     error of the surrogate of cycles; lower_outer, upper_outer: no run is expected beyond, nan where
@@ -48,7 +48,7 @@ class Bounds:
     likely: Array | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Response:
     """How the markers of a scene may move.
 

@@ -16,7 +16,7 @@ from shoal.errors import InputError
 from shoal.response.read import correlations, prices
 from shoal.scene import Scene, load_scene
 from shoal.scene.load import LARGEST, read_yaml, unknown
-from shoal.scene.record import Base
+from shoal.scene.record import Base, limited
 from shoal.shelf import located, shelf
 
 KEY = "uncertain"
@@ -63,21 +63,21 @@ class Stated(Base):
     correlate: Annotated[list[str], _texts("correlate")] = []
     set: Annotated[dict[str, Any], BeforeValidator(_values)] = {}
     method: str = "auto"
-    gap: Annotated[float, Field(gt=0, le=1)] | None = None
-    runs: Annotated[int, Field(ge=3)] = 20_000
-    degree: Annotated[int, Field(ge=1, le=40)] | None = None
-    count: Annotated[int, Field(ge=1)] | None = None
+    gap: Annotated[float, limited("gap")] | None = None
+    runs: Annotated[int, limited("most")] = 20_000
+    degree: Annotated[int, limited("degree")] | None = None
+    count: Annotated[int, limited("count")] | None = None
     limit: Annotated[list[str], _texts("limit")] = []
     limit_method: str = "auto"
-    limit_runs: Annotated[int, Field(ge=100)] = 5_000
+    limit_runs: Annotated[int, limited("limit_runs")] = 5_000
     allocate: bool = False
-    target: Annotated[float, Field(gt=0, lt=0.5)] = 1e-3
+    target: Annotated[float, limited("target")] | None = None
     cost: Annotated[list[str], _texts("cost")] = []
-    time_limit: Annotated[float, Field(gt=0)] | None = None
+    time_limit: Annotated[float, limited("time_limit")] | None = None
     engine: str = "gauss"
     at: Annotated[list[float] | None, BeforeValidator(_instants)] = None
-    tolerance: Annotated[float, Field(gt=0)] | None = None
-    seed: Annotated[int, Field(ge=0)] = 0
+    tolerance: Annotated[float, limited("tolerance")] | None = None
+    seed: Annotated[int, limited("seed")] = 0
     verify: bool = True
     worst: str | None = None
     worst_of: str = ""

@@ -19,7 +19,7 @@ NOTHING = 1e-9
 """A deviation below this share of the largest of its group has no shares to tell of."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Statistics:
     """mean, std: (columns,); quantiles: (quantiles, columns); first, total: Sobol's indices, (parameters, columns), nan
     where nothing varies or nothing is known; error, std_error: within which mean and std lie with 95 % confidence

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from shoal.arguments import check
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
 from shoal.engines.spot_checks import larger
@@ -46,7 +47,8 @@ from shoal.response.read import parameters
 from shoal.response.respond import MOST, Answer, respond
 from shoal.response.result import Bounds, Response
 from shoal.response.runs import Model
-from shoal.scene import Scene, load_scene
+from shoal.scene import Scene
+from shoal.scene.load import as_scene
 from shoal.trajectory import Array
 from shoal.versions import versions
 
@@ -65,7 +67,7 @@ NAMED = 3
 
 
 def uncertain(
-    scene: Scene | str,
+    scene: Scene | Mapping[str, Any] | str | Path,
     vary: Mapping[str, Any] | Sequence[str | Parameter],
     times: Sequence[float] | Array | None = None,
     *,
@@ -85,7 +87,7 @@ def uncertain(
     limit_runs: int = LIMIT_RUNS,
     allocate: bool = False,
     costs: Mapping[str, float] | None = None,
-    target: float = TARGET,
+    target: float | None = None,
     checkpoint: Path | str | None = None,
     time_limit: float | None = None,
     progress: Callable[[int], None] | None = None,
@@ -100,13 +102,18 @@ def uncertain(
     and step errors of extremal runs; most: runs that may be made; limits: what must not happen, such as "B.y < -1.2";
     limit_method: one of `WAYS`; limit_runs: for each of them;
     allocate: look for the widest tolerances that keep the limit, with `costs` (by path, else 1) of tightening each;
-    target: probability of passing it that is allowed; checkpoint: file that keeps the runs, from which the
-    same study goes on; time_limit [s]: after which, compiling aside, it ends with what is known; progress: is told how
-    many runs there are. Raises InputError, ComputationError.
+    target: probability of passing it that is allowed, else `TARGET`; checkpoint: file that keeps the runs, from which
+    the same study goes on; time_limit [s]: after which, compiling aside, it ends with what is known; progress: is told
+    how many runs there are. Raises InputError, ComputationError.
     """
     begin = clock.now()
+    check(gap=gap, degree=degree, count=count, tolerance=tolerance, seed=seed, most=most)
+    check(limit_runs=limit_runs, target=target, time_limit=time_limit)
+    for name, given in {"costs": costs, "target": target}.items():
+        if given and not allocate:
+            raise InputError(f"{name}: belongs to allocate, the search for the widest tolerances; ask for that too")
     end = None if time_limit is None else clock.now() + time_limit
-    wanted = load_scene(scene) if isinstance(scene, str) else scene
+    wanted = as_scene(scene)
     wanted = wanted.with_values(values) if values else wanted
     inputs = Inputs(parameters(vary, wanted), correlations)
     get_way(limit_method)
@@ -155,7 +162,7 @@ def uncertain(
                 shared = answer.found.indices is not None
                 judged.append(crosschecked(found, machine, answer.runs.values, shared=shared))
         if allocate:
-            allocation = _allocated(judged[0], machine, costs or {}, target, most, how)
+            allocation = _allocated(judged[0], machine, costs or {}, TARGET if target is None else target, most, how)
     except TimeIsUpError:
         pass
     finally:

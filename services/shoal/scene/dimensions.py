@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator
 
-from shoal.errors import InputError
 from shoal.scene.record import Record
 
 SPATIAL_KINDS = ("spherical", "universal", "cylindrical", "planar")
@@ -122,9 +121,3 @@ def _is_flat(part: Any, path: str) -> bool:
         return all(_is_flat(value, path) for value in part)
     is_vector = isinstance(part, tuple) and len(part) == 3 and bool(_VECTORS & set(path.split(".")[-2:]))
     return not (is_vector and part[2] != 0)
-
-
-def require_plane(scene: Any, what: str) -> None:
-    """Raises InputError for a scene in space where something (with its verb) is for planar ones only."""
-    if scene.dimensions != 2:
-        raise InputError(f"dimensions: {what} for planar scenes only; {scene.name} is one in space")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable
+import pickle
+from collections.abc import Hashable, Mapping
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
@@ -13,10 +14,12 @@ from typing import Any
 
 import yaml
 
+from shoal.arguments import told
 from shoal.errors import InputError
 from shoal.scene.ended import with_end
 from shoal.scene.measured import with_signals
 from shoal.scene.parametric import EXAMPLES, parametric
+from shoal.scene.paths import unwrapped
 from shoal.scene.scene import Scene
 from shoal.shelf import located, shelf
 
@@ -177,24 +180,43 @@ def built_in_scenes() -> list[str]:
     return sorted([*names(scene_library()), *EXAMPLES])
 
 
-def load_scene(name: str) -> Scene:
+def as_scene(given: Scene | Mapping[str, Any] | str | Path) -> Scene:
+    """A scene as it is, by its fields, or as `load_scene` takes it; files that fields name are found from here.
+
+    Raises InputError.
+    """
+    if isinstance(given, Scene):
+        return given
+    if isinstance(given, Mapping):
+        return _parsed(unwrapped(given), Path(), "scene")
+    if not isinstance(given, str | Path):
+        raise InputError(f"scene: needs a scene, its fields, a name or the path of a YAML file, found {told(given)}")
+    return load_scene(given)
+
+
+def load_scene(name: str | Path) -> Scene:
     """The scene of that name, built-in or of one's own library, or in that YAML file as it is now. Raises InputError.
 
     NAME@VERSION is an earlier version of the library's.
     """
+    name = str(name)
     if (data := parametric(name)) is not None:
         return Scene.parse(data, name)
-    return _built_in(name) if name in built_in_scenes() else _read(located("scenes", name))
+    # Whoever edits the mappings of a scene edits his own; of all copies this one costs least.
+    return pickle.loads(_built_in(name)) if name in built_in_scenes() else _read(located("scenes", name))
 
 
 @cache
-def _built_in(name: str) -> Scene:
-    return _read(name)
+def _built_in(name: str) -> bytes:
+    return pickle.dumps(_read(name))
 
 
 def _read(name: str) -> Scene:
     data = read_named(name, scene_library(), "scene", scene_names())
     if not isinstance(data, dict):
         raise InputError(f"{name}: a scene is a mapping of fields, found {type(data).__name__}")
-    folder = Path(name).parent
+    return _parsed(data, Path(name).parent, name)
+
+
+def _parsed(data: dict[str, Any], folder: Path, name: str) -> Scene:
     return Scene.parse(with_end(with_signals(data, folder, name), folder, name), name)

@@ -8,10 +8,29 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shoal.arguments import told
 from shoal.errors import InputError
 from shoal.scene.function import Function
 from shoal.scene.initial import Begin, InitialState
 from shoal.scene.record import Record
+
+
+def parts(path: Any) -> list[str]:
+    """The names along a dotted path. Raises InputError for what is no text."""
+    if not isinstance(path, str):
+        raise InputError(f"values: {path!r} is no dotted path of a field, such as initial.OA.angle")
+    return path.split(".")
+
+
+def unwrapped(value: Any) -> Any:
+    """A value of a field with numbers and lists of Python in place of numpy's. Raises InputError for masked ones."""
+    if isinstance(value, np.ndarray | np.generic):
+        if np.ma.is_masked(value):
+            raise InputError(f"values: a masked array is no value of a field, found {told(value)}")
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {name: unwrapped(one) for name, one in value.items()}
+    return type(value)(unwrapped(one) for one in value) if type(value) in (list, tuple) else value
 
 
 def with_lanes(place: Any, path: list[str], lanes: npt.NDArray[np.float64]) -> Any:

@@ -32,7 +32,7 @@ from shoal.scene.initial import (
 )
 from shoal.scene.joints import GROUND, Attachment, Joint, MovingPoint, Universal
 from shoal.scene.loads import DistributedForce, Force, Load
-from shoal.scene.paths import key, shared, unknown, with_lanes
+from shoal.scene.paths import key, parts, shared, unknown, unwrapped, with_lanes
 from shoal.scene.record import Record, Vector, one_line
 from shoal.scene.solids import ModalBody
 from shoal.scene.solver import Solver
@@ -249,9 +249,10 @@ class Scene(Record):
         What is set last is kept: where a path moves the start or a joint, the other initial values become guesses. A
         drive that begins as the one before moves nothing.
         """
-        values = {f"{INITIAL}_{FROM}" if path == f"{INITIAL}.{FROM}" else path: x for path, x in values.items()}
+        from_ = f"{INITIAL}_{FROM}"
+        values = {from_ if parts(path) == [INITIAL, FROM] else path: unwrapped(value) for path, value in values.items()}
         fresh = [path for path, value in values.items() if not self._has(path, value)]
-        check_start(values.get(f"{INITIAL}_{FROM}", self.initial_from), fresh)
+        check_start(values.get(from_, self.initial_from), fresh)
         turned = [path for path in fresh if self._begins_there(path, values[path])]
         data = self._guessing(fresh, turned).model_dump(mode="json")
         for path, value in values.items():
@@ -288,7 +289,7 @@ class Scene(Record):
 
     def alone(self, paths: Iterable[str]) -> str | None:
         """The first path whose number has to be the same in all lanes, as those in functions of time and matrices."""
-        return next((path for path in paths if shared(self, path.split("."))), None)
+        return next((path for path in paths if shared(self, parts(path))), None)
 
     def _has(self, path: str, value: Any) -> bool:
         """Whether the scene states this value there already, or a function that begins like this one."""

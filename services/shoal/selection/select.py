@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shoal.arguments import check
 from shoal.engines.contract import sampling_times
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import left_out, softer
@@ -35,7 +36,7 @@ TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
 """Of the adaptive integrator for rigid machines, from coarse to fine."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Selection:
     """The chosen model and how it was found.
 
@@ -112,8 +113,7 @@ def select(
     looked for. Raises InputError, and ComputationError where a curved or twisted rod in space, which is never rigid,
     takes too long.
     """
-    if not (np.isfinite(tolerance) and tolerance > 0):
-        raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
+    check(tolerance=tolerance)
     if not patience > 0:
         raise InputError(f"patience: needs a time above 0 s, found {patience:g}")
     begin = clock.now()

@@ -155,7 +155,7 @@ def started(scene: Scene) -> tuple[dict[str, Begin], Any, dict[str, InitialState
         return found, lambda side, axis: np.array([0.0, 0.0, 1.0]), initial
     placement = place_started(scene)
     q, v = stacked(placement.positions)[:, 0], stacked(placement.velocities)[:, 0]
-    initial = begun(placement.frames, scene, q, v)
+    initial = begun(placement.frames, q, v)
     for name, begin in initial.items():
         axes = Rotation.from_rotvec(begin.rotation or (0.0, 0.0, 0.0)).as_matrix()
         parts = (np.array(part, dtype=float) for part in (begin.position, begin.velocity, begin.spin or (0, 0, 0)))

@@ -1,7 +1,7 @@
 """What to measure: the sensor, the duration and the rate that would sharpen the parameter that is known worst."""
 
 from shoal.identification.design.asked import SENSORS
-from shoal.identification.design.plan import Design, about_answer, about_start, design, has_data
+from shoal.identification.design.plan import ABOUT, Design, about_answer, about_start, design, has_data
 from shoal.identification.design.sensors import Sensor
 
-__all__ = ["SENSORS", "Design", "Sensor", "about_answer", "about_start", "design", "has_data"]
+__all__ = ["ABOUT", "SENSORS", "Design", "Sensor", "about_answer", "about_start", "design", "has_data"]

@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from shoal.arguments import Limit, told
 from shoal.errors import InputError
 from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.source import ACCELERATIONS, FORCES, MOMENTS, RATES, Channel, EngineSource
 from shoal.trajectory import Array
 
+_POSITIVE = Limit(gt=0)
 _MOST = 4000
 """Instants at which sensitivities are computed, at most."""
 
@@ -49,8 +51,8 @@ def stated_noise(
     named = {"noise": (POSITION, noise), "angle_noise": (ANGLE, angle_noise)}
     named |= {f"sensor_noise.{kind}": (kind, size) for kind, size in (sensors or {}).items()}
     for what, (_, size) in named.items():
-        if size is not None and not (np.isfinite(size) and size > 0):
-            raise InputError(f"{what}: {size:g} is no standard deviation; it is positive")
+        if size is not None and not _POSITIVE.holds(size):
+            raise InputError(f"{what}: {told(size)} is no standard deviation; it is positive")
     found = {kind: size for kind, size in named.values() if size is not None}
     channels = problem.channels_of(source)
     for channel in channels:
@@ -93,7 +95,7 @@ def today_of(
         found = (source.duration or 0.0, (source.rate or 0.0) / source.every)
     duration, rate = found[0] if duration is None else duration, found[1] if rate is None else rate
     for what, size, unit in (("duration", duration, "s"), ("rate", rate, "samples per second")):
-        if not (np.isfinite(size) and size > 0):
+        if not _POSITIVE.holds(size):
             raise InputError(f"{what}: needed, and positive [{unit}]; without a recording it cannot be guessed")
     return duration, rate, first
 

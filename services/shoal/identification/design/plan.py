@@ -28,6 +28,7 @@ from shoal.identification.spread.sensitivity import sensitivity
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
+ABOUT = ("answer", "start")
 _DURATIONS = (0.25, 0.5, 1.0, 1.5, 2.0)
 _RATES = (0.25, 0.5, 1.0, 2.0)
 _COURSE = 40
@@ -35,7 +36,7 @@ _ENOUGH = 0.1
 """Relative difference of the sensitivities by two steps: who compares sensors wants no more digits."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Design:
     """Sensors, the best first, at the duration [s] and rate [1/s] of today.
 

@@ -119,7 +119,7 @@ class Segments:
                 break
             if iteration == 0:
                 states = self._unwound(states, seen)
-            step, moved = self._step(point, states, seen, jacobian)
+            step, moved = self._step(states, seen, jacobian)
             states = states + step
             point[self.others] += moved
             for k, component in self.sought.items():
@@ -137,7 +137,7 @@ class Segments:
         shape = (len(points), len(instants), -1)
         return seen.reshape(shape), jacobian.reshape(*shape, points.shape[1])
 
-    def _step(self, point: Array, states: Array, seen: Array, jacobian: Array) -> tuple[Array, Array]:
+    def _step(self, states: Array, seen: Array, jacobian: Array) -> tuple[Array, Array]:
         """Change of the states (segments, states) and of the others (others,): least squares with equations."""
         count, width = states.shape
         channels = len(self.recording.channels)

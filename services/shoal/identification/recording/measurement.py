@@ -28,7 +28,7 @@ class Held:
     values: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """Samples of one run. times [s]: (samples,), by the recording's clock, from the start of the motion to fit on.
 
@@ -88,7 +88,7 @@ class Recording:
         return replace(self, times=self.times[::step], values=self.values[::step])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurement:
     """The recordings by name, and the parameters of computed data (`truth`), for the report."""
 

@@ -24,7 +24,7 @@ class Held(StrEnum):
     FAILED = "failed"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Equilibrium:
     """A state of rest, and the evidence for it.
 

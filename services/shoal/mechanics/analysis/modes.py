@@ -8,11 +8,12 @@ equilibrium these are the motions relative to its fall. Dry friction is left out
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from shoal.arguments import check, one_of
 from shoal.errors import ComputationError
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.balance import BALANCED, Balance
@@ -28,12 +29,16 @@ from shoal.mechanics.reach import span
 from shoal.scene import Scene
 from shoal.trajectory import plain
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 Complex = npt.NDArray[np.complex128]
+ABOUT = ("equilibrium", "start")
 COARSE = 0.5
 """An eigenvalue whose mesh error is above this part of it is not known."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mode:
     """One small motion, shape * exp(eigenvalue * t).
 
@@ -79,7 +84,7 @@ class Mode:
         return "oscillating" if self.eigenvalue.imag > 0 else "creeping"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Modes:
     """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
 
@@ -128,6 +133,23 @@ class Modes:
         """Frequencies without damping [Hz], (modes,)."""
         return np.array([mode.frequency for mode in self.modes])
 
+    def to_pandas(self) -> pd.DataFrame:
+        """A row a mode, lowest first: kind, frequencies [Hz], damping ratio, growth [1/s], relative mesh error."""
+        import pandas as pd
+
+        rows = [
+            {
+                "kind": mode.kind,
+                "frequency": mode.frequency,
+                "damped_frequency": mode.damped_frequency,
+                "damping_ratio": mode.damping_ratio,
+                "growth": mode.eigenvalue.real,
+                "mesh_error": self.mesh_errors[number] if self.mesh_errors else np.nan,
+            }
+            for number, mode in enumerate(self.modes)
+        ]
+        return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="mode"))
+
     def to_json(self) -> dict[str, Any]:
         """Plain data, which `shoal modes --json` prints."""
         status, why = self.verdict
@@ -170,6 +192,8 @@ def modes(
 
     Raises InputError if the scene cannot be modelled, ComputationError if there is no equilibrium or it is singular.
     """
+    one_of("about", about, ABOUT)
+    check(time=time, count=count)
     if about == "equilibrium":
         equilibrium = statics(scene, time, leave_unstable=leave_unstable)
         if not equilibrium.balanced:

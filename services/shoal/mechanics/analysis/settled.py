@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shoal.errors import InputError
+from shoal.arguments import check
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.mesh_error import apart, beyond, finer
 from shoal.mechanics.analysis.statics import statics
@@ -28,8 +28,7 @@ def settled(scene: Scene, tolerance: float, time: float = 0.0) -> Equilibrium:
     with shear take the place of slender ones where that moves a marker by as much as the estimate may be off, unless
     `solver.theory` is slender. Raises InputError.
     """
-    if not (np.isfinite(tolerance) and tolerance > 0):
-        raise InputError(f"tolerance: needs a length above 0 m, found {tolerance:g}")
+    check(tolerance=tolerance)
     found = _refined(scene, tolerance, time)
     stout = None if scene.solver.theory == "slender" else with_shear(found.scene)
     if stout is None:

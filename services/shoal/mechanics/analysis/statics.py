@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from shoal.errors import InputError
+from shoal.arguments import check
 from shoal.mechanics import plane
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.balance import BALANCED, Balance, Found, View
@@ -56,8 +56,7 @@ def statics(scene: Scene, time: float = 0.0, *, leave_unstable: bool = True) -> 
     loads have a potential. With loads that have none the place is stable where no small motion grows, with the damping
     of the machine. The message tells what is left out. Raises InputError if the scene cannot be modelled.
     """
-    if not (np.isfinite(time) and time >= 0):
-        raise InputError(f"time: needs a time of at least 0 s, found {time:g}")
+    check(time=time)
     evaluator = Evaluator.of(scene, horizon=time)
     return _Search(scene, evaluator, time).run(leave_unstable)
 

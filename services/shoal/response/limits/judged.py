@@ -107,7 +107,7 @@ class Between:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Judged:
     """Of one limit.
 

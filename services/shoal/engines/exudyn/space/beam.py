@@ -55,7 +55,7 @@ class SpatialBeamPart(Chain, Part):
         stiffness, inertia = _stiffness(fine, sections), _inertia(fine, sections)
         nodes, columns, frames = [], [], []
         for s in np.linspace(0.0, rod.length, fine.elements + 1):
-            here = _start(placement, name, rod, float(s), q, v)
+            here = _start(placement, name, float(s), q, v)
             turn = here.axes.as_quat(scalar_first=True)
             rates = 0.25 * local_rates(turn).T @ here.axes.inv().apply(here.spin)
             node, places = system.node("NodeRigidBodyEP", [*here.place, *turn], [*here.speed, *rates])
@@ -146,7 +146,7 @@ class _Begin:
     spin: Array
 
 
-def _start(placement: SpatialPlacement, name: str, rod: Rod, s: float, q: Array, v: Array) -> _Begin:
+def _start(placement: SpatialPlacement, name: str, s: float, q: Array, v: Array) -> _Begin:
     """A section of the native machine at its start, where rods are unstrained."""
     scene, frame, at = placement.scene, placement.frames[name], Attachment(body=name, point=(s, 0.0, 0.0))
     assert isinstance(frame, BeamFrame)

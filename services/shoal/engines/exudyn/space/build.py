@@ -74,7 +74,7 @@ def build_in_space(
     exchanges += [add_load(ends, name, load) for name, load in scene.loads.items()]
     mbs.Assemble()
     reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
-    started = scene.model_copy(update={"initial": begun(placement.frames, scene, q, v)})
+    started = scene.model_copy(update={"initial": begun(placement.frames, q, v)})
     dependent = _dependent(exu, mbs) if any(loops(scene)) else 0
     return Machine(
         started, system, mbs, container, clock, parts, gaps, exchanges, span(scene), np.array(reference), dependent

@@ -185,7 +185,7 @@ def _aligned(exu: Any, ends: SpatialEnds, where: str, one: Aligned) -> Gap:
     if len(cables) == 2:
         return lambda q, v: np.zeros(len(q))  # neither has a section that could hold an axis
     if cables:
-        return _cable_axis(exu, ends, where, one, cables[0])
+        return _cable_axis(exu, ends, one, cables[0])
     ends.require_direction(where, one.first, one.second)
     images = [ends.image(side, one.axis) for side in (one.first, one.second)]
     _lock(ends, one.first, one.second, [0, 0, 0, 1, 1, 0], *(frame_about(image) for image in images))
@@ -197,7 +197,7 @@ def _aligned(exu: Any, ends: SpatialEnds, where: str, one: Aligned) -> Gap:
     return gap
 
 
-def _cable_axis(exu: Any, ends: SpatialEnds, where: str, one: Aligned, cable: Attachment) -> Gap:
+def _cable_axis(exu: Any, ends: SpatialEnds, one: Aligned, cable: Attachment) -> Gap:
     """A cable is held along the axis or at a right angle to it."""
     held = one.second if cable is one.first else one.first
     image = ends.image(held, one.axis)

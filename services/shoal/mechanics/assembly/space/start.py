@@ -389,7 +389,7 @@ _POSES: tuple[Quantity, ...] = ("position", "rotation", "angle")
 _RATES: tuple[Quantity, ...] = ("velocity", "spin", "rate")
 
 
-def begun(frames: dict[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
+def begun(frames: dict[str, Frame], q: Array, v: Array) -> dict[str, InitialState]:
     """State of every body at the coordinates q and rates v of a machine, each (unknowns,); rods have no attitude."""
     found = {}
     for name, frame in frames.items():

@@ -1,0 +1,125 @@
+"""What a caller may ask for: limits of numbers and lists of numbers, as library, command line and services check them.
+
+The command line and the services read `LIMITS`, so that help and schemas tell the same; what computes calls `check`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any
+
+from shoal.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+_LONGEST = 60
+"""Characters of a value that a message shows."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A finite number. gt, ge, lt, le: its bounds, named as in Python's operator module; whole: whether an integer.
+
+    what: in words; unit: of its bounds
+    """
+
+    what: str = "a number"
+    unit: str = ""
+    gt: float | None = None
+    ge: float | None = None
+    lt: float | None = None
+    le: float | None = None
+    whole: bool = False
+
+    @property
+    def bounds(self) -> dict[str, Any]:
+        """Those there are."""
+        return {name: bound for name, bound in asdict(self).items() if name in _WORDS and bound is not None}
+
+    def holds(self, value: Any) -> bool:
+        """Whether a value is such a number; true, false, texts and arrays are none."""
+        if not isinstance(value, Integral if self.whole else Real) or isinstance(value, bool):
+            return False
+        return math.isfinite(value) and all(_HOLDS[name](value, bound) for name, bound in self.bounds.items())
+
+    def __str__(self) -> str:
+        bounds = " and ".join(f"{_WORDS[name]} {bound:g}" for name, bound in self.bounds.items())
+        return " ".join(filter(None, (self.what, bounds, self.unit)))
+
+
+_WORDS = {"gt": "above", "ge": "of at least", "lt": "below", "le": "of at most"}
+_HOLDS = {
+    "gt": lambda value, bound: value > bound,
+    "ge": lambda value, bound: value >= bound,
+    "lt": lambda value, bound: value < bound,
+    "le": lambda value, bound: value <= bound,
+}
+
+LIMITS = {
+    "bootstrap": Limit("a whole number", ge=0, whole=True),
+    "count": Limit("a whole number", ge=1, whole=True),
+    "degree": Limit("a whole number", ge=1, le=40, whole=True),
+    "gap": Limit("a share", gt=0, le=1),
+    "limit_runs": Limit("a whole number", ge=100, whole=True),
+    "most": Limit("a whole number", ge=3, whole=True),
+    "sample": Limit("a whole number", ge=0, whole=True),
+    "seed": Limit("a whole number", ge=0, whole=True),
+    "target": Limit("a probability", gt=0, lt=0.5),
+    "time": Limit("a time", "s", ge=0),
+    "time_limit": Limit("a time", "s", gt=0),
+    "tolerance": Limit("a length", "m", gt=0),
+}
+"""Of arguments that mean the same wherever they are taken."""
+
+
+def check(**given: Any) -> None:
+    """Arguments of `LIMITS` by name, None for those that are left out. Raises InputError that names the first wrong."""
+    for name, value in given.items():
+        if value is not None and not LIMITS[name].holds(value):
+            raise InputError(f"{name}: needs {LIMITS[name]}, found {told(value)}")
+
+
+def check_estimated(tolerance: float | None, verify: bool) -> None:
+    """Raises InputError where a tolerance is to be kept of which no estimate may be made."""
+    if tolerance is not None and not verify:
+        raise InputError(
+            "verify: a tolerance is kept by estimates of the error; leave it out, or do not turn verify off"
+        )
+
+
+def one_of(name: str, value: Any, known: tuple[str, ...]) -> None:
+    """Raises InputError where a value is none of the names there are."""
+    if value not in known:
+        raise InputError(f"{name}: needs one of {', '.join(known)}, found {told(value)}")
+
+
+def mapping(name: str, given: Any, what: str) -> Mapping[Any, Any]:
+    """A mapping of one or more entries. Raises InputError; what: they are, in words."""
+    if not isinstance(given, Mapping) or not given:
+        raise InputError(f"{name}: needs a mapping of one or more {what}, found {told(given)}")
+    return given
+
+
+def numbers(name: str, given: Any, what: str = "numbers") -> npt.NDArray[np.float64]:
+    """A list of one or more finite real numbers as an array of its own. Raises InputError; what: they are, in words."""
+    import numpy as np
+
+    try:
+        found = np.asarray(given)
+    except ValueError:  # lists of different lengths
+        found = np.array(given, dtype=object)
+    right = found.ndim == 1 and found.size > 0 and found.dtype.kind in "iuf" and not np.ma.is_masked(given)
+    if not (right and np.isfinite(found).all()):
+        raise InputError(f"{name}: needs a list of one or more finite {what}, found {told(given)}")
+    return found.astype(float)
+
+
+def told(value: Any) -> str:
+    """A value in a message: one line, not a long one."""
+    text = " ".join(repr(value.tolist() if hasattr(value, "tolist") else value).split())
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
