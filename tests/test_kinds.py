@@ -14,6 +14,7 @@ from shoal.engines.exudyn import ExudynEngine
 from shoal.engines.exudyn.build import build, library
 from shoal.engines.exudyn.joints import add_friction, add_joint
 from shoal.engines.exudyn.loads import add_load
+from shoal.engines.mujoco.refused import require_counterparts
 from shoal.engines.theory import left_out
 from shoal.errors import InputError
 from shoal.identification.methods import get_method
@@ -28,6 +29,7 @@ from shoal.scene.dimensions import SPATIAL_KINDS
 from shoal.scene.joints import sides
 from shoal.scene.record import Record
 from shoal.scene.solver import IntegratorName
+from shoal.selection.levels import open_rods
 
 NAME = "invented"
 SCENE = load_scene("single-pendulum")
@@ -78,13 +80,16 @@ PLACES: dict[str, Callable[[], Any]] = {
     **{f"joint, {name}": lambda name=name: require(get_engine(name), JOINT) for name in OTHERS},
     "joint, exudyn's table": lambda: add_joint(None, "J", Joint()),  # type: ignore[arg-type]
     "joint, exudyn's friction": lambda: add_friction(None, "J", Joint()),  # type: ignore[arg-type]
+    "joint, MJCF": lambda: require_counterparts(JOINT),
     "joint, casadi's tree": lambda: casadi_forces(JOINT),
     "load, scene": lambda: Scene.parse(data(loads={"L": {"kind": NAME}})),
     **{f"load, {name}": lambda name=name: require(get_engine(name), LOAD) for name in OTHERS},
     "load, exudyn's table": lambda: add_load(None, "L", Load()),  # type: ignore[arg-type]
+    "load, MJCF": lambda: require_counterparts(LOAD),
     "load, casadi's table": lambda: casadi_forces(LOAD),
     "element, scene": lambda: CABLES.with_values({"bodies.OA.element": NAME}),
     **{f"element, {name}": lambda name=name: require(get_engine(name), ELEMENT) for name in OTHERS},
+    "element, selection": lambda: open_rods(ELEMENT),
     "element, exudyn's table": lambda: build(library(), ELEMENT, "ancf-cable"),
     "element, casadi's table": lambda: casadi_forces(ELEMENT),
     "element, what its theory leaves out": lambda: left_out(
