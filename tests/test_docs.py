@@ -186,9 +186,9 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         extend(page, folder)
         for page in ("extend/element.md", "extend/joint.md", "extend/load.md", "extend/integrator.md")
     ]
-    wanted = "misses", "gap", "balanced", "ways", "given_way", "side_by_side", "order"
+    wanted = "misses", "gap", "balanced", "rises", "ways", "given_way", "side_by_side", "order"
     names = ", ".join(f"{name}={name}" for name in wanted)
-    program = "\n".join([*uses, f"import json\nprint(json.dumps(dict({names}), default=float))"])
+    program = "\n".join([*uses, f"import json\nprint(json.dumps(dict({names}), default=lambda of: of.tolist()))"])
     place = {"PYTHONPATH": str(folder / "services"), "SHOAL_HOME": str(folder / "home"), "NUMBA_CACHE_DIR": ""}
     done = subprocess.run(
         [sys.executable, "-c", program], env=os.environ | place, cwd=folder, capture_output=True, text=True, check=False
@@ -205,6 +205,7 @@ def test_pages_of_the_mechanics_do_what_they_say(extended: dict[str, Any]) -> No
     assert second < 1e-2
     assert extended["gap"] < 1e-8, "the joint holds what a slider holds"
     assert extended["balanced"]
+    assert extended["rises"] == pytest.approx([0.0, 0.01], abs=1e-9)
     falls, quarter = extended["ways"], 0.25 * 9.81 / 2
     assert falls[0] == pytest.approx([0.0], abs=1e-9)
     assert falls[1] == pytest.approx([quarter], abs=1e-9)

@@ -22,7 +22,7 @@ from shoal.mechanics import elements
 from shoal.mechanics.assembly.build import build as build_model
 from shoal.mechanics.assembly.loads import LOADS
 from shoal.mechanics.integrators import INTEGRATORS, facts
-from shoal.mechanics.joints import CONDITIONS, SPATIAL
+from shoal.mechanics.joints import CONDITIONS, SPATIAL, conditions
 from shoal.scene import JOINT_KINDS, LOAD_KINDS, Attachment, Resisted, Scene, load_scene
 from shoal.scene.bodies import Element
 from shoal.scene.dimensions import SPATIAL_KINDS
@@ -158,6 +158,12 @@ def test_a_condition_that_nobody_told_of_is_refused_by_its_name(monkeypatch: pyt
     monkeypatch.setitem(CONDITIONS, Joint, lambda joint: [Invented()])
     with pytest.raises(NotImplementedError, match="Invented"):
         build_model(JOINT)
+
+
+def test_a_joint_that_is_known_in_the_plane_alone_is_refused_in_space(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CONDITIONS, Joint, lambda joint: [])
+    with pytest.raises(InputError, match="'invented' is no joint of scenes with 3 dimensions"):
+        conditions(Joint(), 3)
 
 
 def test_what_casadi_says_is_what_its_tables_hold() -> None:
