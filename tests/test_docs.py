@@ -104,6 +104,7 @@ FILES = {"element": 3, "joint": 2, "load": 2, "integrator": 3, "engine": 2, "opt
 HELD = {
     "heun": ["tests/mechanics/test_integrators.py"],
     "cross-entropy": ["tests/swarm/test_contract.py"],
+    "pendulum and every_engine and not (counterweight or level or rope)": ["tests/engines/test_capabilities.py"],
     "nelder-mead": ["tests/identification/methods/test_methods.py"],
     "joint or load or element or refused or mechanics": ["tests/test_kinds.py", "tests/scene/test_refused.py"],
 }
