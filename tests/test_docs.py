@@ -99,8 +99,23 @@ def test_the_servers_of_the_tutorial_are_started_as_it_says(tutorial: str) -> No
 
 NEW = re.compile(r"`((?:mechanics|engines|swarm|identification)/\S+\.py)`:$", re.MULTILINE)
 CHANGED = re.compile(r"^\+\+\+ b/services/shoal/(\S+)$", re.MULTILINE)
-FILES = {"element": 3, "joint": 3, "load": 3, "integrator": 3, "engine": 2}
-"""How many files a new kind touches, by its page."""
+FILES = {"element": 3, "joint": 2, "load": 2, "integrator": 3, "engine": 2, "optimiser": 4}
+"""How many files a new kind touches, by its page; the last one has a method and a swarm."""
+HELD = {
+    "heun": ["tests/mechanics/test_integrators.py"],
+    "cross-entropy": ["tests/swarm/test_contract.py"],
+    "pendulum and every_engine and not (counterweight or level or rope)": ["tests/engines/test_capabilities.py"],
+    "nelder-mead": ["tests/identification/methods/test_methods.py"],
+    "joint or load or element or refused or mechanics": ["tests/test_kinds.py", "tests/scene/test_refused.py"],
+}
+"""Tests that the pages name, by what chooses those of the pages' kinds."""
+
+
+def copied(folder: Path) -> dict[str, str]:
+    """A copy of the package below a folder, and what makes a process take it in place of ours."""
+    shutil.copytree(DOCS.parent / "services", folder / "services", ignore=shutil.ignore_patterns("__pycache__"))
+    place = {"PYTHONPATH": str(folder / "services"), "SHOAL_HOME": str(folder / "home"), "NUMBA_CACHE_DIR": ""}
+    return os.environ | place
 
 
 def extend(page: str, folder: Path) -> str:
@@ -123,8 +138,63 @@ def test_a_new_kind_touches_few_files(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", FILES)
 def test_the_changes_of_a_page_apply(kind: str, tmp_path: Path) -> None:
-    shutil.copytree(DOCS.parent / "services", tmp_path / "services", ignore=shutil.ignore_patterns("__pycache__"))
+    copied(tmp_path)
     assert extend(f"extend/{kind}.md", tmp_path)
+
+
+def changed(folder: Path) -> list[str]:
+    """The files of a copy, with all changes of all pages, that are not as ours."""
+    for kind in FILES:
+        extend(f"extend/{kind}.md", folder)
+    ours = DOCS.parent / "services"
+    files = [file.relative_to(folder) for file in (folder / "services").rglob("*.py")]
+    return [
+        str(file)
+        for file in files
+        if not (ours.parent / file).exists() or (ours.parent / file).read_text() != (folder / file).read_text()
+    ]
+
+
+def checked(folder: Path, *command: str) -> None:
+    """A tool of this environment finds nothing in a folder that has the project's settings."""
+    shutil.copy(DOCS.parent / "pyproject.toml", folder)
+    done = subprocess.run([sys.executable, "-m", *command], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_code_of_the_pages_is_written_as_ours(tmp_path: Path) -> None:
+    copied(tmp_path)
+    files = changed(tmp_path)
+    assert len(files) == sum(FILES.values())
+    checked(tmp_path, "ruff", "check", *files)
+    checked(tmp_path, "ruff", "format", "--check", *files)
+
+
+@pytest.mark.slow  # Checks the package that the code imports.
+def test_the_code_of_the_pages_has_types(tmp_path: Path) -> None:
+    copied(tmp_path)
+    checked(tmp_path, "mypy", *changed(tmp_path))
+
+
+@pytest.mark.slow  # Compiles the copy.
+@pytest.mark.parametrize("chosen", HELD)
+def test_kinds_of_the_pages_pass_the_tests_of_all_kinds(chosen: str, everything: tuple[Path, dict[str, str]]) -> None:
+    """Those that a newcomer would run, on a copy of the package with the changes of all pages."""
+    _, environment = everything
+    options = ["-q", "-p", "no:cacheprovider", "-k", f"({chosen}) and not lanes and not lane", *HELD[chosen]]
+    command = [sys.executable, "-m", "pytest", *options]
+    done = subprocess.run(command, env=environment, cwd=DOCS.parent, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-4000:]
+    assert re.search(r"\b[1-9]\d* passed", done.stdout)
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    """A copy of the package with all changes of all pages, and what makes a process take it."""
+    folder = tmp_path_factory.mktemp("everything")
+    environment = copied(folder)
+    changed(folder)
+    return folder, environment
 
 
 def used(page: str, room: str, folder: Path, wanted: str) -> Any:
@@ -142,9 +212,11 @@ def used(page: str, room: str, folder: Path, wanted: str) -> Any:
 
 
 def test_engine_of_its_page_agrees_with_ours(tmp_path: Path) -> None:
-    largest, estimated, refusal = used("extend/engine.md", "engines", tmp_path, "[largest, estimated, refusal]")
-    assert max(largest, estimated) < 1e-8
-    assert refusal == "joints.S: engine pendulum cannot do slider; use gauss or exudyn or exudyn-ge"
+    wanted = "[largest, estimated, refusals]"
+    largest, estimated, (kind, own) = used("extend/engine.md", "engines", tmp_path, wanted)
+    assert max(*largest, estimated) < 1e-8
+    assert kind == "joints.S: engine pendulum cannot do slider; use gauss or exudyn or exudyn-ge"
+    assert own.endswith("engine pendulum takes one body on one joint, and markers on the body")
 
 
 @pytest.mark.slow  # A swarm takes thousands of runs.
@@ -178,19 +250,15 @@ def test_a_method_and_a_swarm_are_two_files_each_and_find_the_angles(
 
 
 @pytest.fixture(scope="module")
-def extended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def extended(everything: tuple[Path, dict[str, str]]) -> dict[str, Any]:
     """What the pages leave behind that change the mechanics: on a copy of the package, with all their changes in it."""
-    folder = tmp_path_factory.mktemp("copy")
-    shutil.copytree(DOCS.parent / "services", folder / "services", ignore=shutil.ignore_patterns("__pycache__"))
-    uses = [
-        extend(page, folder)
-        for page in ("extend/element.md", "extend/joint.md", "extend/load.md", "extend/integrator.md")
-    ]
-    wanted = "misses=misses, gap=float(gap), balanced=balanced, ways=ways, order=float(order)"
-    program = "\n".join([*uses, f"import json\nprint(json.dumps(dict({wanted})))"])
-    place = {"PYTHONPATH": str(folder / "services"), "SHOAL_HOME": str(folder / "home"), "NUMBA_CACHE_DIR": ""}
+    folder, environment = everything
+    uses = [blocks(f"extend/{page}.md")[-1] for page in ("element", "joint", "load", "integrator")]
+    wanted = "misses", "gap", "balanced", "rises", "ways", "given_way", "side_by_side", "order"
+    names = ", ".join(f"{name}={name}" for name in wanted)
+    program = "\n".join([*uses, f"import json\nprint(json.dumps(dict({names}), default=lambda of: of.tolist()))"])
     done = subprocess.run(
-        [sys.executable, "-c", program], env=os.environ | place, cwd=folder, capture_output=True, text=True, check=False
+        [sys.executable, "-c", program], env=environment, cwd=folder, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
@@ -204,5 +272,11 @@ def test_pages_of_the_mechanics_do_what_they_say(extended: dict[str, Any]) -> No
     assert second < 1e-2
     assert extended["gap"] < 1e-8, "the joint holds what a slider holds"
     assert extended["balanced"]
-    assert extended["ways"] == pytest.approx([0.0, 0.25 * 9.81 / 2], abs=1e-9)
+    assert extended["rises"] == pytest.approx([0.0, 0.01], abs=1e-9)
+    falls, quarter = extended["ways"], 0.25 * 9.81 / 2
+    assert falls[0] == pytest.approx([0.0], abs=1e-9)
+    assert falls[1] == pytest.approx([quarter], abs=1e-9)
+    assert falls[2] == pytest.approx([0.0, quarter], abs=1e-9), "two loads act as if each were alone"
+    assert extended["side_by_side"] == pytest.approx([0.0, quarter], abs=1e-9)
+    assert extended["given_way"] == pytest.approx(1.0, abs=1e-8), "statics knows what the rope holds"
     assert extended["order"] == pytest.approx(2.0, abs=0.1)

@@ -14,6 +14,7 @@ from shoal.engines.exudyn import ExudynEngine
 from shoal.engines.exudyn.build import build, library
 from shoal.engines.exudyn.joints import add_friction, add_joint
 from shoal.engines.exudyn.loads import add_load
+from shoal.engines.mujoco.refused import require_counterparts
 from shoal.engines.theory import left_out
 from shoal.errors import InputError
 from shoal.identification.methods import get_method
@@ -21,13 +22,14 @@ from shoal.mechanics import elements
 from shoal.mechanics.assembly.build import build as build_model
 from shoal.mechanics.assembly.loads import LOADS
 from shoal.mechanics.integrators import INTEGRATORS, facts
-from shoal.mechanics.joints import CONDITIONS, SPATIAL
+from shoal.mechanics.joints import CONDITIONS, SPATIAL, conditions
 from shoal.scene import JOINT_KINDS, LOAD_KINDS, Attachment, Resisted, Scene, load_scene
 from shoal.scene.bodies import Element
 from shoal.scene.dimensions import SPATIAL_KINDS
 from shoal.scene.joints import sides
 from shoal.scene.record import Record
 from shoal.scene.solver import IntegratorName
+from shoal.selection.levels import open_rods
 
 NAME = "invented"
 SCENE = load_scene("single-pendulum")
@@ -78,13 +80,16 @@ PLACES: dict[str, Callable[[], Any]] = {
     **{f"joint, {name}": lambda name=name: require(get_engine(name), JOINT) for name in OTHERS},
     "joint, exudyn's table": lambda: add_joint(None, "J", Joint()),  # type: ignore[arg-type]
     "joint, exudyn's friction": lambda: add_friction(None, "J", Joint()),  # type: ignore[arg-type]
+    "joint, MJCF": lambda: require_counterparts(JOINT),
     "joint, casadi's tree": lambda: casadi_forces(JOINT),
     "load, scene": lambda: Scene.parse(data(loads={"L": {"kind": NAME}})),
     **{f"load, {name}": lambda name=name: require(get_engine(name), LOAD) for name in OTHERS},
     "load, exudyn's table": lambda: add_load(None, "L", Load()),  # type: ignore[arg-type]
+    "load, MJCF": lambda: require_counterparts(LOAD),
     "load, casadi's table": lambda: casadi_forces(LOAD),
     "element, scene": lambda: CABLES.with_values({"bodies.OA.element": NAME}),
     **{f"element, {name}": lambda name=name: require(get_engine(name), ELEMENT) for name in OTHERS},
+    "element, selection": lambda: open_rods(ELEMENT),
     "element, exudyn's table": lambda: build(library(), ELEMENT, "ancf-cable"),
     "element, casadi's table": lambda: casadi_forces(ELEMENT),
     "element, what its theory leaves out": lambda: left_out(
@@ -153,6 +158,12 @@ def test_a_condition_that_nobody_told_of_is_refused_by_its_name(monkeypatch: pyt
     monkeypatch.setitem(CONDITIONS, Joint, lambda joint: [Invented()])
     with pytest.raises(NotImplementedError, match="Invented"):
         build_model(JOINT)
+
+
+def test_a_joint_that_is_known_in_the_plane_alone_is_refused_in_space(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CONDITIONS, Joint, lambda joint: [])
+    with pytest.raises(InputError, match="'invented' is no joint of scenes with 3 dimensions"):
+        conditions(Joint(), 3)
 
 
 def test_what_casadi_says_is_what_its_tables_hold() -> None:

@@ -468,7 +468,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 @pytest.fixture
 def scenes() -> list[Scene]:
     """All scenes, those included that only the native solver can do."""
-    return [*(case.scene for case in CASES), *ONLY_NATIVE]
+    return [*(case.scene for case in CASES), *ONLY_NATIVE, load_scene("single-pendulum")]
 
 
 @pytest.fixture

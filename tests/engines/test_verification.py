@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from shoal.engines import get_engine, verification
-from shoal.engines.verification import verified
+from shoal.engines.verification import verified, verify
 from shoal.scene import load_scene
 from shoal.trajectory import Status
 from shoal_validation.problems import PROBLEMS, get_problem
@@ -76,6 +77,19 @@ def test_other_engines_are_held_against_the_native_one() -> None:
     run = verified(get_engine("exudyn"), load_scene("flexible-double-pendulum"))
     assert run.ok, run.message
     assert 1e-6 < run.model["verification"]["time_error"] < 1e-3
+
+
+def test_another_engine_that_is_far_off_is_said_to_differ_and_by_how_much() -> None:
+    """Its trajectory is ours under another gravity, of which no step is to blame."""
+    scene, gauss = load_scene("single-pendulum"), get_engine("gauss")
+    times = np.linspace(0.1, 1.0, 10)
+    ours, other = gauss.simulate(scene, times), gauss.simulate(scene.with_values({"gravity.0": 3.0}), times)
+    found = verify(replace(other, engine="other", model={"unknowns": 1}), scene)
+    assert found.time_error == pytest.approx(ours.distance(other), rel=1e-6)
+    stated = f"{ours.distance(other):.2g} m"
+    assert found.complaint.startswith(f"other differs from the native solver by about {stated}: ")
+    assert "\n" not in found.complaint
+    assert verify(ours, scene).complaint == ""
 
 
 def test_no_second_run_that_takes_too_long(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,11 +6,12 @@ import copy
 import math
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from shoal.errors import InputError
 from shoal.scene import Scene, load_scene
+from shoal.scene.bodies import Element
 
 CABLES = load_scene("flexible-double-pendulum").model_dump()
 CABLE_SCENE = load_scene("flexible-double-pendulum")
@@ -63,7 +64,7 @@ GROUNDS = {"first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": 
         pytest.param(
             ("bodies.OA.element", "brick"),
             "bodies.OA.element",
-            "'rigid', 'ancf-cable', 'ancf-quintic', 'ancf-full', 'simo-reissner', 'director-rod' or 'modal'",
+            " or ".join([", ".join(map(repr, get_args(Element)[:-1])), repr(get_args(Element)[-1])]),
             id="element",
         ),
         pytest.param(("bodies.OA.elements", 0), "bodies.OA.elements", "greater than or equal to 1", id="no-elements"),

@@ -241,9 +241,15 @@ SPATIAL: dict[type, Callable[[Any], list[Any]]] = {
 
 
 def conditions(joint: Any, dimensions: int = 2) -> list[Any]:
-    """The conditions of a joint. Raises NotImplementedError for a kind that nobody told the mechanics of."""
-    table = CONDITIONS if dimensions == 2 else SPATIAL
+    """The conditions of a joint.
+
+    Raises InputError for a kind that is known in the plane alone, or in space alone, and NotImplementedError for one
+    that nobody told the mechanics of.
+    """
+    table, other = (CONDITIONS, SPATIAL) if dimensions == 2 else (SPATIAL, CONDITIONS)
     if type(joint) not in table:
+        if type(joint) in other:
+            raise InputError(f"joints: {joint.kind!r} is no joint of scenes with {dimensions} dimensions")
         raise NotImplementedError(f"the mechanics knows no conditions of a joint of kind {joint.kind!r}")
     return table[type(joint)](joint)
 

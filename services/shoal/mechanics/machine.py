@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from shoal.errors import UnstableStepError
+from shoal.errors import InputError, UnstableStepError
 from shoal.mechanics import clock, plane
 from shoal.mechanics import reach as reaches
 from shoal.mechanics.assembly.groups import start_angle
@@ -223,7 +223,12 @@ class Machine:
 
 
 def check_step(scene: Scene, choice: Choice) -> None:
-    """Raises UnstableStepError if the step is beyond the stability limit."""
+    """Raises UnstableStepError if the step is beyond the stability limit, InputError if no step is stable."""
+    if choice.limit == 0.0:
+        raise InputError(
+            f"solver.integrator: {choice.name} is stable at no step for this scene, which can vibrate; use another one "
+            "such as generalized-alpha"
+        )
     if scene.solver.step > choice.limit:
         raise UnstableStepError(
             f"solver.step: {scene.solver.step:g} s is beyond the stability limit {choice.limit:.3e} s of "

@@ -114,15 +114,23 @@ def open_rods(scene: Scene) -> dict[str, str]:
     """The rods whose model is open, and the element whose limit is their truth: of the scene's theory the finest.
 
     Bernoulli-Euler's beam, unless the scene names simo-reissner or ancf-full, which have shear, or director-rod, which
-    twists. A rigid rod that leaves the plane may twist.
+    twists. A rigid rod that leaves the plane may twist. Raises InputError for an element that is on no ladder.
     """
     finest = dict.fromkeys(("ancf-cable", "modal", SLENDER), SLENDER)
     finest["rigid"] = "director-rod" if scene.dimensions == 3 and not is_flat(scene) else SLENDER
-    return {
+    limits = {
         name: finest.get(body.element, body.element)
         for name, body in scene.bodies.items()
         if isinstance(body, Rod) and body.youngs_modulus is not None
     }
+    for name, limit in limits.items():
+        if limit not in LADDERS:
+            known = ", ".join(dict.fromkeys((*finest, *LADDERS)))
+            raise InputError(
+                f"bodies.{name}.element: models are chosen of {known}, not of {limit}; state its number of elements "
+                "instead of a tolerance"
+            )
+    return limits
 
 
 def coarsest(scene: Scene, limits: Mapping[str, str], meshed: Collection[str] = ()) -> dict[str, Level]:

@@ -3,7 +3,25 @@
 from __future__ import annotations
 
 from shoal.errors import InputError
-from shoal.scene import Distance, Revolute, Scene, Slider, TorsionSpring
+from shoal.scene import (
+    Cylindrical,
+    Distance,
+    Force,
+    Planar,
+    Revolute,
+    Scene,
+    Slider,
+    Spherical,
+    Spring,
+    Torque,
+    TorsionSpring,
+    Universal,
+    Weld,
+)
+
+JOINTS = (Revolute, Spherical, Universal, Slider, Cylindrical, Planar, Weld, Distance)
+LOADS = (Spring, TorsionSpring, Force, Torque)
+"""What is written as MJCF."""
 
 
 def require_counterparts(scene: Scene) -> None:
@@ -20,7 +38,7 @@ def require_counterparts(scene: Scene) -> None:
     for name, joint in scene.joints.items():
         if joint.kind == "gear":
             raise InputError(f"joints.{name}: a gear is not written as MJCF; there its teeth would give way")
-        if joint.kind in ("driven-angle", "coupling", "parallel", "perpendicular"):
+        if not isinstance(joint, JOINTS):
             raise InputError(f"joints.{name}: MJCF has no {joint.kind}")
         if isinstance(joint, Revolute | Slider) and joint.share:
             raise InputError(f"joints.{name}.mu: MJCF has no friction by the force of a joint")
@@ -30,8 +48,8 @@ def require_counterparts(scene: Scene) -> None:
             raise InputError(f"joints.{name}.length: MJCF has no functions of time")
     for name, load in scene.loads.items():
         where = f"loads.{name}"
-        if load.kind == "distributed-force":
-            raise InputError(f"{where}: MJCF has no distributed-force")
+        if not isinstance(load, LOADS):
+            raise InputError(f"{where}: MJCF has no {load.kind}")
         if isinstance(load, TorsionSpring) and (load.first_to or load.second_to):
             raise InputError(f"{where}: MJCF has no springs between directions from place to place")
         for key in ("cubic", "elastic"):

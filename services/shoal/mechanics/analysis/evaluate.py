@@ -17,7 +17,7 @@ import scipy.sparse
 from shoal.mechanics import forces, functions, plane
 from shoal.mechanics.affine import Affine
 from shoal.mechanics.analysis import kernels, stored
-from shoal.mechanics.analysis.load_stiffness import in_plane, in_space
+from shoal.mechanics.analysis.load_stiffness import driven, in_plane, in_space, of_drives
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.dynamics import derived_rows, work_space
 from shoal.mechanics.elements.families import KERNELS
@@ -281,8 +281,8 @@ class Evaluator:
         """Functions of time by number, -1 for the constant 1."""
         return np.array([1.0 if k < 0 else functions.evaluate(arrays.functions, int(k), t, 0) for k in numbers])
 
-    def _torques(self, arrays: Arrays, t: float) -> list[tuple[int, float]]:
-        """(force element, applied torque [N m]) of motors."""
+    def _drives(self, arrays: Arrays, t: float) -> list[tuple[int, float]]:
+        """(force element, applied torque [N m] or force [N]) of motors."""
         law = arrays.forces.law.reshape(-1, forces.LAW)
         return [
             (k, law[k, forces.AMPLITUDE] * functions.evaluate(arrays.functions, int(arrays.forces.drive[k]), t, 0))
@@ -297,12 +297,8 @@ class Evaluator:
             return float("nan")
         strength = self._strengths(arrays, applied.fixed_function, t)
         total = -float(np.sum(applied.coefficient * strength * z[applied.row])) if applied.fixed else 0.0
-        rows = arrays.forces.rows.reshape(-1, forces.side(arrays.forces))
-        for k, torque in self._torques(arrays, t):
-            ax, ay, bx, by = z[rows[k, :4]]
-            last = self._room.memory[k]
-            change = plane.angle((bx, by)) - plane.angle((ax, ay)) - last
-            total -= torque * (last + change - 2 * np.pi * np.rint(change / (2 * np.pi)))
+        for k, size in self._drives(arrays, t):
+            total -= size * driven(arrays, z, k, self._room.memory[k])
         return total
 
     def _load_stiffness(self, arrays: Arrays, t: float) -> scipy.sparse.csc_array:
@@ -312,10 +308,8 @@ class Evaluator:
         def strengths(numbers: Index) -> Array:
             return self._strengths(arrays, numbers, t)
 
-        if self.model.dimensions == plane.DIMENSIONS:
-            parts = in_plane(arrays, z, strengths, self._torques(arrays, t))
-        else:
-            parts = in_space(arrays, z, strengths)
+        following = in_plane if self.model.dimensions == plane.DIMENSIONS else in_space
+        parts = [*following(arrays, z, strengths), *of_drives(arrays, z, self._drives(arrays, t))]
         if not parts:
             return scipy.sparse.csc_array((n, n))
         row = np.concatenate([np.repeat(to, len(source)) for to, source, _ in parts])

@@ -1,4 +1,4 @@
-"""-dQ/dq of applied loads that turn with a body, and of torques: blocks (rows, rows by which, values)."""
+"""-dQ/dq of applied loads that turn with a body, of torques and of drives: blocks (rows, rows by which, values)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from shoal.mechanics import forces
+from shoal.mechanics import forces, plane
 from shoal.mechanics import rotation as turns
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics.tile import Array, Index
@@ -16,8 +16,8 @@ Strengths = Callable[[Index], Array]
 """Functions of time by number, at one time."""
 
 
-def in_plane(arrays: Arrays, z: Array, strengths: Strengths, torques: list[tuple[int, float]]) -> Blocks:
-    """Of forces that follow, and of motors: (force element, torque [N m])."""
+def in_plane(arrays: Arrays, z: Array, strengths: Strengths) -> Blocks:
+    """Of forces that follow."""
     applied, blocks = arrays.applied, []
     strength = strengths(applied.following_function)
     for k in range(applied.following):
@@ -28,14 +28,6 @@ def in_plane(arrays: Arrays, z: Array, strengths: Strengths, torques: list[tuple
         # d/dd of R d/|d| with R = [[fx, -fy], [fy, fx]]: R (I - n n')/|d|
         normal = np.array([[dy * dy, -dx * dy], [-dx * dy, dx * dx]]) / size**3
         blocks.append((rows[:2], rows[2:], -np.array([[fx, -fy], [fy, fx]]) @ normal))
-    pairs = arrays.forces.rows.reshape(-1, forces.side(arrays.forces))
-    for k, torque in torques:
-        for rows, sign in ((pairs[k, :2], -1.0), (pairs[k, 2:4], 1.0)):
-            x, y = z[rows]
-            square = (x * x + y * y) ** 2
-            # The second derivatives of atan2(y, x).
-            turn = np.array([[2 * x * y, y * y - x * x], [y * y - x * x, -2 * x * y]]) / square
-            blocks.append((rows, rows, -torque * sign * turn))
     return blocks
 
 
@@ -71,3 +63,51 @@ def in_space(arrays: Arrays, z: Array, strengths: Strengths) -> Blocks:
         )
         blocks += [(rows[to], rows[by], -strength[k] / square * block) for to, by, block in parts]
     return blocks
+
+
+def driven(arrays: Arrays, z: Array, number: int, last: float) -> float:
+    """What a drive acts along: the distance, the angle nearest to the last one, or the place of a force element."""
+    kind, (a, b, d) = _measured(arrays, z, number)
+    if kind == forces.DISTANCE:
+        return float(np.linalg.norm(b - a))
+    if kind == forces.PLACE:
+        return float((b - a) @ d / np.linalg.norm(d))
+    change = float(plane.angle(b) - plane.angle(a)) - last
+    return float(last + change - 2 * np.pi * np.rint(change / (2 * np.pi)))
+
+
+def of_drives(arrays: Arrays, z: Array, drives: list[tuple[int, float]]) -> Blocks:
+    """Of drives: (force element, force [N] or torque [N m]) times the second derivatives of what it acts along."""
+    blocks: Blocks = []
+    for number, size in drives:
+        kind, (a, b, d) = _measured(arrays, z, number)
+        ends = arrays.forces.rows.reshape(-1, 3, len(a))[number]
+        if kind == forces.ANGLE:
+            for rows, sign in ((ends[0], -1.0), (ends[1], 1.0)):
+                x, y = z[rows]
+                turn = np.array([[2 * x * y, y * y - x * x], [y * y - x * x, -2 * x * y]]) / (x * x + y * y) ** 2
+                blocks.append((rows, rows, -size * sign * turn))
+            continue
+        line = b - a if kind == forces.DISTANCE else d
+        length = np.linalg.norm(line)
+        n = line / length
+        across = (np.eye(len(n)) - np.outer(n, n)) / length
+        if kind == forces.DISTANCE:
+            pairs = [(one, other, across if one == other else -across) for one in (0, 1) for other in (0, 1)]
+        else:
+            way = b - a
+            off = (way - n * (way @ n)) / length**2
+            bent = -(np.outer(off, n) + np.outer(n, off) + (way @ n) / length * across)
+            pairs = [(0, 2, -across), (2, 0, -across), (1, 2, across), (2, 1, across), (2, 2, bent)]
+        blocks += [(ends[one], ends[other], -size * block) for one, other, block in pairs]
+    return blocks
+
+
+def _measured(arrays: Arrays, z: Array, number: int) -> tuple[int, Array]:
+    """The kind of a force element and its points or directions (a, b, d); see `forces.Forces`."""
+    kind, side = int(arrays.forces.kind[number]), forces.side(arrays.forces)
+    if kind == forces.ANGLE and side != 3 * plane.DIMENSIONS:
+        raise NotImplementedError(
+            "nobody says here what a drive about an axis in space does; state it as a torque does"
+        )
+    return kind, z[arrays.forces.rows[side * number : side * (number + 1)]].reshape(3, -1)

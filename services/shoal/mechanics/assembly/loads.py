@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,6 +41,24 @@ from shoal.scene import (
 )
 from shoal.scene.dimensions import padded
 from shoal.scene.record import Vector3
+
+
+class Law(NamedTuple):
+    """The force of an element along its measure g, F = -[k x + k3 x^3] - [(c + c2 |g'|) g' + F_c tanh(g'/v_s)] + A.
+
+    x = g - g0, A times the element's drive where it has one. Numbers, or one for each lane, in the order in which
+    `forces.Forces` holds them. stiffness: k; cubic: k3; damping: c; natural: g0; coulomb: F_c; speed: v_s, positive;
+    amplitude: A, of a drive; drag: c2.
+    """
+
+    stiffness: Number = 0.0
+    cubic: Number = 0.0
+    damping: Number = 0.0
+    natural: Number = 0.0
+    coulomb: Number = 0.0
+    speed: Number = 1.0
+    amplitude: Number = 0.0
+    drag: Number = 0.0
 
 
 @contextmanager
@@ -83,7 +101,7 @@ class Loads:
             LOADS[type(load)](self, name, load)
 
     def _friction(self, name: str, joint: Revolute | Slider) -> None:
-        law = [0.0, 0.0, joint.friction, 0.0, joint.coulomb, joint.coulomb_speed, 0.0, joint.drag]
+        law = Law(damping=joint.friction, coulomb=joint.coulomb, speed=joint.coulomb_speed, drag=joint.drag)
         if np.any(joint.share):
             self.rubbing.append((name, len(self.kinds), joint.share))
         if isinstance(joint, Revolute):
@@ -106,7 +124,7 @@ class Loads:
                 both = [np.sum(part[i], axis=0) if i == j else -part[i, j] for part in (stiffness, damping)]
                 if any(np.any(part) for part in both):
                     base, natural = (nowhere, rest) if i == j else (other, rest - other_rest)
-                    law = [both[0], 0.0, both[1], natural, 0.0, 1.0, 0.0, 0.0]
+                    law = Law(stiffness=both[0], damping=both[1], natural=natural)
                     self._measure(name, PLACE, [base, one, frame.directors[0]], law, 0.0)
 
     def _torsion_spring(self, name: str, load: TorsionSpring) -> None:
@@ -116,7 +134,7 @@ class Loads:
         rest = start if load.angle is None else load.angle
         if places:  # which tell no whole turns: straight is pi on either side
             start = start + 2 * np.pi * np.round((rest - start) / (2 * np.pi))
-        law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0, 0.0]
+        law = Law(load.stiffness, load.cubic, load.damping, rest)
         if places:
             self._measure(name, ANGLE, ways, law, start, elastic=load.elastic)
         else:
@@ -153,7 +171,7 @@ class Loads:
         if isinstance(self.placement, SpatialPlacement):
             self._turn_body(name, load, self.placement)
             return
-        law = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0]
+        law = Law(amplitude=1.0)
         base = load.reaction or Attachment(body=GROUND, point=(0.0, 0.0))
         self._angle(name, base, load.at, law, load.axis, drive=load.torque)
 
@@ -184,6 +202,10 @@ class Loads:
             self.fitted.append(fitting.fit(f, self.horizon, f.knots))
         return len(self.fitted) - 1
 
+    def _field(self, name: str, function: Function) -> str:
+        """Where a function of a load stands, or the load alone if that has made it."""
+        return ".".join([f"loads.{name}", *(field for field, value in self.scene.loads[name] if value is function)])
+
     def _turn(self, first: Attachment, second: Attachment) -> Number:
         return start_angle(self.scene, second) - start_angle(self.scene, first)
 
@@ -192,7 +214,7 @@ class Loads:
         name: str,
         kind: int,
         vectors: list[Affine],
-        law: list[Number],
+        law: Law,
         angle: Number,
         *,
         elastic: Function | None = None,
@@ -200,13 +222,13 @@ class Loads:
     ) -> None:
         table = energy = -1
         if elastic is not None and self.horizon > 0.0:
-            with naming(f"loads.{name}.elastic"):
+            with naming(self._field(name, elastic)):
                 fitted = fitting.fit_law(elastic)
             self.fitted += [fitting.ended(one) for one in (fitted, fitting.antiderivative(fitted))]
             table, energy = len(self.fitted) - 2, len(self.fitted) - 1
         driven = -1
         if drive is not None and self.horizon > 0.0:
-            with naming(f"loads.{name}.torque"):
+            with naming(self._field(name, drive)):
                 self.fitted.append(fitting.fit(drive, self.horizon, drive.knots))
             driven = len(self.fitted) - 1
         vectors = [*vectors, *vectors[-1:] * (3 - len(vectors))]
@@ -222,7 +244,7 @@ class Loads:
         name: str,
         first: Attachment,
         second: Attachment,
-        law: list[Number],
+        law: Law,
         axis: Vector3,
         *,
         elastic: Function | None = None,
@@ -252,7 +274,7 @@ class Loads:
         if rest is None:
             first, second = (self.placement.start_of(end)[0] for end in ends)
             rest = np.sqrt(sum((second - first) ** 2))
-        law = [load.stiffness, load.cubic, load.damping, rest, 0.0, 1.0, 0.0, 0.0]
+        law = Law(load.stiffness, load.cubic, load.damping, rest)
         self._measure(name, DISTANCE, ends, law, 0.0, elastic=load.elastic)
 
     def _force(self, name: str, load: Force) -> None:
