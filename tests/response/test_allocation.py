@@ -15,9 +15,10 @@ from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.response import uncertain
 from shoal.response.allocation import Allocation, cheapest, with_factors
-from shoal.response.allocation_of_random import Cut
+from shoal.response.allocation_of_random import Confirmed, Cut
 from shoal.response.allocation_of_random import cheapest as within
 from shoal.response.inputs import Inputs, Parameter
+from shoal.response.limits.estimate import Estimate
 from shoal.response.marginals import Frozen, Interval, Normal, Scaled, Uniform
 from shoal.response.worst import worst
 from shoal.scene import Scene, load_scene
@@ -293,6 +294,19 @@ def test_an_interval_that_reaches_beyond_the_limit() -> None:
             *(Scene.parse(THROWN), {UP: "normal(5,0.2)", HEIGHT: (-0.5, 0.5)}, [0.5]),
             **dict[str, Any](limits=["P.y > 1.2"], limit_runs=600, verify=False, allocate=True, target=1e-2),
         )
+
+
+def test_a_probability_of_nothing_is_not_near_the_target() -> None:
+    """Few runs that none passes leave room for the target, and say nothing of how wide tolerances may be."""
+
+    def confirmed(chance: float, unseen: float) -> Confirmed:
+        return Confirmed(np.ones(1), Estimate(np.array([chance]), np.array([0.02]), "", unseen), "")
+
+    assert confirmed(9.8e-3, 0.0).near(1e-2)
+    assert not confirmed(1.01e-2, 0.0).near(1e-2)
+    assert not confirmed(0.0, 0.1).near(1e-2)
+    assert "wider ones may do" in confirmed(0.0, 0.1).message(1e-2, np.full(1, 3.0))
+    assert not confirmed(0.0, 0.1).message(1e-2, np.ones(1))
 
 
 def test_what_cannot_be_allocated_is_refused() -> None:

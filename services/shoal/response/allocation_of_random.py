@@ -145,7 +145,8 @@ class Confirmed:
 
     def near(self, target: float) -> bool:
         """Whether the probability is the target as far as can be told, and not above."""
-        return self.kept(target) and max(self.estimate.probability / NEAR, np.nan_to_num(self.interval[1])) >= target
+        chance = self.estimate.probability
+        return 0 < chance <= target <= max(chance / NEAR, float(np.nan_to_num(self.interval[1])))
 
     def kept(self, target: float) -> bool:
         """Whether the probability is not above the target."""
