@@ -167,7 +167,7 @@ def _allocated(found: Response) -> list[str]:
     if told is None:
         return []
     return [
-        f"The {told.what} is {told.stated:.3g} with the stated tolerances and {told.confirmed:.3g} with those found, "
+        f"The {told.what} is {told.stated:.3g} with the stated tolerances and {told.reached} with those found, "
         f"which cost {told.cost:.3g} times as much.",
         f"To tighten first: {told.first or 'none'}.",
     ]

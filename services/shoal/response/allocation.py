@@ -1,9 +1,9 @@
 """How wide tolerances may be so that a limit is kept, and which one to tighten for most effect.
 
-A tolerance is the half width of an interval, or the deviation of a distribution. Costs grow with its reciprocal (Chase
-and Greenwood, Design issues in mechanical tolerance analysis, Manufacturing Review 1, 1988). What keeps the limit is
-looked up with the model, replaced by its first-order form in the tolerances, for which the cheapest ones are known, and
-looked up there again.
+A tolerance is the half width of an interval, or the standard deviation of a distribution. Costs grow with its
+reciprocal (Chase and Greenwood, Design issues in mechanical tolerance analysis, Manufacturing Review 1, 1988). What
+keeps the limit is looked up with the model, replaced by its first-order form in the tolerances, for which the cheapest
+ones are known, and looked up there again.
 """
 
 from __future__ import annotations
@@ -14,14 +14,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import optimize, special
+from scipy import optimize
 
 from shoal.errors import ComputationError, InputError
 from shoal.response.inputs import Inputs, Parameter
-from shoal.response.limits.choice import probability
-from shoal.response.limits.form import design_points
-from shoal.response.limits.margins import Margins
-from shoal.response.limits.margins import least as least_of
 from shoal.response.marginals import scaled
 from shoal.response.runs import Model, Runs
 from shoal.scene import Scene
@@ -33,9 +29,9 @@ ROUNDS = 15
 SETTLED = 5e-3
 """Relative change of all factors at which the search ends."""
 MANY = 100_000
-"""Runs of all rounds together."""
+"""Runs of a search for the place that decides."""
 STEP = 0.02
-"""Of central differences, as a share of a tolerance that is stated."""
+"""Of differences, as a share of a tolerance that is stated."""
 TARGET = 1e-3
 """Probability of passing a limit, where none is stated."""
 Least = Callable[[Inputs], "Reached"]
@@ -58,7 +54,7 @@ class Allocation:
     factors: on those that are stated, (parameters,); effects: of tightening each by one per cent: by how much the least
     margin grows, or by which share the probability falls, (parameters,); confirmed: the least margin, or the
     probability (the largest over intervals), with the new ones; target: what it had to be; cost: of the new ones over
-    that of the stated ones
+    that of the stated ones; interval: in which that probability lies with 95 % confidence
     """
 
     limit: str
@@ -71,6 +67,7 @@ class Allocation:
     cost: float
     evaluations: int
     message: str
+    interval: tuple[float, float] | None = None
 
     @property
     def ok(self) -> bool:
@@ -89,9 +86,17 @@ class Allocation:
         return "least margin" if not random.any() else "probability" if random.all() else "largest probability"
 
     @property
+    def reached(self) -> str:
+        """What is confirmed, and how well it is known, in words."""
+        if self.interval is None or not np.all(np.isfinite(self.interval)):
+            return f"{self.confirmed:.3g}"
+        low, high = self.interval
+        return f"{self.confirmed:.3g} ({low:.3g} to {high:.3g}, of {self.target:g} that are allowed)"
+
+    @property
     def first(self) -> str | None:
         """Which parameter's tolerance to tighten first, None where none has an effect."""
-        return None if not np.any(self.effects) else self.inputs.names[int(np.argmax(self.effects))]
+        return None if not np.any(self.effects > 0) else self.inputs.names[int(np.argmax(self.effects))]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -105,6 +110,7 @@ class Allocation:
                     "message": self.message,
                     f"{told}_stated": self.stated,
                     f"{told}_allocated": self.confirmed,
+                    f"{told}_interval": self.interval,
                     "target": self.target,
                     "cost": self.cost,
                     "evaluations": self.evaluations,
@@ -112,8 +118,8 @@ class Allocation:
                     "parameters": {
                         one.name: {
                             "factor": float(factor),
-                            "tolerance_stated": tolerance(old),
-                            "tolerance": tolerance(one),
+                            "tolerance_stated": old.marginal.tolerance,
+                            "tolerance": one.marginal.tolerance,
                             "effect_of_one_per_cent": float(effect),
                         }
                         for one, old, factor, effect in zip(
@@ -129,36 +135,27 @@ class Allocation:
         )
 
 
-def tolerance(one: Parameter) -> float:
-    """Half the width of an interval, the deviation of a distribution by its quartiles."""
-    if not one.marginal.random:
-        low, high = one.marginal.value(np.array([-1.0, 1.0]))
-        return float(0.5 * (high - low))
-    low, high = one.marginal.value(one.marginal.germ(special.ndtr(np.array([-1.0, 1.0]))))
-    return float(0.5 * (high - low))
-
-
 def with_factors(inputs: Inputs, factors: Array) -> Inputs:
     """Parameters with their tolerances multiplied about their middle values."""
     pairs = zip(inputs.parameters, factors, strict=True)
     return replace(inputs, parameters=tuple(replace(one, marginal=scaled(one.marginal, float(f))) for one, f in pairs))
 
 
-def cheapest(weights: Array, costs: Array, room: float, power: int, most: Array) -> Array:
-    """The factors s, least sum(costs / s), with sum((weights s)^power) = room and TIGHTEST <= s <= most.
+def cheapest(weights: Array, costs: Array, room: float, most: Array) -> Array:
+    """The factors s, least sum(costs / s), with sum(weights s) = room and TIGHTEST <= s <= most.
 
-    By the multiplier of the constraint, s = (costs / (power * multiplier * weights^power))^(1 / (power + 1)). A weight
-    that is not positive does not limit its factor.
+    By the multiplier of the constraint, s = sqrt(costs / (multiplier * weights)). A weight that is not positive does
+    not limit its factor.
     """
-    weight = np.maximum(weights, 0.0) ** power
+    weight = np.maximum(weights, 0.0)
 
     def factors(logarithm: float) -> Array:
-        pull = power * math.exp(logarithm) * weight
-        free = np.divide(costs, pull, out=np.full(len(costs), np.inf), where=pull > 0) ** (1 / (power + 1))
+        pull = math.exp(logarithm) * weight
+        free = np.sqrt(np.divide(costs, pull, out=np.full(len(costs), np.inf), where=pull > 0))
         return np.asarray(np.clip(free, TIGHTEST, most))
 
     def beyond(logarithm: float) -> float:
-        return float(weight @ factors(logarithm) ** power) - room
+        return float(weight @ factors(logarithm)) - room
 
     if beyond(-700.0) <= 0:
         return factors(-700.0)
@@ -201,7 +198,7 @@ def of_intervals(text: str, model: Model, inputs: Inputs, least: Least, costs: A
 
 def _within(cuts: list[tuple[Array, float]], costs: Array, most: Array) -> Array:
     """The cheapest factors within all cuts, pull @ factors <= room."""
-    alone = [cheapest(pull, costs, room, 1, most) for pull, room in cuts]
+    alone = [cheapest(pull, costs, room, most) for pull, room in cuts]
     if len(alone) == 1:
         return alone[0]
     pulls, rooms = np.array([pull for pull, _ in cuts]), np.array([room for _, room in cuts])
@@ -248,69 +245,9 @@ def _pull(model: Model, inputs: Inputs, germ: Array, factors: Array) -> tuple[Ar
     return np.asarray(-(up - down) / (2 * STEP) * germ / factors), len(values)
 
 
-def of_distributions(
-    text: str, model: Model, inputs: Inputs, target: float, costs: Array, most: Array, seed: int
-) -> Allocation:
-    """So that the limit is passed with a probability of at most `target`. Raises InputError, ComputationError.
-
-    In each round FORM tells the share of each deviation in 1 / beta^2, and a probability by `auto` corrects beta.
-    """
-    factors, spent = np.ones(len(inputs)), 0
-    stated, effects = math.nan, np.zeros(len(inputs))
-    wanted = -float(special.ndtri(target))
-    aim = wanted
-    found = math.nan
-    if least_of(Margins(model, inputs, 1)(np.zeros((1, len(inputs)))))[0] <= 0:
-        raise passed(text)
-    for round_ in range(ROUNDS):
-        margins = Margins(model, with_factors(inputs, factors), MANY)
-        points = design_points(margins, np.zeros((1, len(inputs))))
-        spent += margins.evaluations
-        if not points or not points[0].converged:
-            # So far off that it is not found: the widest tolerances come nearest to it.
-            if np.all(factors == most):
-                break
-            factors = most.copy()
-            continue
-        point = points[0]
-        if point.beta <= 0:
-            raise passed(text)
-        weights = np.abs(point.normal) / (point.beta * factors)
-        if round_ == 0:
-            # d ln P / d ln s = beta alpha^2 phi(beta) / Phi(-beta)
-            hazard = math.exp(-0.5 * point.beta**2) / (math.sqrt(2 * math.pi) * special.ndtr(-point.beta))
-            effects = 0.01 * point.beta * point.normal**2 * hazard
-            stated, runs = _chance(model, inputs, seed)
-            spent += runs
-        fresh = cheapest(weights, costs, 1 / aim**2, 2, most)
-        settled = np.max(np.abs(fresh / factors - 1)) < SETTLED
-        factors = fresh
-        if not settled:
-            continue
-        found, runs = _chance(model, with_factors(inputs, factors), seed)
-        spent += runs
-        if found <= target:
-            break
-        aim += wanted + float(special.ndtri(found)) + 0.01
-    if math.isnan(found) or found > target:
-        found, runs = _chance(model, with_factors(inputs, factors), seed)
-        spent += runs
-    if math.isnan(stated):
-        stated, runs = _chance(model, inputs, seed)
-        spent += runs
-    message = "" if found <= target else f"the probability is {found:.2e} with the tolerances that were found"
-    cost = float(costs @ (1 / factors) / costs.sum())
-    return Allocation(text, inputs, factors, effects, stated, found, target, cost, spent, message)
-
-
 def passed(text: str) -> ComputationError:
     """What to say of a limit that no tolerances keep."""
     return ComputationError(f"allocate: limit {text} is passed by the middle values, whatever the tolerances")
-
-
-def _chance(model: Model, inputs: Inputs, seed: int) -> tuple[float, int]:
-    margins = Margins(model, inputs, 5000)
-    return probability(margins, "auto", seed).estimate.probability, margins.evaluations
 
 
 def costs_of(texts: Mapping[str, float], inputs: Inputs) -> Array:

@@ -130,6 +130,14 @@ class Inputs:
         except np.linalg.LinAlgError:
             raise InputError("correlate: these correlations contradict each other (no positive matrix)") from None
 
+    @property
+    def root(self) -> Array:
+        """Cholesky's factor of the correlations of all parameters, (parameters, parameters)."""
+        found = np.eye(len(self))
+        if self._correlated:
+            found[np.ix_(self._correlated, self._correlated)] = self._factor
+        return found
+
     def _standard(self, k: int) -> bool:
         """Whether the germ of a parameter is a standard normal variable whatever its distribution."""
         return k in self._correlated

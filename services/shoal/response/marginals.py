@@ -7,6 +7,7 @@ and Nowak, Reliability Engineering and System Safety 106, 2012).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -39,6 +40,11 @@ class Marginal(Protocol):
         """Polynomials in the germ that are orthonormal under its measure."""
         ...
 
+    @property
+    def tolerance(self) -> float:
+        """Half the width of an interval, the standard deviation of a distribution."""
+        ...
+
     def germ(self, x: Array) -> Array:
         """The germ at probabilities x in (0, 1)."""
         ...
@@ -58,6 +64,11 @@ class Interval:
     random = False
     basis = LEGENDRE
 
+    @property
+    def tolerance(self) -> float:
+        """Half the width."""
+        return 0.5 * (self.high - self.low)
+
     def germ(self, x: Array) -> Array:
         """Evenly over [-1, 1]."""
         return np.asarray(2 * x - 1)
@@ -74,6 +85,11 @@ class Uniform(Interval):
 
     random = True
 
+    @property
+    def tolerance(self) -> float:
+        """The standard deviation."""
+        return (self.high - self.low) / math.sqrt(12)
+
 
 @dataclass(frozen=True)
 class Normal:
@@ -85,6 +101,13 @@ class Normal:
     logarithmic: bool = False
     random = True
     basis = HERMITE
+
+    @property
+    def tolerance(self) -> float:
+        """The standard deviation of the value."""
+        if not self.logarithmic:
+            return self.deviation
+        return math.exp(self.mean + 0.5 * self.deviation**2) * math.sqrt(math.expm1(self.deviation**2))
 
     def germ(self, x: Array) -> Array:
         """The standard normal variable."""
@@ -107,6 +130,11 @@ class Frozen:
     @cached_property
     def _scale(self) -> tuple[float, float]:
         return float(self.distribution.mean()), float(self.distribution.std())
+
+    @property
+    def tolerance(self) -> float:
+        """The standard deviation."""
+        return self._scale[1]
 
     @cached_property
     def basis(self) -> Recurrence:
@@ -141,6 +169,11 @@ class Empirical:
     @cached_property
     def _scale(self) -> tuple[float, float]:
         return float(np.mean(self.data)), float(np.std(self.data))
+
+    @property
+    def tolerance(self) -> float:
+        """The standard deviation."""
+        return self._scale[1]
 
     @cached_property
     def basis(self) -> Recurrence:
@@ -177,6 +210,11 @@ class Scaled:
     def basis(self) -> Recurrence:
         """That of the distribution."""
         return self.marginal.basis
+
+    @property
+    def tolerance(self) -> float:
+        """The standard deviation."""
+        return self.factor * self.marginal.tolerance
 
     def germ(self, x: Array) -> Array:
         """That of the distribution."""

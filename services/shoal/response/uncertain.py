@@ -26,10 +26,9 @@ from shoal.response.allocation import (
     Reached,
     accepted,
     costs_of,
-    of_distributions,
     of_intervals,
 )
-from shoal.response.allocation_of_both import of_both
+from shoal.response.allocation_of_random import of_random
 from shoal.response.attained import DRAWN
 from shoal.response.between import between
 from shoal.response.finer import repeated
@@ -335,12 +334,10 @@ def _allocated(
 ) -> Allocation:
     """The cheapest tolerances that keep a limit. stated: what is known of it with those that are stated."""
     wanted, inputs, seed = stated.limit, stated.inputs, how["seed"]
-    told, when = watched(machine, wanted), machine.times
     prices, widest = costs_of(costs, inputs), accepted(machine.scene, inputs)
-    if stated.between is not None:
-        return of_both(wanted, machine, inputs, stated.between, target, prices, widest, **how)
-    if inputs.random.all():
-        return of_distributions(wanted.text, told, inputs, target, prices, widest, seed)
+    if inputs.random.any():
+        return of_random(wanted, machine, inputs, stated, target, prices, widest, **how)
+    told, when = watched(machine, wanted), machine.times
 
     def least(here: Inputs) -> Reached:
         lower, outer, germs, evaluations, _ = _reach(here, when, None, seed, most)(told, abs(wanted.bound))

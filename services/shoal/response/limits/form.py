@@ -68,7 +68,7 @@ def design_points(margins: Margins, starts: Array) -> list[DesignPoint]:
             moving = np.flatnonzero(active & ~straight)
             if not moving.size:
                 break
-            slopes[moving] = _gradients(margins, u[moving], rows[moving])
+            slopes[moving] = gradients(margins, u[moving], rows[moving])
             size = np.linalg.norm(slopes[moving], axis=1)
             # Where nothing changes the margin there is nowhere to go.
             active[moving[~(size > 0)]] = False
@@ -78,14 +78,14 @@ def design_points(margins: Margins, starts: Array) -> list[DesignPoint]:
             if moving.size:
                 u[moving], g[moving], rows[moving] = _step(margins, u[moving], g[moving], slopes[moving])
                 active &= np.isfinite(g)
-            _meet(u, active)
+            meet(u, active)
     except TooManyRunsError:
         pass
     reached = active & np.any(slopes, axis=1) & (g <= NEAR * np.linalg.norm(slopes, axis=1))
     return distinct([_point(u[k], slopes[k], rows[k], bool(straight[k])) for k in np.flatnonzero(reached)])
 
 
-def _gradients(margins: Margins, u: Array, rows: Array) -> Array:
+def gradients(margins: Margins, u: Array, rows: Array) -> Array:
     """Of the margin at the instant that decides, by central differences, (places, parameters); 0 where one failed."""
     count, parameters = u.shape
     away = STEP * np.eye(parameters)
@@ -119,7 +119,7 @@ def _step(margins: Margins, u: Array, g: Array, slope: Array) -> tuple[Array, Ar
     return tried[each, best], value[each, best], found[each, best]
 
 
-def _meet(u: Array, active: BoolArray) -> None:
+def meet(u: Array, active: BoolArray) -> None:
     """Searches that come together go on as one."""
     going = np.flatnonzero(active)
     for k, one in enumerate(going):

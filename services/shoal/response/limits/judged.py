@@ -83,9 +83,7 @@ class Between:
         """Why it should not be believed, empty if it may be."""
         if found := self.lower.reason_to_doubt or self.upper.reason_to_doubt:
             return found
-        if max(self.beyond) > MOST_BEYOND:
-            return f"the interval values that decide are not known: others may change beta by {max(self.beyond):.2g}"
-        return ""
+        return undecided(max(self.beyond))
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -105,6 +103,13 @@ class Between:
             "interval_values": self.places,
             **sides,
         }
+
+
+def undecided(beyond: float) -> str:
+    """Whether so much of a reliability index is too much for interval values that were not looked at, in words."""
+    if beyond <= MOST_BEYOND:
+        return ""
+    return f"the interval values that decide are not known: others may change beta by {beyond:.2g}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,6 +43,11 @@ class Combined:
         """Orthonormal over these places."""
         return of_measure(self.places, self.weights)
 
+    @property
+    def tolerance(self) -> float:
+        """The standard deviation."""
+        return float(np.sqrt(self.weights @ self.places**2))
+
     def germ(self, x: Array) -> Array:
         """The place."""
         return np.interp(x, np.cumsum(self.weights), self.places)

@@ -140,7 +140,7 @@ def _allocation(found: Allocation) -> None:
         table.add_row(escape(name), *(f"{x:.3g}" for x in numbers))
     screen.out.print(table)
     screen.say(
-        f"{found.what} {found.stated:.3g} with the stated tolerances, {found.confirmed:.3g} with those found, which "
+        f"{found.what} {found.stated:.3g} with the stated tolerances, {found.reached} with those found, which "
         f"cost {found.cost:.3g} times as much; to tighten first: {found.first or 'none'}; {found.evaluations} runs"
     )
 

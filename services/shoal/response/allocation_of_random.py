@@ -1,0 +1,313 @@
+"""How wide tolerances may be where some parameters, or all, are random.
+
+The largest probability over the intervals is what must stay below the target. In the standard normal space of the
+random parameters the margin is least, at the distance of the target's reliability index, at a place that always exists
+(`limits.inverse`). There a parameter moves the margin by its tolerance times what the place stands for, which to first
+order in the place is a share of its own, as of an interval, and one that scatters:
+
+    sum of pull_i s_i + beta |spread s| <= room
+
+with factors s on the tolerances. It is exact where the margin is linear and the parameters are intervals, normal or
+correlated normal. It is convex in the factors, as is the cost (Boyd, Kim, Vandenberghe and Hassibi, A tutorial on
+geometric programming, Optimization and Engineering 8, 2007, for its form in logarithms), so that the cheapest factors
+are known; there the model is asked again. The distance is corrected, either way, by the probability that a study of the
+limit tells.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import optimize, special
+
+from shoal.errors import ComputationError
+from shoal.response.allocation import MANY, ROUNDS, SETTLED, STEP, TIGHTEST, Allocation, passed, with_factors
+from shoal.response.between import GAP, MORE, PLACES, between
+from shoal.response.inputs import Inputs
+from shoal.response.limits import MOST, Judged, Limit
+from shoal.response.limits.choice import probability
+from shoal.response.limits.estimate import Estimate
+from shoal.response.limits.form import design_points
+from shoal.response.limits.inverse import Nearest, nearest
+from shoal.response.limits.judge import watched
+from shoal.response.limits.judged import undecided
+from shoal.response.limits.margins import FAR, Margins, least
+from shoal.response.machine import Machine
+from shoal.response.respond import respond
+from shoal.response.runs import Answers
+from shoal.trajectory import Array
+
+MARGIN = 0.01
+"""Of the reliability index, by which more is aimed at where a confirming study finds too little or too much."""
+NEAR, OFF = 0.9, 0.5
+"""Shares of the target above which a probability is the target, and below which tolerances are told to be too tight."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """What bounds the factors, in units of the margin: pull @ s + beta |spread @ s| <= room.
+
+    pull: (parameters,); spread: of the margin by independent standard normal variables, (parameters, parameters)
+    """
+
+    pull: Array
+    spread: Array
+    room: float
+
+    def used(self, factors: Array, beta: float) -> float:
+        """The left side."""
+        return float(self.pull @ factors + beta * np.linalg.norm(self.spread @ factors))
+
+    def slope(self, factors: Array, beta: float) -> Array:
+        """Of that by each factor, (parameters,)."""
+        along = self.spread @ factors
+        return np.asarray(self.pull + beta * self.spread.T @ along / max(float(np.linalg.norm(along)), 1e-300))
+
+
+def cheapest(cuts: list[Cut], costs: Array, beta: float, most: Array) -> Array:
+    """The factors, least sum(costs / s), within all cuts and with TIGHTEST <= s <= most."""
+    # A cut is homogeneous: the same share of the widest ones is within it.
+    share = min(1.0, *(one.room / max(one.used(most, beta), 1e-300) for one in cuts))
+    start = np.clip(share * most, TIGHTEST, most)
+
+    def within(one: Cut) -> optimize.NonlinearConstraint:
+        """Of the room that logarithms of factors take up."""
+
+        def used(x: Array) -> Array:
+            return np.array([one.used(np.exp(x), beta) / one.room])
+
+        def slope(x: Array) -> Array:
+            return np.asarray(one.slope(np.exp(x), beta) * np.exp(x) / one.room)[None]
+
+        return optimize.NonlinearConstraint(used, -np.inf, 1.0, jac=slope)
+
+    found: Any = optimize.minimize(  # type: ignore[call-overload]
+        lambda x: float(costs @ np.exp(-x)) / costs.sum(),
+        np.log(start),
+        jac=lambda x: -costs * np.exp(-x) / costs.sum(),
+        method="SLSQP",
+        bounds=[(math.log(TIGHTEST), math.log(top)) for top in most],
+        constraints=[within(one) for one in cuts],
+        options={"maxiter": 500, "ftol": 1e-10},
+    )
+    return np.asarray(np.exp(found.x) if found.success else start)
+
+
+@dataclass(frozen=True)
+class Deciding:
+    """What decides about the probability, and how the margin there falls as tolerances grow.
+
+    germ: of the intervals; place: of the random parameters; falls: if each tolerance doubles, to first order,
+    (parameters,); beyond: by how much the reliability index may be less at other interval values
+    """
+
+    germ: Array
+    place: Nearest
+    falls: Array
+    beyond: float
+
+    def cut(self, inputs: Inputs, factors: Array, beta: float) -> Cut:
+        """beta: the distance of the place. inputs: with their tolerances multiplied by the factors."""
+        root, normal, standard = inputs.root, np.zeros(len(inputs)), np.zeros(len(inputs))
+        normal[inputs.random], standard[inputs.random] = self.place.normal, self.place.place
+        each = self.place.slope * np.linalg.solve(root.T, normal)
+        pull, spread = (self.falls - each * (root @ standard)) / factors, root.T * (each / factors)
+        return Cut(pull, spread, self.place.margin + float(pull @ factors) + beta * self.place.slope)
+
+    def effects(self, beta: float) -> Array:
+        """By which share the probability falls if a tolerance becomes one per cent smaller, (parameters,).
+
+        beta: the index of that probability. It grows by as many standard deviations as the margin does.
+        """
+        if not self.place.slope > 0:
+            return np.zeros(len(self.falls))
+        grown = beta + 0.01 * self.falls / self.place.slope
+        return np.asarray(-np.expm1(special.log_ndtr(-grown) - special.log_ndtr(-beta)))
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """What a study tells with these factors. doubt: why it should not be believed, empty if it may be."""
+
+    factors: Array
+    estimate: Estimate
+    doubt: str
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Of the probability, of 95 % confidence."""
+        lower, upper = self.estimate.interval
+        return float(lower[-1]), float(upper[-1])
+
+    def near(self, target: float) -> bool:
+        """Whether the probability is the target as far as can be told, and not above."""
+        chance = self.estimate.probability
+        return 0 < chance <= target <= max(chance / NEAR, float(np.nan_to_num(self.interval[1])))
+
+    def kept(self, target: float) -> bool:
+        """Whether the probability is not above the target."""
+        return self.estimate.probability <= target
+
+    def message(self, target: float, widest: Array) -> str:
+        """What speaks against the answer."""
+        chance, told = self.estimate.probability, "with the tolerances that were found"
+        if not self.kept(target):
+            return f"the probability is {chance:.2e} {told}"
+        if chance < OFF * target and not self.near(target) and np.any(self.factors < widest):
+            return f"the probability is {chance:.2e} {told}, of {target:g} that are allowed: wider ones may do"
+        return self.doubt
+
+
+def of_random(
+    limit: Limit,
+    machine: Machine,
+    inputs: Inputs,
+    stated: Judged,
+    target: float,
+    costs: Array,
+    widest: Array,
+    **how: Any,
+) -> Allocation:
+    """So that the limit is passed with a probability of at most `target`, whatever the values of the intervals.
+
+    stated: what is known of the limit with the stated tolerances; widest: factors; how: of `between`. Raises
+    InputError, ComputationError.
+    """
+    model, seed = watched(machine, limit), how["seed"]
+    middle = model(inputs.values(_germs(inputs, np.zeros(int((~inputs.random).sum())), None)))
+    if least(middle.values)[0] <= 0:
+        raise passed(limit.text)
+    chance = stated.estimates[-1].probability
+    factors, spent, effects = np.ones(len(inputs)), 1, np.zeros(len(inputs))
+    if chance > 0:
+        index = float(np.clip(-special.ndtri(chance), -FAR, FAR))
+        found, spent = _deciding(limit, machine, inputs, index, seed, on=True)
+        effects = found.effects(index)
+    wanted = -float(special.ndtri(target))
+    aim = wanted
+    cuts: dict[tuple[float, ...], Cut] = {}
+    told = list[Confirmed]()
+    for _ in range(ROUNDS):
+        here = with_factors(inputs, factors)
+        found, runs = _deciding(limit, machine, here, aim, seed)
+        spent += runs
+        cut = found.cut(here, factors, aim)
+        if cut.room <= 0:
+            # Too bent for a first-order form; nearer to the middle values, which keep the limit, it is less so.
+            factors = np.maximum(0.5 * factors, TIGHTEST)
+            continue
+        # The margin at each corner of the intervals falls by slopes of its own.
+        cuts[tuple(np.sign(np.round(found.germ, 3)))] = cut
+        fresh = cheapest(list(cuts.values()), costs, aim, widest)
+        settled = np.max(np.abs(fresh / factors - 1)) < SETTLED
+        factors = fresh
+        if not settled:
+            continue
+        confirmed, runs = _confirmed(limit, machine, inputs, factors, found.beyond, **how)
+        spent += runs
+        told.append(confirmed)
+        if confirmed.near(target) or (confirmed.kept(target) and np.all(factors >= widest)):
+            break
+        off = float(np.nan_to_num(-special.ndtri(confirmed.estimate.probability), posinf=FAR)) - wanted
+        aim = max(aim - min(max(off - MARGIN, -1.0), 1.0), 0.1 * wanted)
+    if not told:
+        confirmed, runs = _confirmed(limit, machine, inputs, factors, found.beyond, **how)
+        spent += runs
+        told.append(confirmed)
+    best = min(told, key=lambda one: (not one.kept(target), float(costs @ (1 / one.factors))))
+    return Allocation(
+        limit=limit.text,
+        inputs=inputs,
+        factors=best.factors,
+        effects=effects,
+        stated=chance,
+        confirmed=best.estimate.probability,
+        target=target,
+        cost=float(costs @ (1 / best.factors) / costs.sum()),
+        evaluations=spent,
+        message=best.message(target, widest),
+        interval=best.interval,
+    )
+
+
+def _germs(inputs: Inputs, germ: Array, place: Array | None) -> Array:
+    """Of all parameters, (1, parameters): those of the intervals, and of a place of the random ones or their middle."""
+    found = np.zeros((1, len(inputs)))
+    found[0, ~inputs.random] = germ
+    if inputs.random.any():
+        random = inputs.some(inputs.random)
+        found[:, inputs.random] = random.standard(np.zeros((1, len(random))) if place is None else place[None])
+    return found
+
+
+def _deciding(
+    limit: Limit, machine: Machine, inputs: Inputs, beta: float, seed: int, *, on: bool = False
+) -> tuple[Deciding, int]:
+    """Where the margin is least over the intervals and at that distance of the random parameters; runs.
+
+    on: at the place on the limit beside it, which lies at another distance where the limit bends
+    """
+    random, made = inputs.some(inputs.random), 0
+
+    def near(values: Mapping[str, Array], k: int = 0, on: bool = False) -> Nearest:
+        nonlocal made
+        here = machine.at({path: float(at[k]) for path, at in values.items()})
+        margins = Margins(watched(here, limit), random, MANY)
+        found = nearest(margins, beta, seed)
+        points = design_points(margins, found.place[None]) if on else []
+        if points and points[0].converged:
+            found = Nearest(points[0].place, points[0].normal, points[0].slope, 0.0, points[0].instant)
+        made += margins.evaluations
+        return found
+
+    def margin(values: Mapping[str, Array]) -> Answers:
+        found = np.array([[near(values, k).margin] for k in range(len(next(iter(values.values()))))])
+        return Answers(found, np.isfinite(found[:, 0]))
+
+    germ, beyond = np.zeros(0), 0.0
+    if inputs.mixed:
+        given = inputs.some(~inputs.random)
+        answer = respond(margin, given, 1, gap=GAP, seed=seed, most=PLACES + MORE * len(given))
+        germ = answer.runs.germs[int(answer.runs.values[:, 0].argmin())]
+        place = near(given.values(germ[None]), on=on)
+        assert answer.bounds is not None
+        beyond = float(answer.bounds.lower[0] - answer.bounds.lower_outer[0]) / max(place.slope, 1e-300)
+    else:
+        place = near({}, on=on)
+    falls = _falls(watched(machine, limit), inputs, _germs(inputs, germ, place.place), place.instant)
+    return Deciding(germ, place, falls, beyond), made + 2 * len(inputs) + 1
+
+
+def _falls(model: Machine, inputs: Inputs, germs: Array, instant: int) -> Array:
+    """By how much the margin falls at germs, (1, parameters), if each tolerance doubles, to first order, (parameters,).
+
+    From narrower ones, as wider ones may reach where the machine has no sense.
+    """
+    tried = [np.ones(len(inputs)), *(1 - share * row for share in (STEP, 2 * STEP) for row in np.eye(len(inputs)))]
+    runs = [with_factors(inputs, factors).values(germs) for factors in tried]
+    answers = model({path: np.concatenate([one[path] for one in runs]) for path in runs[0]})
+    if not answers.good.all():
+        raise ComputationError(f"allocate: runs beside the worst one failed: {answers.why}")
+    middle, (once, twice) = answers.values[0, instant], answers.values[1:, instant].reshape(2, -1)
+    return np.asarray((4 * once - twice - 3 * middle) / (2 * STEP))
+
+
+def _confirmed(
+    limit: Limit, machine: Machine, inputs: Inputs, factors: Array, beyond: float, **how: Any
+) -> tuple[Confirmed, int]:
+    """By the largest probability over the intervals; runs. beyond: of `Deciding`."""
+    here = with_factors(inputs, factors)
+    if not inputs.mixed:
+        margins = Margins(watched(machine, limit), here, MOST)
+        passing = probability(margins, "auto", how["seed"])
+        return Confirmed(factors, passing.estimate, passing.doubt), margins.evaluations
+    found = between(limit, machine, here, **{**how, "verify": False, "progress": None})
+    assert found.between is not None
+    largest = found.between.upper
+    # The index has no bound where a limit cannot be passed, and no polynomial follows it there; the margin has.
+    doubt = largest.reason_to_doubt or undecided(min(found.between.beyond[1], beyond))
+    return Confirmed(factors, largest.estimates[0], doubt), found.evaluations
