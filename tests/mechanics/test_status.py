@@ -197,6 +197,7 @@ def _machine(bodies: dict[str, Any], joints: dict[str, Any], markers: dict[str, 
     return Scene.parse({"name": "m", "bodies": bodies, "joints": joined, "markers": places} | other)
 
 
+BOB = {"kind": "rigid-body", "mass": 1.0, "inertia": 0.0, "centre_of_mass": [1.0, 0.0], "named_points": {"end": [1, 0]}}
 GROUNDED = {"O": ("ground", [0.0, 0.0], "R", "start")}
 
 
@@ -205,8 +206,15 @@ GROUNDED = {"O": ("ground", [0.0, 0.0], "R", "start")}
     [
         pytest.param(
             _machine({"R": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.0}}, GROUNDED, {"E": ("R", "start")}),
-            "mass matrix is singular",
+            "mass matrix is singular; some coordinate of R moves no mass: state a larger bodies.R.inertia$",
             id="a-mass-point-that-cannot-move",
+        ),
+        pytest.param(
+            load_scene("rigid-double-pendulum").with_values(
+                {"bodies": dict.fromkeys(("OA", "AB"), BOB), "joints.A.mu": 0.1, "joints.A.radius": 0.01}
+            ),
+            r"a larger bodies\.(OA|AB)\.inertia, or leave out joints\.A\.mu",
+            id="a-pin-whose-force-counts-between-bodies-without-inertia",
         ),
         pytest.param(
             _machine(
