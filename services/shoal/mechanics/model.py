@@ -231,8 +231,8 @@ class Model:
                if np.any(getattr(joint, "mu", 0.0)) and any(side.body in bodies for side in places(joint))]  # fmt: skip
         advice = f", or leave out joints.{dry[0]}.mu, for which its places have coordinates of their own" if dry else ""
         return InputError(
-            f"{self.scene.name}: the mass matrix is singular; some coordinate of {', '.join(bodies)} moves no mass: state "
-            f"a larger bodies.{(bodies or ['<name>'])[0]}.inertia{advice}"
+            f"{self.scene.name}: the mass matrix is singular; some coordinate of {', '.join(bodies)} moves no mass: "
+            f"state a larger bodies.{(bodies or ['<name>'])[0]}.inertia{advice}"
         )
 
     def tile(self, tile: Tile, lanes: slice) -> Arrays:

@@ -155,14 +155,15 @@ THINNEST = 1e-11
 def second_moments(body: Rod | RigidBody) -> list[list[Number]]:
     """The integral of x_i x_j dm about the centre of mass along the axes of a body in space [kg m^2].
 
-    J = tr(I)/2 - I of the inertia I. A rod has those of its section, which the plane does not: there, without rotary
-    inertia, their sum with that along the axis is the plane's.
+    J = tr(I)/2 - I of the inertia I. A rod has about its own axis the inertia of its sections, m (h^2 + w^2)/12 of a
+    rectangle. About the two others it has m (L^2 + w^2)/12 and m (L^2 + h^2)/12, or without rotary inertia m L^2/12, as
+    in the plane, where it is so much longer than thick that a body can have both.
     """
     if isinstance(body, Rod):
-        section = body.section_at(0.0)
-        across, wide = body.mass * section.bending / section.area, body.mass * section.side / section.area
-        along = body.inertia - across
-        matrix = [[along, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, wide]]
+        across, wide = body.section_inertia
+        if not body.rotary_inertia:
+            across = wide = (across + wide) / 2
+        matrix = [[body.inertia - across, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, wide]]
     else:
         inertia = body.inertia_matrix
         half = sum(inertia[k][k] for k in range(3)) / 2
