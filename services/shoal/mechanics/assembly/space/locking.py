@@ -61,7 +61,7 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
 
 
 def _rounding(scene: Scene, names: Iterable[str]) -> float:
-    """Half a unit of the last digit of the axis or the place of these joints that has the fewest; a half is exact."""
+    """Half a unit of the last digit of that axis or place of these joints that has the fewest; one digit is exact."""
     sides = [side for name in names for side in places(scene.joints[name])]
     axes = [getattr(scene.joints[name], "axis", ()) for name in names]
     starts = [scene.initial[side.body] for side in sides if side.body in scene.initial]
@@ -83,13 +83,13 @@ class Lock(NamedTuple):
 
 
 def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Array) -> Lock | None:
-    """What locks a machine at the coordinates q, (unknowns,).
+    """What locks a machine at the coordinates q, (unknowns,), by the least.
 
     gap: (rows,), and slope: (rows, unknowns), of constraints in units in which a row that nothing cancels has about
     unit length
     """
     left, sizes, right = np.linalg.svd(slope(q), full_matrices=False)
-    for k in np.flatnonzero((sizes > LEAST) & (sizes < MOST)):
+    for k in np.flatnonzero((sizes > LEAST) & (sizes < MOST))[::-1]:
         there = _followed(gap, slope, q + _WAY * right[k])
         gapes = float(np.max(np.abs(gap(there))))
         depends = np.any(np.linalg.svd(slope(there), compute_uv=False) < _SAME * sizes[k])
