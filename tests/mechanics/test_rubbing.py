@@ -57,34 +57,42 @@ def test_a_wheel_slows_down_evenly_by_the_weight_on_its_pin() -> None:
     np.testing.assert_allclose(run.angle("W"), rate * run.times - slower * run.times**2 / 2, rtol=1e-9)
 
 
-def pendulum(mu: float, radius: float, **more: Any) -> Scene:
-    rod = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.04, "density": 2500.0}
-    return machine({"A": rod}, {"O": {"first": GROUND, "second": {"body": "A"}, "mu": mu, "radius": radius,
+ROD = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.04, "density": 2500.0}
+BOB = {"kind": "rigid-body", "mass": 2.0, "inertia": 0.0, "centre_of_mass": [1.0, 0.0], "named_points": {"end": [1, 0]}}
+
+
+def pendulum(mu: float, radius: float, body: dict[str, Any] = ROD, **more: Any) -> Scene:
+    return machine({"A": body}, {"O": {"first": GROUND, "second": {"body": "A"}, "mu": mu, "radius": radius,
                                       "coulomb_speed": 0.05}},
                    {"A": {"body": "A", "point": "end"}}, initial={"A": {"angle": 0.2}}, **more)  # fmt: skip
 
 
-def test_a_pendulum_loses_what_its_pin_bears_times_the_way_it_slides() -> None:
-    """Moments about the pin, with its force from the motion of the centre of mass: integrated by scipy."""
-    mu, radius, mass, length = 0.3, 0.05, 2.0, 1.0
-    inertia = mass * length**2 / 3
+@pytest.mark.parametrize(("body", "arm", "inertia"), [(ROD, 0.5, 2.0 / 3.0), (BOB, 1.0, 2.0)])
+def test_a_pendulum_loses_what_its_pin_bears_times_the_way_it_slides(
+    body: dict[str, Any], arm: float, inertia: float
+) -> None:
+    """Moments about the pin, with its force from the motion of the centre of mass: integrated by scipy.
+
+    arm: of the centre of mass [m]; inertia: about the pin [kg m^2]. A bob has none about its own centre.
+    """
+    mu, radius, mass = 0.3, 0.05, 2.0
 
     def slopes(_: float, y: Any) -> list[float]:
         angle, rate = y
-        bend = -mass * G * length / 2 * np.cos(angle) / inertia
+        bend = -mass * G * arm * np.cos(angle) / inertia
         for _ in range(200):
-            along = mass * (G * np.sin(angle) - length / 2 * rate**2)
-            across = mass * (G * np.cos(angle) + length / 2 * bend)
+            along = mass * (G * np.sin(angle) - arm * rate**2)
+            across = mass * (G * np.cos(angle) + arm * bend)
             torque = mu * radius * np.hypot(along, across) * np.tanh(rate / 0.05)
-            bend = (-mass * G * length / 2 * np.cos(angle) - torque) / inertia
+            bend = (-mass * G * arm * np.cos(angle) - torque) / inertia
         return [rate, bend]
 
     times = np.linspace(0.5, 4.0, 8)
     exact = solve_ivp(slopes, (0, 4), [0.2, 0.0], rtol=1e-11, atol=1e-12, t_eval=times).y[0]
-    run = simulate(pendulum(mu, radius), times)
+    run = simulate(pendulum(mu, radius, body), times)
     assert run.ok, run.message
     np.testing.assert_allclose(run.angle("A"), exact, atol=1e-8)
-    lanes = simulate(pendulum(mu, radius), times, {"joints.O.mu": np.array([0.0, mu, 0.5])})
+    lanes = simulate(pendulum(mu, radius, body), times, {"joints.O.mu": np.array([0.0, mu, 0.5])})
     np.testing.assert_allclose(lanes.angles[:, 0, 1], exact, atol=1e-8)
 
 

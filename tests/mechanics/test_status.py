@@ -34,6 +34,44 @@ def test_a_run_that_loses_energy_is_not_believed() -> None:
     assert simulate.simulate(_with(scene, step=0.005), np.array([2.0])).ok
 
 
+def _sprung(rate: float, law: dict[str, Any], **solver: Any) -> Scene:
+    """1 kg on a line, at the place where the spring is relaxed, with a rate [m/s]."""
+    anchor = {"body": "ground", "point": [-1.0, -1.3]}
+    return Scene.parse({
+        "name": "sprung", "gravity": [0.0, 0.0], "bodies": {"p": {"kind": "point-mass", "mass": 1.0}},
+        "joints": {"s": {"kind": "slider", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "p"},
+                         "friction": 0.1}},
+        "loads": {"w": {"kind": "spring", "first": anchor, "second": {"body": "p"}, "length": 2.69**0.5, **law}},
+        "markers": {"p": {"body": "p"}}, "initial": {"p": {"position": [0.0, 0.0], "velocity": [rate, 0.0]}},
+        "solver": {"duration": 20.0, "integrator": "dop853", **solver},
+    })  # fmt: skip
+
+
+LAWS = [{"elastic": "100*t"}, {"elastic": "-t+t**3"}, {"elastic": "sin(t)"}, {"stiffness": 100.0}]
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("rate", [0.0, 1e-12, 1e-10])
+def test_a_machine_at_rest_but_for_round_off_is_believed(law: dict[str, Any], rate: float) -> None:
+    """What the law returns in place of zero drives it, and its energy had no other to be compared with."""
+    run = simulate.simulate(_sprung(rate, law, absolute_tolerance=1e-11), np.array([3.0, 20.0]))
+    assert run.ok, run.message
+
+
+@pytest.mark.parametrize("law", [{"elastic": "1e12*t"}, {"stiffness": 1e12}])
+def test_a_stiff_spring_at_rest_but_for_round_off_is_believed(law: dict[str, Any]) -> None:
+    run = simulate.simulate(_sprung(0.0, law, absolute_tolerance=1e-16, duration=1e-4), np.array([1e-4]))
+    assert run.ok, run.message
+
+
+@pytest.mark.parametrize("law", [LAWS[0], LAWS[3]])
+@pytest.mark.parametrize("rate", [1e-9, 1e-6])
+def test_small_motions_with_steps_too_long_are_not_believed(law: dict[str, Any], rate: float) -> None:
+    """0.1 nm and 0.1 um: the oscillator turns by a radian in a step, and leapfrog's energy is off by a half."""
+    run = simulate.simulate(_sprung(rate, law, integrator="leapfrog", step=0.15), np.array([3.0, 20.0]))
+    assert run.status == (Status.ENERGY,)
+
+
 def test_runge_kutta_near_its_limit_shows_its_loss_of_energy() -> None:
     near = simulate.simulate(_with(FLEXIBLE, integrator="rk4", step=9.3e-4, energy_tolerance=1e-7), np.array([0.5]))
     assert near.status == (Status.ENERGY,)
@@ -159,6 +197,7 @@ def _machine(bodies: dict[str, Any], joints: dict[str, Any], markers: dict[str, 
     return Scene.parse({"name": "m", "bodies": bodies, "joints": joined, "markers": places} | other)
 
 
+BOB = {"kind": "rigid-body", "mass": 1.0, "inertia": 0.0, "centre_of_mass": [1.0, 0.0], "named_points": {"end": [1, 0]}}
 GROUNDED = {"O": ("ground", [0.0, 0.0], "R", "start")}
 
 
@@ -167,8 +206,15 @@ GROUNDED = {"O": ("ground", [0.0, 0.0], "R", "start")}
     [
         pytest.param(
             _machine({"R": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.0}}, GROUNDED, {"E": ("R", "start")}),
-            "mass matrix is singular",
+            "mass matrix is singular; some coordinate of R moves no mass: state a larger bodies.R.inertia$",
             id="a-mass-point-that-cannot-move",
+        ),
+        pytest.param(
+            load_scene("rigid-double-pendulum").with_values(
+                {"bodies": dict.fromkeys(("OA", "AB"), BOB), "joints.A.mu": 0.1, "joints.A.radius": 0.01}
+            ),
+            r"a larger bodies\.(OA|AB)\.inertia, or leave out joints\.A\.mu",
+            id="a-pin-whose-force-counts-between-bodies-without-inertia",
         ),
         pytest.param(
             _machine(

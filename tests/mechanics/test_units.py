@@ -57,6 +57,23 @@ initial: {slide: {position: [0.0, 0.0]}, bob: {position: [0.3, -0.5]}}
 solver: {duration: 1.0, step: 1.0e-3, integrator: rk4}
 """
 
+PARALLELOGRAM = """
+name: parallelogram
+gravity: [0.0, -9.81]
+bodies:
+  left: {kind: rod, length: 0.4, height: 0.02, width: 0.02, density: 2700.0}
+  coupler: {kind: rod, length: 1.1, height: 0.02, width: 0.02, density: 2700.0}
+  right: {kind: rod, length: 0.4, height: 0.02, width: 0.02, density: 2700.0}
+joints:
+  O: {first: {body: ground, point: [0.0, 0.0]}, second: {body: left}}
+  A: {first: {body: left, point: end}, second: {body: coupler}}
+  B: {first: {body: coupler, point: end}, second: {body: right, point: end}}
+  C: {first: {body: ground, point: [1.1, 0.0]}, second: {body: right}}
+markers: {A: {body: left, point: end}}
+initial: {left: {angle: 1.0, rate: 3.0}, right: {angle: 1.0, rate: 3.0}}
+solver: {duration: 0.1}
+"""
+
 SCALES = [(1e-6, 1e-18, 1e-5), (1e-3, 1e-9, 1e-2), (1e3, 1e9, 30.0), (1e6, 1e12, 1e3)]
 """From a machine that a watchmaker could not see to one that spans a country."""
 
@@ -83,6 +100,17 @@ def run(text: str, scale: tuple[float, float, float], **solver: Any) -> Trajecto
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("text", [RODS, POINTS], ids=["rods", "points"])
 def test_the_motion_does_not_depend_on_the_units(text: str, scale: tuple[float, float, float]) -> None:
+    here, there = run(text, (1.0, 1.0, 1.0)), run(text, scale)
+    assert here.ok, here.message
+    assert there.ok, there.message
+    np.testing.assert_allclose(there.points / scale[0], here.points, atol=1e-9)
+
+
+@pytest.mark.parametrize("scale", [*SCALES, (1e7, 1e12, 1e3)])
+@pytest.mark.parametrize("angle", [1.0, 0.0])
+def test_stated_rates_that_agree_do_so_in_any_unit(angle: float, scale: tuple[float, float, float]) -> None:
+    """Of both cranks; at angle 0 all bars are on one line, where the rates choose the branch as well."""
+    text = PARALLELOGRAM.replace("angle: 1.0", f"angle: {angle}")
     here, there = run(text, (1.0, 1.0, 1.0)), run(text, scale)
     assert here.ok, here.message
     assert there.ok, there.message

@@ -30,6 +30,7 @@ from shoal.mechanics.numerics.tile import SINGLE, Array, Flags, Index, Tile, pac
 from shoal.mechanics.rubbing import Rubbing
 from shoal.mechanics.saddle import Saddle
 from shoal.scene import Scene
+from shoal.scene.joints import places
 
 
 class Gates(NamedTuple):
@@ -223,6 +224,17 @@ class Model:
         dense = sparse.dense(pattern, matrix) if size <= alike.FEW else np.zeros((0, 0))
         return Alike(components, pattern, matrix, paired(pattern, factor), alike.spread_inverse(dense, components))
 
+    def _singular(self, weightless: set[int]) -> InputError:
+        """What to state where these unknowns move no mass."""
+        bodies = [name for name, frame in self.frames.items() if any(weightless & {*v.terms} for v in frame.vectors)]
+        dry = [name for name, joint in self.scene.joints.items()
+               if np.any(getattr(joint, "mu", 0.0)) and any(side.body in bodies for side in places(joint))]  # fmt: skip
+        advice = f", or leave out joints.{dry[0]}.mu, for which its places have coordinates of their own" if dry else ""
+        return InputError(
+            f"{self.scene.name}: the mass matrix is singular; some coordinate of {', '.join(bodies)} moves no mass: "
+            f"state a larger bodies.{(bodies or ['<name>'])[0]}.inertia{advice}"
+        )
+
     def tile(self, tile: Tile, lanes: slice) -> Arrays:
         """The arrays of one tile of lanes. Raises InputError if a mass matrix is singular."""
         if self.varies:
@@ -237,12 +249,10 @@ class Model:
         factor = mass.copy()
         _factor_mass(tile, pattern, factor)
         inverse, whole = (part[: self.unknowns * len(tile)] for part in (factor, mass))
-        known = bool(np.all((inverse > 0) & np.isfinite(inverse)))
-        if not known or np.any(inverse * whole >= _SINGULAR):
-            raise InputError(
-                f"{self.scene.name}: the mass matrix is singular; some coordinate moves no mass, as in a body that is "
-                "flat to the last digit of its inertia"
-            )
+        known = (inverse > 0) & np.isfinite(inverse)
+        weightless = ~known | (np.where(known, inverse, 0.0) * whole >= _SINGULAR)
+        if np.any(weightless):
+            raise self._singular({*(np.flatnonzero(weightless) // len(tile)).tolist()})
         forces = self.elements, self.forces, self.applied, self.functions, self.constraints, self._saddle, self.rubbing
         nobody = np.zeros(len(self.elements), dtype=np.int64)
         return Arrays(

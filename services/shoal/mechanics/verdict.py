@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from shoal.mechanics import reach as reaches
+from shoal.mechanics.forces import ANGLE, LAW, STIFFNESS
+from shoal.mechanics.functions import value
 from shoal.mechanics.integrators import Choice, facts
 from shoal.mechanics.marched import CONSTRAINT_DRIFT, ENERGY_SCALE, FARTHEST, REACHED, STEPS
 from shoal.mechanics.model import Model
@@ -19,6 +21,8 @@ ROUND_OFF = 1e-12
 SINKING = 3000.0
 """A weight that nothing holds yet falls for as long as the error of its rate is below the absolute tolerance; by then
 it is 14 times as fast as that. Twice as much is no error by the default tolerance of energies, a hundredth."""
+RESOLVED = 1e4
+"""Of rates of so many absolute tolerances the errors of 50 steps, added up, are a hundredth of the energy."""
 
 _JUDGED = slice(FARTHEST, CONSTRAINT_DRIFT + 1)
 """What has a largest value."""
@@ -45,7 +49,8 @@ class Limits:
         self._driven = any(not _constant(joint) for joint in scene.joints.values()) or bool(scene.ground_points)
         self._weight = float(np.max(np.abs(model.weight), initial=0.0))
         stiff = max(np.max(family.coefficients, initial=0.0) for family in model.elements)
-        self._still = self._weight * 1e-9 * self.span + 1e-12 * float(stiff)
+        self._mass = float(sum(np.max(part) for (row, column), part in model.mass_entries.items() if row == column))
+        self._still = self._weight * 1e-9 * self.span + 1e-12 * float(stiff) + self._sprung() * ROUND_OFF**2 / 2
         # So far away a marker may be whatever the energy of the run.
         near = np.minimum(self._reach(np.zeros(1)), np.finfo(float).max)
         tolerances = np.array([[scene.solver.energy_tolerance], [DRIFT_TOLERANCE]])
@@ -55,15 +60,26 @@ class Limits:
         """How far a marker may be away [m]; a wheel's centre, which moves nowhere, as far as round-off goes."""
         return reaches.MARGIN * reaches.reach(self._model.scene, energy) + ROUND_OFF * self.span
 
+    def _sprung(self) -> float:
+        """The sum of what springs are stiff by where they are relaxed, by the machine's size or by 1 rad [J]."""
+        forces = self._model.forces
+        stiff = np.max(np.abs(forces.law[STIFFNESS::LAW]), axis=1, initial=0.0)
+        laws = [abs(value(self._model.function(int(k)), 0.0, 1)) if k >= 0 else 0.0 for k in forces.table]
+        return float(np.sum((stiff + laws) * np.where(forces.kind == ANGLE, 1.0, self.span) ** 2))
+
     def energy_floor(self, end: float) -> float:
         """The energy [J] that the energy error of a run up to `end` [s] is compared with at least.
 
         That error is relative to the largest energy in motion. A machine that never moves has none: then its
-        weight lifted by its span and the energy of stretching its rods set the scale, as far as round-off goes. Nor is
-        it an error if the weight sinks at a rate that the tolerance of rates allows: between two bars in one line,
-        which hold it to the second order only, it does until they feel it.
+        weight lifted by its span and the energy of stretching its rods and springs set the scale, as far as round-off
+        goes. Rates near the tolerance of rates are not known: a motion by them, such as an elastic law begins that
+        vanishes at rest but for round-off, is compared with their energy. Nor is it an error if the weight sinks at a
+        rate that this tolerance allows: between two bars in one line, which hold it to the second order only, it does
+        until they feel it.
         """
-        return self._still + self._weight * SINKING * self._solver.absolute_tolerance * end + 1e-300
+        tolerance = self._solver.absolute_tolerance
+        moving = 0.5 * self._mass * (RESOLVED * tolerance) ** 2
+        return self._still + moving + self._weight * SINKING * tolerance * end + 1e-300
 
     def verdict(self, numbers: Array, choice: Choice, failed: Flags) -> tuple[tuple[Status, ...], str]:
         """Status of every lane, and the reason for the first that is not ok; failed: lanes that have no start."""

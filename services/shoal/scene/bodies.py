@@ -267,12 +267,13 @@ class Rod(Record):
         """Moment of inertia about the centre of mass [kg m^2], of a slender rod unless `rotary_inertia` says more."""
         x, y = self.centre_of_mass
         total: float = sum(mass * abs(place - x - 1j * y) ** 2 for mass, place in self._pieces())
-        if self.rotary_inertia:
-            total += sum(
-                mass * section.bending / section.area
-                for (mass, _), section in zip(self._pieces(), self._sections(), strict=True)
-            )
-        return total
+        return total + self.section_inertia[0] if self.rotary_inertia else total
+
+    @property
+    def section_inertia(self) -> tuple[float, float]:
+        """The integrals of y^2 and of z^2 over the mass of all sections [kg m^2], y along their height."""
+        parts = [(m / s.area, s) for (m, _), s in zip(self._pieces(), self._sections(), strict=True)]
+        return sum(part * s.bending for part, s in parts), sum(part * s.side for part, s in parts)
 
     @property
     def centre_of_mass(self) -> Vector:

@@ -83,6 +83,35 @@ def test_near_a_singular_place_it_is_no_rounding(lean: float) -> None:
     assert run.marker("B")[0, 0] == pytest.approx(0.5 * math.sin(pendulum(lean, -3.0, 0.1)), abs=1e-6)
 
 
+@pytest.mark.parametrize("lever", [math.pi * 1e-4, math.e * 3e-4])
+def test_a_short_lever_told_to_all_digits_is_no_rounding(lever: float) -> None:
+    """Two places of a body that far apart run along two lines along x: 3 freedoms, and all falls along x."""
+    ground = {"body": "ground", "point": [0.0, 0.0, 0.0]}
+    beside = {"body": "ground", "point": [0.0, -lever * math.cos(0.7), -lever * math.sin(0.7)]}
+    place = {"body": "b", "point": [0.0, -lever * math.cos(0.7), -lever * math.sin(0.7)]}
+    body = {**BAR, "centre_of_mass": [0.0, 0.0, 0.0]}
+    still = {"rotation": [0, 0, 0], "position": [0, 0, 0]}
+    short = Scene.parse({
+        "name": "short", "dimensions": 3, "gravity": [9.81, 0.0, 0.0], "bodies": {"a": body, "b": body},
+        "joints": {"tube": {"kind": "cylindrical", "first": ground, "second": {"body": "a"}, "axis": "x"},
+                   "ball": {"kind": "spherical", "first": {"body": "a"}, "second": {"body": "b"}},
+                   "rail": {"kind": "slider", "first": beside, "second": place, "axis": "x", "rotation": "free"}},
+        "markers": {"b": {"body": "b"}}, "initial": {"a": still, "b": still},
+    })  # fmt: skip
+    run = simulate(short, np.array([0.4]))
+    assert run.ok, run.message
+    np.testing.assert_allclose(run.marker("b")[0], [0.5 * 9.81 * 0.16, 0.0, 0.0], atol=1e-9)
+
+
+def test_the_same_angle_told_by_three_digits_is_one() -> None:
+    """0.001 may be 0; sin(0.001) is as it stands."""
+    exact = four_bar(0.001, 0.3, 0.0)
+    rounded = exact.with_values({"joints.B.axis": [0.0, 1.0, 0.001]})
+    with pytest.raises(InputError, match=r"joints\.[ABCD]: .* forbids a motion"):
+        simulate(rounded, np.array([0.1]))
+    simulate(exact, np.array([0.1]))
+
+
 def pendulum(angle: float, rate: float, end: float) -> float:
     """The angle of both cranks, by scipy."""
     from scipy.integrate import solve_ivp

@@ -104,29 +104,59 @@ def test_a_bennett_linkage_closes_at_the_angle_of_its_closure() -> None:
     assert found.model["redundant_joints"]
 
 
-def test_a_body_in_free_flight_turns_as_eulers_equations_say() -> None:
-    """Torque-free, three different moments, a rotated frame: against Euler's equations with a quaternion."""
-    rotation, spin = Rotation.from_rotvec([0.3, -0.8, 0.5]), np.array([1.0, 4.0, -0.5])
-    matrix = np.array([[0.5, 0.05, -0.02], [0.05, 0.4, 0.03], [-0.02, 0.03, 0.3]])
-    flying = scene(
-        bodies={"B": body(matrix.tolist())}, markers={**TIPS, "o": {"body": "B"}},
-        initial={"B": {"rotation": rotation.as_rotvec().tolist(), "spin": spin.tolist(),
-                       "position": [0, 0, 0], "velocity": [0.1, 0.2, 0.3]}},
-    )  # fmt: skip
+ROTATION, SPIN = Rotation.from_rotvec([0.3, -0.8, 0.5]), np.array([1.0, 4.0, -0.5])
+FREE = {"rotation": ROTATION.as_rotvec().tolist(), "spin": SPIN.tolist(), "position": [0, 0, 0]}
+
+
+def turned(inertia: Any, times: list[float]) -> Any:
+    """Axes of a free body that begins so as columns, by Euler's equations with a quaternion, (times, 3, 3)."""
 
     def rate(_: float, state: Any) -> Any:
         quaternion, own = state[:4], state[4:]
         half = 0.5 * np.array([own[0], own[1], own[2]])
         v, w = quaternion[:3], quaternion[3]
         turning = [*(w * half + np.cross(v, half)), -v @ half]
-        return [*turning, *np.linalg.solve(matrix, np.cross(matrix @ own, own))]
+        return [*turning, *np.linalg.solve(inertia, np.cross(inertia @ own, own))]
 
-    begin = [*rotation.as_quat(), *rotation.inv().apply(spin)]
-    times = [0.5, 2.0]
-    exact = solve_ivp(rate, (0, 2), begin, t_eval=times, method="DOP853", rtol=1e-12, atol=1e-13).y[:4].T
-    found = motion(flying, *times)
-    assert attitude(found) == pytest.approx(Rotation.from_quat(exact).as_matrix(), abs=2e-9)
+    begin = [*ROTATION.as_quat(), *ROTATION.inv().apply(SPIN)]
+    exact = solve_ivp(rate, (0, times[-1]), begin, t_eval=times, method="DOP853", rtol=1e-12, atol=1e-13).y[:4].T
+    return Rotation.from_quat(exact).as_matrix()
+
+
+def test_a_body_in_free_flight_turns_as_eulers_equations_say() -> None:
+    """Torque-free, three different moments, a rotated frame."""
+    matrix = np.array([[0.5, 0.05, -0.02], [0.05, 0.4, 0.03], [-0.02, 0.03, 0.3]])
+    flying = scene(
+        bodies={"B": body(matrix.tolist())}, markers={**TIPS, "o": {"body": "B"}},
+        initial={"B": {**FREE, "velocity": [0.1, 0.2, 0.3]}},
+    )  # fmt: skip
+    found = motion(flying, 0.5, 2.0)
+    assert attitude(found) == pytest.approx(turned(matrix, [0.5, 2.0]), abs=2e-9)
     assert found.marker("o")[-1] == pytest.approx([0.2, 0.4, 0.6], abs=1e-10)
+
+
+@pytest.mark.parametrize("ends", [(0.3, 0.3, 0.1), (0.1, 0.1, 0.3), (0.3, 0.1, 0.2)])
+@pytest.mark.parametrize("rotary", [False, True])
+def test_a_rigid_rod_has_the_inertia_of_its_length_and_of_its_sections(ends: Any, rotary: bool) -> None:
+    """h^2 + w^2 about its own axis; L^2 about both others, with rotary inertia L^2 + w^2 about y and L^2 + h^2 about z.
+
+    ends: height at both, and the width [m]. The integrals over the length are by Gauss's rule.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    (first, last, width), x = ends, (nodes + 1) / 2
+    height = first + (last - first) * x
+    part = 1000.0 * height * width * weights / 2
+    along, tall, wide = (
+        np.sum(part * (x - np.sum(part * x) / np.sum(part)) ** 2),
+        part @ height**2,
+        part.sum() * width**2,
+    )
+    moments = [(tall + wide) / 12, along + rotary * wide / 12, along + rotary * tall / 12]
+    rod = {"kind": "rod", "length": 1.0, "height": first, "width": width, "density": 1000.0, "rotary_inertia": rotary}
+    places = {"o": [0, 0, 0], "x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1]}
+    flying = scene(bodies={"B": rod | ({} if first == last else {"end_height": last})}, initial={"B": FREE},
+                   markers={name: {"body": "B", "point": place} for name, place in places.items()})  # fmt: skip
+    assert attitude(motion(flying, 0.5, 2.0)) == pytest.approx(turned(np.diag(moments), [0.5, 2.0]), abs=1e-8)
 
 
 def test_a_torque_about_a_fixed_axis_spins_up_a_ball() -> None:

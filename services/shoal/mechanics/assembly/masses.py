@@ -15,8 +15,9 @@ from shoal.mechanics.elements import FAMILIES, SPATIAL_FAMILIES
 from shoal.mechanics.elements.families import Collected
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.frames import BeamFrame, ModalFrame, PointFrame, RigidFrame
+from shoal.mechanics.joints import Meet, conditions
 from shoal.mechanics.numerics.tile import Number
-from shoal.scene import Body, RigidBody, Rod, Scene
+from shoal.scene import GROUND, Body, RigidBody, Rod, Scene
 from shoal.scene.dimensions import padded
 
 LENT = np.array([1e-8, 1e-5])
@@ -47,6 +48,21 @@ class Masses:
             # The motion of a moving point of the ground is prescribed, so its mass is of no consequence.
             least = min(np.min(np.asarray(body.mass)) for body in scene.bodies.values())
             _add(self.mass, [vector], [[least]])
+        for name in placement.terms.pressed:
+            self._lend(name)
+
+    def _lend(self, name: str) -> None:
+        """The place that a pin holds on the ground has its body's mass besides: it is at rest, so nothing else changes.
+
+        A body without inertia would else move no mass by turning about its centre of mass.
+        """
+        for pin in conditions(self.scene.joints[name]):
+            if isinstance(pin, Meet):
+                sides = pin.first, pin.second
+                free = [side for side in sides if side.body != GROUND]
+                if len(free) == 1 and not any(isinstance(side.point, str) for side in sides if side.body == GROUND):
+                    mass = self.scene.bodies[free[0].body].mass
+                    _add(self.mass, [self.placement.point(self.scene, free[0])], [[mass]])
 
     def _add(self, name: str, body: Body) -> None:
         frame = self.placement.frames[name]
@@ -139,14 +155,15 @@ THINNEST = 1e-11
 def second_moments(body: Rod | RigidBody) -> list[list[Number]]:
     """The integral of x_i x_j dm about the centre of mass along the axes of a body in space [kg m^2].
 
-    J = tr(I)/2 - I of the inertia I. A rod has those of its section, which the plane does not: there, without rotary
-    inertia, their sum with that along the axis is the plane's.
+    J = tr(I)/2 - I of the inertia I. A rod has about its own axis the inertia of its sections, m (h^2 + w^2)/12 of a
+    rectangle. About the two others it has m (L^2 + w^2)/12 and m (L^2 + h^2)/12, or without rotary inertia m L^2/12, as
+    in the plane, where it is so much longer than thick that a body can have both.
     """
     if isinstance(body, Rod):
-        section = body.section_at(0.0)
-        across, wide = body.mass * section.bending / section.area, body.mass * section.side / section.area
-        along = body.inertia - across
-        matrix = [[along, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, wide]]
+        across, wide = body.section_inertia
+        if not body.rotary_inertia:
+            across = wide = (across + wide) / 2
+        matrix = [[body.inertia - across, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, wide]]
     else:
         inertia = body.inertia_matrix
         half = sum(inertia[k][k] for k in range(3)) / 2

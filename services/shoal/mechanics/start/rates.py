@@ -104,16 +104,17 @@ class Velocities:
     def _on_branch(self, rates: Array, basis: _Basis, closed: int, keep: list[int]) -> tuple[Array, Flags]:
         """Rates that a singular position allows: those for which the joints stay closed in second order."""
         ok = np.ones(self.lanes, dtype=bool)
+        units = np.tile([self.size, self.size, 1.0], rates.shape[1] // 3)
         singular = closed < len(keep) or bool(np.any(basis.dependent))
         if not singular or self.flexible or len(keep) > _LARGEST or np.any(self.rows.rate):
             return rates, ok
         for lane in np.flatnonzero(basis.dependent & (np.max(np.abs(rates), axis=1) > AGREES * self.speed / self.size)):
-            slope = self.rows.slope[lane, keep]
+            slope = self.rows.slope[lane, keep] * units
             left = np.linalg.svd(slope / (np.linalg.norm(slope, axis=1, keepdims=True) + 1e-300))
             rank = int(np.sum(left.S > SINGULAR))
             null = left.U[:, rank:].T / (np.linalg.norm(slope, axis=1) + 1e-300)
             closure = Closure(_of_lane(self.scene, int(lane)), self.poses[lane : lane + 1], self.closure.own)
-            bend = _Bend(closure, self.poses[lane], null, keep)
+            bend = _Bend(closure, self.poses[lane], null, keep, units)
             free = basis.rest(int(lane))
             found = bend.nearest(rates[lane], free, self.speed / self.size)
             ok[lane] = found is not None
@@ -123,16 +124,20 @@ class Velocities:
 
 
 class _Bend(NamedTuple):
-    """Second derivative of dependent joints along a motion, w . d2C/dt2 = v' (w . C_qq) v."""
+    """Second derivative of dependent joints along a motion, w . d2C/dt2 = v' (w . C_qq) v.
+
+    units: of the poses, the machine's size [m] and 1 rad, (3 bodies,)
+    """
 
     closure: Closure
     poses: Array
     null: Array
     keep: list[int]
+    units: Array
 
     def value(self, v: Array) -> Array:
         """For rates v (3 bodies,)."""
-        step = 1e-4 / max(float(np.max(np.abs(v))), 1e-300)
+        step = 1e-4 / max(float(np.max(np.abs(v / self.units))), 1e-300)
         shifts = step * np.array([-2.0, -1.0, 1.0, 2.0])
         u = self.poses + shifts[:, None] * v
         own = self.closure
@@ -147,6 +152,7 @@ class _Bend(NamedTuple):
             return v
         if not free.shape[0]:
             return None
+        free = free / np.max(np.abs(free / self.units))
         rng = np.random.default_rng(0)
         best, least = None, np.inf
         for attempt in range(BRANCHES):

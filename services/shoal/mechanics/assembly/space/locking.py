@@ -2,13 +2,15 @@
 
 Axes that are to be parallel and differ in the sixth digit leave a linkage no freedom. What holds it is a row of the
 constraints that nearly depends on others. It does so near a singular position as well; but there the dependence ends a
-short way on, while a rounded machine keeps it wherever it would go.
+short way on, while a rounded machine keeps it wherever it would go. A short lever keeps it as well: what is large for
+numbers of so many digits is one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from decimal import Decimal
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,9 +20,14 @@ from shoal.mechanics.assembly.space.values import jacobian, uncancelled, value_o
 from shoal.mechanics.assembly.terms import Term
 from shoal.mechanics.numerics.tile import Array
 from shoal.scene import Scene
+from shoal.scene.joints import places
 
 LEAST, MOST = 1e-10, 1e-3
 """Singular values of the rows that are between those of round-off and those of a machine."""
+FINE = 2e-4
+"""Numbers of more than three or four digits are not rounded by more; what is larger is a short lever of the machine."""
+ROUNDED = 10.0
+"""Singular values may be so many times the rounding of a number of few digits."""
 LARGEST = 500
 """With so many unknowns or more, as of flexible rods, rows are not looked at: it would take too long."""
 _WAY = 0.05
@@ -43,12 +50,29 @@ def require_unlocked(scene: Scene, terms: Sequence[Term], q: Array) -> None:
         return np.asarray(jacobian(terms, q, 0) / length[:, None])
 
     if (found := lock(gap, slope, q)) is not None:
-        first, *others = joints_of(scene, [terms[row].name for row in found.rows])
+        first, *others = names = joints_of(scene, [terms[row].name for row in found.rows])
+        if found.off > max(FINE, ROUNDED * _rounding(scene, names)):
+            return
         beside = f"with {', '.join(others)} it" if others else "it"
         raise InputError(
             f"joints.{first}: {beside} forbids a motion by {found.off:.1g} rad, as rounded axes, rotations or places "
             "do; state them with more digits"
         )
+
+
+def _rounding(scene: Scene, names: Iterable[str]) -> float:
+    """Half a unit of the last digit of that axis or place of these joints that has the fewest; one digit is exact."""
+    sides = [side for name in names for side in places(scene.joints[name])]
+    axes = [getattr(scene.joints[name], "axis", ()) for name in names]
+    starts = [scene.initial[side.body] for side in sides if side.body in scene.initial]
+    vectors = [*axes, *(side.point for side in sides), *(one.rotation for one in starts)]
+    digits = [max(map(_decimals, one)) for one in vectors if one and not isinstance(one, str)]
+    return 0.5 * 10.0 ** -min((count for count in digits if count > 1), default=17)
+
+
+def _decimals(number: Any) -> int:
+    """Digits of a number behind the point, as it is written in the shortest way."""
+    return -int(Decimal(repr(float(np.ravel(number)[0]))).normalize().as_tuple().exponent)
 
 
 class Lock(NamedTuple):
@@ -59,13 +83,13 @@ class Lock(NamedTuple):
 
 
 def lock(gap: Callable[[Array], Array], slope: Callable[[Array], Array], q: Array) -> Lock | None:
-    """What locks a machine at the coordinates q, (unknowns,).
+    """What locks a machine at the coordinates q, (unknowns,), by the least.
 
     gap: (rows,), and slope: (rows, unknowns), of constraints in units in which a row that nothing cancels has about
     unit length
     """
     left, sizes, right = np.linalg.svd(slope(q), full_matrices=False)
-    for k in np.flatnonzero((sizes > LEAST) & (sizes < MOST)):
+    for k in np.flatnonzero((sizes > LEAST) & (sizes < MOST))[::-1]:
         there = _followed(gap, slope, q + _WAY * right[k])
         gapes = float(np.max(np.abs(gap(there))))
         depends = np.any(np.linalg.svd(slope(there), compute_uv=False) < _SAME * sizes[k])
