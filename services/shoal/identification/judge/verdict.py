@@ -13,7 +13,7 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
 from shoal.identification.judge.odd_one import odd_one
 from shoal.identification.judge.residual_tests import ResidualTests
-from shoal.identification.judge.rivals import relation, rivals_of, within
+from shoal.identification.judge.rivals import ALIAS, relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
 from shoal.identification.judge.suspects import Findings, Suspect, suspects
 from shoal.identification.methods.lanes import Descent
@@ -107,7 +107,10 @@ def judge(
     if rivals:
         kinds = {relation(model, outcome.point, rival) for rival in rivals}
         message = f"{1 + len(rivals)} parameter sets fit equally well ({', '.join(sorted(kinds))})"
-        advice = ["measure another marker or a longer motion, or narrow the bounds to the set that is meant"]
+        more = ["sample more often"] * (ALIAS in kinds) + ["measure another marker or a longer motion"] * (
+            kinds != {ALIAS}
+        )
+        advice = [f"{', or '.join(more)}, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
     judged = _identifiable(seen, tests, with_refits(parameters, looked.refits), unknown, found)
     return replace(judged, refits=looked.refits)
