@@ -97,6 +97,16 @@ def test_a_joint_off_its_place_on_a_body() -> None:
     assert first.value == pytest.approx(0.03, abs=2e-3)
 
 
+@pytest.mark.parametrize(("place", "words"), [([0.5, 0.01], "instead of (0.5, 0) m"), ("end", "about that of end,")])
+def test_a_marker_off_its_place_on_a_body(place: str | list[float], words: str) -> None:
+    """1 cm beside the line of the rod, and at its end instead of in its middle."""
+    named = found({"markers": {"A": DATA["markers"]["A"], "M": {"body": "OA", "point": place}}})
+    first = next(iter(named.values()))
+    assert first.name == "place of the marker M on OA"
+    assert first.value == pytest.approx(0.5 if place == "end" else 0.01, abs=1e-3)
+    assert words in first.change
+
+
 @pytest.mark.slow
 def test_a_rod_that_bends() -> None:
     """Of a double pendulum recorded by Exudyn; a pendulum alone hardly bends."""
