@@ -49,7 +49,9 @@ def with_aliases(model: ForwardModel, outcome: Outcome) -> Outcome:
     looking = model.aside()
     first = _first_part(looking)
     free = ~model.parameters.initial & ~model.parameters.proportional
-    dips = [_dips(first, outcome.point, k) for k in np.flatnonzero(free) if _unresolved(first, outcome.point, k)]
+    dips = [
+        _dips(first, outcome.point, k) for k in np.flatnonzero(free).tolist() if _unresolved(first, outcome.point, k)
+    ]
     found = np.concatenate(dips) if dips else np.empty((0, len(outcome.point)))
     part, end = first, first.measurement.end
     while len(found):
