@@ -57,6 +57,14 @@ def test_samples_are_fitted_or_held() -> None:
     assert found.origin == "here, 6 of them held out"
 
 
+def test_a_window_of_empty_cells_is_refused_as_such() -> None:
+    times = np.arange(1, 11) / 10.0
+    values = np.column_stack([np.where((times > 0.35) & (times < 0.65), np.nan, times)] * 2)
+    recording = Recording(times, CHANNELS, values, "here", np.full(2, np.nan))
+    with pytest.raises(InputError, match=r"no sample from 0.4 s to 0.6 s; all cells of its 3 rows are empty"):
+        recording.holding([(0.4, 0.6)])
+
+
 @pytest.mark.parametrize(
     ("windows", "words"),
     [

@@ -16,6 +16,7 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.other_laws import OtherLaw, other_laws, sentences
 from shoal.identification.judge.remarks import remarks
 from shoal.identification.judge.rivals import valley
+from shoal.identification.judge.turns import with_nearest_turns
 from shoal.identification.judge.verdict import Judgement, Verdict, judge
 from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.outcome import Outcome
@@ -70,6 +71,8 @@ def conclude(
     searched, model = model, model.aside()
     if model.deadline is not None:
         model.deadline.extend()
+    found = outcome
+    outcome = unless_late(lambda: with_nearest_turns(model, found), found)
     near = evidence(model, outcome.point)
     if not near.looked:
         outcome = replace(outcome, ended=False, message=outcome.message or "no time was left for the intervals")

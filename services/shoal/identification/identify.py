@@ -20,6 +20,7 @@ from shoal.identification.conclude import NOTHING, Wishes, conclude
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
 from shoal.identification.estimate import Estimate
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.aliases import with_aliases
 from shoal.identification.judge.mirrors import with_mirror_images
 from shoal.identification.measure import Windows, measure
 from shoal.identification.methods import Method, Outcome, get_method
@@ -138,7 +139,8 @@ def _search(
         model, outcome = unless_late(lambda: repaced(searched, at_end, progress), (searched, at_end))
     if outcome.ended:
         found = outcome
-        outcome = unless_late(lambda: with_mirror_images(model, found), found)
+        known = unless_late(lambda: with_aliases(model, found), found)
+        outcome = unless_late(lambda: with_mirror_images(model, known), known)
     if model.refusal and not np.isfinite(outcome.fitness):
         raise InputError(model.refusal)
     return model, outcome, stages

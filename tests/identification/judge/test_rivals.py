@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from shoal.identification import Problem, Verdict, identify
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.mirrors import images
 from shoal.identification.judge.rivals import connected
+from shoal.identification.judge.turns import nearest_turns
 from shoal.identification.measure import measure
 from shoal.identification.problem import Parameter
 
@@ -145,6 +147,91 @@ def test_a_swing_that_was_recorded_a_period_later_looks_alike() -> None:
     assert "recorded in different ways" in found.message
     period = 4 * np.sqrt(1 / 9.81) * ellipk(np.sin((np.pi / 2 - 0.9) / 2) ** 2)
     np.testing.assert_allclose(abs(found.minima[0]["d"] - found.parameters["d"].value), period, rtol=1e-3)
+
+
+OSCILLATOR = {
+    "name": "oscillator",
+    "gravity": [0.0, 0.0],
+    "bodies": {"m": {"kind": "point-mass", "mass": 0.5}},
+    "joints": {"rail": {"kind": "slider", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "m"}}},
+    "loads": {
+        "k": {
+            "kind": "spring",
+            "first": {"body": "ground", "point": [-0.3, 0.0]},
+            "second": {"body": "m"},
+            "stiffness": 2000.0,
+            "length": 0.3,
+        }
+    },
+    "markers": {"m": {"body": "m"}},
+    "initial": {"m": {"position": [0.01, 0.0], "velocity": [0.0, 0.0]}},
+    "solver": {"duration": 1.0, "samples": 100},
+}
+
+
+def oscillator(folder: Path, frequency: float, lower: float, upper: float, start: float, damping: float) -> Problem:
+    """A mass of 0.5 kg on a spring, x = exp(-d t) 0.01 (cos w t + d / w sin w t), sampled at 40 Hz; bounds in Hz."""
+
+    def stiffness(hertz: float) -> float:
+        return 0.5 * (2 * np.pi * hertz) ** 2
+
+    times = np.arange(0, 1, 1 / 40)
+    w = np.sqrt((2 * np.pi * frequency) ** 2 - damping**2)
+    x = 0.01 * np.exp(-damping * times) * (np.cos(w * times) + damping / w * np.sin(w * times))
+    x += 1e-4 * np.random.default_rng(3).standard_normal(len(times))
+    np.savetxt(folder / "x.csv", np.column_stack([times, x]), delimiter=",", header="t,x", comments="")
+    (folder / "oscillator.yaml").write_text(json.dumps(OSCILLATOR))
+    bounds = {"lower": stiffness(lower), "upper": stiffness(upper), "start": stiffness(start)}
+    parameters = {"k": {"path": "loads.k.stiffness", **bounds}}
+    if damping:
+        parameters["c"] = {"path": "loads.k.damping", "lower": 1e-3, "upper": 50.0}
+    stated = {
+        "name": "alias",
+        "scene": str(folder / "oscillator.yaml"),
+        "parameters": parameters,
+        "channels": [{"marker": "m", "quantity": "x", "column": "x"}],
+        "noise": 1e-4,
+        "source": {"kind": "file", "path": str(folder / "x.csv")},
+    }
+    return Problem.parse(stated, "alias")
+
+
+@pytest.mark.parametrize("start", [9.0, 28.0])
+def test_a_stiffness_whose_frequency_the_samples_show_alike_is_ambiguous(start: float, tmp_path: Path) -> None:
+    """cos(2 pi f t) is the same at multiples of 1 / 40 s for f = 10, 30 and 50 Hz."""
+    found = identify(oscillator(tmp_path, 30.0, 5.0, 55.0, start, 0.0))
+    assert found.verdict is Verdict.AMBIGUOUS
+    assert "3 parameter sets" in found.message
+    assert "the same at every sample" in found.message
+    assert "sample more often" in found.advice[0]
+    alike = [found.parameters["k"].value, *(other["k"] for other in found.minima if other["fitness"] < 4e-8)]
+    frequencies = np.sqrt(np.array(sorted(alike)) / 0.5) / (2 * np.pi)
+    np.testing.assert_allclose(frequencies, [10.0, 30.0, 50.0], rtol=1e-3)
+
+
+def test_a_stiffness_that_fits_better_at_another_frequency_is_the_answer(tmp_path: Path) -> None:
+    """Damping shifts the phase at the start by c / (2 m w), which tells 30 Hz from 10 Hz by more than the noise."""
+    found = identify(oscillator(tmp_path, 30.0, 3.0, 45.0, 9.0, 4.0))
+    assert found.verdict is Verdict.IDENTIFIED, found.message
+    assert found.parameters["k"].lower < 0.5 * (2 * np.pi * 30.0) ** 2 < found.parameters["k"].upper
+
+
+def test_bounds_that_hold_no_alias_leave_a_stiffness_identified(tmp_path: Path) -> None:
+    found = identify(oscillator(tmp_path, 30.0, 21.0, 39.0, 28.0, 0.0))
+    assert found.verdict is Verdict.IDENTIFIED, found.message
+
+
+def test_an_angle_is_told_by_the_turn_nearest_to_its_start() -> None:
+    """Bounds of several turns hold several angles for one pose."""
+    for start in (0.0, 7.0, -5.5):
+        angle = {"path": "initial.OA.angle", "lower": -10.0, "upper": 10.0, "start": start}
+        found = identify(problem("single-pendulum", {"a": angle}, ["x", "y"], {"initial.OA.angle": 0.6}))
+        nearest = 0.6 + 2 * np.pi * np.round((start - 0.6) / (2 * np.pi))
+        assert found.verdict is Verdict.IDENTIFIED
+        assert found.parameters["a"].value == pytest.approx(nearest, abs=0.01)
+        assert found.parameters["a"].lower < nearest < found.parameters["a"].upper
+    seen = model(problem("single-pendulum", {"a": {**angle, "lower": 2.0, "start": 3.0}}, ["x", "y"], {}))
+    np.testing.assert_allclose(nearest_turns(seen, np.array([0.6 + 2 * np.pi])), 0.6 + 2 * np.pi)
 
 
 @pytest.mark.parametrize(

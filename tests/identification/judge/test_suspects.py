@@ -59,7 +59,9 @@ def test_nothing_is_suspect_where_the_model_is_right() -> None:
 def test_every_suspect_of_a_machine_has_a_name_of_its_own() -> None:
     """Both coordinates of a centre of mass beside the axes, among others."""
     scene = machine(np.random.default_rng(40)).scene
-    candidates = [*of_machine(cast("ForwardModel", SimpleNamespace(scene=scene)))]
+    seen = [SimpleNamespace(marker=marker, is_position=True) for marker in scene.markers]
+    measurement = SimpleNamespace(recordings={"one": SimpleNamespace(channels=seen)})
+    candidates = [*of_machine(cast("ForwardModel", SimpleNamespace(scene=scene, measurement=measurement)))]
     names = [candidate.name for candidate in candidates]
     assert {"x of the centre of mass of crank", "y of the centre of mass of crank"} <= {*names}
     assert len({*names}) == len(names)

@@ -1,10 +1,14 @@
 """Faults of pivots, joints and rods: a small one is named, with its size, and what has the same effect is said."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.stretch import odd_stretch
 from shoal.identification.judge.suspects import Suspect, suspects
 from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.fits import Together, groups_of
@@ -95,6 +99,33 @@ def test_a_joint_off_its_place_on_a_body() -> None:
     first = next(iter(named.values()))
     assert first.name == "place of O on OA"
     assert first.value == pytest.approx(0.03, abs=2e-3)
+
+
+@pytest.mark.parametrize(("place", "words"), [([0.5, 0.01], "instead of (0.5, 0) m"), ("end", "about that of end,")])
+def test_a_marker_off_its_place_on_a_body(place: str | list[float], words: str) -> None:
+    """1 cm beside the line of the rod, and at its end instead of in its middle."""
+    named = found({"markers": {"A": DATA["markers"]["A"], "M": {"body": "OA", "point": place}}})
+    first = next(iter(named.values()))
+    assert first.name == "place of the marker M on OA"
+    assert first.value == pytest.approx(0.5 if place == "end" else 0.01, abs=1e-3)
+    assert words in first.change
+
+
+def test_a_marker_that_was_lost_for_a_while_is_told_with_its_time() -> None:
+    """M stands still from 1 s to 1.3 s, where it moves by many times the noise; a wrong gravity is no such stretch."""
+    model = model_of({})
+    run = model.measurement.first
+    held, marker = (run.times > 0.99) & (run.times < 1.31), [c.marker == "M" for c in run.channels]
+    values = run.values.copy()
+    values[np.ix_(held, marker)] = values[held][0, marker]
+    lost = model.aside(measurement=model.measurement.changed(lambda run: replace(run, values=values)))
+    said, do = odd_stretch(lost, descend(lost, np.array([-0.9]), lambda *_: None).point)
+    begin, end = (float(time) for time in re.findall(r"[\d.]+(?= s)", said))
+    assert said.startswith("without M from ")
+    assert begin == pytest.approx(1.0, abs=0.11)
+    assert end == pytest.approx(1.3, abs=1e-3)
+    assert do.startswith("check M from ")
+    assert odd_stretch(model_of({"gravity": [0.0, -9.0]}), np.array([-0.9])) == ("", "")
 
 
 @pytest.mark.slow

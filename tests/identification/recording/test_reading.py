@@ -236,6 +236,21 @@ def test_gaps_dropped_frames_and_spikes_are_told(tmp_path: Path) -> None:
     assert [note for note in found.notes if "outliers, 3 samples" in note and "huber" in note]
 
 
+@pytest.mark.parametrize("kind", ["interpolated", "past a dead centre", "another marker"])
+def test_motion_that_the_samples_do_not_resolve_is_no_outlier(kind: str, tmp_path: Path) -> None:
+    """Kinks, fast turns and jumps are not mended by another value of one sample, as an outlier is."""
+    times = np.arange(400) / 200
+    noise = 2e-4 * np.random.default_rng(0).standard_normal(400)
+    knots = np.arange(0, 401, 10) / 200
+    x = {
+        "interpolated": np.interp(times, knots, np.sin(3 * knots)),
+        "past a dead centre": np.arctan(150 * np.sin(3 * times + 0.3)) + noise,
+        "another marker": np.sin(3 * times) + (times > 1.0) + noise,
+    }[kind]
+    found = read(FileSource(), TIP[:1], written(tmp_path, rows([times, x], "t,x")))
+    assert not [note for note in found.notes if "outliers" in note]
+
+
 def test_parquet_is_read_with_its_gaps(tmp_path: Path) -> None:
     pyarrow = pytest.importorskip("pyarrow")
     from pyarrow import parquet

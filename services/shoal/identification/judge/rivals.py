@@ -16,8 +16,14 @@ from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.identification.spread.value import Value
 from shoal.trajectory import Array
 
-_EVEN, _WHOLE = 1e-3, 0.02
-"""Steps between samples that differ by no more of themselves are even; turns this near to a whole number are whole."""
+ALIAS = "the same at every sample, and apart between samples"
+"""What an answer's alias is to it."""
+_EVEN = 1e-3
+"""Steps between samples that differ by no more of themselves are even."""
+_PART = 0.382
+"""Of the way from one sample to the next."""
+_BETWEEN, _SEEN = 9.0, 0.01
+"""Motions are apart between samples by so many times more than at them, in squares, and by so much of the spread's."""
 _STATIONS, _STEPS = 7, 10
 """Points between two minima, and how many steps they may descend towards the valley's floor."""
 
@@ -89,12 +95,43 @@ def apart(model: ForwardModel, one: Array, other: Array) -> bool:
     return bool(np.any(differing(model, one, other)))
 
 
-def turn_of_samples(model: ForwardModel) -> float | None:
-    """The rate [rad/s] at which a body turns once from each sample to the next; None where samples are uneven."""
-    steps = [np.diff(recording.times) for recording in model.measurement.recordings.values()]
-    if any(step.size == 0 or np.ptp(step) > _EVEN * step[0] for step in steps):
-        return None
-    return float(2 * np.pi / max(step[0] for step in steps))
+def turn_of_samples(model: ForwardModel, uneven: float = _EVEN) -> float | None:
+    """The rate [rad/s] at which a body turns once from each sample to the next; None where samples are uneven.
+
+    Steps may be whole multiples of the shortest, where samples are missing; uneven: of it, by how much they may be off.
+    """
+    shortest = []
+    for recording in model.measurement.recordings.values():
+        steps = np.diff(recording.times)
+        if steps.size == 0 or np.any(np.abs(steps - _usual(steps) * np.round(steps / _usual(steps))) > uneven * steps):
+            return None
+        shortest.append(_usual(steps))
+    return float(2 * np.pi / max(shortest))
+
+
+def _usual(steps: Array) -> float:
+    """The step between samples where none are missing."""
+    return float(np.median(steps[steps < 1.5 * np.min(steps)]))
+
+
+def beside_samples(model: ForwardModel, points: Array, name: str) -> tuple[Array, Array, Array]:
+    """Channels of a recording over their spread where no samples are missing, (points, instants * channels) each.
+
+    At the first of two samples, and a part of the way to the next: on the straight line, and by the motion itself. The
+    part is no simple fraction: in the middle every other alias is the same as well.
+    """
+    recording = model.measurement.recordings[name]
+    steps = np.diff(recording.times)
+    near = np.flatnonzero(steps < 1.5 * np.min(steps))
+    between = recording.times[near] + _PART * steps[near]
+    order = np.argsort(times := np.append(recording.times, between), kind="stable")
+    seen = np.empty((len(points), len(times), len(recording.channels)))
+    seen[:, order] = model.observe(points, name, times[order])
+    size = np.nanstd(recording.values, axis=0)
+    seen, count = seen / np.where(size > 0.0, size, 1.0), len(recording.times)
+    line = seen[:, near] + _PART * (seen[:, near + 1] - seen[:, near])
+    first, straight, there = (part.reshape(len(points), -1) for part in (seen[:, near], line, seen[:, count:]))
+    return first, straight, there
 
 
 def within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -> bool:
@@ -105,14 +142,22 @@ def within(model: ForwardModel, point: Array, parameters: Mapping[str, Value]) -
     return all(parameters[name].lower <= value <= parameters[name].upper for name, value in values)
 
 
+def same_at_samples(model: ForwardModel, one: Array, other: Array) -> bool:
+    """Whether two motions that fit alike at the samples are apart between them: by whole turns or swings."""
+    aside = model.aside()
+    for name in model.measurement.recordings:
+        at, _, between = beside_samples(aside, np.array([one, other]), name)
+        off, apart_by = (float(np.mean((seen[1] - seen[0]) ** 2)) for seen in (at, between))
+        if apart_by > max(_BETWEEN * off, _SEEN):
+            return True
+    return False
+
+
 def relation(model: ForwardModel, one: Array, other: Array) -> str:
     """What another solution is to the first: a mirror image, another clock or camera, or just different."""
+    if same_at_samples(model, one, other):
+        return ALIAS
     changed = np.flatnonzero(differing(model, one, other))
-    turn = turn_of_samples(model)
-    if turn is not None and all(model.parameters.paths[k].endswith(".rate") for k in changed):
-        turns = (one - other)[changed] / turn
-        if np.all(np.abs(turns - np.round(turns)) < _WHOLE):
-            return "the same at every sample, by whole turns between samples; sample more often"
     if np.all(model.parameters.initial[changed]):
         return "mirror images: the same marker positions with another pose"
     entries = list(model.parameters.entries.values())

@@ -13,8 +13,9 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
 from shoal.identification.judge.odd_one import odd_one
 from shoal.identification.judge.residual_tests import ResidualTests
-from shoal.identification.judge.rivals import relation, rivals_of, within
+from shoal.identification.judge.rivals import ALIAS, relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
+from shoal.identification.judge.stretch import odd_stretch
 from shoal.identification.judge.suspects import Findings, Suspect, suspects
 from shoal.identification.methods.lanes import Descent
 from shoal.identification.methods.outcome import Outcome
@@ -88,15 +89,20 @@ def judge(
         advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
         return Judgement(Verdict.UNFINISHED, unfinished, advice)
     looked = Findings()
-    if (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal:
+    misfitting = (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal
+    if misfitting:
         looked = suspects(model, outcome.point, seen.residual, seen.jacobian, tests.explained)
     if looked.better is not None:
         reason = f"a better minimum was met, of fitness {looked.better.fitness:.3g} instead of {outcome.fitness:.3g}"
         advice = ["look for another minimum (--method multi-start)"]
         return Judgement(Verdict.FAILED, reason, advice, looked.suspects, better=looked.better)
     found = looked.suspects
+    # A suspect that leaves more than noise explains less than a stretch or a recording that is left out.
+    odd = ("", "")
+    if misfitting and not looked.cut and (not found or found[0].after > _LOUD * tests.explained):
+        odd = unless_late(lambda: odd_stretch(model, outcome.point), odd)
     if tests.wrong_model or (found and found[0].before >= _DECISIVE * found[0].after):
-        return _rejected(model, outcome, seen, tests, found)
+        return _rejected(model, outcome, seen, tests, found, odd)
     if looked.cut:
         reason = f"no time was left to see what a misfit of {tests.sized(tests.size)} is due to"
         return Judgement(Verdict.FAILED, reason, ["allow more time"], found)
@@ -107,9 +113,12 @@ def judge(
     if rivals:
         kinds = {relation(model, outcome.point, rival) for rival in rivals}
         message = f"{1 + len(rivals)} parameter sets fit equally well ({', '.join(sorted(kinds))})"
-        advice = ["measure another marker or a longer motion, or narrow the bounds to the set that is meant"]
+        more = ["sample more often"] * (ALIAS in kinds) + ["measure another marker or a longer motion"] * (
+            kinds != {ALIAS}
+        )
+        advice = [f"{', or '.join(more)}, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
-    judged = _identifiable(seen, tests, with_refits(parameters, looked.refits), unknown, found)
+    judged = _identifiable(seen, tests, with_refits(parameters, looked.refits), unknown, found, odd)
     return replace(judged, refits=looked.refits)
 
 
@@ -127,8 +136,14 @@ def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
 
 
 def _rejected(
-    model: ForwardModel, outcome: Outcome, seen: Sensitivity, tests: ResidualTests, found: list[Suspect]
+    model: ForwardModel,
+    outcome: Outcome,
+    seen: Sensitivity,
+    tests: ResidualTests,
+    found: list[Suspect],
+    odd: tuple[str, str],
 ) -> Judgement:
+    """odd: what is said, and to do, about a stretch that contradicts the rest."""
     reason = f"the best fit is off by {tests.sized(tests.size)}, {_against(tests)}"
     advice = []
     if found:
@@ -143,10 +158,9 @@ def _rejected(
     for name, off in _against_priors(model, seen.residual):
         reason += f"; {name} is {off:.2g} standard deviations off its prior"
         advice.insert(0, f"check the prior of {name}")
-    said, do = unless_late(lambda: odd_one(model, outcome.point, seen.residual), ("", ""))
+    said, do = odd if odd[0] else unless_late(lambda: odd_one(model, outcome.point, seen.residual), odd)
     if said:
         reason += f"; {said}"
-        # A suspect that leaves more than noise explains less than a recording that is left out.
         advice.insert(0 if found and found[0].after > _LOUD * tests.explained else len(advice), do)
     if (exchange := exchanged(model)) is not None:
         reason += f"; {exchange}"
@@ -176,7 +190,12 @@ def _against(tests: ResidualTests) -> str:
 
 
 def _identifiable(
-    seen: Sensitivity, tests: ResidualTests, parameters: Mapping[str, Value], unknown: list[str], found: list[Suspect]
+    seen: Sensitivity,
+    tests: ResidualTests,
+    parameters: Mapping[str, Value],
+    unknown: list[str],
+    found: list[Suspect],
+    odd: tuple[str, str],
 ) -> Judgement:
     """Identified, wholly or up to a combination, with what has to be said beside."""
     reasons, notes, advice = [], [], []
@@ -198,6 +217,8 @@ def _identifiable(
         size = f"{tests.sized(tests.excess)} ({share:.2g} % of the signal)"
         notes.append(f"a systematic residual of {size} widens the intervals: the model, not the noise, limits them")
         notes += [f"{found[0]}; the intervals hold the answer with it too"] if found else []
+        notes += [said for said in odd[:1] if said]
+        advice += [do for do in odd[1:] if do]
     elif tests.too_large:
         notes.append(f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found")
     verdict = Verdict.COMBINATION if reasons else Verdict.IDENTIFIED

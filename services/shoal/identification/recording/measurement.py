@@ -61,9 +61,9 @@ class Recording:
             inside = fitted & (self.times >= low) & (self.times <= high)
             if not np.any(np.isfinite(self.values[inside])):
                 span = f"{self.times[0] + begin:g} s to {self.times[-1] + begin:g} s"
-                raise InputError(
-                    f"hold_out: no sample from {window[0]:g} s to {window[1]:g} s; the recording covers {span}"
-                )
+                empty = f"all cells of its {np.count_nonzero(inside)} rows are empty"
+                why = empty if np.any(inside) else f"the recording covers {span}"
+                raise InputError(f"hold_out: no sample from {window[0]:g} s to {window[1]:g} s; {why}")
             held.append(Held(window, self.times[inside], self.values[inside]))
             fitted &= ~inside
         left = np.isfinite(self.values[fitted]).sum(axis=0)

@@ -262,18 +262,27 @@ def _held(times: Array, signal: Array) -> list[str]:
 
 
 def _outliers(times: Array, signal: Array) -> int:
-    """How many samples stand alone, by the cubic through their four neighbours; none where times are uneven."""
+    """How many samples stand alone, by the cubic through their four neighbours; none where times are uneven.
+
+    A kink or a jump of the motion looks like one too, but is not mended by another value of that sample.
+    """
     known = np.isfinite(signal)
     x, steps = signal[known], np.diff(times[known])
     if len(x) < 20 or np.ptp(steps) > 0.1 * np.median(steps):
         return 0
-    off = np.abs(x[2:-2] - (4 * (x[1:-3] + x[3:-1]) - x[:-4] - x[4:]) / 6) / np.sqrt(70 / 36)
+    signed = (x[2:-2] - (4 * (x[1:-3] + x[3:-1]) - x[:-4] - x[4:]) / 6) / np.sqrt(70 / 36)
+    off = np.abs(signed)
+    # What is left beside a sample when it takes the value that the cubic has there.
+    beside = np.lib.stride_tricks.sliding_window_view(np.pad(signed, 2), 5)
+    left = np.max(np.abs(beside - signed[:, None] * np.array([1, -4, 6, -4, 1]) / 6), axis=1)
     around = np.lib.stride_tricks.sliding_window_view(np.pad(off, 3), 7)
     # A spike spoils the prediction of the two samples on either side, and of no other; fast motion spoils them all.
     alone = (off == around.max(axis=1)) & (off > _OUTLIER * np.maximum(around[:, 0], around[:, 6]))
     # Of a signal in whole units (pixels) that hardly moves, the differences tell nothing below the unit.
     resolution = float(np.diff(np.unique(x)).min(initial=np.inf)) if np.ptp(x) else 0.0
-    return int(np.sum(alone & (off > _OUTLIER * max(differences(x), resolution))))
+    noise, background = differences(x), np.maximum(around[:, 0], around[:, 6])
+    mended = left <= np.maximum(0.5 * _OUTLIER * np.maximum(background, noise), resolution)
+    return int(np.sum(alone & mended & (off > _OUTLIER * max(noise, resolution))))
 
 
 def _span(times: Array) -> str:

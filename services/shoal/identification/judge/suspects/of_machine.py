@@ -13,9 +13,12 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.suspects.candidate import Candidate
 from shoal.identification.judge.suspects.size import Size, size_of
 from shoal.identification.judge.suspects.springs import springs
+from shoal.identification.problem import Parameter
 from shoal.mechanics.start.start import is_direct
 from shoal.scene import PointMass, RigidBody, Rod, Scene
+from shoal.scene.dimensions import padded
 from shoal.scene.joints import GROUND, Attachment, Resisted, Revolute, Slider, places
+from shoal.trajectory import Array
 
 RESISTING = {"friction": "friction", "drag": "quadratic drag", "coulomb": "dry friction"}
 """Fields of joints that resist a motion by laws of their own, and what suspects call them."""
@@ -26,6 +29,8 @@ _SLIGHT = 1e-6
 """As _STEP, of friction: its laws are so alike that the curvature of a larger change hides what tells them apart."""
 _SHIFT = 0.2
 """Of the size of the machine, how far off a pivot is looked for."""
+_ABOUT = 0.03
+"""Of how far a marker is off: nearer to another named point of its body it is taken to be there."""
 _NOTHING = 1e-6
 """Of the machine: a further mass that is none."""
 
@@ -40,6 +45,7 @@ def of_machine(model: ForwardModel) -> Iterator[Candidate]:
     yield from _lengths(scene)
     yield from _pivots(scene, size)
     yield from _rates(scene, size)
+    yield from _markers(model, size)
 
 
 def _friction(scene: Scene, size: Size) -> Iterator[Candidate]:
@@ -150,6 +156,48 @@ def _near(name: str, path: str, stated: float, width: float, scene: Scene | None
     """A number known to within a width."""
     bounds = (stated - width, stated + width)
     return Candidate.single(name, path, stated, bounds, stated + _STEP * width, scene=scene)
+
+
+def _positions(model: ForwardModel) -> list[str]:
+    """Markers of which positions are measured, in the order of the scene."""
+    runs = model.measurement.recordings.values()
+    seen = {channel.marker for run in runs for channel in run.channels if channel.is_position}
+    return [name for name in model.scene.markers if name in seen]
+
+
+def _markers(model: ForwardModel, size: Size) -> Iterator[Candidate]:
+    """Places on their rigid bodies of markers whose positions are measured."""
+    explicit, found = model.scene.model_dump(mode="json"), dict[str, tuple[float, ...]]()
+    for name in _positions(model):
+        marker = model.scene.markers[name]
+        body = model.scene.bodies[marker.body]
+        if isinstance(body, RigidBody) or (isinstance(body, Rod) and body.element == "rigid"):
+            found[name] = tuple(float(x) for x in model.scene.location(marker))
+            explicit["markers"][name]["point"] = list(found[name])
+    with suppress(InputError):
+        scene = Scene.parse(explicit)
+        for name, place in found.items():
+            yield _marker(name, place, size.length, scene)
+
+
+def _marker(name: str, place: tuple[float, ...], width: float, scene: Scene) -> Candidate:
+    """The place of one marker, all of its coordinates."""
+    paths = [f"markers.{name}.point.{axis}" for axis in range(len(place))]
+    both = zip(paths, place, strict=True)
+    numbers = tuple(Parameter(path=path, lower=x - width, upper=x + width, scale="linear") for path, x in both)
+    body = scene.markers[name].body
+    base, words = np.array([place]), f"place of the marker {name} on {body}"
+    points = {point: np.array(padded(at, len(place))) for point, at in scene.bodies[body].points.items()}
+    probes = (base + _STEP * width * np.eye(len(place)))[None]
+
+    def tell(values: Array) -> tuple[float, str]:
+        there, stated = (", ".join(f"{x:.4g}" for x in one) for one in (values, place))
+        off = {point: float(np.linalg.norm(values - at)) for point, at in points.items()}
+        nearest = min(off, key=lambda point: off[point])
+        known = f", about that of {nearest}," if off[nearest] < _ABOUT * np.linalg.norm(values - place) else ""
+        return float(np.linalg.norm(values - place)), f"a value of ({there}) m{known} instead of ({stated}) m"
+
+    return Candidate(words, "machine", numbers, place, probes, base, scene=scene, tell=tell)
 
 
 def _rates(scene: Scene, size: Size) -> Iterator[Candidate]:
