@@ -200,5 +200,7 @@ def _identifiable(
         notes += [f"{found[0]}; the intervals hold the answer with it too"] if found else []
     elif tests.too_large:
         notes.append(f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found")
+    if tests.unresolved:
+        notes.append("the samples do not resolve the motion: what the model leaves out of it between them is not seen")
     verdict = Verdict.COMBINATION if reasons else Verdict.IDENTIFIED
     return Judgement(verdict, "; ".join([*reasons, *notes]), advice, found)
