@@ -9,6 +9,7 @@ import numpy as np
 from shoal.identification.deadline import unless_late
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
+from shoal.identification.spread.between_samples import between_samples
 from shoal.identification.spread.covariance import Block, blocks_of
 from shoal.identification.spread.given import Given
 from shoal.identification.spread.model_error import Corrections, ModelError, model_error, rms_of
@@ -31,7 +32,7 @@ class Evidence:
     blocks: the series of the residuals
     at: the linearisation, with what the model, not the noise, leaves
     error: of the model itself; mesh, theory: sizes of its parts, root mean squares
-    given: what is taken as known and is not quite: noise of measured signals, fields of the scene
+    given: what is taken as known and is not quite: measured signals, between their samples too, and fields of the scene
     """
 
     point: Array
@@ -91,8 +92,12 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
 
 def _given(model: ForwardModel, point: Array, predicted: dict[str, Array], residual: Array) -> list[Given]:
     """What is taken as known and is not quite, where there is any. Raises TimeIsUp."""
-    both = signal_noise(model, point, predicted, residual), uncertain_fields(model, point, predicted)
-    return [one for one in both if one is not None]
+    found = (
+        between_samples(model, point, predicted, residual),
+        signal_noise(model, point, predicted, residual),
+        uncertain_fields(model, point, predicted),
+    )
+    return [one for one in found if one is not None]
 
 
 def _size(model: ForwardModel, rows: Array | None) -> float | None:

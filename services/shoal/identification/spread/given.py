@@ -14,6 +14,8 @@ from shoal.identification.spread.covariance import Noise
 from shoal.identification.spread.uncertainty import Linearisation
 from shoal.trajectory import Array
 
+EXACT = 1e9
+"""Freedom of a variance that is stated."""
 _NOTICED = 0.2
 """Of a variance: the part of something given from which on it is said."""
 
@@ -41,7 +43,8 @@ class Given:
     def spread(self, at: Linearisation) -> Linearisation:
         """The linearisation with its share in the covariance."""
         noise = Noise(0.0, 0.0, self.freedom)
-        return replace(at, parts=np.concatenate([at.parts, self._share(at)[None]]), noise=(*at.noise, noise))
+        parts = np.concatenate([at.parts, self._share(at)[None]])
+        return replace(at, parts=parts, noise=(*at.noise, noise), given=at.given + 1)
 
     def sentence(self, at: Linearisation, names: Sequence[str]) -> str:
         """Which parameters it makes less certain, at a linearisation that has its share; empty if none."""

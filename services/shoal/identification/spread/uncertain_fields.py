@@ -9,12 +9,10 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.units import unit
-from shoal.identification.spread.given import Given
+from shoal.identification.spread.given import EXACT, Given
 from shoal.identification.spread.model_error import difference
 from shoal.trajectory import Array
 
-_EXACT = 1e9
-"""Freedom of a variance that is stated."""
 _STEP = 1e-4
 """Of the differences by fields, of the size of each: the whole uncertainty may shift a long motion by turns."""
 _NAMED = 3
@@ -32,7 +30,7 @@ def uncertain_fields(model: ForwardModel, point: Array, predicted: Mapping[str, 
     sizes = [f"{path} ({size:.2g} {unit(path)}".rstrip() + ")" for path, size in model.problem.uncertain.items()]
     more = f" and {len(sizes) - _NAMED} more" if len(sizes) > _NAMED else ""
     moved = np.array([_moved(model, point, predicted, entry) for entry in stated])
-    return Given(moved, _EXACT, f"what is uncertain of {', '.join(sizes[:_NAMED])}{more}")
+    return Given(moved, EXACT, f"what is uncertain of {', '.join(sizes[:_NAMED])}{more}")
 
 
 def _moved(model: ForwardModel, point: Array, predicted: Mapping[str, Array], entry: Mapping[str, float]) -> Array:
