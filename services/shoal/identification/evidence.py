@@ -79,8 +79,9 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
     parts = (_size(model, error.mesh), _size(model, error.theory))
     unshown = [one.left(seen.jacobian, at.pseudo_inverse) for one in given]
     limit = float(np.linalg.norm([parts[0] or 0.0, parts[1] or 0.0, *unshown]))
+    chosen = float(np.linalg.norm([size for size, one in zip(unshown, given, strict=True) if one.one_of_many]))
     refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
-    tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined)
+    tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined, chosen)
     told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
     at = replace(at, systematic=tests.excess * told)
     for one in given:

@@ -1,12 +1,15 @@
 """What a drive does between its samples is in the intervals: nobody measured it, and no residual need show it."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 from shoal.identification import Estimate, Problem, identify
-from shoal.identification.spread.between_samples import finer_of
+from shoal.identification.spread.between_samples import between_samples, finer_of
+from shoal.identification.spread.given import Given
 from shoal.scene.function import Function
 
 MASS, STIFFNESS, DAMPING, END = 0.5, 0.5 * (2 * np.pi * 17.0) ** 2, 2.0, 2.0
@@ -115,3 +118,18 @@ def test_tables_by_hand_are_what_they_say() -> None:
     corners = np.repeat(np.arange(12.0), 2)[1:] + np.tile([0.0, 1e-6], 12)[1:]
     assert finer_of(Function(table=np.column_stack([corners, corners % 2 > 0.5]).tolist(), smooth=False)) is None
     assert finer_of(Function(table=[(0.0, 0.0), (1.0, 2.0), (2.0, 1.0)])) is None
+
+
+@pytest.mark.parametrize("one_of_many", [False, True])
+def test_a_residual_is_no_less_systematic_for_what_a_drive_might_have_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, one_of_many: bool
+) -> None:
+    """What is left of one choice among many may be larger than the residual, and then says nothing of it."""
+
+    def between(*known: Any) -> Given | None:
+        found = between_samples(*known)
+        return None if found is None else replace(found, moved=9.0 * found.moved, one_of_many=one_of_many)
+
+    monkeypatch.setattr("shoal.identification.evidence.between_samples", between)
+    tests = fitted(tmp_path, 50.0).residual_tests
+    assert (tests.excess > 0.5 * tests.size) == one_of_many

@@ -166,11 +166,14 @@ def residual_tests(
     noise: tuple[Noise, ...],
     mesh: float = 0.0,
     refined: Array | None = None,
+    chosen: float = 0.0,
 ) -> ResidualTests:
     """Test the residuals (rows,) of an answer; blocks, noise: as estimated with it.
 
-    mesh: size of the model's own error; refined: residuals (rows,) that the answer of a better mesh and theory would
-    leave, whose whiteness is then what counts. With a loss that lets outliers weigh less, they count as zero here.
+    mesh: size of the model's own error; chosen: the part of it that is of one choice among many: it explains the size
+    of a residual, yet what is systematic in that may be of another choice
+    refined: residuals (rows,) that the answer of a better mesh and theory would leave, whose whiteness is then what
+    counts. With a loss that lets outliers weigh less, they count as zero here.
     """
     measured = [(b, n) for b, n in zip(blocks, noise, strict=True) if not b.known]
     rows = np.concatenate([block.rows for block, _ in measured])
@@ -181,6 +184,7 @@ def residual_tests(
     left = counted * (residual if refined is None else refined)
     size, smaller = (float(np.sqrt(np.sum(r[rows] ** 2) / np.sum(counted[rows]))) for r in (counted * residual, left))
     seen = model.rows.noise if model.rows.noise is not None else _without_model(model)
+    known = float(np.sqrt(max(0.0, mesh**2 - chosen**2)))
     motion = model.rows.noise is None and seen > _SEVERAL * size
     unresolved = motion and seen > _UNRESOLVED * model.rows.signal
     seen = size if unresolved else seen
@@ -202,7 +206,7 @@ def residual_tests(
         outliers=int(sum(np.sum(part) for part in outlying)),
         rows=len(rows),
         unit=of_channels(model.measurement),
-        excess=0.0 if white > _DOUBT else _excess([left[block.rows] for block, _ in measured], seen, mesh, motion),
+        excess=0.0 if white > _DOUBT else _excess([left[block.rows] for block, _ in measured], seen, known, motion),
         refined=smaller,
         chance_as_it_is=as_it_is,
         unresolved=unresolved,

@@ -54,7 +54,7 @@ def between_samples(model: ForwardModel, point: Array, predicted: Mapping[str, A
     if not moved:
         return None
     what = f"what is not known of {' and '.join(sizes)} between its samples"
-    return Given(np.array(moved), EXACT, what, "; sample the drive more finely")
+    return Given(np.array(moved), EXACT, what, "; sample the drive more finely", one_of_many=True)
 
 
 def finer_of(signal: Function) -> tuple[Function, float] | None:

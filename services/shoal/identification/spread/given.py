@@ -25,12 +25,14 @@ class Given:
     """moved: what independent standard deviations of it change of the residuals, (n, rows); freedom: of their size.
 
     what: in words, as the subject of a sentence; remedy: what would help, as the end of one
+    one_of_many: whether it might as well have been something else, so that a systematic residual counts too
     """
 
     moved: Array
     freedom: float
     what: str
     remedy: str = ""
+    one_of_many: bool = False
 
     def left(self, jacobian: Array, pseudo_inverse: Array) -> float:
         """Size of the residual that it leaves beside what the parameters follow, root mean square.
