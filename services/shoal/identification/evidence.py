@@ -10,6 +10,7 @@ import numpy as np
 from shoal.identification.deadline import unless_late
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
+from shoal.identification.spread.between_samples import between_samples
 from shoal.identification.spread.covariance import Block, blocks_of
 from shoal.identification.spread.given import Given
 from shoal.identification.spread.model_error import Corrections, ModelError, model_error, rms_of
@@ -33,7 +34,7 @@ class Evidence:
     beside: the linearisation, with what the model, not the noise, leaves, and with what is `given`
     at: the same with what uncertain `fields` of the scene add
     error: of the model itself; mesh, theory: sizes of its parts, root mean squares
-    given: what is taken as known and is not quite, such as the noise of measured signals
+    given: what is taken as known and is not quite: measured signals, between their samples too
     """
 
     point: Array
@@ -80,24 +81,26 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
         found = unless_late(lambda: _given(model, point, predicted, seen.residual), None)
         (given, fields), looked = found or (given, fields), None if found is None else looked
     parts = (_size(model, error.mesh), _size(model, error.theory))
-    unshown = [one.left(seen.jacobian, at.pseudo_inverse) for one in (*given, fields) if one is not None]
+    known = [one for one in (*given, fields) if one is not None]
+    unshown = [one.left(seen.jacobian, at.pseudo_inverse) for one in known]
     limit = float(np.linalg.norm([parts[0] or 0.0, parts[1] or 0.0, *unshown]))
+    chosen = float(np.linalg.norm([size for size, one in zip(unshown, known, strict=True) if one.one_of_many]))
     refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
-    tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined)
+    tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined, chosen)
     told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
     at = replace(at, systematic=tests.excess * told)
     beside = reduce(lambda so_far, one: one.spread(so_far), given, at)
     at = beside if fields is None else fields.spread(beside)
-    known = point, predicted, residual, seen, looked is not None, possible, blocks, beside, at, error
-    return Evidence(*known, *parts, tests, given, fields)
+    told_of = point, predicted, residual, seen, looked is not None, possible, blocks, beside, at, error
+    return Evidence(*told_of, *parts, tests, given, fields)
 
 
 def _given(
     model: ForwardModel, point: Array, predicted: dict[str, Array], residual: Array
 ) -> tuple[list[Given], Given | None]:
     """What is taken as known and is not quite, and the uncertain fields, where there are any. Raises TimeIsUp."""
-    signals = signal_noise(model, point, predicted, residual)
-    return [] if signals is None else [signals], uncertain_fields(model, point, predicted)
+    signals = between_samples(model, point, predicted, residual), signal_noise(model, point, predicted, residual)
+    return [one for one in signals if one is not None], uncertain_fields(model, point, predicted)
 
 
 def _size(model: ForwardModel, rows: Array | None) -> float | None:

@@ -20,7 +20,8 @@ from shoal.scene.smoothing import smooth
 
 Array = npt.NDArray[Any]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-_MOST_ROWS = 20_000
+MOST_ROWS = 20_000
+"""Of a table."""
 
 
 class Function(Record):
@@ -71,8 +72,8 @@ class Function(Record):
     @classmethod
     def _in_order(cls, table: tuple[tuple[float, float], ...] | None) -> tuple[tuple[float, float], ...] | None:
         if table is not None:
-            if not 2 <= len(table) <= _MOST_ROWS:
-                raise ValueError(f"a table has 2 to {_MOST_ROWS} rows [t, value], found {len(table)}")
+            if not 2 <= len(table) <= MOST_ROWS:
+                raise ValueError(f"a table has 2 to {MOST_ROWS} rows [t, value], found {len(table)}")
             for row, ((before, _), (after, _)) in enumerate(pairwise(table)):
                 if after <= before:
                     raise ValueError(f"times must increase, found {after:g} after {before:g} in row {row + 1}")

@@ -111,3 +111,30 @@ def test_intervals_contain_the_truth_as_often_as_they_say(case) -> None:  # type
         assert 0.92 <= count.covered <= 0.985, count
     if case.rho:
         assert min(count.naive for count in counts) < 0.6
+
+
+@pytest.mark.parametrize("count", [4, 8, 16, 60])
+def test_a_stated_noise_is_taken_at_its_word_by_few_samples(count: int) -> None:
+    """Intervals of a straight line, as wide as its closed form says but for what little memory chance shows."""
+    times, seeds = np.linspace(-1.0, 1.0, count), 200
+    lines = np.column_stack([np.ones(count), times])
+    exact = 1.96 * np.sqrt(np.diag(np.linalg.inv(lines.T @ lines)))
+    off = []
+    for seed in range(seeds):
+        noise = np.random.default_rng(seed).standard_normal(count)
+        shift = np.linalg.lstsq(lines, noise)[0]
+        at = linearise(lines, noise - lines @ shift, np.ones(2), [Block(np.arange(count), np.ones(count - 1), 1.0)])
+        half = np.array([spread(lambda p, k=k: float(p[k]), shift, at).half for k in range(2)])  # type: ignore[misc]
+        assert np.all(half > 0.999 * exact)
+        off.append(shift / half)
+    assert np.mean(np.abs(off) <= 1.0) >= 0.94
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(0.5, abs=0.08)
+
+
+def test_residuals_that_chance_does_not_make_of_a_stated_noise_tell_their_own() -> None:
+    count = 40
+    noise = np.random.default_rng(1).standard_normal(count)
+    block = Block(np.arange(count), np.ones(count - 1), 0.5)
+    found = estimate_noise(noise, np.zeros((count, 1)), [block])[0]
+    assert found.variance == pytest.approx(np.mean(noise**2), rel=0.1)
+    assert found.freedom < count

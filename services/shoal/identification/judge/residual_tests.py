@@ -30,6 +30,14 @@ _ROUND_OFF = 1e-9
 """Of the signal: digits of a table, and no noise."""
 _MOSTLY = 0.5
 """Of the signal: a residual above this may be noise, but nobody said so."""
+_SEVERAL = 3.0
+"""Times the residual: a noise that the data show beyond this is motion; no noise makes fourth differences so large."""
+_UNRESOLVED = 0.05
+"""Of the signal: motion that its fourth differences show as a noise above this has less than eight samples a period."""
+_LAGS = 16
+"""Earlier samples that foretell one, at most a fifth of all: so many foretell eight lines of a spectrum."""
+_FAR = 3
+"""Samples later they do: noise is alike so far apart by no differences, such as those that make a rate of angles."""
 _OUTLIER = 5.0
 _FEW = 0.1
 """Of the samples: so many outliers a robust loss may set aside."""
@@ -44,6 +52,8 @@ class ResidualTests:
     """Sizes are RMS over (weighted) rows, in SI units; priors do not count.
 
     noise: the stated one, else what the data show without any model; signal: spread of the data about their means
+    unresolved: that the noise is not stated and the data show none, as they move too far between samples: the residual
+    is much smaller, and `noise` is its size
     mesh: the model's own error, 0 if unknown; chance_of_size: that noise of this size and correlation leaves such a
     residual (chi-square); chance_of_white: that white noise is so correlated (Ljung and Box 1978), by the worst channel
     excess: size of what is systematic in it, 0 where the residual is white
@@ -67,6 +77,7 @@ class ResidualTests:
     excess: float = 0.0
     refined: float = np.inf
     chance_as_it_is: float = 1.0
+    unresolved: bool = False
 
     @property
     def explained(self) -> float:
@@ -112,7 +123,7 @@ class ResidualTests:
         """Whether the model is refuted: against a stated noise, against a good part of the signal, or a constant."""
         if self.noise_stated:
             return self.systematic or self.explains_nothing
-        hardly = not self.white and self.ratio > 1.0 and self.size > _HARDLY * self.signal
+        hardly = not self.white and (self.ratio > 1.0 or self.unresolved) and self.size > _HARDLY * self.signal
         return hardly or self.explains_nothing or (self.systematic and self.size > _NO_FIT * self.signal)
 
     def sized(self, size: float) -> str:
@@ -124,7 +135,8 @@ class ResidualTests:
         kind = "the stated noise" if self.noise_stated else "the noise that the data show without a model"
         size = f"{self.sized(self.size)} (RMS for each channel), " if self.unit else ""
         times = self.size / max(self.noise, 1e-300)
-        against = f"{_digits(times, 2)} times {kind}" if np.isfinite(times) else "against a noise that is not known"
+        known = np.isfinite(times) and not self.unresolved
+        against = f"{_digits(times, 2)} times {kind}" if known else "against a noise that is not known"
         found = [f"size: {size}{against}"]
         if self.signal > 0:
             found[0] += f", {_digits(100 * self.size / self.signal, 1)} % of the spread of the data"
@@ -154,11 +166,14 @@ def residual_tests(
     noise: tuple[Noise, ...],
     mesh: float = 0.0,
     refined: Array | None = None,
+    chosen: float = 0.0,
 ) -> ResidualTests:
     """Test the residuals (rows,) of an answer; blocks, noise: as estimated with it.
 
-    mesh: size of the model's own error; refined: residuals (rows,) that the answer of a better mesh and theory would
-    leave, whose whiteness is then what counts. With a loss that lets outliers weigh less, they count as zero here.
+    mesh: size of the model's own error; chosen: the part of it that is of one choice among many: it explains the size
+    of a residual, yet what is systematic in that may be of another choice
+    refined: residuals (rows,) that the answer of a better mesh and theory would leave, whose whiteness is then what
+    counts. With a loss that lets outliers weigh less, they count as zero here.
     """
     measured = [(b, n) for b, n in zip(blocks, noise, strict=True) if not b.known]
     rows = np.concatenate([block.rows for block, _ in measured])
@@ -169,6 +184,10 @@ def residual_tests(
     left = counted * (residual if refined is None else refined)
     size, smaller = (float(np.sqrt(np.sum(r[rows] ** 2) / np.sum(counted[rows]))) for r in (counted * residual, left))
     seen = model.rows.noise if model.rows.noise is not None else _without_model(model)
+    known = float(np.sqrt(max(0.0, mesh**2 - chosen**2)))
+    motion = model.rows.noise is None and seen > _SEVERAL * size
+    unresolved = motion and seen > _UNRESOLVED * model.rows.signal
+    seen = size if unresolved else seen
     # Chi-square with as many samples as the residual's memory leaves independent for its variance (Bartlett 1935),
     # less the parameters.
     independent = sum(len(b.rows) * (1.0 - n.rho**2) / (1.0 + n.rho**2) for b, n in measured) - len(model.names)
@@ -187,9 +206,10 @@ def residual_tests(
         outliers=int(sum(np.sum(part) for part in outlying)),
         rows=len(rows),
         unit=of_channels(model.measurement),
-        excess=0.0 if white > _DOUBT else _excess([left[block.rows] for block, _ in measured], seen, mesh),
+        excess=0.0 if white > _DOUBT else _excess([left[block.rows] for block, _ in measured], seen, known, motion),
         refined=smaller,
         chance_as_it_is=as_it_is,
+        unresolved=unresolved,
     )
 
 
@@ -199,12 +219,30 @@ def _chance_of_white(residual: Array, blocks: list[Block]) -> float:
     return min(1.0, min(chances) * len(chances))
 
 
-def _excess(residuals: list[Array], noise: float, mesh: float) -> float:
-    """Size of what is systematic in residuals (samples,) of the channels: beyond the noise, or alike in neighbours."""
+def _excess(residuals: list[Array], noise: float, mesh: float, fast: bool) -> float:
+    """Size of what is systematic in residuals (samples,) of the channels: beyond the noise, or alike between samples.
+
+    fast: whether nothing fast in them is known to be noise
+    """
     count = sum(len(part) for part in residuals)
     power = sum(float(part @ part) for part in residuals) / count
-    alike = sum(float(part[1:] @ part[:-1]) for part in residuals) / count
+    alike = sum(_alike(part, fast) for part in residuals) / count
     return float(np.sqrt(max(0.0, power - noise**2 - mesh**2, alike - mesh**2)))
+
+
+def _alike(signal: Array, fast: bool) -> float:
+    """The part of the sum of squares of a signal (samples,) that is no white noise.
+
+    Neighbours tell that of a slow one; of one that swings fast, what earlier samples foretell by linear prediction.
+    """
+    neighbours, lags = float(signal[1:] @ signal[:-1]), min(_LAGS, len(signal) // 5)
+    if not fast or lags < 1:
+        return neighbours
+    earlier = np.lib.stride_tricks.sliding_window_view(signal[:-_FAR], lags)
+    later = signal[-len(earlier) :]
+    rest = later - earlier @ np.linalg.lstsq(earlier, later)[0]
+    unforeseen = float(rest @ rest) / (len(later) - lags) / max(float(later @ later) / len(later), 1e-300)
+    return max(neighbours, (1.0 - unforeseen) * float(signal @ signal))
 
 
 def ljung_box(signal: Array, lags: int = 10) -> float:

@@ -221,5 +221,7 @@ def _identifiable(
         advice += [do for do in odd[1:] if do]
     elif tests.too_large:
         notes.append(f"the noise is {tests.ratio:.3g} times what was stated; the intervals go by what was found")
+    if tests.unresolved:
+        notes.append("the samples do not resolve the motion: what the model leaves out of it between them is not seen")
     verdict = Verdict.COMBINATION if reasons else Verdict.IDENTIFIED
     return Judgement(verdict, "; ".join([*reasons, *notes]), advice, found)

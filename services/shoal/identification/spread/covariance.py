@@ -13,10 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.spread.chances import above_chi_square
 from shoal.trajectory import Array
 
 _ROUNDS = 60
 _SETTLED = 1e-5
+_DOUBT = 1e-3
+"""Chance below which residuals are larger than the stated noise, and that is not the noise."""
 _LONGEST = 1.0 / 3.0
 """Correlation that outlasts this part of a recording cannot be told from a change of the parameters."""
 
@@ -126,11 +129,20 @@ def _expected(
 def _noise(block: Block, variance: float, rho: float, part: Array) -> Noise:
     """The noise with degrees of freedom by Satterthwaite (1946).
 
+    A stated noise is taken at its word, unless chance hardly makes residuals so much larger. How long it remembers is
+    not stated: its estimate is drawn towards none by its own variance of 1/n (James and Stein 1961), and its freedom is
+    what remains of the formula below.
+
     The logarithm of the variance of a mean is ln s^2 - 2 ln(1 - rho), where ln s^2 and rho of an AR(1) process have
     variances of 2/n and (1 - rho^2)/n (Priestley, Spectral Analysis and Time Series, 1981, 5.4).
     """
     if block.known:
         return Noise(variance, 0.0, np.inf)
     count = max(1.0, len(block.rows) - float(np.sum(part**2)))
+    independent = max(1.0, count * (1.0 - rho**2) / (1.0 + rho**2))
+    if block.stated > 0.0 and above_chi_square(independent, independent * variance / block.stated**2) > _DOUBT:
+        rho *= max(0.0, 1.0 - 1.0 / (count * max(rho, 1e-9) ** 2))
+        freedom = count * (1.0 - rho) / (2.0 * (1.0 + rho)) if rho > 0.0 else np.inf
+        return Noise(block.stated**2, float(rho), max(1.0, freedom))
     freedom = count / (1.0 + 2.0 * (1.0 + rho) / (1.0 - rho))
     return Noise(max(float(variance), block.stated**2), float(rho), max(1.0, freedom))

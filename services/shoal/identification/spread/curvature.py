@@ -27,8 +27,10 @@ _LEAST, _MOST = 0.7, 1.4
 def bent(model: ForwardModel, point: Array, at: Linearisation, seen: Sensitivity) -> list[int]:
     """Which parameters have an interval at whose ends the misfit is not as promised. Not counted. Raises TimeIsUp.
 
-    The others follow by linear theory; one call for all ends.
+    The others follow by linear theory; one call for all ends. What another drive or another known field would make of
+    the answer is no move along this misfit: the intervals are those of the residuals alone.
     """
+    at = at.alone
     share = at.pseudo_inverse @ at.pseudo_inverse.T
     moves = []
     for k in range(len(point)):
@@ -50,7 +52,8 @@ def by_profile(
 ) -> tuple[dict[str, Value], dict[str, Profile]]:
     """The parameters with intervals by their profiles, where these were wanted, and the profiles.
 
-    ends: the answer, and other minima in its valley, which the intervals hold too, (parameters,) each
+    ends: the answer, and other minima in its valley, which the intervals hold too, (parameters,) each; they also hold
+    what linear theory says where it is not the residuals alone that count.
     What a better mesh and theory would change is in the interval as before. A side that the data leave open is not
     known, and neither is a parameter for whose profile no time is left.
     """
@@ -65,7 +68,7 @@ def by_profile(
             continue
         more = abs(known.correction or 0.0) + abs(known.theory or 0.0)
         told = known.identifiable and not seen.open
-        lower, upper = (known.lower, known.upper) if len(ends) > 1 else (seen.lower, seen.upper)
+        lower, upper = (known.lower, known.upper) if len(ends) > 1 or at.given else (seen.lower, seen.upper)
         lower, upper = min(lower, seen.lower - more), max(upper, seen.upper + more)
         found[name] = replace(known, lower=lower, upper=upper, identifiable=told)
         profiled[name] = seen

@@ -14,6 +14,8 @@ from shoal.identification.spread.covariance import Noise
 from shoal.identification.spread.uncertainty import Linearisation
 from shoal.trajectory import Array
 
+EXACT = 1e9
+"""Freedom of a variance that is stated."""
 _NOTICED = 0.2
 """Of a variance: the part of something given from which on it is said."""
 
@@ -23,12 +25,14 @@ class Given:
     """moved: what independent standard deviations of it change of the residuals, (n, rows); freedom: of their size.
 
     what: in words, as the subject of a sentence; remedy: what would help, as the end of one
+    one_of_many: whether it might as well have been something else, so that a systematic residual counts too
     """
 
     moved: Array
     freedom: float
     what: str
     remedy: str = ""
+    one_of_many: bool = False
 
     def left(self, jacobian: Array, pseudo_inverse: Array) -> float:
         """Size of the residual that it leaves beside what the parameters follow, root mean square.
@@ -41,7 +45,8 @@ class Given:
     def spread(self, at: Linearisation) -> Linearisation:
         """The linearisation with its share in the covariance."""
         noise = Noise(0.0, 0.0, self.freedom)
-        return replace(at, parts=np.concatenate([at.parts, self._share(at)[None]]), noise=(*at.noise, noise))
+        parts = np.concatenate([at.parts, self._share(at)[None]])
+        return replace(at, parts=parts, noise=(*at.noise, noise), given=at.given + 1)
 
     def sentence(self, at: Linearisation, names: Sequence[str]) -> str:
         """Which parameters it makes less certain, at a linearisation that has its share; empty if none."""

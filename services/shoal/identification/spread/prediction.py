@@ -19,12 +19,12 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.measurement import Held
 from shoal.identification.recording.units import of_channel
 from shoal.identification.spread.covariance import Block, Noise
-from shoal.identification.spread.given import Given
+from shoal.identification.spread.given import EXACT, Given
 from shoal.identification.spread.left_out import allowance
 from shoal.identification.spread.model_error import ModelError, model_error
 from shoal.identification.spread.sensitivity import AGREED, Sensitivity, sensitivity
 from shoal.identification.spread.stated_error import Fit, block_of, stated, unevenness
-from shoal.identification.spread.uncertain_fields import EXACT, uncertain_fields
+from shoal.identification.spread.uncertain_fields import uncertain_fields
 from shoal.identification.spread.uncertainty import LEVEL, Linearisation
 from shoal.trajectory import Array, plain
 
@@ -252,4 +252,6 @@ def _with_fields(
     parts[-1, -count:, -count:] = np.eye(count)
     pseudo_inverse = np.pad(at.pseudo_inverse, [(0, count), (0, 0)])
     noise = (*at.noise, Noise(0.0, 0.0, EXACT))
-    return np.hstack([slopes, direct.T]), replace(at, parts=parts, pseudo_inverse=pseudo_inverse, noise=noise)
+    return np.hstack([slopes, direct.T]), replace(
+        at, parts=parts, pseudo_inverse=pseudo_inverse, noise=noise, given=at.given + 1
+    )

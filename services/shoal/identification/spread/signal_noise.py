@@ -28,8 +28,8 @@ _DRAWS = 24
 """Of the noise: their variance is that of the noise within a third."""
 _FEWEST = 2
 """Draws that can be run at least."""
-_MATTERS = 0.03
-"""Of what the residual leaves uncertain: a signal's noise that changes less by its first draw is none."""
+MATTERS = 0.03
+"""Of what the residual leaves uncertain: what changes less, such as a signal's noise by its first draw, is nothing."""
 
 
 def signal_noise(model: ForwardModel, point: Array, predicted: Mapping[str, Array], residual: Array) -> Given | None:
@@ -41,7 +41,7 @@ def signal_noise(model: ForwardModel, point: Array, predicted: Mapping[str, Arra
     if not noisy:
         return None
     rng, moved = np.random.default_rng(0), list[Array]()
-    least = _MATTERS * rms_of(residual) / np.sqrt(len(residual))
+    least = MATTERS * rms_of(residual) / np.sqrt(len(residual))
     for _ in range(_DRAWS):
         drawn = {path: one.perturbed(noise, rng).model_dump(mode="json") for path, (one, noise) in noisy.items()}
         rows = difference(model, point, predicted, model.scene.with_values(drawn))
@@ -59,21 +59,29 @@ def signal_noise(model: ForwardModel, point: Array, predicted: Mapping[str, Arra
     return Given(scaled, float(len(moved)), f"the noise of {' and '.join(sizes)}", remedy)
 
 
-def noisy_signals(scene: Scene) -> dict[str, tuple[Function, float]]:
-    """The functions of time of a scene that were measured with noise, and that, by path."""
-    tables = {
-        f"{part}.{name}.{field}": (value, value.noise if value.noise is not None else _shown(part, value))
+def signals_of(scene: Scene) -> dict[str, Function]:
+    """The functions of a scene that are tables, by path."""
+    return {
+        f"{part}.{name}.{field}": value
         for part in PARTS
         for name, member in getattr(scene, part).items()
         for field, value in member
         if isinstance(value, Function) and value.table is not None
     }
+
+
+def noisy_signals(scene: Scene) -> dict[str, tuple[Function, float]]:
+    """The functions of time of a scene that were measured with noise, and that, by path."""
+    tables = {
+        path: (signal, signal.noise if signal.noise is not None else _shown(path, signal))
+        for path, signal in signals_of(scene).items()
+    }
     return {path: found for path, found in tables.items() if found[1]}
 
 
-def _shown(part: str, signal: Function) -> float:
+def _shown(path: str, signal: Function) -> float:
     """The noise that the samples of a drive show, as far as they tell noise from motion."""
-    if part not in _DRIVES or not signal.smooth:
+    if path.split(".")[0] not in _DRIVES or not signal.smooth:
         return 0.0
     times, values = np.array(signal.table).T
     return strength_of(times, values)[1]

@@ -9,12 +9,10 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
 from shoal.identification.recording.units import unit
-from shoal.identification.spread.given import Given
+from shoal.identification.spread.given import EXACT, Given
 from shoal.identification.spread.model_error import difference
 from shoal.trajectory import Array
 
-EXACT = 1e9
-"""Freedom of a variance that is stated."""
 _STEP = 1e-4
 """Of the differences by fields, of the size of each: the whole uncertainty may shift a long motion by turns."""
 _NAMED = 3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ class Linearisation:
 
     unknown: directions the data do not fix, in scaled parameters, (p, k); pseudo_inverse: (p, rows); scale: (p,)
     parts: the share of each block of residuals in the covariance, (blocks, p, p); noise: of each block
+    given: how many of them, the last, are not of residuals but of what is taken as known (see `given`)
     systematic: norm of what is systematic in the residual. A model error moves the parameters by the part of it that
     they can follow, which leaves no residual; taken as ABSORBED times what is left, in the worst direction, it holds
     the truth for 95 % of random wrong models (python -m shoal_validation.coverage.systematic)
@@ -39,6 +40,13 @@ class Linearisation:
     parts: Array
     noise: tuple[Noise, ...]
     systematic: float = 0.0
+    given: int = 0
+
+    @property
+    def alone(self) -> Linearisation:
+        """What the residuals tell, as if all were known that is taken as known."""
+        count = len(self.parts) - self.given
+        return replace(self, parts=self.parts[:count], noise=self.noise[:count], given=0)
 
     @property
     def covariance(self) -> Array:
