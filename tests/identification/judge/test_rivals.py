@@ -213,7 +213,9 @@ def test_a_stiffness_that_fits_better_at_another_frequency_is_the_answer(tmp_pat
     """Damping shifts the phase at the start by c / (2 m w), which tells 30 Hz from 10 Hz by more than the noise."""
     found = identify(oscillator(tmp_path, 30.0, 3.0, 45.0, 9.0, 4.0))
     assert found.verdict is Verdict.IDENTIFIED, found.message
-    assert found.parameters["k"].lower < 0.5 * (2 * np.pi * 30.0) ** 2 < found.parameters["k"].upper
+    known = found.parameters["k"]
+    assert known.value == pytest.approx(0.5 * (2 * np.pi * 30.0) ** 2, abs=4 * known.std)
+    assert known.std < 1e-3 * known.value
 
 
 def test_bounds_that_hold_no_alias_leave_a_stiffness_identified(tmp_path: Path) -> None:

@@ -51,6 +51,8 @@ def odd_stretch(model: ForwardModel, point: Array) -> tuple[str, str]:
     point: where all was fitted. Runs are not counted. Raises TimeIsUp.
     """
     robust = model.aside(problem=model.problem.model_copy(update={"loss": "cauchy"}))
+    if not np.all(robust.loss_scale**2 > 0.0):  # without noise nothing is usual
+        return "", ""
     starts = np.vstack([point, starting_points(model)[:_STARTS]])
     best = min(descend_many(robust, starts, patience=_PATIENCE), key=lambda end: end.fitness)
     plain = model.aside(problem=model.problem.model_copy(update={"loss": "squares"}))
