@@ -172,9 +172,13 @@ def _predicted(
         if _hidden(slopes * fit.sizes, fit.at):
             why = "without a stated error, as it depends on what the fit leaves open"
         else:
-            bias = _bias(window, point, predicted, there, fit, error)[mine]
+            seen = {
+                other: predicted if other == name else window.observe(point[None], other)[0]
+                for other in window.measurement.recordings
+            }
+            bias = _bias(window, point, seen, there, fit, error)[mine]
             larger = allowance(model, name, held, fit) if fit.at.systematic > 0.0 else 1.0
-            slopes, spread = _with_fields(window, point, slopes, there, fit, mine)
+            slopes, spread = _with_fields(window, point, seen, slopes, there, fit, mine)
             for k in range(len(channels)):
                 rows = window.rows.channel[mine] == k
                 if not np.any(rows):
@@ -218,13 +222,15 @@ def _hidden(slopes: Array, at: Linearisation) -> bool:
 
 
 def _bias(
-    window: ForwardModel, point: Array, predicted: Array, there: Sensitivity, fit: Fit, error: ModelError
+    window: ForwardModel, point: Array, seen: dict[str, Array], there: Sensitivity, fit: Fit, error: ModelError
 ) -> Array:
-    """What a finer mesh and a fuller theory would change of the prediction, by size, (rows,), in SI units."""
+    """What a finer mesh and a fuller theory would change of the prediction, by size, (rows,), in SI units.
+
+    seen: channels there by recording, (samples, channels)
+    """
     rows = len(window.rows.time)
     if error.mesh is None and error.theory is None:
         return np.zeros(rows)
-    seen = {name: window.observe(point[None], name)[0] for name in window.measurement.recordings}
     later, shift = model_error(window, point, seen, there.residual), error.corrections(fit.at.pseudo_inverse)
     found = np.zeros(rows)
     for part, moved in ((later.mesh, shift.mesh), (later.theory, shift.theory)):
@@ -234,15 +240,20 @@ def _bias(
 
 
 def _with_fields(
-    window: ForwardModel, point: Array, slopes: Array, there: Sensitivity, fit: Fit, mine: Mask
+    window: ForwardModel,
+    point: Array,
+    seen: dict[str, Array],
+    slopes: Array,
+    there: Sensitivity,
+    fit: Fit,
+    mine: Mask,
 ) -> tuple[Array, Linearisation]:
     """Derivatives in the window (samples, parameters) and their spread, with uncertain fields beside the parameters.
 
     Each direction of these is one more parameter, of variance one, that changes what it changes of the window less what
     the answer follows of it.
     """
-    seen = {name: window.observe(point[None], name)[0] for name in window.measurement.recordings} if fit.fields else {}
-    later = uncertain_fields(window, point, seen) if seen else None
+    later = uncertain_fields(window, point, seen) if fit.fields is not None else None
     if fit.fields is None or later is None:
         return slopes, fit.at
     rows, at, count = len(window.rows.time), fit.at, len(later.moved)
