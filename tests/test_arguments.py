@@ -59,6 +59,8 @@ def _simulate(*given: Any, **asked: Any) -> Callable[[], Any]:
         (_uncertain(allocate=True, target=0.5), "target: needs a probability above 0 and below 0.5, found 0.5"),
         (_uncertain(target=1e-3), "target: belongs to allocate"),
         (_uncertain(costs={ANGLE: 2.0}), "costs: belongs to allocate"),
+        (_uncertain(limit_method="form"), "limit_method: belongs to a limit"),
+        (_uncertain(limit_runs=500), "limit_runs: belongs to a limit"),
         (_identify(seed=-1), "seed: needs a whole number of at least 0, found -1"),
         (_identify(time_limit=NAN), "time_limit: needs a time above 0 s, found nan"),
         (_identify(bootstrap=-5), "bootstrap: needs a whole number of at least 0, found -5"),

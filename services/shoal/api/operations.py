@@ -16,6 +16,8 @@ from shoal.scene.record import limited
 
 Times = list[float]
 Positive = Annotated[float, Field(gt=0)]
+Tolerance = Annotated[float, limited("tolerance")]
+TimeLimit = Annotated[float, limited("time_limit")]
 Some = Annotated[Times, Field(min_length=1)]
 NUMBERS = r"^\s*[a-z-]+\s*\([-+0-9.eE,\s]*\)\s*$"
 Distribution = Annotated[str, Field(max_length=200, pattern=NUMBERS)]
@@ -100,7 +102,7 @@ class Simulate(OfScene):
     answer: ClassVar[Any] = Motion
 
     times: Times | None = None
-    tolerance: Positive | None = None
+    tolerance: Tolerance | None = None
     verify: bool = True
     lanes: dict[Path, Times] | None = None
 
@@ -108,7 +110,7 @@ class Simulate(OfScene):
 class Select(OfScene):
     """The cheapest model whose estimated error at the markers is below a tolerance [m], with its motion."""
 
-    tolerance: Positive
+    tolerance: Tolerance
     times: Times | None = None
 
 
@@ -152,7 +154,7 @@ class Uncertain(OfScene):
     times: Some | None = None
     method: BuiltIn = "auto"
     gap: Annotated[float, limited("gap")] | None = None
-    tolerance: Positive | None = None
+    tolerance: Tolerance | None = None
     verify: bool = True
     seed: Annotated[int, limited("seed", le=2**32 - 1)] = 0
     degree: Annotated[int, limited("degree")] | None = None
@@ -164,7 +166,7 @@ class Uncertain(OfScene):
     allocate: bool = False
     costs: dict[Path, Positive] | None = None
     target: Annotated[float, limited("target")] = 1e-3
-    time_limit: Positive | None = None
+    time_limit: TimeLimit | None = None
 
     @property
     def runs(self) -> int:
@@ -194,7 +196,7 @@ class Statics(AtRest):
     """Where a scene comes to rest, with what is applied as it is at `time` [s], and whether it is stable there."""
 
     time: Annotated[float, limited("time")] = 0.0
-    tolerance: Positive | None = None
+    tolerance: Tolerance | None = None
 
 
 class Modes(AtRest):
@@ -237,8 +239,8 @@ class Identify(OfProblem):
 
     method: BuiltIn | None = None
     seed: Annotated[int, limited("seed", le=2**32 - 1)] = 0
-    tolerance: Positive | None = None
-    time_limit: Positive | None = None
+    tolerance: Tolerance | None = None
+    time_limit: TimeLimit | None = None
     profiles: bool = False
     bootstrap: Annotated[int, limited("bootstrap", le=10_000)] = 0
     sample: Annotated[int, limited("sample", le=100_000)] = 0

@@ -111,6 +111,9 @@ def uncertain(
     for name, given in {"costs": costs, "target": target}.items():
         if given and not allocate:
             raise InputError(f"{name}: belongs to allocate, the search for the widest tolerances; ask for that too")
+    for name, stated in {"limit_method": limit_method != "auto", "limit_runs": limit_runs != LIMIT_RUNS}.items():
+        if stated and not limits:
+            raise InputError(f"{name}: belongs to a limit, whose probability it is for; state one, such as B.y < -1.2")
     end = None if time_limit is None else clock.now() + time_limit
     wanted = as_scene(scene)
     wanted = wanted.with_values(values) if values else wanted
