@@ -130,6 +130,18 @@ def test_information_by_hand() -> None:
     assert found.d == pytest.approx(np.linalg.det(relative) ** 0.25)
 
 
+def test_what_is_taken_as_known_by_hand() -> None:
+    # y = a + b t + c t^2 at t = 0, 1, 2, where c is taken as 0 and is known with a standard deviation of 3.
+    jacobian, c = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]]), 3 * np.array([[0.0, 1.0, 4.0]])
+    found = precision(jacobian, np.array([2.0, 10.0]), moved=c)
+    shift = np.linalg.lstsq(jacobian, c[0], rcond=None)[0]
+    covariance = np.linalg.inv(jacobian.T @ jacobian) + np.outer(shift, shift)
+    assert found.std == pytest.approx(np.sqrt(np.diag(covariance)))
+    relative = np.diag([0.5, 0.1]) @ covariance @ np.diag([0.5, 0.1])
+    assert found.a == pytest.approx(np.sqrt(np.trace(relative) / 2))
+    assert found.d == pytest.approx(np.linalg.det(relative) ** 0.25)
+
+
 def test_what_no_data_tell_is_infinite_and_null_in_json() -> None:
     # Both densities scale out of a free swing.
     both = {**problem().model_dump(mode="json")["parameters"]}

@@ -31,6 +31,7 @@ UNITS = {
     "kg m²": {"kg": 1, "m": 2},
     "kg/m³": {"kg": 1, "m": -3},
     "Pa": {"kg": 1, "m": -1, "s": -2},
+    "N m": {"kg": 1, "m": 2, "s": -2},
     "J": {"kg": 1, "m": 2, "s": -2},
 }
 """Units that variables have, as powers of FMI's base units."""

@@ -10,13 +10,11 @@ import numpy as np
 from shoal.identification.deadline import unless_late
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
-from shoal.identification.spread.between_samples import between_samples
 from shoal.identification.spread.covariance import Block, blocks_of
 from shoal.identification.spread.given import Given
 from shoal.identification.spread.model_error import Corrections, ModelError, model_error, rms_of
 from shoal.identification.spread.sensitivity import Sensitivity, believed
-from shoal.identification.spread.signal_noise import signal_noise
-from shoal.identification.spread.uncertain_fields import uncertain_fields
+from shoal.identification.spread.taken_as_given import taken_as_given
 from shoal.identification.spread.uncertainty import Linearisation, linearise
 from shoal.trajectory import Array
 
@@ -78,7 +76,7 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
     error, given, fields = ModelError(None, None), list[Given](), None
     if possible and looked is not None:
         error = unless_late(lambda: model_error(model, point, predicted, seen.residual), error)
-        found = unless_late(lambda: _given(model, point, predicted, seen.residual), None)
+        found = unless_late(lambda: taken_as_given(model, point, predicted, seen.residual), None)
         (given, fields), looked = found or (given, fields), None if found is None else looked
     parts = (_size(model, error.mesh), _size(model, error.theory))
     known = [one for one in (*given, fields) if one is not None]
@@ -93,14 +91,6 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
     at = beside if fields is None else fields.spread(beside)
     told_of = point, predicted, residual, seen, looked is not None, possible, blocks, beside, at, error
     return Evidence(*told_of, *parts, tests, given, fields)
-
-
-def _given(
-    model: ForwardModel, point: Array, predicted: dict[str, Array], residual: Array
-) -> tuple[list[Given], Given | None]:
-    """What is taken as known and is not quite, and the uncertain fields, where there are any. Raises TimeIsUp."""
-    signals = between_samples(model, point, predicted, residual), signal_noise(model, point, predicted, residual)
-    return [one for one in signals if one is not None], uncertain_fields(model, point, predicted)
 
 
 def _size(model: ForwardModel, rows: Array | None) -> float | None:

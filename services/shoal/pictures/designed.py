@@ -40,6 +40,7 @@ def designed(found: Design) -> str:
         ],
         provenance=[
             ("noise", ", ".join(f"{kind} {size:g}" for kind, size in found.noise.items())),
+            *(("with", what) for what in found.given),
             ("about", ", ".join(f"{name} {value:.6g}" for name, value in found.values.items())),
             ("measured for", f"{found.duration:.4g} s, {found.rate:.4g} samples a second"),
             ("sensitivities", f"two steps differ by {found.doubt:.1g}"),

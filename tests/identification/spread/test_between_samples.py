@@ -130,6 +130,6 @@ def test_a_residual_is_no_less_systematic_for_what_a_drive_might_have_done(
         found = between_samples(*known)
         return None if found is None else replace(found, moved=9.0 * found.moved, one_of_many=one_of_many)
 
-    monkeypatch.setattr("shoal.identification.evidence.between_samples", between)
+    monkeypatch.setattr("shoal.identification.spread.taken_as_given.between_samples", between)
     tests = fitted(tmp_path, 50.0).residual_tests
     assert (tests.excess > 0.5 * tests.size) == one_of_many

@@ -8,6 +8,7 @@ import pytest
 import yaml
 from shoal.engines import get_engine
 from shoal.identification import Measurement, Problem, identify, measure
+from shoal.identification.design import design
 from shoal.identification.evidence import evidence
 from shoal.identification.forward import ForwardModel
 from shoal.identification.spread.signal_noise import noisy_signals
@@ -73,6 +74,9 @@ def test_what_the_noise_of_a_torque_does_to_an_inertia_is_that_of_the_closed_for
     variance = np.sum((angles @ effects / (angles @ angles)) ** 2)
     assert np.sqrt(near.at.parts[-1][0, 0]) == pytest.approx(np.sqrt(variance), rel=0.3)
     assert np.sqrt(near.at.covariance[0, 0]) > 10 * np.sqrt(near.at.parts[0][0, 0])
+    planned = design(problem, duration=1.0, rate=50.0)
+    assert planned.now.std[0] == pytest.approx(INERTIA * np.sqrt(variance), rel=0.3)
+    assert planned.given[-1] == "the noise of loads.motor.torque (0.03 N m)"
 
 
 def test_an_inertia_is_within_its_interval_though_its_drive_was_measured_with_noise(tmp_path: Path) -> None:
@@ -81,7 +85,7 @@ def test_an_inertia_is_within_its_interval_though_its_drive_was_measured_with_no
     inertia = found.parameters["inertia"]
     assert found.verdict.trusted
     assert inertia.lower < INERTIA < inertia.upper
-    assert "the noise of loads.motor.torque (0.03) widens the interval of inertia" in found.message
+    assert "the noise of loads.motor.torque (0.03 N m) widens the interval of inertia" in found.message
 
 
 @pytest.mark.parametrize(("stated", "size"), [({}, 1e-3), ({"noise": 2e-3}, 2e-3), ({"noise": 0.0}, None)])

@@ -10,6 +10,7 @@ import yaml
 from shoal.errors import InputError
 from shoal.identification import Problem, identify
 from shoal.identification.carried import of_estimate, read_values
+from shoal.identification.design import design
 
 MASS, OTHER, STIFFNESS, NOISE = 2.0, 30.0, 50.0, 1e-5
 SPEED_SQUARED = (OTHER + STIFFNESS) / MASS
@@ -79,6 +80,18 @@ def test_a_stiffness_is_known_as_well_as_the_mass_and_the_other_spring(
     assert known.std == pytest.approx(np.hypot(expected, alone), rel=2e-3)
     assert known.upper - known.lower == pytest.approx(2 * 1.96 * known.std, rel=0.05)
     assert ("what is uncertain of bodies.m.mass (" in found.message) == (expected > 0.0)
+
+
+def test_a_design_tells_no_more_than_the_weighed_mass_allows(tmp_path: Path) -> None:
+    """No camera is so good that the stiffness is known better than its ratio to the mass times the mass."""
+    uncertain = oscillator(tmp_path, {"bodies.m.mass": 0.02})
+    asked: dict[str, Any] = {"at": {"k": STIFFNESS}, "duration": 2.0, "rate": 50.0}
+    found, exact = design(uncertain, **asked), design(oscillator(tmp_path), **asked)
+    assert found.now.std[0] == pytest.approx(np.hypot(SPEED_SQUARED * 0.02, exact.now.std[0]), rel=2e-3)
+    assert exact.now.std[0] < 0.01 * found.now.std[0]
+    assert np.allclose(found.course[0], found.course[0][-1], rtol=0.05)  # a longer recording is of no use
+    assert found.given == ["what is uncertain of bodies.m.mass (0.02 kg)"] == found.to_json()["given"]
+    assert exact.given == []
 
 
 def test_what_an_estimate_leaves_open_goes_on_into_what_is_sought_beside_it(tmp_path: Path) -> None:

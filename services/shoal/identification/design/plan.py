@@ -25,6 +25,7 @@ from shoal.identification.problem import Problem
 from shoal.identification.recording.measurement import Measurement, Recording
 from shoal.identification.recording.source import Channel, EngineSource
 from shoal.identification.spread.sensitivity import sensitivity
+from shoal.identification.spread.taken_as_given import taken_as_given
 from shoal.scene import Scene
 from shoal.trajectory import Array, plain
 
@@ -45,6 +46,7 @@ class Design:
     table: score by the best marker, (durations, rates)
     course: score of each sensor until `times` [s], (sensors, times)
     doubt: relative difference of two steps of the sensitivities
+    given: what counts in the standard deviations beside the noise: fields and drives that are taken as known
     """
 
     problem: str
@@ -62,6 +64,7 @@ class Design:
     times: Array
     course: Array
     doubt: float
+    given: list[str]
 
     @property
     def message(self) -> str:
@@ -97,6 +100,7 @@ class Design:
             | {"weakest": self.aim.weakest(self.now)[0], "parameter": self.aim.parameter, "now": told(self.now)}
             | {"ranked": rows(self.ranked), "second": rows(self.second), "durations": self.durations}
             | {"rates": self.rates, "table": self.table, "doubt": self.doubt}
+            | {"given": self.given}
         )
 
 
@@ -134,7 +138,7 @@ def design(
     model = _model(problem, scene, channels, size, grid(duration, rate, first))
     aim = _aim(model, parameter)
     point = _point(model, at)
-    bundle, doubt = _bundle(model, point, aim, len(present), first is not None)
+    bundle, doubt, given = _bundle(model, point, aim, len(present), first is not None)
     now = bundle.precision(range(bundle.present), duration)
     if own is not None:
         # What was measured is known by its own instants, which may be uneven.
@@ -166,11 +170,12 @@ def design(
         times=course,
         course=np.array([[aim.score(bundle.precision(columns[c], end)) for end in course] for c, _ in ranked]),
         doubt=doubt,
+        given=given,
     )
 
 
-def _bundle(model: ForwardModel, point: Array, aim: Aim, present: int, begins: bool) -> tuple[Bundle, float]:
-    """Sensitivities over the noise, and the relative difference of two steps. Raises InputError."""
+def _bundle(model: ForwardModel, point: Array, aim: Aim, present: int, begins: bool) -> tuple[Bundle, float, list[str]]:
+    """Sensitivities over the noise, the relative difference of two steps, and what is given. Raises InputError."""
     seen = sensitivity(model, point)
     if not np.all(np.isfinite(seen.residual)):
         reason = model.refusal or "it fails"
@@ -179,7 +184,17 @@ def _bundle(model: ForwardModel, point: Array, aim: Aim, present: int, begins: b
     over_noise = np.stack([seen.jacobian, seen.error], axis=1) / model.rows.noise
     recording = model.measurement.first
     channels = len(recording.channels)
-    return Bundle.of(recording.times, over_noise, channels, aim.span, present, begins), seen.doubt
+    moved, given = _moved(model, point, len(seen.residual))
+    return Bundle.of(recording.times, over_noise, moved, channels, aim.span, present, begins), seen.doubt, given
+
+
+def _moved(model: ForwardModel, point: Array, rows: int) -> tuple[Array, list[str]]:
+    """What is taken as known and is not quite changes of the rows over the noise, (n, rows), and what it is."""
+    name, noise = next(iter(model.measurement.recordings)), model.rows.noise
+    predicted = {name: model.observe(point[None], name)[0]}
+    signals, fields = taken_as_given(model, point, predicted, np.full(rows, noise))
+    found = [one for one in (*signals, fields) if one is not None]
+    return np.concatenate([np.zeros((0, rows)), *(one.moved for one in found)]) / noise, [one.what for one in found]
 
 
 def _aim(model: ForwardModel, parameter: str | None) -> Aim:

@@ -44,6 +44,7 @@ _FIELDS = {
     "mass": "kg",
     "inertia": "kg m²",
     "youngs_modulus": "Pa",
+    "torque": "N m",
     "delay": "s",
     "retardation": "s",
     "step": "s",

@@ -141,6 +141,6 @@ def design_table(found: Design) -> None:
     units = {"position": "m", "angle": "rad"} | SENSORS
     noise = ", ".join(f"{size:g} {units[kind]}" for kind, size in found.noise.items())
     values = ", ".join(f"{name} {value:.4g}" for name, value in found.values.items())
-    screen.say(f"noise {noise}; about {values}")
+    screen.say(f"noise {noise}; about {values}", *(f"with {what}" for what in found.given))
     screen.say("A, D: root mean square and geometric mean of the standard deviations over the ranges of the parameters")
     screen.say(f"sensitivities by two steps differ by {found.doubt:.0e}")
