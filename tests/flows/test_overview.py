@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from shoal.cli import main
 from shoal.errors import InputError
 from shoal_flows.report import overview
-from shoal_flows.report.overview import WEEK, drift
+from shoal_flows.report.overview import WEEK, Drift, Study, drift, independent
+from shoal_flows.tracking.data import Data, inputs
 from shoal_flows.tracking.store import connect, experiment
 
 STUDIES, TRUE, SLOPE, NOISE = 30, 250.0, -1.5, 0.8
@@ -47,6 +48,48 @@ def test_scatter_beyond_the_intervals_widens_that_of_the_slope() -> None:
     assert drift(times[:2], values[:2], values[:2]) is None
 
 
+def study(started: float, value: float, *data: str, verdict: str = "identified") -> Study:
+    """One study of recordings by their digests, its interval that of a standard deviation of 1."""
+    return Study("id", "name", started, verdict, 0.0, {"k": (value, value - 1.96, value + 1.96)}, frozenset(data))
+
+
+def told(studies: list[Study]) -> Drift | None:
+    good = independent(studies)
+    return drift([one.started for one in good], [one.values["k"][0] for one in good], [3.92] * len(good))
+
+
+def test_a_recording_that_is_identified_again_is_no_new_evidence() -> None:
+    """Whatever is repeated: noise is called a drift in 5 % of the cases, and two recordings are too few."""
+    random, hour, repeats = np.random.default_rng(1), 3600.0, 5
+    claimed, cases = 0, 400
+    for _ in range(cases):
+        values = random.standard_normal(6)
+        studies = [
+            study(WEEK * week + hour * again, value, f"recording {week}")
+            for week, value in enumerate(values)
+            for again in range(repeats)
+        ]
+        line = told(studies)
+        assert line is not None
+        claimed += line.real
+        assert told([one for one in studies if one.started < 1.5 * WEEK]) is None
+    # 20 are expected, 13 more or less at three standard deviations; each study on its own would give some 170.
+    assert claimed <= 33
+
+
+def test_the_newest_answer_counts_at_the_time_of_the_first_study() -> None:
+    again = [study(WEEK * week, week, f"{week}") for week in range(4)]
+    # All in one night by another model: what they tell of the weeks stays, and the slope is of the new values.
+    night = [study(50 * WEEK + week, 3.0 * week, f"{week}") for week in range(4)]
+    line = told(again + night)
+    assert line is not None
+    assert line.per_week == pytest.approx(3.0)
+    doubted = study(60 * WEEK, 99.0, "0", verdict="not converged")
+    without = study(61 * WEEK, 99.0)
+    together = study(62 * WEEK, 99.0, "0", "1", "2", "3")
+    assert told([*again, *night, doubted, without, together]) == line
+
+
 @pytest.fixture(scope="module")
 def machine() -> str:
     """A machine of thirty weeks, one of whose studies cannot be trusted."""
@@ -60,6 +103,7 @@ def machine() -> str:
         tags = {"kind": "study", "machine": "old-press", "verdict": verdict, "mlflow.runName": f"week {week}"}
         run = client.create_run(place, start_time=int(1000 * (1.75e9 + WEEK * week)), tags=tags).info.run_id
         numbers = {"final/k": value, "interval/k/lower": value - 1.6, "interval/k/upper": value + 1.6}
+        client.log_inputs(run, inputs([Data("press.csv", f"{week:016x}", "{}", "{}", "{}")]))
         client.log_batch(run, [Metric(name, number, 0, 0) for name, number in numbers.items()])
     return "old-press"
 
@@ -92,6 +136,23 @@ def test_a_chart_is_drawn_once_and_nothing_of_it_is_cut_off(machine: str, monkey
         assert frame.y0 <= part.y0
         assert part.y1 <= frame.y1
     assert axes.get_tightbbox().y1 <= title.y0
+    # What the axis is, and the date to which its ticks belong, do not run together.
+    label, date = axes.xaxis.label.get_window_extent(), axes.xaxis.offsetText.get_window_extent()
+    assert label.x1 < date.x0 or not axes.xaxis.offsetText.get_text()
+
+
+def test_the_axis_of_a_single_study_is_a_day(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(overview, "machines", lambda: {"press": [study(1.75e9, 5.0, "one")]})
+    drawn, draw = [], Figure.draw
+    monkeypatch.setattr(Figure, "draw", lambda self, renderer: drawn.append(self) or draw(self, renderer))
+    page = overview.overview("press")
+    assert "1 recording with a trusted study, too few to tell a drift" in page
+    (axes,) = drawn[0].axes
+    # A date of matplotlib's is in days.
+    assert np.ptp(axes.get_xlim()) == pytest.approx(1)
+    label, date = axes.xaxis.label.get_window_extent(), axes.xaxis.offsetText.get_window_extent()
+    assert axes.xaxis.offsetText.get_text()
+    assert label.x1 < date.x0
 
 
 def test_a_machine_without_studies_is_one_line(machine: str) -> None:

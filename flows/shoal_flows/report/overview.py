@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -21,16 +21,20 @@ from shoal.pictures.style import BLUE, GREY, VERMILION, canvas, headline, styled
 
 from shoal_flows.tracking.store import connect
 
-WEEK = 7 * 86400.0
+_DAY = 86400.0
+WEEK = 7 * _DAY
 _FEWEST = 3
-"""Studies, without which nothing is said of a drift."""
+"""Recordings, without which nothing is said of a drift."""
 _TRUSTED = "identified"
 """How the verdicts begin of answers that can be used."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """One study. values: (value, lower, upper) by parameter, interval nan where none was kept; started [s]."""
+    """One study. values: (value, lower, upper) by parameter, interval nan where none was kept; started [s].
+
+    data: digests of the recordings that it was fitted to.
+    """
 
     run_id: str
     name: str
@@ -38,6 +42,7 @@ class Study:
     verdict: str
     fitness: float
     values: dict[str, tuple[float, float, float]]
+    data: frozenset[str]
 
     @property
     def day(self) -> str:
@@ -84,7 +89,8 @@ def machines() -> dict[str, list[Study]]:
         }
         if values:
             fitness, started = metrics.get("final/fitness", np.nan), run.info.start_time / 1e3
-            one = Study(run.info.run_id, run.info.run_name, started, tags.get("verdict", ""), fitness, values)
+            data = frozenset(one.dataset.digest for one in run.inputs.dataset_inputs)
+            one = Study(run.info.run_id, run.info.run_name, started, tags.get("verdict", ""), fitness, values, data)
             found.setdefault(machine, []).append(one)
     return found
 
@@ -112,8 +118,26 @@ def _runs(client: Any) -> Iterator[Any]:
             return
 
 
+def independent(studies: Sequence[Study]) -> list[Study]:
+    """Of trusted studies those that share no recording, oldest first: the same samples again are no new evidence.
+
+    Of several of the same recordings the newest counts, at the time when these were first studied, which is the nearest
+    to their measurement; of others that overlap that of fewer recordings. One without known data does not count.
+    """
+    first: dict[frozenset[str], float] = {}
+    for study in studies:
+        first[study.data] = min(study.started, first.get(study.data, np.inf))
+    taken: set[str] = set()
+    found = []
+    for study in sorted(studies, key=lambda study: (len(study.data), -study.started)):
+        if study.trusted and study.data and not taken & study.data:
+            taken |= study.data
+            found.append(replace(study, started=first[study.data]))
+    return sorted(found, key=lambda study: study.started)
+
+
 def drift(times: Sequence[float], values: Sequence[float], widths: Sequence[float]) -> Drift | None:
-    """The weighted straight line through values over times [s]; None where there are too few.
+    """The weighted straight line through independent values over times [s]; None where there are too few.
 
     widths: of the 95 % intervals; values count by them where all are known. What the values scatter beyond their
     intervals widens that of the slope (the Birge ratio); a scatter below them does not narrow it.
@@ -172,46 +196,59 @@ def _shown(study: Study, name: str) -> str:
 
 
 def _drawn(name: str, studies: Sequence[Study]) -> Drawn:
-    good = [study for study in studies if study.trusted]
+    good = independent(studies)
     values = [study.values[name] for study in good]
     line = drift([s.started for s in good], [v for v, _, _ in values], [upper - lower for _, lower, upper in values])
     says = words(name, line, len(good))
-    alt = f"{name} over the time of {len(studies)} studies, {len(good)} of them trusted. {says}."
-    caption = "Points with 95 % intervals; crosses are answers that cannot be used and do not count. Dashed: the line."
-    return Drawn(name, _figure(name, studies, line, says), alt, caption)
+    trusted = sum(study.trusted for study in studies)
+    alt = (
+        f"{name} over the time of {len(studies)} studies, {trusted} of them trusted, of {len(good)} recordings. {says}."
+    )
+    caption = (
+        "Points with 95 % intervals, one for each recording: its newest answer that can be used, at the time of its "
+        "first study, which is not that of the measurement. Crosses are answers that cannot be used and do not count. "
+        "Dashed: the line."
+    )
+    doubted = [study for study in studies if not study.trusted]
+    return Drawn(name, _figure(name, good, doubted, line, says), alt, caption)
 
 
 def words(name: str, line: Drift | None, count: int) -> str:
-    """What a chart says."""
+    """What a chart says; count: of recordings."""
     if line is None:
-        return f"{name}: {count} trusted studies, too few to tell a drift"
+        some = f"{count} recording" + ("s" if count != 1 else "")
+        return f"{name}: {some} with a trusted study, too few to tell a drift"
     if not line.real:
-        return f"{name} = {line.middle:.5g}; no drift beyond ± {line.either:.2g} per week in {count} studies"
+        return f"{name} = {line.middle:.5g}; no drift beyond ± {line.either:.2g} per week in {count} recordings"
     part = f" ({100 * line.per_week / abs(line.middle):+.2g} %)" if line.middle else ""
     return f"{name} drifts by {line.per_week:+.3g} ± {line.either:.2g} per week{part}"
 
 
 @styled
-def _figure(name: str, studies: Sequence[Study], line: Drift | None, says: str) -> Figure:
+def _figure(name: str, good: Sequence[Study], doubted: Sequence[Study], line: Drift | None, says: str) -> Figure:
     figure, axes = canvas()
-    for trusted, look in ((True, {"color": BLUE, "fmt": "o"}), (False, {"color": VERMILION, "fmt": "x"})):
-        some = [study for study in studies if study.trusted is trusted]
+    for some, look in ((good, {"color": BLUE, "fmt": "o"}), (doubted, {"color": VERMILION, "fmt": "x"})):
         if some:
             value, lower, upper = np.array([study.values[name] for study in some]).T
             # An interval of an answer that cannot be used may span all there is.
-            bars = np.nan_to_num(np.abs([value - lower, upper - value])) if trusted else None
+            bars = np.nan_to_num(np.abs([value - lower, upper - value])) if some is good else None
             # Many bars would run together and hide the points.
             thin = {"elinewidth": min(1.0, 60 / len(some)), "ecolor": (look["color"], 0.5), "linewidth": 1}
             axes.errorbar(
                 [_date(s.started) for s in some], value, bars, markersize=min(4, 300 / len(some)), **thin, **look
             )
     if line is not None:
-        ends = np.array([studies[0].started, studies[-1].started])
+        ends = np.array([good[0].started, good[-1].started])
         axes.plot([_date(end) for end in ends], line.at(ends), color=GREY, linestyle="--")
+    times = [study.started for study in (*good, *doubted)]
+    if times and max(times) == min(times):
+        # The axis of a single instant would span years.
+        axes.set_xlim(_date(times[0] - _DAY / 2), _date(times[0] + _DAY / 2))
     locator = AutoDateLocator()  # type: ignore[no-untyped-call]
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
-    axes.set_xlabel("begin of the study (UTC)")
+    # At the right is the date to which the ticks belong.
+    axes.set_xlabel("time of the study (UTC)", loc="left")
     axes.set_ylabel(name)
     headline(figure, says)
     _lay_out(figure, axes)
