@@ -25,29 +25,24 @@ def end_left() -> int:
 def _end(mark: Mark) -> bool:
     """Whether there is nothing left to do for this run."""
     from httpx import HTTPError
-    from mlflow.exceptions import MlflowException
 
     try:
         return _end_in_mlflow(mark) if mark.kind == MLFLOW else _end_in_prefect(mark)
-    except (ComputationError, MlflowException, HTTPError, OSError):
+    except (ComputationError, HTTPError, OSError):
         return False
 
 
 def _end_in_mlflow(mark: Mark) -> bool:
-    from mlflow.exceptions import MlflowException
-
-    from shoal_flows.tracking.store import connect
+    from shoal_flows.tracking.store import answering, connect, found_run
 
     client = connect()
-    try:
-        run = client.get_run(mark.run_id)
-    except MlflowException as error:
-        if error.error_code != "RESOURCE_DOES_NOT_EXIST":
-            raise
+    run = found_run(client, mark.run_id)
+    if run is None:
         return mark.server == os.environ["MLFLOW_TRACKING_URI"]
     if run.info.status == "RUNNING":
-        client.set_tag(mark.run_id, "broken_off", WHY)
-        client.set_terminated(mark.run_id, "KILLED")
+        with answering():
+            client.set_tag(mark.run_id, "broken_off", WHY)
+            client.set_terminated(mark.run_id, "KILLED")
     return True
 
 

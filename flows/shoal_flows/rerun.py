@@ -75,11 +75,12 @@ class Repeated:
 def rerun(run_id: str) -> Repeated:
     """Repeat the flow of a run with what it was given. Raises InputError, ComputationError."""
     settings.apply()
-    from shoal_flows.tracking.store import connect
+    from shoal_flows.tracking.store import answering, connect
 
     client, known = connect(), outbox.address(run_id)
     with TemporaryDirectory() as folder:
-        flow, parameters = _origin(client, known, Path(folder))
+        with answering():
+            flow, parameters = _origin(client, known, Path(folder))
         with remembered.anew():
             # A text in quotes: `run_flow` reads texts as YAML.
             texts = {name: json.dumps(value) for name, value in parameters.items() if isinstance(value, str)}
@@ -88,9 +89,10 @@ def rerun(run_id: str) -> Repeated:
     if now.startswith(LOCAL):
         notice()
         raise ComputationError("rerun: MLflow stopped answering, so that the figures cannot be compared yet")
-    old, new = dict(_figures(client, known)), dict(_figures(client, now))
+    with answering():
+        old, new = dict(_figures(client, known)), dict(_figures(client, now))
+        tags = [client.get_run(one).data.tags for one in (known, now)]
     figures = {name: (old.get(name, math.nan), new.get(name, math.nan)) for name in {**old, **new}}
-    tags = [client.get_run(one).data.tags for one in (known, now)]
     names = (*(f"version.{package}" for package in provenance.PACKAGES), "source.revision", "platform")
     versions = {n: (tags[0].get(n, "?"), tags[1].get(n, "?")) for n in names if tags[0].get(n) != tags[1].get(n)}
     verdicts = tags[0].get("verdict", ""), tags[1].get("verdict", "")
@@ -121,13 +123,12 @@ def main(run_id: str, as_json: bool) -> str:
 
 
 def _origin(client: Any, run_id: str, folder: Path) -> tuple[str, dict[str, Any]]:
-    from mlflow.exceptions import MlflowException
+    from shoal_flows.tracking.store import found_run
 
-    try:
-        tags = client.get_run(run_id).data.tags
-    except MlflowException:
-        raise InputError(f"run: MLflow knows no run {run_id!r}; `shoal ui` shows those it knows") from None
-    if parent := tags.get("mlflow.parentRunId"):
+    run = found_run(client, run_id)
+    if run is None:
+        raise InputError(f"run: MLflow knows no run {run_id!r}; `shoal ui` shows those it knows")
+    if parent := run.data.tags.get("mlflow.parentRunId"):
         raise InputError(f"run: {run_id} is part of a study; repeat the study: {parent}")
     there = {item.path for item in client.list_artifacts(run_id)}
     if origin.CALL not in there:

@@ -100,7 +100,8 @@ def show(result: Any) -> None:
         from shoal_flows.tracking.addresses import run_address
 
         address = run_address(result.run_id, UI)
-        console.print(f"MLflow run {result.run_id}; browse it with `shoal ui`: {address}", soft_wrap=True)
+        where = f": {address}" if address else ""
+        console.print(f"MLflow run {result.run_id}; browse it with `shoal ui`{where}", soft_wrap=True)
 
 
 def notice() -> None:

@@ -6,10 +6,13 @@ import json
 import os
 import platform
 import socket
+import sqlite3
 import sys
+from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError, URLError
 from urllib.request import Request, urlopen
@@ -55,6 +58,7 @@ def examine() -> list[Check]:
         *(check_package(name, extra) for extra, names in _PACKAGES.items() for name in names),
         check_server("Prefect", "PREFECT_API_URL", "a flow starts its own"),
         check_server("MLflow", "MLFLOW_TRACKING_URI", "runs go to a database in the state folder"),
+        *check_runs(os.environ.get("MLFLOW_TRACKING_URI")),
         check_nights(os.environ.get("PREFECT_API_URL") or "http://127.0.0.1:4200/api"),
         *(check_port(number, what) for what, number in _PORTS.items()),
     ]
@@ -130,6 +134,28 @@ def check_server(name: str, variable: str, otherwise: str) -> Check:
     if _answers(f"{address.rstrip('/')}/health"):
         return Check(what, True, f"{address} answers")
     return Check(what, False, f"{address} does not answer", f"start it (make up), or unset {variable}")
+
+
+def check_runs(address: str | None, patience: float = PATIENCE) -> list[Check]:
+    """Whether MLflow's database can be read, where runs go to one of SQLite that is there.
+
+    address: of MLflow, None for the database of the state folder; patience: seconds that another program may hold it
+    """
+    try:
+        path = Path((address or f"sqlite:///{home() / 'mlflow.db'}").removeprefix("sqlite:///").partition("?")[0])
+    except ShoalError:
+        return []  # told already
+    if (address and not address.startswith("sqlite:///")) or not path.exists():
+        return []
+    what = "runs"
+    try:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", patience, uri=True)) as database:
+            database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    except sqlite3.OperationalError as error:
+        return [Check(what, False, f"{path}: {error}", "end the program that holds it, or look at who may read it")]
+    except sqlite3.DatabaseError as error:
+        return [Check(what, False, f"{path}: {error}", "move it away, and a new one is made; then: shoal upload")]
+    return [Check(what, True, f"{path} can be read")]
 
 
 def check_nights(address: str) -> Check:

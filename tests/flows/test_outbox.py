@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext, suppress
 from pathlib import Path
+from typing import Any
 from urllib.request import urlopen
 
+import numpy as np
 import pytest
+from click.testing import CliRunner
 from deployed import free_port
 from mlflow import MlflowClient
+from shoal import doctor
+from shoal.cli import main
 from shoal.engines.compare import Comparison
 from shoal.errors import ComputationError, InputError
 from shoal_flows.rerun import rerun
@@ -85,6 +91,48 @@ def test_an_upload_that_breaks_off_sends_nothing_twice(monkeypatch: pytest.Monke
     (found,) = client.search_runs([experiment])
     assert found.info.run_id == made[0]
     assert found.data.metrics == {"final/x": 1.5}
+
+
+def damaged(path: Path) -> AbstractContextManager[object]:
+    path.write_bytes(np.random.default_rng(0).bytes(5000))
+    return nullcontext()
+
+
+def locked(path: Path) -> AbstractContextManager[object]:
+    other = sqlite3.connect(path)
+    other.execute("CREATE TABLE held (x)")
+    other.execute("BEGIN EXCLUSIVE")
+    return closing(other)
+
+
+@pytest.mark.usefixtures("silent")
+@pytest.mark.parametrize(("how", "reason"), [(damaged, "is not a database"), (locked, "locked by another program")])
+def test_a_database_that_cannot_be_read_is_one_line_and_nothing_is_lost(
+    how: Any, reason: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path = tmp_path / "mlflow.db"
+    # As SQLite takes it: how long [s] to wait for others.
+    use(monkeypatch, f"sqlite:///{path}?timeout=0.1")
+    with how(path):
+        with store.open_run("Forward", "one") as run:
+            run.metric("final/x", 1.5)
+        assert run.run_id.startswith(LOCAL)
+        assert len(outbox.pending()) == 1
+        for command in (["upload"], ["rerun", "0123"], ["report", "--all"], ["report", "0123"]):
+            done = CliRunner().invoke(main, command)
+            assert done.exit_code == ComputationError.exit_status, command
+            assert done.stderr.count("\n") == 1
+            assert f"MLflow at sqlite:///{path}" in done.stderr
+            assert reason in done.stderr
+        (check,) = doctor.check_runs(f"sqlite:///{path}", patience=0.1)
+        assert not check.ok
+    assert len(outbox.pending()) == 1
+    path.unlink()
+    assert doctor.check_runs(f"sqlite:///{path}") == []
+    with closing(sqlite3.connect(path)) as fresh:
+        fresh.execute("CREATE TABLE runs (x)")
+    (check,) = doctor.check_runs(f"sqlite:///{path}")
+    assert check.ok
 
 
 @pytest.mark.usefixtures("silent")

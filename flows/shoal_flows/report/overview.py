@@ -19,7 +19,7 @@ from shoal.pictures.drawn import Drawn
 from shoal.pictures.pages import environment, software
 from shoal.pictures.style import BLUE, GREY, VERMILION, canvas, headline, styled
 
-from shoal_flows.tracking.store import connect
+from shoal_flows.tracking.store import answering, connect
 
 _DAY = 86400.0
 WEEK = 7 * _DAY
@@ -76,6 +76,7 @@ class Drift:
         return np.asarray(self.middle + self.per_week * (when - self.mean) / WEEK)
 
 
+@answering()
 def machines() -> dict[str, list[Study]]:
     """All studies with an answer, by machine, oldest first. Raises ComputationError."""
     found: dict[str, list[Study]] = {}

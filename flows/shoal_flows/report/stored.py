@@ -11,21 +11,17 @@ from shoal.pictures.answer import Answer
 from shoal.pictures.archive import parse
 
 from shoal_flows.tracking.identification import ARCHIVE
-from shoal_flows.tracking.store import connect
+from shoal_flows.tracking.store import answering, connect, found_run
 
 
+@answering()
 def stored(run_id: str) -> dict[str, Answer]:
     """The answer of a run, or those of all runs of a study, by their names. Raises InputError, ComputationError."""
     client = connect()
-    from mlflow.exceptions import MlflowException
-
-    try:
-        run = client.get_run(run_id)
-        children = client.search_runs([run.info.experiment_id], f"tags.`mlflow.parentRunId` = '{run_id}'")
-    except MlflowException:
-        raise InputError(
-            f"run: {run_id} is neither a file nor the id of a run in MLflow; `shoal ui` shows them"
-        ) from None
+    run = found_run(client, run_id)
+    if run is None:
+        raise InputError(f"run: {run_id} is neither a file nor the id of a run in MLflow; `shoal ui` shows them")
+    children = client.search_runs([run.info.experiment_id], f"tags.`mlflow.parentRunId` = '{run_id}'")
     # MLflow lists the latest first.
     runs = [
         one

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
+
+from shoal.errors import ComputationError
 
 from shoal_flows import settings
 from shoal_flows.tracking.record import LOCAL
-from shoal_flows.tracking.store import connect
+from shoal_flows.tracking.store import answering, connect
 
 _LOOK = "viewStateShareKey=studies"
 """Opens the table with the saved view of that key (`tracking.views`)."""
 
 
 def run_address(run_id: str, otherwise: str | None = None) -> str | None:
-    """The page of a run; None if the run is still in the outbox, or there is no server.
+    """The page of a run; None if the run is still in the outbox, there is no server, or it does not answer now.
 
     otherwise: the server that is meant where the runs are in a database. SHOAL_MLFLOW_URL is the server's address as a
     browser sees it, where that is not the address that tasks use.
@@ -28,8 +31,9 @@ def table_address(run_id: str, otherwise: str | None = None) -> str | None:
     return place and f"{place}/runs?{_LOOK}"
 
 
+@answering()
 def latest_study(server: str) -> tuple[str, str] | None:
-    """The pages of the study that was begun last, and of all; None where there is none."""
+    """The pages of the study that was begun last, and of all; None where there is none. Raises ComputationError."""
     client = connect()
     experiment = client.get_experiment_by_name("Identification")
     if experiment is None:
@@ -43,4 +47,7 @@ def _experiment(run_id: str, otherwise: str | None) -> str | None:
     server = os.environ.get("SHOAL_MLFLOW_URL") or settings.tracking_server() or otherwise
     if not server or run_id.startswith(LOCAL):
         return None
-    return f"{server.rstrip('/')}/#/experiments/{connect().get_run(run_id).info.experiment_id}"
+    # A study that has ended does not fail for a link.
+    with suppress(ComputationError), answering():
+        return f"{server.rstrip('/')}/#/experiments/{connect().get_run(run_id).info.experiment_id}"
+    return None

@@ -22,6 +22,12 @@ log = logging.getLogger(__name__)
 _PAUSE = 60.0
 _silent: dict[str, float] = {}
 """Until when [s] a server that did not answer is not asked again, by its address."""
+_DAMAGED = {
+    "database is locked": "the database is locked by another program",
+    "file is not a database": "the file is not a database; move it away, and a new one is made",
+    "disk image is malformed": "the database is damaged; move it away, and a new one is made",
+}
+"""What SQLite says, and what it means."""
 _BATCH = 1000
 _KIND = "custom_model_development"
 """What makes MLflow open on runs and metrics instead of traces of language models."""
@@ -92,10 +98,31 @@ def or_failed(experiment: str, name: str, tags: Mapping[str, str]) -> Iterator[N
 
 def upload() -> int:
     """Send the runs of the outbox; returns how many. Raises ComputationError if MLflow does not answer."""
-    try:
+    with answering():
         return outbox.upload(_make, _send)
+
+
+@contextmanager
+def answering() -> Iterator[None]:
+    """What is asked of MLflow within the block. Raises ComputationError where it does not answer."""
+    try:
+        yield
     except _failures() as error:
         raise _unreachable(error) from None
+
+
+def found_run(client: Any, run_id: str) -> Any:
+    """The run of that id; None if MLflow knows none. Raises ComputationError if MLflow does not answer."""
+    from mlflow.exceptions import MlflowException
+
+    with answering():
+        try:
+            return client.get_run(run_id)
+        except MlflowException as error:
+            # An id that cannot be one is an invalid value.
+            if error.error_code not in ("RESOURCE_DOES_NOT_EXIST", "INVALID_PARAMETER_VALUE"):
+                raise
+            return None
 
 
 def _attempt(what: Callable[[Run], None], run: Run) -> bool:
@@ -156,10 +183,11 @@ def _send(run: Run) -> None:
 
 
 def _failures() -> tuple[type[Exception], ...]:
-    """What a server that is down, or a database that cannot be written, leads to."""
+    """What a server that is down, or a database that cannot be read or written, leads to."""
     from mlflow.exceptions import MlflowException
+    from sqlalchemy.exc import SQLAlchemyError
 
-    return ComputationError, MlflowException, OSError
+    return ComputationError, MlflowException, SQLAlchemyError, OSError
 
 
 def connect() -> Any:
@@ -176,13 +204,10 @@ def _address() -> str:
 @cache
 def _client(address: str) -> Any:
     from mlflow import MlflowClient
-    from mlflow.exceptions import MlflowException
 
-    try:
+    with answering():
         client = MlflowClient(address)
         client.search_experiments(max_results=1)
-    except MlflowException as error:
-        raise _unreachable(error) from None
     return client
 
 
@@ -194,7 +219,8 @@ def _unreachable(error: Exception) -> ComputationError:
     # MLflow's own words for a server that is away are several lines long.
     away = isinstance(error, NoConnection) or isinstance(error.__context__, NoConnection)
     reason = "it does not answer; start it, or let MLFLOW_TRACKING_URI name another" if away else str(error)
-    return ComputationError(f"MLflow at {os.environ['MLFLOW_TRACKING_URI']}: {reason.splitlines()[0]}")
+    told = next((words for mark, words in _DAMAGED.items() if mark in reason), reason.partition("\n")[0])
+    return ComputationError(f"MLflow at {os.environ['MLFLOW_TRACKING_URI']}: {told}")
 
 
 @cache
@@ -240,4 +266,4 @@ def _common_tags() -> dict[str, str]:
     return {**tags, "platform": provenance.machine(), "mlflow.source.name": "shoal", "mlflow.source.type": "PROJECT"}
 
 
-__all__ = ["Run", "connect", "experiment", "open_run", "upload"]
+__all__ = ["Run", "answering", "connect", "experiment", "found_run", "open_run", "upload"]
