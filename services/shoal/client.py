@@ -31,7 +31,7 @@ from shoal.scene.paths import unwrapped
 from shoal.shelf import NAME
 from shoal.table import Table, load_table
 from shoal.trajectory import Array
-from shoal.wire import unpacked
+from shoal.wire import KIND, unpacked
 
 PAUSES = (0.02, 1.0)
 """Between two looks at a job, the shortest and the longest [s]."""
@@ -46,7 +46,8 @@ def _by_service(function: Callable[..., Any], *, job: bool = False) -> Any:
         told = kwargs.pop("progress", None) if job else None
         if job:
             return self._awaited(self.submit(function.__name__, *args, **kwargs), told)
-        found = self._answer("POST", f"/v1/{function.__name__}", self._request(function.__name__, *args, **kwargs))
+        request = self._request(function.__name__, *args, **kwargs)
+        found = self._answer("POST", f"/v1/{function.__name__}", request, _object)
         file = signature(function).bind(*args, **kwargs).arguments.get("file")
         if file is not None:
             found.save(Path(file))
@@ -87,12 +88,12 @@ class Client:
 
     def submit(self, operation: str, /, *args: Any, **kwargs: Any) -> str:
         """Begin an operation, given by the name of its method and its arguments; returns the id of the job."""
-        job = self._answer("POST", f"/v1/jobs/{operation}", self._request(operation, *args, **kwargs))
-        return str(job["id"])
+        request = self._request(operation, *args, **kwargs)
+        return str(self._answer("POST", f"/v1/jobs/{operation}", request, lambda found: found["id"]))
 
     def status(self, job: str) -> Answer:
         """How a job goes: its `status` is queued, running, done, failed or cancelled; `problem` says why it failed."""
-        return dict(self._answer("GET", f"/v1/jobs/{job}"))
+        return dict(self._answer("GET", f"/v1/jobs/{job}", read=_job))
 
     def result(self, job: str) -> Any:
         """What a job that is done has found: that of `submit` what its method returns."""
@@ -118,17 +119,23 @@ class Client:
             raise ComputationError(f"{found['operation']}: the job was cancelled")
         return self.result(job)
 
-    def _answer(self, method: str, path: str, content: Answer | None = None) -> Any:
+    def _answer(
+        self, method: str, path: str, content: Answer | None = None, read: Callable[[Any], Any] = lambda found: found
+    ) -> Any:
         try:
             body = None if content is None else orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
         except TypeError as error:
             raise InputError(f"{path}: an argument cannot be sent: {error}") from None
-        found = self._service.ask(method, path, body)
+        found = self._service.ask(method, path, body, read)
         try:
             return unpacked(found)
         except ValueError as error:
             about = f"{self._service.name} answers what this version does not know, {error}"
             raise ComputationError(f"engine: {about}; install the same version here and there") from None
+
+    def _own(self) -> str:
+        """The service's engine."""
+        return str(self._service.ask("GET", "/v1/capabilities", read=lambda found: found["engine"]))
 
     def _request(self, operation: str, *args: Any, **kwargs: Any) -> Answer:
         """The arguments of a function of the library as the fields of a request. Raises InputError."""
@@ -138,13 +145,16 @@ class Client:
         given |= given.pop("options", {})
         given.pop("file", None)
         engine = given.pop("engine", None)
-        if engine is not None and engine != (own := self._service.ask("GET", "/v1/capabilities")["engine"]):
+        if engine is not None and engine != (own := self._own()):
             raise InputError(f"engine: the service at {self._service.name} runs {own}, found {engine!r}")
         if "scene" in given:
             given["scene"] = _scene(given["scene"])
         if (values := given.get("values")) is not None and not isinstance(values, Mapping):
             found = carried(values)
             given["values"] = found.values
+            if operation == "sweep":
+                # What is varied is not what was found; only what a caller states may be refused for that.
+                given["values"] = {path: value for path, value in found.values.items() if path not in given["vary"]}
             if "problem" in given:
                 given["problem"], given["values"], _ = found.into(as_problem(given["problem"]))
         if "problem" in given:
@@ -158,6 +168,18 @@ class Client:
         if measured is not None:
             stated["recordings"] = measured
         return {**stated, "objects": True}
+
+
+def _object(found: Any) -> Any:
+    """An answer of an operation: an object of the library, or several. Raises KeyError, TypeError for any other."""
+    for one in found if isinstance(found, list) else [found]:
+        one[KIND]
+    return found
+
+
+def _job(found: Answer) -> Answer:
+    """How a job goes. Raises KeyError where it is none."""
+    return {**found, **{name: found[name] for name in ("status", "operation", "progress")}}
 
 
 def _scene(given: notebook.Stated) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import httpx
@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from running import serving
 from shoal.api.settings import Settings
+from shoal.client import Client
 from shoal.engines import get_engine
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.remote import RemoteEngine
@@ -136,6 +137,9 @@ def test_comes_again(url: str, first: int | None) -> None:
         (504, {"type": "urn:shoal:timeout", "detail": "ended after 60 s"}, ComputationError, "ended after 60 s"),
         (404, {"detail": "Not Found"}, InputError, "is not a service of Shoal"),
         (200, None, InputError, "is not a service of Shoal"),
+        (200, {"status": "ok"}, InputError, "is not a service of Shoal"),
+        (200, ["status", "ok"], InputError, "is not a service of Shoal"),
+        (200, "ok", InputError, "is not a service of Shoal"),
     ],
 )
 def test_other_answers(status: int, document: object, error: type[Exception], line: str) -> None:
@@ -145,6 +149,25 @@ def test_other_answers(status: int, document: object, error: type[Exception], li
     engine = RemoteEngine("http://127.0.0.1:9", httpx.MockTransport(answer))
     with pytest.raises(error, match=line):
         engine.simulate(load_scene("single-pendulum"))
+
+
+@pytest.mark.parametrize("document", [{"status": "ok"}, ["ok"], 1])
+def test_another_program_that_answers_json_is_no_service(document: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever is asked of it: such an answer is refused by name, and never returned as a result."""
+    transport = httpx.MockTransport(lambda _: httpx.Response(200, json=document))
+    engine, client = RemoteEngine("http://127.0.0.1:9", transport), Client("http://127.0.0.1:9")
+    monkeypatch.setattr(client, "_service", engine)
+    asks: list[Callable[[], object]] = [
+        lambda: engine.capabilities,
+        lambda: engine.get_entry("scene", "mine"),
+        lambda: client.simulate("single-pendulum"),
+        lambda: client.simulate("single-pendulum", engine="gauss"),
+        lambda: client.identify("paper-case-1"),
+        lambda: client.status("job"),
+    ]
+    for ask in asks:
+        with pytest.raises(InputError, match="is not a service of Shoal"):
+            ask()
 
 
 def test_the_key_goes_along(monkeypatch: pytest.MonkeyPatch) -> None:

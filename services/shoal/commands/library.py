@@ -126,10 +126,17 @@ def push(url: str, names: tuple[str, ...], kind: str | None, as_json: bool) -> N
         for one in chosen:
             tell(f"{_title(one)} to {url}")
             service.put_entry(one.kind, one.name, one.files())
-        there = service.ask("GET", "/v1/library")["entries"]
-    _changed({kind: [entry["name"] for entry in there if entry["kind"] == kind] for kind in library.KINDS})
+        there = service.ask("GET", "/v1/library", read=_names)
+    _changed(there)
     told: dict[str, Any] = {"url": url, "entries": [library.about(one) for one in chosen]}
     screen.show(told, as_json, lambda: screen.say(*(f"{_title(one)}, version {one.version}" for one in chosen)))
+
+
+def _names(found: dict[str, Any]) -> dict[str, list[str]]:
+    """Those of a library by kind, from what a service answers."""
+    from shoal.library import KINDS
+
+    return {kind: [entry["name"] for entry in found["entries"] if entry["kind"] == kind] for kind in KINDS}
 
 
 def _changed(names: dict[str, list[str]] | None = None) -> None:

@@ -11,7 +11,8 @@ import logging
 import os
 import secrets
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -68,8 +69,7 @@ class RemoteEngine:
     @cached_property
     def capabilities(self) -> Capabilities:
         """What the engine there can simulate. Raises InputError, ComputationError."""
-        found = self.ask("GET", "/v1/capabilities")
-        return Capabilities(**{kind: frozenset(found[kind]) for kind in _KINDS}, lanes=found["lanes"])
+        return self.ask("GET", "/v1/capabilities", read=_capabilities_of)
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene; see `Engine`. Raises ComputationError if the service cannot be had."""
@@ -91,7 +91,7 @@ class RemoteEngine:
             "lanes": lanes,
             "verify": False,
         }
-        return trajectory_of(self.ask("POST", "/v1/simulate", orjson.dumps(request)))
+        return self.ask("POST", "/v1/simulate", orjson.dumps(request), trajectory_of)
 
     def put_entry(self, kind: str, name: str, files: Mapping[str, bytes]) -> None:
         """Put an entry into the service's library, checked there. Raises InputError, ComputationError."""
@@ -100,11 +100,15 @@ class RemoteEngine:
 
     def get_entry(self, kind: str, name: str) -> dict[str, bytes]:
         """The files of an entry of the service's library. Raises InputError, ComputationError."""
-        found = self.ask("GET", f"/v1/library/{kind}/{name}")["files"]
-        return {path: base64.b64decode(content) for path, content in found.items()}
+        return self.ask("GET", f"/v1/library/{kind}/{name}", read=_files_of)
 
-    def ask(self, method: str, path: str, content: bytes | None = None) -> Any:
-        """The answer to a request. Raises InputError where it is refused, ComputationError where there is none."""
+    def ask(
+        self, method: str, path: str, content: bytes | None = None, read: Callable[[Any], Any] = lambda found: found
+    ) -> Any:
+        """The answer to a request. Raises InputError where it is refused, ComputationError where there is none.
+
+        read: makes of the JSON what is returned; what it finds missing in there is not the answer of such a service
+        """
         headers = {"Content-Type": "application/json"}
         if method == "POST":
             # Whoever is not answered asks again, and may have been heard the first time.
@@ -123,8 +127,11 @@ class RemoteEngine:
         except orjson.JSONDecodeError:
             found = None
         if response.is_success and found is not None:
-            self._answered = True
-            return found
+            # Any other program may answer JSON as well.
+            with suppress(KeyError, TypeError, ValueError, AttributeError):
+                answer = read(found)
+                self._answered = True
+                return answer
         raise self._refused(response.status_code, found)
 
     def _refused(self, status: int, found: Any) -> InputError | ComputationError:
@@ -158,6 +165,14 @@ def loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
+
+
+def _capabilities_of(found: dict[str, Any]) -> Capabilities:
+    return Capabilities(**{kind: frozenset(found[kind]) for kind in _KINDS}, lanes=found["lanes"])
+
+
+def _files_of(found: dict[str, Any]) -> dict[str, bytes]:
+    return {path: base64.b64decode(content) for path, content in found["files"].items()}
 
 
 def trajectory_of(found: dict[str, Any]) -> Trajectory:
