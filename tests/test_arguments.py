@@ -72,6 +72,10 @@ def _simulate(*given: Any, **asked: Any) -> Callable[[], Any]:
         (_simulate(tolerance=NAN), "tolerance: needs a length above 0 m, found nan"),
         (_simulate(tolerance="1e-3"), "tolerance: needs a length above 0 m, found '1e-3'"),
         (_simulate(tolerance=1e-3, verify=False), "verify: a tolerance is kept by estimates"),
+        (
+            lambda: shoal.sweep(PENDULUM, {ANGLE: [0.1, 0.2]}, values={ANGLE: 0.3}),
+            "initial.OA.angle: is set to 0.3 and varied as well",
+        ),
         (_simulate("abc"), "times: needs a list of one or more finite times in s, found 'abc'"),
         (_simulate(engine=None), "engine: no engine None; there are gauss"),
         (_simulate(values={1: 1}), "values: 1 is no dotted path of a field"),

@@ -125,6 +125,8 @@ def test_a_printed_scene_can_be_simulated_again(tmp_path: Path) -> None:
         (["sweep", "single-pendulum", "--vary", "initial.OA.colour=0:1:3"], "colour"),
         (["sweep", "single-pendulum", "--vary", "bodies.OA.mass=1:2:2", "--vary", "bodies.OA.mass=3:4:2"],
          "bodies.OA.mass is given twice, as 1:2:2 and as 3:4:2"),
+        (["sweep", "single-pendulum", "--vary", "bodies.OA.mass=1:2:2", "--set", "bodies.OA.mass=3"],
+         "bodies.OA.mass: is set to '3' and varied as well"),
         (["sweep", "single-pendulum", "--vary", "bodies.OA.mass=1:2:1"], "1:2:1: one value is not at both ends"),
         (["simulate", "single-pendulum", "--set", "bodies.OA.mass=1", "--set", "bodies.OA.mass=2"],
          "bodies.OA.mass is given twice, as 1 and as 2"),

@@ -6,7 +6,7 @@ The command line and the services read `LIMITS`, so that help and schemas tell t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
@@ -90,6 +90,16 @@ def check_estimated(tolerance: float | None, verify: bool) -> None:
         raise InputError(
             "verify: a tolerance is kept by estimates of the error; leave it out, or do not turn verify off"
         )
+
+
+def check_apart(values: Any, varied: Iterable[str]) -> None:
+    """Raises InputError where a field that is varied is set to one value too, which would count nowhere.
+
+    values: fields of a scene by path as a caller states them; what an estimate carries is none that is stated
+    """
+    for path in varied:
+        if isinstance(values, Mapping) and path in values:
+            raise InputError(f"{path}: is set to {told(values[path])} and varied as well; state one of the two")
 
 
 def one_of(name: str, value: Any, known: tuple[str, ...]) -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from shoal.arguments import check_estimated, numbers, one_of, told
+from shoal.arguments import check_apart, check_estimated, numbers, one_of, told
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.scene.load import as_scene
@@ -111,6 +111,7 @@ def sweep(
     from shoal.engines.spot_checks import spot_checked
     from shoal.engines.sweep import sweep
 
+    check_apart(values, vary)
     found = sweep(_scene(scene, values), vary, get_engine(engine), time)
     return spot_checked(found, get_engine(engine)) if verify else found
 

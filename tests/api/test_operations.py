@@ -225,6 +225,12 @@ def test_a_callers_own_scene_problem_and_recording(client: Client, problem: dict
         ("simulate", {"tolerance": 1e-3, "lanes": {"initial.OA.angle": [0.1]}}, "tolerance: a model is chosen for one"),
         ("sweep", {"vary": {"initial.XY.angle": [0.1]}}, "initial.XY"),
         ("uncertain", {"vary": {"gravity.1": "empirical(f.csv)"}}, "vary.gravity.1: 'empirical(f.csv)' is no dist"),
+        (
+            "sweep",
+            {"vary": {"initial.OA.angle": [0.1]}, "values": {"initial.OA.angle": 0.3}},
+            "is set to 0.3 and varied",
+        ),
+        ("simulate", {"lanes": {"initial.OA.angle": [0.1]}, "values": {"initial.OA.angle": 0.3}}, "is set to 0.3"),
         ("sweep", {"vary": {"initial.OA.angle": []}}, "vary.initial.OA.angle: "),
         ("sweep", {"vary": {f"initial.OA.angle{k}": [0.0] * 1000 for k in range(9)}}, "times: "),
         ("sweep", {"vary": {"solver.step": [1e-3, 1e-12]}}, "solver.step: "),

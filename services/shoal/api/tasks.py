@@ -17,7 +17,7 @@ from shoal.api.content import problem_of, scene_of, written
 from shoal.api.limits import check_end, check_grid, check_lanes, check_scene, within
 from shoal.api.operations import OfProblem, OfScene, Request, Simulate
 from shoal.api.settings import Settings
-from shoal.arguments import check_estimated
+from shoal.arguments import check_apart, check_estimated
 from shoal.engines.contract import Engine
 from shoal.engines.spot_checks import spot_check
 from shoal.engines.verification import verified
@@ -77,6 +77,7 @@ def _of_scene(bench: Bench, request: OfScene) -> tuple[Scene, Scene]:
     """The scene of a request, and the same with no more steps than the service computes. Raises InputError."""
     scene, settings = scene_of(request.scene, request.values), bench.settings
     lanes = request.lanes if isinstance(request, Simulate) else None
+    check_apart(request.values, lanes or request.varied)
     if lanes is None:
         check_grid(scene, settings, request.instants, request.varied)
         check_scene(scene, settings, request.instants, request.runs)

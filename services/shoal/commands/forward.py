@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from shoal.arguments import check_estimated
+from shoal.arguments import check_apart, check_estimated
 from shoal.commands import options
 from shoal.commands.options import Out, Times, Values
 from shoal.errors import InputError, check_trusted
@@ -117,6 +117,7 @@ def sweep(
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
+    check_apart(options.set_values(), vary)
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"sweeping {wanted.name}"):
         screen.compile_for(engine, [1, 2], wanted)

@@ -27,6 +27,8 @@ Out = Path | None
 """Where the result is written, if it is."""
 _VALUES = "shoal.values"
 """Where a command's context keeps what an estimate's file carries."""
+_SET = "shoal.set"
+"""Where it keeps what --set states."""
 
 
 def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, str]:
@@ -185,7 +187,13 @@ def _remember(context: click.Context, parameter: click.Parameter, path: Path | N
 
 def _with_carried(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, Any]:
     found: Carried | None = context.meta.get(_VALUES)
-    return {**({} if found is None else found.values), **field_values(context, parameter, pairs)}
+    context.meta[_SET] = stated = field_values(context, parameter, pairs)
+    return {**({} if found is None else found.values), **stated}
+
+
+def set_values() -> Values:
+    """What --set of the command that runs states, without what an estimate's file carries."""
+    return dict(click.get_current_context().meta.get(_SET, {}))
 
 
 class LateHelp(click.Option):
