@@ -39,10 +39,23 @@ def local(word: str) -> str:
     return re.sub(r"^(tcp://)?(0\.0\.0\.0|dask-scheduler)(?=:|$)", r"\g<1>127.0.0.1", word)
 
 
+def elsewhere(words: list[str]) -> list[str]:
+    """A command without the address on which it listens."""
+    return [word for k, word in enumerate(words) if "--host" not in words[max(k - 1, 0) : k + 1]]
+
+
 def test_every_command_is_the_line_of_the_procfile() -> None:
-    lines = procfile()
+    lines = {name: elsewhere(words) for name, words in procfile().items()}
     assert set(lines) == set(OURS)
-    assert {name: [local(str(word)) for word in SERVICES[name]["command"]] for name in OURS} == lines
+    assert {name: elsewhere([local(str(word)) for word in SERVICES[name]["command"]]) for name in OURS} == lines
+
+
+@pytest.mark.parametrize("line", (ROOT / "Procfile").read_text().splitlines())
+def test_every_process_listens_on_this_machine_alone(line: str) -> None:
+    """Unless told so, the health server of a Prefect worker, and a Dask worker, which runs what it is sent, do not."""
+    hosts = re.findall(r"(?:--host |PREFECT_WORKER_WEBSERVER_HOST=)(\S+)", line)
+    assert hosts == ([] if line.startswith("deploy:") else ["127.0.0.1"])
+    assert all(address.startswith("127.0.0.1:") for address in re.findall(r"--dashboard-address (\S+)", line))
 
 
 @pytest.mark.parametrize("name", sorted(SERVICES))
