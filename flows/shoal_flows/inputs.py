@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from unicodedata import normalize
 
 from shoal import library
 from shoal.errors import ComputationError, InputError
@@ -14,6 +15,11 @@ from shoal.scene.load import read_yaml, unknown
 from shoal.shelf import NAME, check_files, located, shelf
 
 from shoal_flows.choices import names
+
+_OWN = "own"
+"""How YAML is called that states no name."""
+_LONGEST = 64
+"""Name of a run or an entry, in characters."""
 
 
 def held(parameter: str, kind: str, given: str) -> str:
@@ -24,7 +30,7 @@ def held(parameter: str, kind: str, given: str) -> str:
     """
     if not given or library.KINDS[kind].built_in(given):
         return given
-    name = headed(given)
+    name = _plain(_stem(given))
     if "\n" in given:
         name, files = _of_text(parameter, kind, given)
     elif given.startswith(("http://", "https://")):
@@ -44,21 +50,48 @@ def held(parameter: str, kind: str, given: str) -> str:
 
 
 def title(given: str) -> str:
-    """How a scene, a problem or a recording is called: by its name, or by that of its file."""
-    stem = Path(given).name.partition("@")[0].removesuffix(".gz")
-    stem = stem.rpartition(".")[0] or stem
-    return stem if NAME.fullmatch(stem) else re.sub(r"[^A-Za-z0-9_-]+", "-", stem).strip("-_")[:64] or "given"
+    """How a scene, a problem or a study is called: by the name that it states, or by that of its file."""
+    path = Path(given)
+    if path.suffix in (".yaml", ".yml"):
+        with suppress(OSError, ValueError):
+            if name := _stated(path.read_text(encoding="utf-8")):
+                return name
+    return _stem(given)
 
 
-def headed(given: str) -> str:
+def _stem(given: str) -> str:
+    """The name of a file without its ending, or of an entry without its version."""
+    name = Path(given).name.partition("@")[0].removesuffix(".gz")
+    return name.rpartition(".")[0] or name
+
+
+def headed(given: str, kind: str) -> str:
     """The title of a parameter as it was given, YAML among them, before anybody has looked whether it is right."""
-    return "own" if "\n" in given else title(given)
+    return ((_stated(given) or _OWN) if "\n" in given else title(located(kind, given)))[:_LONGEST]
+
+
+def _stated(text: str) -> str:
+    """The name that a document gives itself, on one line; empty if there is none."""
+    try:
+        data = read_yaml(text, "")
+    except InputError:
+        return ""
+    name = data.get("name") if isinstance(data, dict) else None
+    return " ".join(name.split()) if isinstance(name, str) else ""
+
+
+def _plain(name: str) -> str:
+    """A name as an entry of the library may have it: letters without their accents."""
+    if NAME.fullmatch(name):
+        return name
+    letters = normalize("NFKD", name.replace("ß", "ss")).encode("ascii", "ignore").decode()
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", letters).strip("-_")[:_LONGEST] or "given"
 
 
 def _of_text(parameter: str, kind: str, text: str) -> tuple[str, library.Documents]:
     """YAML as it was typed into a form, under the name that it gives itself."""
-    data: Any = read_yaml(text, parameter)
-    name = title(str(data.get("name") or "own")) if isinstance(data, dict) else "own"
+    read_yaml(text, parameter)
+    name = _plain(_stated(text) or _OWN)
     return name, _gathered(parameter, kind, {f"{name}.yaml": text.encode()}, name)
 
 
@@ -75,7 +108,7 @@ def _of_service(parameter: str, kind: str, address: str) -> library.Documents:
         files = RemoteEngine(service).get_entry(kind, name)
     except (InputError, ComputationError) as error:
         raise type(error)(f"{parameter}: {error}") from None
-    return _gathered(parameter, kind, files, title(name))
+    return _gathered(parameter, kind, files, _plain(_stem(name)))
 
 
 def _gathered(parameter: str, kind: str, files: Mapping[str, bytes], name: str) -> library.Documents:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from shoal import library
 from shoal.errors import InputError
 from shoal.scene.load import scene_library
 from shoal_flows import choices, inputs
@@ -107,6 +108,26 @@ def test_an_entry_is_taken_from_the_library_of_a_service(url: str, place: Path) 
         held = Path(inputs.held("given", kind, f"{url}/v1/library/{kind}/{name}"))
         assert {path.name: path.read_bytes() for path in held.parent.iterdir()} == files
         assert held.parent.parent == place / "library" / "held"
+
+
+def test_the_title_is_the_name_that_a_document_states(place: Path) -> None:
+    """In MLflow and Prefect as in the registry: files of one name may hold machines that have nothing in common."""
+    text = PENDULUM.replace("name: single-pendulum", "name: Kran Größe 1")
+    assert text != PENDULUM
+    for folder in ("one", "two"):
+        (place / folder).mkdir()
+        (place / folder / "machine.yaml").write_text(text.replace("Größe 1", f"Größe {folder}"))
+    one, two = (str(place / folder / "machine.yaml") for folder in ("one", "two"))
+    assert [inputs.title(given) for given in (one, two)] == ["Kran Größe one", "Kran Größe two"]
+    assert inputs.headed(one, "scenes") == inputs.title(inputs.held("scene", "scenes", one)) == "Kran Größe one"
+    typed = inputs.held("scene", "scenes", text)
+    assert inputs.headed(text, "scenes") == inputs.title(typed) == "Kran Größe 1"
+    assert Path(typed).stem == "Kran-Grosse-1"
+    library.add(place / "one" / "machine.yaml")
+    assert inputs.headed("machine", "scenes") == "Kran Größe one"
+    assert inputs.headed("http://127.0.0.1:1/v1/library/scenes/arm", "scenes") == "arm"
+    assert inputs.headed("single-pendulum", "scenes") == inputs.title("single-pendulum") == "single-pendulum"
+    assert inputs.headed("bodies: [\n", "scenes") == "own"
 
 
 @pytest.mark.parametrize(

@@ -278,7 +278,7 @@ def test_a_scene_may_be_given_as_yaml() -> None:
     from prefect.client.orchestration import get_client
 
     with get_client(sync_client=True) as client:
-        assert "forward own" in {one.name for one in client.read_flow_runs()}
+        assert "forward single-pendulum" in {one.name for one in client.read_flow_runs()}
     assert {"scene.yaml", "call.json", "inputs"} <= {item.path for item in _client().list_artifacts(found.run_id)}
     with pytest.raises(InputError, match=r"^scene: bodies\.OA\.mass: .* found -1"):
         run.run_flow("forward", {"scene": json.dumps(text.replace("mass: 1.0", "mass: -1.0"))})

@@ -13,6 +13,7 @@ from prefect.artifacts import (
     update_progress_artifact,
 )
 from prefect.states import Completed
+from shoal.library import KINDS
 
 from shoal_flows import workers
 from shoal_flows.inputs import headed
@@ -73,11 +74,12 @@ def _where(run_id: str) -> str:
 
 def named(flow: str, parameter: str) -> Callable[[], str]:
     """How the runs of a flow are called: by the title of what it was given."""
+    kind = {one.one: folder for folder, one in KINDS.items()}[parameter]
 
     def name() -> str:
         from prefect.runtime import flow_run
 
-        return f"{flow} {headed(str(flow_run.parameters[parameter]))}"
+        return f"{flow} {headed(str(flow_run.parameters[parameter]), kind)}"
 
     return name
 
