@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,11 @@ from typing import Any
 import click
 from shoal.commands import options
 from shoal.errors import ComputationError, check_trusted
+
+
+def _stoppable() -> None:
+    """A service manager asks with SIGTERM for what a person does with Ctrl-C."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 @click.command("run")
@@ -24,6 +30,7 @@ def run_flow(flow: str, parameters: dict[str, str], as_json: bool) -> None:
     """
     from shoal_flows import run
 
+    _stoppable()
     doubts = run.main(flow, parameters, as_json)
     check_trusted(not doubts, f"not to be trusted: {'; '.join(doubts)}")
 
@@ -35,6 +42,7 @@ def rerun(run_id: str, as_json: bool) -> None:
     """Repeat a study from its MLflow run, and compare the figures."""
     from shoal_flows import rerun
 
+    _stoppable()
     complaint = rerun.main(run_id, as_json)
     check_trusted(not complaint, complaint)
 
@@ -103,4 +111,5 @@ def demo() -> None:
     """The main job: both cases of the paper on every engine. One table, one report."""
     from shoal_flows import demo
 
+    _stoppable()
     sys.exit(0 if demo.main() else ComputationError.exit_status)

@@ -36,6 +36,27 @@ def figures(estimate: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in estimate.items() if name != "wall_s"}
 
 
+def wait_until_all_have_gone(home: Path) -> None:
+    deadline = time.monotonic() + 300
+    while left := of_home(home):
+        assert time.monotonic() < deadline, f"still there: {left}"
+        time.sleep(0.1)
+
+
+@pytest.mark.slow
+def test_told_to_end_by_a_service_manager(tmp_path: Path) -> None:
+    """SIGTERM is what Ctrl-C is: one line, and nobody is left behind."""
+    with subprocess.Popen(COMMAND, env=environment(tmp_path), stderr=subprocess.PIPE, text=True) as study:
+        assert study.stderr is not None
+        assert any(told.startswith("done: kernels") for told in study.stderr)
+        study.terminate()
+        rest = study.stderr.read()
+    assert study.returncode == 130
+    assert rest.endswith("shoal: stopped\n")
+    assert "resource_tracker" not in rest
+    wait_until_all_have_gone(tmp_path)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "group"),
@@ -53,10 +74,7 @@ def test_killed_and_repeated(line: str, group: bool, tmp_path: Path) -> None:
         assert study.stderr is not None
         assert any(told.startswith(line.encode()) for told in study.stderr)
         (os.killpg if group else os.kill)(study.pid, signal.SIGKILL)
-    deadline = time.monotonic() + 300
-    while left := of_home(tmp_path):
-        assert time.monotonic() < deadline, f"still there: {left}"
-        time.sleep(0.1)
+    wait_until_all_have_gone(tmp_path)
     before = kept(tmp_path)
     assert all(pickle.loads(content) for content in before.values())
 
