@@ -133,6 +133,7 @@ def test_a_printed_scene_can_be_simulated_again(tmp_path: Path) -> None:
         (["simulate", "single-pendulum", "--at", "0.1", "--at", "0.2"], "'--at': is given 2 times"),
         (["sweep", "single-pendulum", "--vary", "bodies.OA.mass=1:2:2", "--at", "1", "--at", "2"], "is given 2 times"),
         (["run", "sweep", "--param", "engine=gauss", "--param", "engine=exudyn"], "engine is given twice"),
+        (["run", "sweep", "--param", "scene="], "'scene=' is not K=V; there is nothing after the ="),
         (["uncertain", "single-pendulum", "--vary", "gravity.0=1:2", *("--cost", "a=1") * 2], "cost: a is given twice"),
         (["uncertain", "single-pendulum", "--vary", "gravity.0=1:2", "--correlate", "a,b=0", "--correlate", "b,a=1"],
          "correlate: b, a: is given twice"),

@@ -96,6 +96,13 @@ def show(result: Any) -> None:
         console.print(f"{len(result.answer.status)} points in {result.answer.wall_s:.2f} s")
         if result.answer.check is not None:
             console.print(str(result.answer.check), soft_wrap=True)
+    else:
+        from shoal_validation.nightly.page import headline
+
+        from shoal_flows.flows.nightly import Validated
+
+        if isinstance(result, Validated):
+            console.print(headline(result.night), soft_wrap=True)
     if not isinstance(result, DemoResult) and not result.run_id.startswith(LOCAL):
         from shoal_flows.tracking.addresses import run_address
 

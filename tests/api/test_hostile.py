@@ -51,6 +51,18 @@ def test_yaml_is_not_read(gauss: httpx.Client) -> None:
     assert refused(gauss, "/v1/simulate", content=text, headers={"content-type": "text/yaml"})[:2] == (422, "input")
 
 
+@pytest.mark.parametrize(
+    ("stated", "found"),
+    [({}, "missing"), ({"content-type": "application/x-www-form-urlencoded"}, "application/x-www-form-urlencoded")],
+)
+def test_json_that_is_not_called_json(gauss: httpx.Client, stated: dict[str, str], found: str) -> None:
+    """As `curl --data` sends it without a header: the answer names the header."""
+    detail = refused(gauss, "/v1/simulate", content=b'{"scene": "single-pendulum"}', headers=stated)[2]
+    assert detail.startswith("Content-Type: ")
+    assert found in detail
+    assert detail.endswith("Content-Type: application/json")
+
+
 def test_large_body(gauss: httpx.Client) -> None:
     """By what it says of itself, and by what arrives when it says nothing."""
     body = b'{"scene": "' + b"x" * 10_000_000 + b'"}'

@@ -185,7 +185,7 @@ def test_forward_sweep_and_compare_are_logged() -> None:
     assert 0 < _client().get_run(forward.run_id).data.metrics["final/time_error"] < 1e-9
 
 
-def test_a_night_is_a_run_with_a_metric_per_line() -> None:
+def test_a_night_is_a_run_with_a_metric_per_line(capsys: pytest.CaptureFixture[str]) -> None:
     # Not `trusted`: this machine may be busy, and a line then takes longer than it should.
     night = run.run_flow("nightly", {"only": "four-bar-2", "quick": "true"})
     metrics = _client().get_run(night.run_id).data.metrics
@@ -195,6 +195,8 @@ def test_a_night_is_a_run_with_a_metric_per_line() -> None:
     assert metrics["lines/passed"] == night.night.counts["passed"]
     names = {item.path for item in _client().list_artifacts(night.run_id)}
     assert {"index.html", "night.json", "call.json"} <= names
+    show(night)
+    assert f"{night.night.counts['passed']} of {len(lines)} lines passed" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -209,6 +211,8 @@ def test_a_night_is_a_run_with_a_metric_per_line() -> None:
         ("sweep", {"scene": "single-pendulum", "vary": "{}"}, "vary"),
         ("sweep", {"vary": "7"}, "vary"),
         ("identify", {"methods": "[guess]"}, "guess"),
+        ("identify", {"methods": "[afsa, afsa]"}, "methods.* afsa is given twice"),
+        ("identify", {"seeds": "0,1,0"}, "seeds.* 0 is given twice"),
         ("compare", {"scene": "single-pendulum", "engines": "gauss"}, "engines"),
         ("compare", {"scene": "single-pendulum", "engines": "[gauss, gauss]"}, "two different"),
         ("export", {"scene": "single-pendulum", "to": "csv,step"}, "to: no form 'step'; there are exudyn, mjcf, fmu"),

@@ -255,7 +255,12 @@ def test_a_letter_is_a_unit_axis(letter: str) -> None:
             ("initial.top.rotation", [1.0, 0.0, 0.0, 0.0]), "initial.top.rotation", "4 entries", id="quaternion"
         ),
         pytest.param(("initial.top.spin", [1.0, 0.0]), "initial.top.spin", "too few numbers", id="two-of-three"),
-        pytest.param(("joints.foot.axis", [1, 0]), "joints.foot.axis", "too few numbers", id="axis-in-the-plane"),
+        pytest.param(
+            ("joints.foot.axis", [1, 0]),
+            "joints.foot.axis",
+            "three components.* `direction`, an angle",
+            id="axis-in-the-plane",
+        ),
         pytest.param(("bodies.top.inertia", [1.0, 2.0]), "bodies.top.inertia", "three principal moments", id="moments"),
         pytest.param(("bodies.top.inertia", [[1.0], [2.0, 3.0]]), "bodies.top.inertia", "3 x 3 matrix", id="rows"),
         pytest.param(("joints.foot.first.point", [0] * 4), "joints.foot.first.point", "a name, or a list", id="point"),

@@ -40,12 +40,20 @@ SceneName = Annotated[str, _named("scenes", "name, YAML, path or address")]
 ProblemName = Annotated[str, _named("problems", "name, YAML, path or address")]
 StudyName = Annotated[str, _named("studies", "name, YAML, path or address")]
 Data = Annotated[str, _named("recordings", "name, path or address")]
+
+
+def _different(given: list[Any]) -> list[Any]:
+    if twice := [one for k, one in enumerate(given) if one in given[:k]]:
+        raise ValueError(f"{twice[0]} is given twice, and would be computed twice")
+    return given
+
+
 EngineName = Annotated[str, _one_of(ENGINES)]
 Engines = Annotated[list[EngineName], Field(min_length=2, json_schema_extra={"uniqueItems": True})]
-Methods = Annotated[list[Annotated[str, _one_of(METHODS)]], Field(min_length=1)]
+Methods = Annotated[list[Annotated[str, _one_of(METHODS)]], Field(min_length=1), AfterValidator(_different)]
 Forms = Annotated[list[Annotated[str, _one_of(FORMS)]], Field(min_length=1, json_schema_extra={"uniqueItems": True})]
 Paths = list[str]
-Seeds = Annotated[list[int], Field(min_length=1)]
+Seeds = Annotated[list[int], Field(min_length=1), AfterValidator(_different)]
 Values = dict[str, Any]
 Instant = Annotated[float | None, Field(ge=0)]
 Time = Annotated[float, Field(ge=0)]

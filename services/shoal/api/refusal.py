@@ -97,12 +97,21 @@ def of_validation(error: RequestValidationError) -> Refusal:
     return Refusal("input", f"{field}: {detail}" if field else detail, field or "body")
 
 
+def _of_content(request: Request, error: RequestValidationError) -> Refusal | None:
+    """Where a body was not read as JSON because nobody said that it is."""
+    stated = request.headers.get("content-type", "")
+    if error.errors()[0]["loc"] != ("body",) or "json" in stated:
+        return None
+    found = f"is {stated}" if stated else "is missing"
+    return Refusal("input", f"Content-Type: {found}; the body is read with Content-Type: application/json")
+
+
 async def on_refusal(request: Request, error: Exception) -> Response:
     """Handler of refusals and of what the framework itself refuses."""
     if isinstance(error, Refusal):
         return problem_response(error)
     if isinstance(error, RequestValidationError):
-        return problem_response(of_validation(error))
+        return problem_response(_of_content(request, error) or of_validation(error))
     assert isinstance(error, PlainHTTPException)
     kind = _BY_STATUS.get(error.status_code, "internal")
     return problem_response(Refusal(kind, str(error.detail), headers=error.headers))

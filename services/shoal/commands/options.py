@@ -32,12 +32,13 @@ _SET = "shoal.set"
 
 
 def key_value(context: click.Context, parameter: click.Parameter, pairs: tuple[str, ...]) -> dict[str, str]:
-    """PATH=VALUE pairs as a mapping; of a path that stands twice no value is lost in silence."""
+    """Pairs such as PATH=VALUE as a mapping; of a path that stands twice no value is lost in silence."""
     found: dict[str, str] = {}
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not (key and equals and value):
-            raise click.BadParameter(f"{pair!r} is not PATH=VALUE")
+            reason = "; there is nothing after the =" if key and equals else ""
+            raise click.BadParameter(f"{pair!r} is not {parameter.metavar}{reason}")
         if (key := key.strip()) in found:
             raise click.BadParameter(f"{key} is given twice, as {found[key]} and as {value.strip()}")
         found[key] = value.strip()

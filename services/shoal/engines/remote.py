@@ -69,7 +69,8 @@ class RemoteEngine:
     @cached_property
     def capabilities(self) -> Capabilities:
         """What the engine there can simulate. Raises InputError, ComputationError."""
-        return self.ask("GET", "/v1/capabilities", read=_capabilities_of)
+        found: Capabilities = self.ask("GET", "/v1/capabilities", read=_capabilities_of)
+        return found
 
     def simulate(self, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
         """Run one scene; see `Engine`. Raises ComputationError if the service cannot be had."""
@@ -91,7 +92,8 @@ class RemoteEngine:
             "lanes": lanes,
             "verify": False,
         }
-        return self.ask("POST", "/v1/simulate", orjson.dumps(request), trajectory_of)
+        found: Trajectory = self.ask("POST", "/v1/simulate", orjson.dumps(request), trajectory_of)
+        return found
 
     def put_entry(self, kind: str, name: str, files: Mapping[str, bytes]) -> None:
         """Put an entry into the service's library, checked there. Raises InputError, ComputationError."""
@@ -100,7 +102,8 @@ class RemoteEngine:
 
     def get_entry(self, kind: str, name: str) -> dict[str, bytes]:
         """The files of an entry of the service's library. Raises InputError, ComputationError."""
-        return self.ask("GET", f"/v1/library/{kind}/{name}", read=_files_of)
+        found: dict[str, bytes] = self.ask("GET", f"/v1/library/{kind}/{name}", read=_files_of)
+        return found
 
     def ask(
         self, method: str, path: str, content: bytes | None = None, read: Callable[[Any], Any] = lambda found: found
@@ -118,7 +121,7 @@ class RemoteEngine:
         except httpx.HTTPError as error:
             raise ComputationError(
                 f"engine: {self.name} does not answer: {str(error) or type(error).__name__}; "
-                "start it with `shoal serve`, or leave --engine out"
+                "start it with `shoal serve`, or choose another engine"
             ) from None
         if response.status_code == 204:
             return None

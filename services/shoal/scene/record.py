@@ -95,6 +95,9 @@ def _letter(given: Any) -> Any:
     units = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     if isinstance(given, str) and given not in units:
         raise ValueError(f"an axis has three components, such as [1, 0, 0], or is x, y or z; found {given!r}")
+    if isinstance(given, list | tuple) and len(given) == 2:
+        in_plane = "in the plane the line of a slider is its `direction`, an angle [rad]"
+        raise ValueError(f"an axis is of space and has three components; {in_plane}; found {list(given)}")
     return units[given] if isinstance(given, str) else given
 
 
