@@ -11,7 +11,8 @@ from shoal.engines import get_engine
 from shoal.errors import InputError
 from shoal.identification import Problem, identify
 from shoal.identification.measure import measure
-from shoal.scene import load_scene
+from shoal.identification.recording.plausible import swing
+from shoal.scene import Scene, load_scene
 
 SCENE = load_scene("rigid-double-pendulum").with_values({"initial.OA.angle": 0.8, "initial.AB.angle": 0.3})
 TIMES = np.linspace(0.0, 1.5, 61)
@@ -74,3 +75,26 @@ def test_single_outliers_are_no_sign_of_degrees(tmp_path: Path) -> None:
 def test_a_channel_that_stands_still_is_named_before_any_search(tmp_path: Path, kind: str) -> None:
     with pytest.raises(InputError, match=r"column '[by]' is constant .* moves in the model"):
         identify(problem(recorded(tmp_path, kind, still=True), kind))
+
+
+def hinged(axis: list[float]) -> Scene:
+    """A rod of 0.6 m in space on a hinge alone, under gravity along -z."""
+    return Scene.model_validate({
+        "name": "hinged", "dimensions": 3, "gravity": [0, 0, -9.81],
+        "bodies": {"r": {"kind": "rod", "length": 0.6, "height": 0.01, "width": 0.01, "density": 2700.0}},
+        "joints": {"h": {"kind": "revolute", "axis": axis, "first": {"body": "ground", "point": [0, 0, 0]},
+                         "second": {"body": "r"}}},
+        "markers": {"e": {"body": "r", "point": "end"}},
+    })  # fmt: skip
+
+
+def test_a_hinge_in_space_swings_by_gravity_across_its_axis() -> None:
+    """As in the plane; about an upright axis gravity turns nothing, and no time is too long."""
+    scales = swing(hinged([0.0, 1.0, 0.0]))
+    assert scales is not None
+    assert scales.size == pytest.approx(0.6)
+    assert scales.slow == scales.fast == pytest.approx(2 * np.pi * np.sqrt(0.6 / 9.81))
+    tilted = swing(hinged([0.0, 0.6, 0.8]))
+    assert tilted is not None
+    assert tilted.slow == pytest.approx(scales.slow / np.sqrt(0.6))
+    assert swing(hinged([0.0, 0.0, 2.0])) is None

@@ -3,20 +3,25 @@
 Samples in even steps show a vibration of frequency f and one of n times the sampling rate more or less f alike. Where
 the bounds hold motions that the samples do not resolve, each parameter is scanned over its bounds on the first samples,
 so finely that no swing is missed, the others following to first order; from the dips of the misfit descents go on to
-the whole record.
+the whole record. Where an answer leaves a misfit, its start may be the alias: from starts that turn more often between
+samples it is sought anew over growing parts of the record, as the first samples show all of them alike.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.judge.other_starts import turned
 from shoal.identification.judge.rivals import apart, beside_samples, turn_of_samples
+from shoal.identification.methods.auto import explained
 from shoal.identification.methods.lanes import descend_many, differentiate_many, distinct, kept_apart
 from shoal.identification.methods.outcome import Outcome
+from shoal.identification.methods.progressive import extend
 from shoal.trajectory import Array
 
 _UNEVEN = 0.1
@@ -34,6 +39,8 @@ _FOLLOWED = 8
 """Dips that are followed, of each parameter."""
 _FITS = 0.3
 """Of the spread of the data: deviation (RMS) on the scanned samples, beyond that of the answer, that is followed."""
+_TURNED = 16
+"""Starts by more turns from which an answer that leaves a misfit is sought anew."""
 _PATIENCE = 100.0
 _GAINED = 1e-3
 """Of the fitness: an alias that fits no better is not the answer, but one beside it."""
@@ -47,6 +54,7 @@ def with_aliases(model: ForwardModel, outcome: Outcome) -> Outcome:
     if not np.isfinite(outcome.fitness) or turn_of_samples(model, _UNEVEN) is None:
         return outcome
     looking = model.aside()
+    outcome = _faster(looking, outcome)
     first = _first_part(looking)
     free = ~model.parameters.initial & ~model.parameters.proportional
     dips = [
@@ -64,6 +72,15 @@ def with_aliases(model: ForwardModel, outcome: Outcome) -> Outcome:
         end *= 2
         part = looking if end >= looking.measurement.end else looking.until(end)
     return outcome
+
+
+def _faster(model: ForwardModel, outcome: Outcome) -> Outcome:
+    """The outcome, or one that explains the data better and turns more often, or less, from sample to sample."""
+    starts = [] if explained(model, outcome) else list(islice(turned(model, outcome.point), _TURNED))
+    if not starts:
+        return outcome
+    found = extend(model, np.array(starts), lambda *_: None)
+    return _beside(model, outcome, [(found.point, found.fitness)]) if explained(model, found) else outcome
 
 
 def _beside(model: ForwardModel, outcome: Outcome, ends: list[tuple[Array, float]]) -> Outcome:

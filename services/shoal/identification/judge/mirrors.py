@@ -1,9 +1,10 @@
 """Mirror images of an answer: other starts of the machine that the measured channels may not tell apart.
 
 A height alone is the same for the machine reflected about the axis of gravity, a tip is the same for both elbows. From
-the answer such starts follow by reflections and half turns of its angles, and by other poses that show what its own
-shows. Those whose channels begin alike are simulated, and those that fit are followed to their minimum. An image that a
-descent from the answer itself reaches is none.
+the answer such starts follow by reflections and half turns of its angles, in space of the machine, and by other poses
+that show what its own shows; and others by a turn more from each sample to the next. Those whose channels begin alike
+are simulated, and those that fit are followed to their minimum. An image that a descent from the answer itself reaches
+is none.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from itertools import combinations, product
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
-from shoal.identification.judge.rivals import apart, turn_of_samples
+from shoal.identification.judge.other_starts import mirrored, turned, within_bounds
+from shoal.identification.judge.rivals import apart
 from shoal.identification.methods.lanes import descend_many, kept_apart
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.methods.starts import poses_at
@@ -25,8 +27,6 @@ from shoal.trajectory import Array
 _MOST = 256
 """Images by each combination of reflections; of machines with more only those of all angles, and of single ones."""
 _SIMULATED, _FOLLOWED = 16, 4
-_TURNS = 3
-"""So many times more, either way, a body may turn between two samples."""
 _ALIKE = 0.05
 """Of the spread of the data: deviation of an image's first channels from those of the answer."""
 _FITS = 0.3
@@ -41,7 +41,9 @@ def with_mirror_images(model: ForwardModel, outcome: Outcome) -> Outcome:
     if not np.isfinite(outcome.fitness):
         return outcome
     looking = model.aside()
-    points = _alike(looking, outcome.point, images(looking, outcome.point))
+    # Where a body turns more often it begins where it does in the answer.
+    more = kept_apart([outcome.point, *turned(looking, outcome.point)], partial(apart, model))[1 : 1 + _SIMULATED]
+    points = np.array([*_alike(looking, outcome.point, images(looking, outcome.point)), *more])
     if not len(points):
         return outcome
     values = looking.cost(looking.uncounted(points))
@@ -67,20 +69,21 @@ def with_mirror_images(model: ForwardModel, outcome: Outcome) -> Outcome:
 
 def images(model: ForwardModel, point: Array) -> Array:
     """Starts that might show the same, within the bounds, (images, parameters)."""
-    turned = (_within_bounds(model, candidate) for candidate in _candidates(model, point))
-    found = kept_apart([point, *(one for one in turned if one is not None)], partial(apart, model))
+    inside = (within_bounds(model, candidate) for candidate in _candidates(model, point))
+    found = kept_apart([point, *(one for one in inside if one is not None)], partial(apart, model))
     return np.array(found[1:]).reshape(-1, len(point))
 
 
 def _candidates(model: ForwardModel, point: Array) -> Iterator[Array]:
     """Images by reflections of the start, by poses that show the same, by changed signs and exchanged values."""
     recordings = tuple(model.measurement.recordings)
+    for name in recordings:
+        yield from mirrored(model, point, name)
     groups = [recordings, *((name,) for name in recordings)] if len(recordings) > 1 else [recordings]
     for group in groups:
         yield from _reflected(model, point, group)
     for name in recordings:
         yield from poses_at(model, point, name)
-    yield from _aliases(model, point)
     values = model.parameters.to_values(point)
     fields = [path.rpartition(".")[2] for path in model.parameters.paths]
     states = model.parameters.initial
@@ -126,31 +129,10 @@ def _reflected(model: ForwardModel, point: Array, recordings: tuple[str, ...]) -
         yield image
 
 
-def _aliases(model: ForwardModel, point: Array) -> Iterator[Array]:
-    """Rates of the start by which a body turns once more, or once less, and so on, from each sample to the next."""
-    turn = turn_of_samples(model)
-    if turn is None:
-        return
-    for k in (k for k, path in enumerate(model.parameters.paths) if path.endswith(".rate")):
-        for turns in (n * sign for n in range(1, _TURNS + 1) for sign in (1, -1)):
-            alias = point.copy()
-            alias[k] += turns * turn
-            yield alias
-
-
 def _few(count: int) -> list[tuple[int, ...]]:
     """Kinds for so many angles: the same for all, and one that differs."""
     alike = [(kind,) * count for kind in range(4)]
     return alike + [tuple(kind if i == k else 0 for i in range(count)) for k in range(count) for kind in range(1, 4)]
-
-
-def _within_bounds(model: ForwardModel, point: Array) -> Array | None:
-    """The point with whole turns taken off its angles until it is inside the bounds; None where none is."""
-    turned = point.copy()
-    for k in np.flatnonzero(model.parameters.turning):
-        turned[k] -= 2 * np.pi * np.ceil((turned[k] - model.upper[k]) / (2 * np.pi))
-    inside = np.all((turned >= model.lower) & (turned <= model.upper))
-    return turned if inside and np.all(np.isfinite(turned)) else None
 
 
 def _alike(model: ForwardModel, point: Array, candidates: Array) -> Array:

@@ -17,6 +17,7 @@ from shoal.errors import InputError
 from shoal.identification.recording.measurement import Measurement
 from shoal.identification.recording.source import Channel, FileSource
 from shoal.scene import Scene
+from shoal.scene.dimensions import padded
 from shoal.scene.joints import Revolute, Weld, places
 from shoal.trajectory import Array
 
@@ -30,6 +31,8 @@ _PARTS = 50.0
 """Of the shortest period: rates are taken over that time, so that noise does not count."""
 _STILL = 1e-9
 """Of a channel's size: what moves less does not move."""
+_UPRIGHT = 1e-3
+"""Of gravity: across the axis of a hinge, less swings nothing."""
 _FEWEST = 3
 """Samples, without which there is no motion."""
 _LENGTHS = {"cm": 100.0, "mm": 1000.0, "um": 1e6}
@@ -46,21 +49,31 @@ class Swing:
 
 def swing(scene: Scene) -> Swing | None:
     """The scales of a machine that is held by pivots and that gravity alone moves; None for any other."""
-    gravity = math.hypot(*scene.gravity)
+    gravity, swinging = math.hypot(*scene.gravity), _swinging(scene)
     held = {place.body for joint in scene.joints.values() for place in places(joint)}
     pivoted = all(isinstance(joint, Revolute | Weld) for joint in scene.joints.values())
-    if gravity == 0.0 or scene.loads or scene.ground_points or not pivoted or not held >= set(scene.bodies):
+    alone = not (scene.loads or scene.ground_points) and pivoted and held >= set(scene.bodies)
+    if not alone or swinging <= _UPRIGHT * gravity:
         return None
     attached = [*(place for joint in scene.joints.values() for place in places(joint)), *scene.markers.values()]
     lengths = []
     for name, body in scene.bodies.items():
-        used = {*(scene.location(place) for place in attached if place.body == name), *body.points.values()}
+        named = (padded(point, scene.dimensions) for point in body.points.values())
+        used = {*(scene.location(place) for place in attached if place.body == name), *named}
         lengths.append(max((math.dist(a, b) for a, b in combinations(used, 2)), default=0.0))
     if not (longest := sum(lengths)):
         return None
     shortest = min(length for length in lengths if length > 0.0)
-    slow, fast = (2 * math.pi * math.sqrt(length / gravity) for length in (longest, shortest))
+    slow, fast = (2 * math.pi * math.sqrt(length / g) for length, g in ((longest, swinging), (shortest, gravity)))
     return Swing(slow, fast, longest)
+
+
+def _swinging(scene: Scene) -> float:
+    """Gravity [m/s^2] across the axes of the hinges, the least of all: along an axis it turns nothing."""
+    gravity = np.array(padded(scene.gravity, 3))
+    axes = [np.array(joint.axis) for joint in scene.joints.values() if isinstance(joint, Revolute)]
+    across = [float(np.linalg.norm(np.cross(axis, gravity)) / np.linalg.norm(axis)) for axis in axes]
+    return min(across, default=math.hypot(*gravity))
 
 
 def check_units(
