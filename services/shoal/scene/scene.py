@@ -353,7 +353,7 @@ class Scene(Record):
     def value(self, path: str) -> Any:
         """The field at a dotted path. Raises InputError."""
         place: Any = self
-        for part in path.split("."):
+        for depth, part in enumerate(names := path.split(".")):
             if part in self.bodies and place is self.initial:
                 place = self.start(part)
             elif isinstance(place, Mapping) and part in place:
@@ -365,7 +365,7 @@ class Scene(Record):
             elif isinstance(place, tuple):
                 place = place[key(place, part, path, "")]
             else:
-                raise unknown(path, "", place)
+                raise unknown(path, ".".join(names[:depth]), place)
         return place
 
     @property
