@@ -19,7 +19,7 @@ from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array
-from shoal.scene import Attachment, Rod, Scene
+from shoal.scene import Attachment, PointMass, Rod, Scene
 from shoal.scene.record import Record
 
 UNSEEN = 1e-6
@@ -57,7 +57,7 @@ def _axes(scene: Scene, placement: Placement, size: float) -> Iterator[tuple[str
     told = [at for part in (scene.joints, scene.loads, scene.markers) for at in _attachments(part)]
     for name, body in scene.bodies.items():
         frame = placement.frames[name]
-        if not isinstance(frame, RigidFrame):
+        if not isinstance(frame, RigidFrame) or isinstance(body, PointMass):
             continue
         on = [Attachment(body=name, point=point) for point in (body.points if isinstance(body, Rod) else ())]
         on += [Attachment(body=name, point=tuple(np.ravel(body.centre_of_mass).tolist()))]
