@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shoal
 from scipy.integrate import solve_ivp
+from shoal.engines.contract import Extremes, check_lanes
 from shoal.errors import InputError
 from shoal.scene import Scene
 
@@ -96,6 +97,46 @@ def test_one_of_three_principal_moments_differs_from_lane_to_lane() -> None:
 
         end = solve_ivp(slope, (0.0, 1.0), [*np.eye(3).ravel(), *spin], rtol=1e-12, atol=1e-13).y[:9, -1]
         assert found.positions["tip"][lane] == pytest.approx(0.3 * end.reshape(3, 3)[:, 1], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("body", "lanes", "refused"),
+    [
+        (
+            {"kind": "rigid-body", "mass": 1.0, "inertia": [0.025, 0.025, 0.025]},
+            {"inertia.0": [0.045, 0.02], "inertia.1": [0.002, 0.02], "inertia.2": [0.002, 0.02]},
+            "principal moments 0.002, 0.002, 0.045",
+        ),
+        (
+            {"kind": "rod", "length": 1.0, "height": 0.04, "section": "tube", "wall": 0.004, "density": 1e3},
+            {"height": [0.012, 0.04], "wall": [0.018, 0.01]},
+            "wall 0.018 m is more than half the diameter",
+        ),
+        (
+            {"kind": "rod", "length": 1.0, "height": 0.04, "width": 0.01, "density": 1e3},
+            {"height": [0.6, 0.04], "length": [0.5, 1.0]},
+            "height 0.6 m is larger than the length",
+        ),
+    ],
+)
+def test_lanes_are_refused_that_no_body_is_whose_numbers_are_possible_one_by_one(
+    body: dict[str, Any], lanes: dict[str, list[float]], refused: str
+) -> None:
+    """Each number is accepted beside those of the scene; with the others of its lane it is impossible."""
+    start = {"position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0], "spin": [1.0, 2.0, 3.0]}
+    data = {"name": "alone", "dimensions": 3, "gravity": [0, 0, 0], "bodies": {"b": body}, "initial": {"b": start}}
+    scene = Scene.parse({**data, "markers": {"m": {"body": "b", "point": "start"}}})
+    values = {f"bodies.b.{field}": np.array(numbers) for field, numbers in lanes.items()}
+    for path, numbers in values.items():
+        for number in numbers.tolist():
+            scene.with_values({path: number})
+    with pytest.raises(InputError, match=refused):
+        check_lanes(scene, values)
+    accepted: Extremes = {}
+    second = {path: numbers[1:] for path, numbers in values.items()}
+    assert check_lanes(scene, second, accepted) == 1
+    with pytest.raises(InputError, match=refused):
+        check_lanes(scene, values, accepted)
 
 
 @pytest.mark.parametrize("path", ["bodies.rod.modal_stiffness.0.0", "bodies.rod.modes.0.translation.1"])

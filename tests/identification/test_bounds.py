@@ -59,3 +59,30 @@ def test_a_bound_that_a_tie_makes_right_is_one(tmp_path: Path) -> None:
     low = {"a": moment | {"lower": 0.5}}
     with pytest.raises(InputError, match=r"parameters\.a\.lower: 0\.5 cannot be: .* 2\.5 can be"):
         Problem.parse(fields | {"parameters": low}, "spin").load_scene()
+
+
+def _model(problem: Problem) -> ForwardModel:
+    channels = problem.channels_of(problem.sources["recording"])
+    measurement = Measurement.single(np.array([0.0, 0.1]), channels, np.zeros((2, 1)), "nothing", noise=1.0)
+    return ForwardModel(problem, problem.load_scene(), get_engine("gauss"), measurement)
+
+
+def test_all_three_principal_moments_are_sought(tmp_path: Path) -> None:
+    """Each obeys the triangle beside those of its point: what a scan holds beside the scene's own need not."""
+    one = _problem(tmp_path, 2.0, 8.0).model_dump(exclude_unset=True)
+    bounds = [(1.0, 9.0), (2.0, 8.0), (1.0, 7.0)]
+    sought = {
+        f"I{k}": {"path": f"bodies.b.inertia.{k}", "lower": low, "upper": high} for k, (low, high) in enumerate(bounds)
+    }
+    model = _model(Problem.parse(one | {"parameters": sought}, "spin"))
+    told = np.isfinite(model.uncounted(np.array([[1.2, 2.0, 1.5], [1.2, 2.1, 1.5]])))
+    assert told.all()
+    told = np.isfinite(model.uncounted(np.array([[1.2, 2.0, 1.5], [1.2, 8.0, 1.5], [3.0, 4.0, 5.0]]))).all(axis=1)
+    assert told.tolist() == [True, False, True]
+
+
+def test_a_factor_on_a_known_moment_is_beside_what_is_sought(tmp_path: Path) -> None:
+    """No body has 3, 4 and 10 kg m^2; one has 3, 8 and 10."""
+    model = _model(_problem(tmp_path, 2.0, 8.0))
+    seen = model.observe(np.array([[4.0], [8.0]]), factors={"bodies.b.inertia.2": 2.0})
+    assert np.isfinite(seen).all(axis=(1, 2)).tolist() == [False, True]

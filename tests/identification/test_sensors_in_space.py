@@ -137,6 +137,26 @@ def test_an_unbalanced_shaft_pulls_at_its_drive_as_euler_says() -> None:
         np.testing.assert_allclose(row, [*force, torque[0], torque[1], 0.0, torque[2], torque[2]], atol=1e-7)
 
 
+@pytest.mark.parametrize("lanes", [1, 2])
+@pytest.mark.parametrize("law", ["friction", "drag", "coulomb"])
+def test_the_motor_of_a_hinge_works_against_the_resistance_of_its_lane(law: str, lanes: int) -> None:
+    """M = I a + k w, k w |w| or k tanh(w/0.01) about an axis that is none of the ground's; the hinge has the rest."""
+    sides = {"first": GROUND, "second": {"body": "B"}, "axis": [1 / 3, 2 / 3, 2 / 3]}
+    scene = arm(
+        gravity=[0.0, 0.0, 0.0], bodies={"B": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.03}}, initial={},
+        markers={"o": {"body": "B"}},
+        joints={"J": {"kind": "revolute", **sides, law: 0.01}, "D": {"kind": "driven-angle", **sides, "angle": "2*t"}},
+    )  # fmt: skip
+    channels = (Channel(joint="D", quantity="torque"), Channel(joint="J", quantity="mx"))
+    engine, wanted, sizes = get_engine("gauss"), from_start(TIMES, channels), np.array([0.05, 0.2])[:lanes]
+    values = {f"joints.J.{law}": sizes}
+    motion = engine.simulate_many(equipped(scene, channels), values, wanted, **asking(engine, scene, channels))
+    found = observe(motion, channels, STRAIGHT, scene, values)[:, len(wanted) - len(TIMES) :]
+    against = sizes * {"friction": 2.0, "drag": 4.0, "coulomb": 1.0}[law]
+    np.testing.assert_allclose(found[..., 0], np.broadcast_to(against[:, None], found.shape[:2]), atol=1e-9)
+    np.testing.assert_allclose(found[..., 1], -found[..., 0] / 3, atol=1e-9)
+
+
 @pytest.mark.parametrize("element", ["rigid", "director-rod"])
 def test_what_stays_in_the_plane_shows_the_same_in_space(element: str) -> None:
     """A pendulum about z: of a rod that bends hardly, and of a rigid one."""

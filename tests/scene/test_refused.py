@@ -203,6 +203,13 @@ def test_a_scene_that_cannot_be_found_is_refused(
         ("bodies.OA.length.x", 1.0, r"bodies\.OA\.length\.x: no such field; bodies\.OA\.length has nothing"),
         ("initial.XY.angle", 1.0, r"initial\.XY\.angle: no such field; initial has OA, AB"),
         ("initial.OA.speed", 1.0, r"initial\.OA\.speed: no such field"),
+        (
+            "initial.OA.spin.0",
+            1.0,
+            r"spin\.0: initial\.OA\.spin is not stated, .*; state it whole, such as \[0, 0, 0\]",
+        ),
+        ("initial.OA.position.1", 1.0, r"initial\.OA\.position is not stated, .*; state it whole$"),
+        ("initial.OA.modes.0", 1.0, r"initial\.OA\.modes\.0: no such field; initial\.OA\.modes has nothing below it"),
         ("initial.OA", 1.0, r"initial\.OA"),
         ("solver", 1.0, r"solver"),
         ("", 1.0, r"no such field"),

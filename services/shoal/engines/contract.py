@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +13,9 @@ from shoal.arguments import numbers
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
+
+Extremes = dict[tuple[str, ...], list[tuple[float, float]]]
+"""The least and the most of each of some paths that a scene accepts together, by these paths."""
 
 
 @dataclass(frozen=True)
@@ -72,25 +76,25 @@ def sampling_times(scene: Scene, times: Sequence[float] | Array | None) -> Array
     return wanted
 
 
-def check_lanes(
-    scene: Scene, values: Mapping[str, Array], accepted: dict[str, tuple[float, float]] | None = None
-) -> int:
+def check_lanes(scene: Scene, values: Mapping[str, Array], accepted: Extremes | None = None) -> int:
     """Number of lanes in `values`, after the scene accepted the extremes of each, or whole lanes. Raises InputError.
 
-    accepted: the extremes of earlier calls, by path, which these widen; what lies between them is accepted too.
+    Of numbers that limit each other (`Scene.bound_together`) it accepted the extremes with each other. accepted: the
+    extremes of earlier calls, which these widen; what lies between them is accepted too.
     """
     values = {path: numbers(path, lanes) for path, lanes in values.items()}
     sizes = {path: lanes.size for path, lanes in values.items()}
     if len(set(sizes.values())) != 1:
         raise InputError(f"lanes: every path needs as many numbers as the others, found {sizes}")
     known, count = {} if accepted is None else accepted, next(iter(sizes.values()))
-    for path, lanes in values.items():
-        low, high = float(np.min(lanes)), float(np.max(lanes))
-        least, most = known.get(path, (np.inf, -np.inf))
-        if not (least <= low and high <= most):
+    for group in (*((path,) for path in values), *scene.bound_together(values)):
+        ends = [(float(np.min(values[path])), float(np.max(values[path]))) for path in group]
+        before = known.get(group, [(np.inf, -np.inf)] * len(group))
+        wider = [(min(low, least), max(high, most)) for (low, high), (least, most) in zip(ends, before, strict=True)]
+        if wider != before:
             try:
-                for extreme in (low, high):
-                    scene.with_values({path: extreme})
+                for corner in product(*wider):
+                    scene.with_values(dict(zip(group, corner, strict=True)))
             except InputError:
                 if len(values) == 1:
                     raise
@@ -98,5 +102,5 @@ def check_lanes(
                 for k in range(count):
                     scene.with_values({name: float(column[k]) for name, column in values.items()})
                 return count
-            known[path] = min(low, least), max(high, most)
+            known[group] = wider
     return count

@@ -12,7 +12,7 @@ import numpy as np
 from shoal.arguments import numbers
 from shoal.engines import swarm_motion
 from shoal.engines.capabilities import check_acceleration
-from shoal.engines.contract import check_lanes, sampling_times
+from shoal.engines.contract import Extremes, check_lanes, sampling_times
 from shoal.errors import InputError
 from shoal.mechanics.machine import Machine
 from shoal.mechanics.persist import persist
@@ -42,7 +42,7 @@ class Prepared:
         self._threads = threads
         self._instants = sampling_times(scene, None)
         self._checked: dict[tuple[str, tuple[int, ...], bytes], Array] = {}
-        self._accepted: dict[str, tuple[float, float]] = {}
+        self._accepted: Extremes = {}
         self._machines: dict[tuple[float, bool], Machine] = {}
         self._set: dict[str, Prepared] = {}
 

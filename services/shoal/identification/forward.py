@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ from shoal.trajectory import Array, Status, Trajectory
 AT_ONCE = 2 * len(WIDE)
 """Lanes of a call where the time is limited: whole tiles, enough for two threads."""
 
-_KEPT = ("parameters", "rows", "loss_scale", "_native", "_placements", "_accepted")
+_KEPT = ("parameters", "rows", "loss_scale", "_native", "_placements", "_accepted", "_together")
 """What models of the same scene, engine and measurement share."""
 
 Progress = Callable[[int, float, float], None]
@@ -74,6 +75,7 @@ class ForwardModel:
     """Of the longest part of the recordings that was fitted: its end [s], the best fitness on it, and the point."""
 
     _placements: dict[str, Placement] = field(init=False, default_factory=dict)
+    _together: dict[tuple[str, ...], bool] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.counter = EvaluationCounter(self._residuals, cost=self.cost)
@@ -163,19 +165,17 @@ class ForwardModel:
         scene = scene.with_values(recording.stated.known) if recording.stated.known else scene
         values = self.parameters.scene_values(points, name)
         factors = factors or {}
-        # What is the same in all lanes belongs into the scene, whose model is kept.
-        if fixed := {path: factor * scene.value(path) for path, factor in factors.items() if path not in values}:
-            scene = scene.with_values(fixed)
+        fixed = {path: factor * scene.value(path) for path, factor in factors.items() if path not in values}
         values |= {path: factor * values[path] for path, factor in factors.items() if path not in fixed}
         seen_by = self.parameters.measurement_values(points, name, recording.stated)
         seen = np.full((len(points), len(times), len(recording.channels)), np.nan)
         clock, delay = seen_by.pop("clock"), seen_by.pop("delay")
-        for lanes, instants, rows in by_clock(times, clock, delay, self._possible(points, values, scene)):
+        possible = self._possible(points, values | {path: np.full(len(points), x) for path, x in fixed.items()}, scene)
+        for lanes, instants, rows in by_clock(times, clock, delay, possible):
             inputs = {path: numbers[lanes] for path, numbers in values.items()}
-            shared = {path: float(x[0]) for path, x in inputs.items() if _same_in_all(path, x)}
-            inputs = {path: x for path, x in inputs.items() if path not in shared}
+            held, inputs = _with_shared(scene, fixed, inputs, len(lanes))
             view = Camera(**{key: numbers[lanes] for key, numbers in seen_by.items()})
-            found = self._simulate(scene.with_values(shared) if shared else scene, inputs, instants, view, name)
+            found = self._simulate(held, inputs, instants, view, name)
             seen[lanes] = np.take_along_axis(found, rows[:, :, None], axis=1)
         return seen
 
@@ -281,7 +281,10 @@ class ForwardModel:
         return self.scene.with_values({**stated, **{path: float(x[0]) for path, x in values.items()}})
 
     def _possible(self, points: Array, values: dict[str, Array], scene: Scene) -> npt.NDArray[np.bool_]:
-        """Which points are scenes at all, (points,): inside the box all are, outside a mass may be negative."""
+        """Which points are scenes at all, (points,): outside the box a mass may be negative.
+
+        Inside it all are, but for numbers that limit each other, such as the moments of inertia of a body.
+        """
         possible: npt.NDArray[np.bool_] = np.ones(len(points), dtype=bool)
         outside = np.any((points < self.lower) | (points > self.upper), axis=1)
         doubtful = possible.copy() if self.problem.ties else outside
@@ -291,9 +294,24 @@ class ForwardModel:
             if not all(self.accepts(path, x, scene) for x in extremes):
                 possible[doubtful] &= [self.accepts(path, float(x), scene) for x in numbers[doubtful]]
         # What cannot be beside the other values of the scene may be beside those of the point.
-        for k in np.flatnonzero(np.logical_not(possible)) if self.problem.ties else ():
+        for k in np.flatnonzero(np.logical_not(possible)):
             possible[k] = accepts(scene, {path: float(numbers[k]) for path, numbers in values.items()})
+        for group in scene.bound_together(values):
+            if not self._box_accepts(group):
+                possible &= [
+                    accepts(scene, {path: float(values[path][k]) for path in group}) for k in range(len(points))
+                ]
         return possible
+
+    def _box_accepts(self, paths: tuple[str, ...]) -> bool:
+        """Whether the scene accepts the bounds of the parameters at some paths with each other."""
+        if paths not in self._together:
+            bounds = {one.path: (one.lower, one.upper) for one in self.problem.parameters.values()}
+            self._together[paths] = all(path in bounds for path in paths) and all(
+                accepts(self.scene, dict(zip(paths, corner, strict=True)))
+                for corner in product(*(bounds[path] for path in paths))
+            )
+        return self._together[paths]
 
     def accepts(self, path: str, value: float, scene: Scene | None = None) -> bool:
         """Whether a scene, else the model's, may have a value at a path."""
@@ -395,6 +413,20 @@ def _not_felt(recording: Recording) -> Recording:
     shown = [k for k, channel in enumerate(recording.channels) if not channel.is_felt]
     channels = tuple(recording.channels[k] for k in shown)
     return replace(recording, channels=channels, values=recording.values[:, shown], noise=recording.noise[shown])
+
+
+def _with_shared(
+    scene: Scene, fixed: dict[str, float], values: dict[str, Array], lanes: int
+) -> tuple[Scene, dict[str, Array]]:
+    """The scene with what is the same in all lanes, so that its model is kept, and what is left of the values."""
+    shared = fixed | {path: float(x[0]) for path, x in values.items() if _same_in_all(path, x)}
+    if not shared:
+        return scene, values
+    try:
+        return scene.with_values(shared), {path: x for path, x in values.items() if path not in shared}
+    except InputError:
+        # What cannot be beside the other values of the scene may be beside those of its lane.
+        return scene, values | {path: np.full(lanes, x) for path, x in fixed.items()}
 
 
 def _same_in_all(path: str, numbers: Array) -> bool:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -104,6 +104,10 @@ class Rod(Record):
     torsion_constant: Positive | None = None
     director: Literal["y", "z"] | None = None
     rotary_inertia: bool = False
+    limiting: ClassVar[tuple[str, ...]] = (
+        *("length", "height", "width", "wall", "web", "flange"),
+        *("end_height", "end_width", "twist"),
+    )
 
     @model_validator(mode="after")
     def _nothing_is_ignored(self) -> Rod:

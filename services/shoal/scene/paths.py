@@ -14,6 +14,9 @@ from shoal.scene.function import Function
 from shoal.scene.initial import Begin, InitialState
 from shoal.scene.record import Record
 
+_VECTORS = (".rotation", ".spin")
+"""Of a start in space."""
+
 
 def parts(path: Any) -> list[str]:
     """The names along a dotted path. Raises InputError for what is no text."""
@@ -87,11 +90,14 @@ def key(place: Any, part: str, path: str, parent: str) -> Any:
 
 def unknown(path: str, parent: str, place: Any) -> InputError:
     """What to say of a path that leads nowhere."""
+    if place is None and parent.startswith("initial.") and parent.endswith((".position", *_VECTORS)):
+        whole = ", such as [0, 0, 0]" if parent.endswith(_VECTORS) else ""
+        return InputError(f"{path}: {parent} is not stated, so it has no component to set; state it whole{whole}")
     if isinstance(place, Record):
         place = type(place).model_fields
     if isinstance(place, Begin):
         place = InitialState.model_fields
     if isinstance(place, list | tuple):
         place = {str(k): entry for k, entry in enumerate(place)}
-    known = ", ".join(place) if isinstance(place, Mapping) else "nothing below it"
+    known = (", ".join(place) if isinstance(place, Mapping) else "") or "nothing below it"
     return InputError(f"{path}: no such field; {parent or 'the scene'} has {known}")

@@ -291,6 +291,28 @@ class Scene(Record):
         """The first path whose number has to be the same in all lanes, as those in functions of time and matrices."""
         return next((path for path in paths if shared(self, parts(path))), None)
 
+    def bound_together(self, paths: Iterable[str]) -> list[tuple[str, ...]]:
+        """Those of some paths of numbers whose limits depend on each other, two or more by body.
+
+        Of a rod its lengths and the places on its axis, of a rigid body its moments of inertia. Where it accepts the
+        extremes of all with each other it accepts what lies between.
+        """
+        groups: dict[str, list[str]] = {}
+        for path in paths:
+            if (body := self._limiting(path.split("."))) is not None:
+                groups.setdefault(body, []).append(path)
+        return [tuple(group) for group in groups.values() if len(group) > 1]
+
+    def _limiting(self, path: list[str]) -> str | None:
+        """The body whose other numbers limit the one at a path, or are limited by it."""
+        if path[0] == "bodies":
+            body = self.bodies.get(path[1])
+            return path[1] if body is not None and path[2] in getattr(body, "limiting", ()) else None
+        if "point" not in path:
+            return None
+        on = str(self.value(".".join([*path[: path.index("point")], "body"])))
+        return on if on in self.bodies and self.bodies[on].element not in FRAMED else None
+
     def _has(self, path: str, value: Any) -> bool:
         """Whether the scene states this value there already, or a function that begins like this one."""
         head, *rest = path.split(".")
@@ -331,7 +353,7 @@ class Scene(Record):
     def value(self, path: str) -> Any:
         """The field at a dotted path. Raises InputError."""
         place: Any = self
-        for part in path.split("."):
+        for depth, part in enumerate(names := path.split(".")):
             if part in self.bodies and place is self.initial:
                 place = self.start(part)
             elif isinstance(place, Mapping) and part in place:
@@ -343,7 +365,7 @@ class Scene(Record):
             elif isinstance(place, tuple):
                 place = place[key(place, part, path, "")]
             else:
-                raise unknown(path, "", place)
+                raise unknown(path, ".".join(names[:depth]), place)
         return place
 
     @property

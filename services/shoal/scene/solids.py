@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -42,6 +42,7 @@ class RigidBody(Record):
     centre_of_mass: Vector = (0.0, 0.0)
     named_points: dict[str, Vector] = {}
     element: Literal["rigid"] = "rigid"
+    limiting: ClassVar[tuple[str, ...]] = ("inertia",)
 
     @model_validator(mode="after")
     def _possible(self) -> RigidBody:

@@ -48,6 +48,21 @@ def test_an_unbalanced_shaft_pulls_at_its_bearing_as_euler_says() -> None:
     assert found.unique
 
 
+def test_a_driven_hinge_holds_nothing_twice() -> None:
+    """The model holds the cosine and the sine of the angle of a body whose director is of unit length: one for all."""
+    sides = {"first": {"body": "ground", "point": [0.0, 0.0, 0.0]}, "second": {"body": "B"}, "axis": [1.0, 0.0, 0.0]}
+    scene = Scene.parse({
+        "name": "shaft", "dimensions": 3, "gravity": [0.0, 0.0, 0.0],
+        "bodies": {"B": {"kind": "rigid-body", "mass": 1.0, "inertia": [0.1, 0.2, 0.3]}},
+        "joints": {"h": {"kind": "revolute", **sides}, "d": {"kind": "driven-angle", **sides, "angle": "3*t"}},
+        "markers": {"m": {"body": "B"}},
+    })  # fmt: skip
+    (found,) = reactions(scene)
+    assert found.redundancy == 0
+    assert found.constraints == ()
+    assert found.not_unique == ()
+
+
 def test_a_conical_pendulum_pulls_along_its_rod() -> None:
     """Speed so that the angle stays: m g tan a = m w^2 L sin a; the pull is m g / cos a."""
     angle, length, g = 0.6, 1.3, 9.81

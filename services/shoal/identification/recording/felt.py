@@ -124,7 +124,7 @@ def _by_states(
         raise InputError(f"channels: {channel.quantity} needs all coordinates, which this motion does not tell")
     finite = np.all(np.isfinite(states.q) & np.isfinite(states.v), axis=(0, 1))
     whole = np.flatnonzero(finite).tolist()
-    if alone and trajectory.lanes > 1:
+    if alone and values:
         yield from ((lane, lane_of(states, trajectory.times, scene, values, lane)) for lane in whole)
     else:
         yield from zip(whole, lanes_of(states, trajectory.times, whole), strict=True)

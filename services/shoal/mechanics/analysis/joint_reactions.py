@@ -172,7 +172,8 @@ def reactions_of(
             {unknown[k].name: values[k] for k in mine},
             bool(np.all(free_play[mine] < SHARE)),
         )
-    names = redundant_constraints(evaluator, q, t) if naming else ()
+    # Without a self-stress only rows of the model depend on each other, as both parts of a driven angle on a director.
+    names = redundant_constraints(evaluator, q, t) if naming and count > rank else ()
     return Reactions(t, found, count - rank, names, rest / scale if scale > 0 else 0.0, scale)
 
 

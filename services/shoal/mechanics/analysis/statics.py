@@ -84,7 +84,7 @@ class _Search:
         q, gap = self.balance.restore(q)
         if gap > GAPE * self.balance.size:
             return self._ending(q, Held.FAILED, f"the joints cannot be closed: they gape by {gap:.2g}")
-        self.balance.left_out, self.spinning = idle_spins(self.balance, self.placement, q)
+        self._leave_out_spins(q)
         has_potential = not self.evaluator.follows
         message = ""
         found = self._at(q) or self._loaded(q)
@@ -177,7 +177,8 @@ class _Search:
             text = f"{message}nothing holds {self._movers(lowest)}; it may rest in other places as well"
             return self._ending(found.q, Held.UNHELD, text, found)
         if self.spinning:
-            message += f"{', '.join(self.spinning)}: free to spin about its axis, which moves nothing"
+            axes = "its axis" if len(self.spinning) == 1 else "their axes"
+            message += f"{', '.join(self.spinning)}: free to spin about {axes}, which moves nothing"
         return self._ending(found.q, Held.OK, message.rstrip("; "), found)
 
     def _ending(self, q: Array, status: Held, message: str, found: Found | None = None) -> Equilibrium:
@@ -320,8 +321,15 @@ class _Search:
     def _follow(self, q: Array) -> None:
         """Count the turns of springs and markers."""
         self.evaluator.remember(q)
+        if self.spinning and not self.evaluator.model.flexible:
+            self._leave_out_spins(q)
         change = plane.angle(self.marker_lines.at(q).T) - self.angles
         self.angles = self.angles + change - 2 * np.pi * np.rint(change / (2 * np.pi))
+
+    def _leave_out_spins(self, q: Array) -> None:
+        """What bodies may turn about their own axes from q on is no motion of the machine."""
+        self.balance.left_out = self.balance.left_out[:0]
+        self.balance.left_out, self.spinning = idle_spins(self.balance, self.placement, q)
 
     def _movers(self, displacement: Array) -> str:
         """The bodies that a displacement moves, most of all first."""
@@ -353,5 +361,5 @@ def _vectors(frame: Any, size: float) -> list[Any]:
     if isinstance(frame, PointFrame):
         return [frame.origin]
     if isinstance(frame, RigidFrame):
-        return [frame.origin, frame.origin + frame.directors[0] * size]
+        return [frame.origin, *(frame.origin + one * size for one in frame.directors[: len(frame.directors) - 1])]
     return [node[0] for node in frame.nodes]
