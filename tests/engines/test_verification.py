@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from shoal.engines import get_engine, verification
 from shoal.engines.verification import verified, verify
 from shoal.scene import load_scene
@@ -98,3 +99,45 @@ def test_no_second_run_that_takes_too_long(monkeypatch: pytest.MonkeyPatch) -> N
     stated = verified(get_engine("gauss"), load_scene("flexible-double-pendulum")).model["verification"]
     assert stated["time_error"] is stated["mesh_error"] is None
     assert "that would take" in stated["note"]
+
+
+ENDED: dict[str, tuple[str, dict[str, float]]] = {
+    "at the longest step": ("0", {"solver.max_step": 0.3, "solver.duration": 5.0}),
+    "as functions of time have it": ("3*sin(7*t)", {"solver.duration": 25.0}),
+    "at kinks": ("2*abs(sin(9*t))", {"solver.max_step": 10.0, "solver.duration": 6.0}),
+}
+"""Steps that end for other reasons than a loose tolerance: the torque on a pendulum of 1 kg and 1 m, and settings."""
+
+
+@pytest.mark.parametrize("name", list(ENDED))
+def test_steps_that_end_for_other_reasons_than_their_tolerance_are_halved_to_tell_their_error(name: str) -> None:
+    """A second run of the same steps agrees to the last digit, however wrong both are. Truth: scipy."""
+    torque, settings = ENDED[name]
+    loose = {"solver.integrator": "dop853", "solver.relative_tolerance": 0.1, "solver.absolute_tolerance": 0.1}
+    drive = {"loads": {"drive": {"kind": "torque", "at": {"body": "OA"}, "torque": torque}}}
+    times = np.linspace(0.0, settings["solver.duration"], 41)
+    run = verified(get_engine("gauss"), load_scene("single-pendulum").with_values(loose | drive | settings), times)
+    push = eval(f"lambda t: {torque}", {"sin": np.sin, "abs": abs})
+    angle = solve_ivp(
+        lambda t, y: [y[1], push(t) - 9.81 * np.cos(y[0])],
+        (0.0, times[-1]),
+        [0.0, 0.0],
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-12,
+        max_step=0.02,
+        t_eval=times,
+    ).y[0]
+    true = np.max(np.hypot(*(run.marker("A").T - [np.cos(angle), np.sin(angle)])))
+    assert run.ok, run.message
+    assert true > 1e-6
+    assert true / 1.2 < run.model["verification"]["time_error"] < 3 * true
+
+
+def test_a_looser_run_of_the_same_steps_says_nothing() -> None:
+    """Every step ends at `solver.max_step`, at tolerances that are held against looser ones. Truth: the usual ones."""
+    settings = {"solver.relative_tolerance": 1e-8, "solver.absolute_tolerance": 1e-8, "solver.max_step": 0.005}
+    scene, engine = load_scene("single-pendulum"), get_engine("gauss")
+    run = verified(engine, scene.with_values({"solver.integrator": "radau5", **settings}), [5.0])
+    true = run.distance(engine.simulate(scene, [5.0]))
+    assert true / 1.2 < run.model["verification"]["time_error"] < 3 * true

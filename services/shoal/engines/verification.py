@@ -45,9 +45,16 @@ SPAN = 100.0
 LOOSE = 1e-8
 """A tolerance above this is held against a tighter one, a tolerance below against a looser one, which costs less."""
 TIGHTER, TIGHTEST = 0.1, 1e-14
-"""Factor on the tolerance of the run that tells whether a chaotic motion is still known; the smallest tolerance."""
+"""Factor on the tolerance of the run that is asked where a looser one does not tell; the smallest tolerance."""
+FEWER = 0.8
+"""A looser run that takes more than this part of the steps takes them for another reason than its tolerance."""
+SHORTER, MORE = 0.5, 4
+"""Part of the mean step that those of a tighter run may reach, and how many times as many it may take at most."""
 HALVING = 4.0 / 3.0
-"""The error of a method of second order in terms of its distance from the run with half the step."""
+"""The error of a method of second order in terms of its distance from the run with half the step.
+
+Friction and kinks leave methods of higher order no more where steps are long.
+"""
 SHARPER, CREEP = 0.1, 0.01
 """Factor on the speed over which dry friction is smoothed, for the run that tells the creep, and how far that one may
 creep itself: a fraction of the machine's size, or rad."""
@@ -157,7 +164,7 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
     if careful is not None:
         if careful.status[0] in UNTRUSTED:
             return Verification(None, None, scale, rejected=careful.message)
-        time_error, angle_error = _time_error(trajectory, careful, scene, scale, second)
+        (time_error, angle_error), notes[0] = _time_error(trajectory, careful, scene, scale, second)
     mesh_error = None
     if any(_flexible(scene)):
         mesh_error, note = _mesh_error(trajectory, scene, scale, second)
@@ -264,20 +271,30 @@ def _second(
 
 def _time_error(
     trajectory: Trajectory, careful: Trajectory, scene: Scene, scale: float, second: Second
-) -> tuple[float, float | None]:
-    """The distance of the two runs as an error of the first [m], and that of its angles [rad]; None in space."""
+) -> tuple[tuple[float | None, float | None], str]:
+    """The distance of the two runs as an error of the first [m], and that of its angles [rad], which is None in space.
+
+    Both are None, and the note says why, where the runs are no measure of it.
+    """
     away = _apart(trajectory, careful)
     if not _adaptive(trajectory):
         # One that chooses its steps is as good as exact beside one that does not.
         away = away if facts(careful.model["integrator"]).adaptive else HALVING * away
-    elif scene.solver.relative_tolerance <= LOOSE:
-        if np.all(away <= WRONG * np.array([scale, 1.0])):
-            away = away / np.sqrt(SPAN)
+    elif scene.solver.relative_tolerance > LOOSE:
+        away = HALVING * away
+    else:
+        chaotic = bool(np.any(away > WRONG * np.array([scale, 1.0])))
+        if not chaotic and careful.steps <= FEWER * trajectory.steps:
+            away = away / (np.sqrt(SPAN) - 1.0)
         else:
-            # A chaotic motion may be lost to the looser run and not yet to this one, which a tighter one tells.
-            tighter, _ = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)
-            away = away if tighter is None else np.minimum(away, _apart(trajectory, tighter))
-    return float(away[0]), None if scene.dimensions == 3 else float(away[1])
+            # A chaotic motion may be lost to the looser run and not yet to this one, and one whose steps end for other
+            # reasons than its tolerance has the same ones in both: a tighter one with shorter steps tells.
+            tighter, note = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)
+            if tighter is not None and tighter.ok:
+                away = _apart(trajectory, tighter)
+            elif not chaotic:
+                return (None, None), note or "time error not estimated: the run with shorter steps is rejected"
+    return (float(away[0]), None if scene.dimensions == 3 else float(away[1])), ""
 
 
 def _apart(one: Trajectory, other: Trajectory) -> Array:
@@ -302,7 +319,11 @@ def _flexible(scene: Scene) -> dict[str, Rod]:
 
 
 def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) -> Iterator[Scene]:
-    """The same mesh, with the usual treatment of constraints. factor: on the tolerance of an adaptive integrator."""
+    """The same mesh, with the usual treatment of constraints. factor: on the tolerance of an adaptive integrator.
+
+    Steps of these may end at a longest one or where forces have kinks, whatever the tolerance. So those of a tighter
+    run are shorter in any case: two runs of the same steps would agree, however wrong both are.
+    """
     named = ("acceleration", "project", "rank_tolerance", "inertia_cap")
     usual = {name: Solver.model_fields[name].default for name in named}
     settings = {f"solver.{name}": value for name, value in usual.items()}
@@ -311,9 +332,14 @@ def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) 
         factor = factor or (1 / SPAN if solver.relative_tolerance > LOOSE else SPAN)
         settings["solver.relative_tolerance"] = max(solver.relative_tolerance * factor, TIGHTEST)
         settings["solver.absolute_tolerance"] = solver.absolute_tolerance * factor
+        if factor < 1 and trajectory.steps:
+            settings["solver.max_step"] = SHORTER * float(trajectory.times[-1]) / trajectory.steps
+            settings["solver.max_steps"] = max(solver.max_steps, MORE * trajectory.steps)
         yield scene.with_values(settings)
     elif not any(_flexible(scene)):
-        yield scene.with_values({**settings, "solver.integrator": "auto"})
+        # Tolerances that the run itself had no use for may be any.
+        close = {path: min(scene.value(path), most) for path, most in CLOSE.items()}
+        yield scene.with_values({**settings, **close, "solver.integrator": "auto"})
     else:
         scene = scene.with_values(settings)
         if _cut(trajectory, scene):

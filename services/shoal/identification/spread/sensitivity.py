@@ -60,10 +60,12 @@ def sensitivity(model: ForwardModel, point: Array, residual: Array | None = None
     residual: at the point, (rows,), where it is known.
 
     Errors along the strongest direction would hide the weakest, so that the differences are repeated along the
-    singular directions found, until these stay. At a bound the difference is taken to the inner side.
+    singular directions found, until these stay. At a bound the difference is taken to the inner side, and the parameter
+    is none of these directions: those that the others follow would lead out of the box with it.
     """
     sizes = model.sizes(point)
     basis = turned = np.eye(len(point))
+    free = np.flatnonzero(np.minimum(point - model.lower, model.upper - point) > _STEPS[0] * sizes)
     residual = model.uncounted(point[None])[0] if residual is None else residual
     columns, doubt, error = _differences(model, point, sizes, basis, _USUAL)
     if np.max(doubt) < _SURE and (growth := _growth(columns)) < _WELL_CONDITIONED:
@@ -71,13 +73,14 @@ def sensitivity(model: ForwardModel, point: Array, residual: Array | None = None
     for _ in range(_ROUNDS):
         basis = turned
         columns, doubt, error = _differences(model, point, sizes, basis, _STEPS)
-        right = np.linalg.svd(columns, full_matrices=False)[2]
-        growth = _growth(columns)
-        if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(right) - np.eye(len(point)))) < AGREED / growth:
+        growth = _growth(columns[:, free])
+        right = np.linalg.svd(columns[:, free], full_matrices=False)[2]
+        if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(right) - np.eye(len(free)))) < AGREED / growth:
             break
-        turned = basis @ right.T
+        turned = basis.copy()
+        turned[np.ix_(free, free)] = basis[np.ix_(free, free)] @ right.T
     turned_back = basis.T / sizes
-    return Sensitivity(residual, columns @ turned_back, float(np.max(doubt)), growth, error @ turned_back)
+    return Sensitivity(residual, columns @ turned_back, float(np.max(doubt)), _growth(columns), error @ turned_back)
 
 
 def believed(model: ForwardModel, point: Array, residual: Array | None = None) -> Sensitivity:
@@ -102,6 +105,8 @@ def believed(model: ForwardModel, point: Array, residual: Array | None = None) -
 
 
 def _growth(columns: Array) -> float:
+    if not columns.shape[1]:
+        return 1.0
     singular = np.linalg.svd(columns, compute_uv=False)
     return float(singular[0] / singular[-1]) if singular[-1] > _NONE * singular[0] else np.inf
 

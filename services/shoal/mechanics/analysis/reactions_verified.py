@@ -17,7 +17,7 @@ from shoal.errors import ComputationError
 from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.assembly.build import build
-from shoal.mechanics.integrators import facts, pick
+from shoal.mechanics.integrators import STRIDES, facts, pick
 from shoal.mechanics.reach import span
 from shoal.mechanics.stability import step_limit
 from shoal.scene import Scene
@@ -68,8 +68,8 @@ def verified(scene: Scene, times: Sequence[float]) -> list[Reactions]:
 
 def _others(scene: Scene) -> Iterator[dict[str, Any]]:
     """Settings of other runs, the cheapest first."""
-    solver = scene.solver
-    name = pick(solver, build(scene), step_limit).name
+    solver, model = scene.solver, build(scene)
+    name = pick(solver, model, step_limit).name
     names: tuple[str, ...] = (name,)
     tolerances = (100 * solver.relative_tolerance, max(0.1 * solver.relative_tolerance, 1e-14))
     if not facts(name).adaptive:
@@ -77,12 +77,17 @@ def _others(scene: Scene) -> Iterator[dict[str, Any]]:
     elif solver.relative_tolerance > _TIGHT:
         tolerances = 0.01 * solver.relative_tolerance, 1e-4 * solver.relative_tolerance
     steps = min(solver.max_steps, _MOST) if not facts(name).adaptive else solver.max_steps
+    longest = solver.max_step or (solver.duration / STRIDES if model.functions.size else None)
+    if longest and facts(name).adaptive:
+        # Two runs that both take the longest step would agree, however wrong both are.
+        longest *= 0.5
     for integrator in names:
         for tolerance in tolerances:
             yield {
                 "solver.integrator": integrator,
                 "solver.relative_tolerance": tolerance,
                 "solver.absolute_tolerance": tolerance,
+                "solver.max_step": longest,
                 "solver.max_steps": steps,
             }
 
