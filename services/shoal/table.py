@@ -9,7 +9,8 @@ import re
 import warnings
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,7 +44,7 @@ class Table:
 
     rows: the line of the file that each row stands on, (rows,); decimal: how its text writes the decimal mark
     comments: lines that are no rows, increasing
-    units: of the columns, as a line of the file states them
+    units: of the columns, as a line of the file states them; digest: SHA-256 of the file, unpacked
     """
 
     path: Path
@@ -52,6 +53,7 @@ class Table:
     decimal: str = "."
     comments: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
     units: Units | None = None
+    digest: str = ""
 
     @property
     def frames(self) -> NDArray[np.intp]:
@@ -100,9 +102,9 @@ def load_table(path: Path, columns: list[str] | None = None, *, largest: int | N
         raise InputError(f"data: {path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if len(data) > largest:
         raise InputError(f"data: {path} holds more than {largest / 1e6:.0f} MB; cut the part to fit on out of it")
-    if data.startswith(b"PAR1"):
-        return _parquet(path, data, largest)
-    return _csv(path, _utf8(path, data), columns)
+    parquet = data.startswith(b"PAR1")
+    found = _parquet(path, data, largest) if parquet else _csv(path, _utf8(path, data), columns)
+    return replace(found, digest=sha256(data).hexdigest())
 
 
 def _utf8(path: Path, data: bytes) -> bytes:

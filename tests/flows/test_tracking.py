@@ -11,12 +11,16 @@ import pytest
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
+from shoal.identification import Measurement
+from shoal.identification.recording.reading import read
+from shoal.identification.recording.source import Channel, FileSource
 from shoal.pictures.signals import signals
 from shoal.trajectory import Status, Trajectory
 from shoal_flows import pictures
 from shoal_flows.jobs import Cell, Fit
 from shoal_flows.report.stored import stored
 from shoal_flows.tracking import addresses, store
+from shoal_flows.tracking.data import of_measurement, whole
 from shoal_flows.tracking.engines import log_comparison, log_forward, log_sweep
 from shoal_flows.tracking.identification import log_fit, log_outcome, open_study
 from shoal_flows.tracking.store import connect
@@ -204,6 +208,29 @@ def test_pages_are_told_to_open_on_runs_and_metrics() -> None:
     assert entry_points(group="mlflow.app")["shoal"].value == "shoal_flows.tracking.dashboard:app"
 
 
+def test_parts_of_a_file_are_the_same_recording(tmp_path: Path) -> None:
+    """Whatever is fitted of it: a study of another window of the same file is no new evidence of a drift."""
+    text = "t,x,y\n" + "".join(f"{k},{k**2},{-k}\n" for k in range(9))
+    for name, content in (("run.csv", text), ("other.csv", text.replace("16", "17"))):
+        (tmp_path / name).write_text(content)
+    x, y = (Channel.model_validate({"marker": "B", "quantity": axis, "column": axis}) for axis in "xy")
+    asked = [
+        ({"path": "run.csv"}, (x, y)),
+        ({"path": "run.csv", "duration": 5.0}, (x, y)),
+        ({"path": "run.csv", "hold_out": [[2, 3]]}, (x, y)),
+        ({"path": "run.csv"}, (x,)),
+        ({"path": "other.csv"}, (x, y)),
+    ]
+    told = []
+    for fields, channels in asked:
+        source = FileSource.model_validate({**fields, "path": str(tmp_path / fields["path"])})
+        told += of_measurement(Measurement({"recording": read(source, channels)}))
+    assert len({one.digest for one in told}) == len(asked)
+    *parts, other = [whole(one.digest, one.source) for one in told]
+    assert len(set(parts)) == 1
+    assert other not in parts
+
+
 def test_a_recording_is_a_data_set_by_which_runs_group(client: Any, fits: list[Fit]) -> None:
     measurement = fits[0].estimate.measurement
     halved = measurement.changed(lambda recording: recording.every(2))
@@ -216,6 +243,10 @@ def test_a_recording_is_a_data_set_by_which_runs_group(client: Any, fits: list[F
     first, again, other = found
     assert first.name == "exudyn"
     assert first.digest == again.digest != other.digest
+    # Fitted without a part of its samples it is another data set of the same recording.
+    (part,) = of_measurement(measurement.changed(lambda recording: recording.holding([(0.1, 0.2)])))
+    assert part.digest != first.digest
+    assert whole(part.digest, part.source) == whole(first.digest, first.source) == first.digest
     columns = [column["name"] for column in json.loads(first.schema)["mlflow_colspec"]]
     assert columns == ["t", "B.x", "B.y"]
     assert json.loads(first.profile)["num_rows"] == len(measurement.first.times)

@@ -19,6 +19,7 @@ from shoal.pictures.drawn import Drawn
 from shoal.pictures.pages import environment, software
 from shoal.pictures.style import BLUE, GREY, VERMILION, canvas, headline, styled
 
+from shoal_flows.tracking.data import whole
 from shoal_flows.tracking.store import answering, connect
 
 _DAY = 86400.0
@@ -33,7 +34,7 @@ _TRUSTED = "identified"
 class Study:
     """One study. values: (value, lower, upper) by parameter, interval nan where none was kept; started [s].
 
-    data: digests of the recordings that it was fitted to.
+    data: what tells the recordings that it was fitted to, in whole or in part, from others.
     """
 
     run_id: str
@@ -90,7 +91,8 @@ def machines() -> dict[str, list[Study]]:
         }
         if values:
             fitness, started = metrics.get("final/fitness", np.nan), run.info.start_time / 1e3
-            data = frozenset(one.dataset.digest for one in run.inputs.dataset_inputs)
+            sets = [one.dataset for one in run.inputs.dataset_inputs]
+            data = frozenset(whole(one.digest, one.source) for one in sets)
             one = Study(run.info.run_id, run.info.run_name, started, tags.get("verdict", ""), fitness, values, data)
             found.setdefault(machine, []).append(one)
     return found

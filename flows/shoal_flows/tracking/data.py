@@ -7,13 +7,17 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     # A second of importing, which a page of what is in MLflow does without.
     from shoal.identification import Measurement
-    from shoal.identification.recording.measurement import Recording
+    from shoal.identification.recording.measurement import Held, Recording
 
 _CONTEXT = "mlflow.data.context"
 """The tag by which MLflow tells what a run used a data set for."""
+_WHOLE = "recording"
+"""The tag of a source that holds what is the same for all parts of a recording."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +38,31 @@ def of_measurement(measurement: Measurement) -> list[Data]:
 
 def _of(name: str, recording: Recording) -> Data:
     channels = [channel.signal for channel in recording.channels]
-    digest = hashlib.sha256(repr((channels, recording.values.shape)).encode())
-    digest.update(recording.times.tobytes() + recording.values.tobytes())
+    digest = _digest(recording)
     columns = [{"type": "double", "name": column, "required": True} for column in ("t", *channels)]
     told = {"num_rows": len(recording.times), "num_elements": int(recording.values.size)}
-    source = {"tags": {"mlflow.source.type": "PROJECT", "mlflow.source.name": recording.origin}}
+    # What was held out is of the same recording.
+    whole = recording.table or _digest(recording, *recording.held)
+    source = {"tags": {"mlflow.source.type": "PROJECT", "mlflow.source.name": recording.origin, _WHOLE: whole}}
     # An origin begins with the file or the engine, and goes on with what was taken from it.
     called = recording.origin.partition(",")[0] or name
-    return Data(called, digest.hexdigest()[:16], *map(json.dumps, ({"mlflow_colspec": columns}, told, source)))
+    return Data(called, digest, *map(json.dumps, ({"mlflow_colspec": columns}, told, source)))
+
+
+def _digest(recording: Recording, *held: Held) -> str:
+    """Of the samples of a recording, and of what is held out, in the order of time."""
+    parts: list[Recording | Held] = [recording, *held]
+    times = np.concatenate([part.times for part in parts])
+    values = np.concatenate([part.values for part in parts])
+    order = np.argsort(times, kind="stable")
+    digest = hashlib.sha256(repr(([channel.signal for channel in recording.channels], values.shape)).encode())
+    digest.update(times[order].tobytes() + values[order].tobytes())
+    return digest.hexdigest()[:16]
+
+
+def whole(digest: str, source: str) -> str:
+    """What tells a recording from others, whatever part of it was fitted: from what MLflow has of a data set."""
+    return str(json.loads(source).get("tags", {}).get(_WHOLE, digest))
 
 
 def inputs(data: list[Data]) -> list[object]:

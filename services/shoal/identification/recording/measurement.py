@@ -38,6 +38,7 @@ class Recording:
     origin: where the data come from; notes: what was found and mended in them
     held: windows that are not fitted, whose samples are not among the others
     begin [s]: when the motion starts, by the clock of the table
+    table: digest of the file that it is read from, whatever part of it; empty if there is none
     """
 
     times: Array
@@ -49,6 +50,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     held: tuple[Held, ...] = ()
     begin: float = 0.0
+    table: str = ""
 
     def holding(self, windows: Sequence[tuple[float, float]], begin: float = 0.0) -> Recording:
         """With the samples of these windows [s] held out; begin [s]: the motion's start by their clock.

@@ -105,7 +105,12 @@ def sampled(source: FileSource, channels: tuple[Channel, ...]) -> tuple[Recordin
         chosen = chosen[::part]
     origin = f"{path.name}, {_span(times[chosen])}, {len(chosen)} samples"
     unknown = np.full(len(channels), np.nan)
-    found = Recording(times[chosen] - begin, channels, values[chosen], origin, unknown, notes=tuple(notes), begin=begin)
+    found = Recording(
+        *(times[chosen] - begin, channels, values[chosen], origin, unknown),
+        notes=tuple(notes),
+        begin=begin,
+        table=table.digest,
+    )
     try:
         return found.holding(source.hold_out, begin), source
     except InputError as error:
