@@ -74,6 +74,16 @@ class Parametrization:
         return np.asarray(measured | self.initial & np.array([path.endswith(".angle") for path in self.paths]))
 
     @cached_property
+    def rotations(self) -> dict[tuple[str | None, str], dict[int, int]]:
+        """Of each recording (None: all) and body the sought components of its rotation vector, by their number."""
+        found: dict[tuple[str | None, str], dict[int, int]] = {}
+        for k, (path, entry) in enumerate(zip(self.paths, self.entries.values(), strict=True)):
+            if self.initial[k] and ".rotation." in path:
+                _, body, _, number = path.split(".")
+                found.setdefault((entry.recording, body), {})[int(number)] = k
+        return found
+
+    @cached_property
     def proportional(self) -> npt.NDArray[np.bool_]:
         """Which components the channels follow in proportion, with a single minimum, (components,), bool."""
         return np.array([path.startswith(RESERVED) and path.partition(".")[2] in PROPORTIONAL for path in self.paths])

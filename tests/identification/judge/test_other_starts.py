@@ -16,6 +16,8 @@ from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.aliases import with_aliases
 from shoal.identification.judge.mirrors import with_mirror_images
 from shoal.identification.judge.other_starts import mirrored, turned
+from shoal.identification.judge.rivals import apart
+from shoal.identification.judge.turns import nearest_turns
 from shoal.identification.measure import measure
 from shoal.identification.methods.lanes import descend_many
 from shoal.identification.methods.outcome import Outcome
@@ -211,3 +213,17 @@ def test_more_turns_stay_on_the_axis_of_a_hinge(tmp_path: Path) -> None:
     seen = model(tmp_path, pendulum([0, 0, 0], OBLIQUE), {"s": {"lower": -100.0, "upper": 100.0}}, **tied)
     found = np.array(list(turned(seen, np.array([5.0]))))
     np.testing.assert_allclose(np.unique(np.round(found, 6)), np.round([5.0 - TURN, 5.0 + TURN], 6))
+
+
+def test_rotation_vectors_that_are_whole_turns_apart_are_one_attitude(tmp_path: Path) -> None:
+    """About one axis; with another component beside, that is not sought, they are two."""
+    wide = {"a": {**ANGLE, "lower": -7.0, "upper": 7.0}, "w": RATE}
+    seen = model(tmp_path, pendulum([0, 0.7, 0], Y), wide)
+    start, beyond = np.array([0.5, 1.0]), np.array([0.5 - 2 * np.pi, 1.0])
+    assert not apart(seen, start, beyond)
+    assert apart(seen, start, -start)
+    np.testing.assert_allclose(nearest_turns(seen, beyond), start)
+    beside = model(tmp_path, pendulum([0.3, 0.7, 0], Y), wide)
+    assert apart(beside, start, beyond)
+    one, other = (Rotation.from_rotvec([0.3, point[0], 0.0]) for point in (start, beyond))
+    assert (one.inv() * other).magnitude() > 0.1

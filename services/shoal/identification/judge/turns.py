@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.methods.attitudes import nearest_attitudes
 from shoal.identification.methods.outcome import Outcome
 from shoal.trajectory import Array
 
@@ -30,9 +31,14 @@ def with_nearest_turns(model: ForwardModel, outcome: Outcome) -> Outcome:
 
 
 def nearest_turns(model: ForwardModel, point: Array) -> Array:
-    """A point (parameters,) with each angle, of those within its bounds, by whole turns nearest to its start."""
+    """A point (parameters,) with each angle, of those within its bounds, by whole turns nearest to its start.
+
+    Rotation vectors are taken to where they are nearest if all are within the bounds there.
+    """
     turn = 2 * np.pi
     fewest = np.minimum(np.ceil((model.lower - point) / turn), 0.0)
     most = np.maximum(np.floor((model.upper - point) / turn), 0.0)
     turns = np.clip(np.round((model.parameters.start - point) / turn), fewest, most)
-    return np.asarray(np.where(model.parameters.turning, point + turn * turns, point))
+    angles = np.where(model.parameters.turning, point + turn * turns, point)
+    near = nearest_attitudes(model, angles, model.parameters.start)
+    return near if np.all((near >= model.lower) & (near <= model.upper)) else np.asarray(angles)

@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from shoal.identification.forward import ForwardModel, Progress
+from shoal.identification.methods.attitudes import nearest_attitudes
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.numerics.tile import WIDE
 from shoal.trajectory import Array
@@ -319,8 +320,9 @@ def differing(model: ForwardModel, one: Array, other: Array) -> Array:
     """Which parameters of two minima are different, (parameters,).
 
     By a part of their range, or where that is wide beside them of ten times their size: bounds may be as far away as
-    one likes. Angles that differ by whole turns are the same.
+    one likes. Angles that differ by whole turns are the same, and so are rotation vectors.
     """
+    other = nearest_attitudes(model, other, one)
     turning, difference = model.parameters.turning, np.abs(one - other)
     turned = np.abs(difference - 2 * np.pi * np.round(difference / (2 * np.pi)))
     span = model.upper - model.lower
