@@ -16,6 +16,7 @@ from shoal.engines.exudyn.space.bodies import SolidPart
 from shoal.identification.recording.felt import asking, equipped, from_start
 from shoal.identification.recording.observation import STRAIGHT, Camera, observe
 from shoal.identification.recording.source import Channel
+from shoal.mechanics.analysis.reactions import reactions
 from shoal.scene import Scene
 from shoal.trajectory import Array
 
@@ -135,6 +136,42 @@ def test_an_unbalanced_shaft_pulls_at_its_drive_as_euler_says() -> None:
         force = 2.0 * (np.cross(change, r) + np.cross(w, np.cross(w, r)))
         torque = here @ change + np.cross(w, here @ w) + np.cross(r, force)
         np.testing.assert_allclose(row, [*force, torque[0], torque[1], 0.0, torque[2], torque[2]], atol=1e-7)
+
+
+HIP = {"first": {"body": "post", "point": "hip"}, "second": {"body": "arm"}}
+
+
+@pytest.mark.parametrize(
+    "joint",
+    [
+        {"kind": "weld"},
+        {"kind": "spherical"},
+        {"kind": "revolute", "axis": [0.0, 0.6, 0.8], "friction": 0.02, "drag": 0.01, "mu": 0.2, "radius": 0.05},
+        {"kind": "universal", "axis": [0.0, 1.0, 0.0], "second_axis": [1.0, 0.0, 0.0]},
+        {"kind": "cylindrical", "axis": [0.0, 0.6, 0.8]},
+        {"kind": "planar", "axis": [1.0, 0.0, 0.0], "rotation": "locked"},
+        {"kind": "slider", "axis": [0.0, 0.6, 0.8], "rotation": "locked", "coulomb": 0.3, "friction": 0.1},
+        {"kind": "distance", "first": {"body": "post", "point": "start"}},
+    ],
+    ids=lambda joint: "-".join(str(joint[part]) for part in ("kind", "rotation") if part in joint),
+)
+def test_load_cells_along_a_motion_show_the_reactions_at_its_instants(joint: dict[str, Any]) -> None:
+    """The wrenches of all samples at once against work per displacement, one state after the other."""
+    scene = arm(
+        joints={"O": {"kind": "revolute", "first": GROUND, "second": {"body": "post"}, "friction": 0.05},
+                "E": HIP | joint},
+        initial={"post": {"rate": 2.0}, "arm": {"position": [0.3, 0.0, 0.4], "spin": [0.0, 0.0, 2.0]}},
+        loads={"s": {"kind": "spring", "first": GROUND, "second": {"body": "arm"}, "stiffness": 40.0, "damping": 0.3}},
+        solver={"duration": 0.5, "integrator": "dop853"},
+    )  # fmt: skip
+    if joint["kind"] in ("spherical", "universal", "distance"):
+        start = {"position": [0.3, 0.0, 0.4]}
+        scene = scene.with_values({"initial": {"post": {"rate": 2.0, "guess": ["rate"]}, "arm": start}})
+    few = TIMES[:2]
+    found = seen(scene, tuple(Channel(joint=name, quantity=axis) for name in "OE" for axis in LOADS), few)
+    for row, told in zip(found, reactions(scene, few.tolist()), strict=True):
+        wanted = [np.concatenate([told.joints[name].force, told.joints[name].torque]) for name in "OE"]
+        np.testing.assert_allclose(row, np.concatenate(wanted), atol=1e-7 * max(1.0, np.max(np.abs(row))))
 
 
 @pytest.mark.parametrize("lanes", [1, 2])

@@ -1,4 +1,4 @@
-"""What the joints of a rigid machine in the plane exert along its motion.
+"""What the joints of a rigid machine exert along its motion.
 
 As `joint_reactions` at one state, by the balance of every body by itself, at all samples at once.
 """
@@ -24,6 +24,7 @@ from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.mechanics.rubbing import ROUNDS, SETTLED
 from shoal.scene import GROUND, Attachment, Revolute, Slider
+from shoal.scene.joints import DrivenAngle
 
 
 class Reaction(NamedTuple):
@@ -38,12 +39,15 @@ class Reaction(NamedTuple):
     drive: Array | None = None
 
 
-def reactions_along(felt: Felt, names: tuple[str, ...]) -> dict[str, Reaction]:
-    """What some joints exert; the model has one lane. Raises InputError, see `not_unique`."""
+def reactions_along(felt: Felt, names: tuple[str, ...], kind: type[Balance]) -> dict[str, Reaction]:
+    """What some joints exert; the model has one lane. Raises InputError, see `not_unique`.
+
+    kind: how forces and torques act on its bodies, of the plane or of space
+    """
     bodies = FreeBodies(felt.evaluator, float(felt.times[-1]))
     rubbing = felt.evaluator.model.forces.size - bodies.evaluator.model.forces.size
     at, rate, change = bodies.state(felt.q, felt.v, felt.a)
-    balance = _Balance(bodies, at, rate, float(np.ravel(span(bodies.scene))[0]))
+    balance = kind(bodies, at, rate, float(np.ravel(span(bodies.scene))[0]))
     force = np.empty_like(at)
     for k, (q, v, t) in enumerate(zip(at, rate, felt.times, strict=True)):
         bodies.evaluator.turns = felt.turns[k, rubbing:]
@@ -65,14 +69,15 @@ def reactions_along(felt: Felt, names: tuple[str, ...]) -> dict[str, Reaction]:
     for name in names:
         mine = [(size[:, k], part) for k, part in enumerate(unknown) if part.joint == name]
         mine += [(np.ones(len(at)), rubbed[name])] if name in rubbed else []
-        none = np.zeros_like(mine[0][1].force)
-        total = sum((much[:, None] * part.force for much, part in mine), none)
-        found[name] = Reaction(total, sum((much * part.torque for much, part in mine), none[:, 0]))
+        acting = [part.times(much) for much, part in mine]
+        force, torque = (np.sum([getattr(one, side) for one in acting], axis=0) for side in ("force", "torque"))
+        driven = torque.ndim > 1 and isinstance(bodies.scene.joints[name], DrivenAngle)
+        found[name] = Reaction(force, torque, mine[0][0] if driven else None)
     return found
 
 
-def _require_unique(scene: str, columns: Array, unknown: list[_Part], names: tuple[str, ...]) -> None:
-    """Of the forces of some joints, by what all exert per unit, (3 bodies, unknowns). Raises InputError."""
+def _require_unique(scene: str, columns: Array, unknown: list[Part], names: tuple[str, ...]) -> None:
+    """Of the forces of some joints, by what all exert per unit, (rows of the bodies, unknowns). Raises InputError."""
     _, sizes, right = np.linalg.svd(columns, full_matrices=True)
     rank = int(np.sum(sizes > RANK * sizes[0]))
     for name in names:
@@ -89,16 +94,20 @@ def not_unique(scene: str, joint: str) -> InputError:
     )
 
 
-class _Part(NamedTuple):
-    """What acts in a joint: on all bodies by itself, (samples, 3 bodies), and as it is told of the second body."""
+class Part(NamedTuple):
+    """What acts in a joint: on all bodies by itself, (samples, rows of the bodies), and as told of the second body."""
 
     joint: str
     wrench: Array
     force: Array
     torque: Array
 
+    def times(self, factor: Array) -> Part:
+        """Scaled at every sample, (samples,)."""
+        return Part(self.joint, *((factor * np.asarray(one).T).T for one in (self.wrench, self.force, self.torque)))
 
-class _Balance:
+
+class Balance:
     """Forces and torques on free bodies along a motion; a wrench is force and torque over the lever, (3,) of a body.
 
     at, rate: of the free bodies' coordinates, (samples, unknowns); lever [m]: the machine's size
@@ -146,17 +155,17 @@ class _Balance:
                 found[:, first + 2] += (moment + torque) / self._lever
         return found
 
-    def _pair(self, name: str, first: Attachment, second: Attachment, where: Array, force: Array) -> _Part:
+    def _pair(self, name: str, first: Attachment, second: Attachment, where: Array, force: Array) -> Part:
         """A force on the second body at a place, and its opposite on the first there."""
         wrench = self._on((second.body, where, force, 0.0), (first.body, where, -force, 0.0))
-        return _Part(name, wrench, force, np.zeros(len(force)))
+        return Part(name, wrench, force, np.zeros(len(force)))
 
-    def _torques(self, name: str, sides: tuple[Attachment, ...], factors: tuple[float, ...]) -> _Part:
+    def _torques(self, name: str, sides: tuple[Attachment, ...], factors: tuple[float, ...]) -> Part:
         none = np.zeros((len(self.at), 2))
         acting = [(side.body, none, none, factor) for side, factor in zip(sides, factors, strict=True)]
-        return _Part(name, self._on(*acting), none, np.full(len(self.at), factors[0]))
+        return Part(name, self._on(*acting), none, np.full(len(self.at), factors[0]))
 
-    def components(self) -> Iterator[_Part]:
+    def components(self) -> Iterator[Part]:
         """The unknowns of all joints, per unit."""
         ones = np.ones((len(self.at), 1))
         for name, one in joints.of_scene(self._bodies.scene):
@@ -174,21 +183,21 @@ class _Balance:
                     yield self._pair(name, one.first, one.second, self._place(one.second), across)
                 case Apart():
                     way = self._place(one.second) - self._place(one.first)
-                    yield self._pair(name, one.first, one.second, self._place(one.second), _unit(way))
+                    yield self._pair(name, one.first, one.second, self._place(one.second), unit(way))
                 case Sum():
                     axes = [np.eye(2)["xy".index(term.axis)] for term in one.terms]
                     acting = [
                         (term.at.body, self._place(term.at), ones * term.factor * axis, 0.0)
                         for term, axis in zip(one.terms, axes, strict=True)
                     ]
-                    yield _Part(name, self._on(*acting), acting[0][2], np.zeros(len(self.at)))
+                    yield Part(name, self._on(*acting), acting[0][2], np.zeros(len(self.at)))
                 case _:
                     raise joints.unknown(one)
 
     def _line(self, first: Attachment, turn: object) -> Array:
         """Unit vector of a slider's line."""
         direction = self._bodies.placement.direction(self._bodies.scene, first)
-        return _unit(self._value(direction.turned(plane.rotation(turn))))
+        return unit(self._value(direction.turned(plane.rotation(turn))))
 
     def _turning(self, side: Attachment) -> Array:
         """The rate of a side's direction [rad/s]."""
@@ -196,7 +205,7 @@ class _Balance:
         line = self._value(direction)
         return np.asarray(plane.cross(line.T, self._speed(direction).T) / dot(line, line))
 
-    def held(self, unknown: list[_Part], size: Array) -> dict[str, Array]:
+    def held(self, unknown: list[Part], size: Array) -> dict[str, Array]:
         """The force of each joint whose friction depends on it [N], (samples,)."""
         found = {}
         for name, joint in self._bodies.scene.joints.items():
@@ -205,7 +214,7 @@ class _Balance:
                 found[name] = np.linalg.norm(np.sum(parts, axis=0), axis=1)
         return found
 
-    def friction(self, held: Mapping[str, Array]) -> Iterator[_Part]:
+    def friction(self, held: Mapping[str, Array]) -> Iterator[Part]:
         """What rubs in every joint; held: as `held` found it, where it is known."""
         for name, joint in self._bodies.scene.joints.items():
             if not isinstance(joint, Revolute | Slider) or not joint.resists:
@@ -213,17 +222,17 @@ class _Balance:
             placement, scene = self._bodies.placement, self._bodies.scene
             if isinstance(joint, Revolute):
                 speed = self._turning(joint.second) - self._turning(joint.first)
-                unit = self._torques(name, (joint.second, joint.first), (1.0, -1.0))
+                one = self._torques(name, (joint.second, joint.first), (1.0, -1.0))
             else:
                 line = self._line(joint.first, joint.direction)
                 here, there = placement.point(scene, joint.first), placement.point(scene, joint.second)
                 way, moving = self._value(there) - self._value(here), self._speed(there) - self._speed(here)
                 carried = self._turning(joint.first)[:, None] * quarter(way)
                 speed = dot(line, moving - carried)
-                unit = self._pair(name, joint.first, joint.second, self._place(joint.second), line)
-            against = -joint.resistance(speed, held.get(name, 0.0))
-            yield _Part(name, against[:, None] * unit.wrench, against[:, None] * unit.force, against * unit.torque)
+                one = self._pair(name, joint.first, joint.second, self._place(joint.second), line)
+            yield one.times(-joint.resistance(speed, held.get(name, 0.0)))
 
 
-def _unit(vectors: Array) -> Array:
+def unit(vectors: Array) -> Array:
+    """Vectors (..., d) of length one along some."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

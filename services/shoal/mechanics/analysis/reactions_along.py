@@ -9,7 +9,8 @@ from shoal.mechanics.analysis import load_cells
 from shoal.mechanics.analysis.felt import Felt
 from shoal.mechanics.analysis.free_bodies import FreeBodies
 from shoal.mechanics.analysis.joint_reactions import JointReaction, reactions_of
-from shoal.mechanics.analysis.load_cells import Reaction
+from shoal.mechanics.analysis.load_cells import Balance, Reaction
+from shoal.mechanics.analysis.load_cells_in_space import SpatialBalance
 from shoal.scene.joints import DrivenAngle
 
 
@@ -19,8 +20,9 @@ def reactions_along(felt: Felt, names: tuple[str, ...]) -> dict[str, Reaction]:
     In space the torque is a vector, (samples, 3).
     """
     model = felt.evaluator.model
-    if model.dimensions == plane.DIMENSIONS and not model.flexible and not model.modal:
-        return load_cells.reactions_along(felt, names)
+    if not model.flexible and not model.modal:
+        kind = Balance if model.dimensions == plane.DIMENSIONS else SpatialBalance
+        return load_cells.reactions_along(felt, names, kind)
     bodies = FreeBodies(felt.evaluator, float(felt.times[-1]))
     found: dict[str, list[JointReaction]] = {name: [] for name in names}
     for q, v, a, turns, t in zip(felt.q, felt.v, felt.a, felt.turns, felt.times.tolist(), strict=True):
