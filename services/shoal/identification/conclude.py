@@ -18,6 +18,9 @@ from shoal.identification.judge.remarks import remarks
 from shoal.identification.judge.rivals import valley
 from shoal.identification.judge.turns import with_nearest_turns
 from shoal.identification.judge.verdict import Judgement, Verdict, judge
+from shoal.identification.lengthening import lengthened
+from shoal.identification.methods.auto import FRACTAL, LARGE
+from shoal.identification.methods.growth import growth
 from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread import intervals
@@ -76,6 +79,7 @@ def conclude(
     near = evidence(model, outcome.point)
     if not near.looked:
         outcome = replace(outcome, ended=False, message=outcome.message or "no time was left for the intervals")
+    outcome, near = _settled(model, outcome, near)
     known = _known(model, outcome, near, wishes.profiles)
     judgement = _judged(model, near, known)
     values = intervals.with_refits(known.values, judgement.refits)
@@ -255,13 +259,26 @@ def _fitted(scene: Scene) -> dict[str, Any]:
     return found | {f"solver.{name}": getattr(scene.solver, name) for name in ("integrator", "step", "inertia_cap")}
 
 
-def _moved(outcome: Outcome, better: Descent) -> Outcome:
+def _moved(outcome: Outcome, better: Descent, how: str = "least squares from a refit") -> Outcome:
     """The outcome at a better minimum; where it was is left as another one."""
-    choice = "; then ".join(part for part in (outcome.choice, "least squares from a refit") if part)
+    choice = "; then ".join(part for part in (outcome.choice, how) if part)
     minima = [(outcome.point, outcome.fitness), *outcome.minima]
     message = "" if better.converged else "no convergence"
     moved = replace(outcome, point=better.point, fitness=better.fitness, minima=minima, choice=choice)
     return replace(moved, message=message, converged=better.converged)
+
+
+def _settled(model: ForwardModel, outcome: Outcome, near: Evidence) -> tuple[Outcome, Evidence]:
+    """An outcome and what is around it; of a chaotic motion at the end of the valley in which the search stopped."""
+    if not (outcome.ended and near.known):
+        return outcome, near
+    if growth(model, near.seen.jacobian) < (FRACTAL if near.seen.reliable else LARGE):
+        return outcome, near
+    better = unless_late(lambda: lengthened(model, outcome.point), None)
+    if better is None:
+        return outcome, near
+    moved = _moved(outcome, better, "over a lengthening record")
+    return replace(moved, minima=outcome.minima), evidence(model, moved.point)
 
 
 def _lower(model: ForwardModel, outcome: Outcome, profiled: dict[str, Profile]) -> Descent | None:
@@ -278,7 +295,12 @@ def _by_thing(model: ForwardModel, rows: Array | None) -> float | None:
 
 
 def _curved(model: ForwardModel, outcome: Outcome, near: Evidence) -> list[int]:
-    """Parameters whose intervals linear theory does not tell; where the model limits them they are wider anyway."""
+    """Parameters whose intervals linear theory does not tell; where the model limits them they are wider anyway.
+
+    Refits of a profile end on their way along the narrow valley of a chaotic motion, which would make it too narrow.
+    """
     if not outcome.ended or not outcome.converged or near.tests.limited or not near.seen.reliable:
+        return []
+    if growth(model, near.seen.jacobian) > FRACTAL:
         return []
     return unless_late(lambda: bent(model, near.point, near.at, near.seen), [])

@@ -12,16 +12,17 @@ from shoal.identification.deadline import TimeIsUp, unless_late
 from shoal.identification.forward import ForwardModel
 from shoal.identification.judge.exchanged import exchanged
 from shoal.identification.judge.odd_one import odd_one
-from shoal.identification.judge.residual_tests import ResidualTests
+from shoal.identification.judge.residual_tests import ResidualTests, residual_tests
 from shoal.identification.judge.rivals import ALIAS, relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
 from shoal.identification.judge.stretch import odd_stretch
 from shoal.identification.judge.suspects import Findings, Suspect, suspects
 from shoal.identification.methods.lanes import Descent
 from shoal.identification.methods.outcome import Outcome
+from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.intervals import Refit, few, with_refits
 from shoal.identification.spread.sensitivity import Sensitivity
-from shoal.identification.spread.uncertainty import Linearisation
+from shoal.identification.spread.uncertainty import Linearisation, linearise
 from shoal.identification.spread.value import Value
 from shoal.trajectory import Array
 
@@ -88,6 +89,12 @@ def judge(
     if unfinished := _unfinished(model, outcome.point, seen):
         advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
         return Judgement(Verdict.UNFINISHED, unfinished, advice)
+    if tests.wrong_model and seen.end is not None and _fits_until(model, outcome.point, seen):
+        reason = (
+            f"the motion is chaotic, or its steps coarse: the model fits the first {seen.end:.3g} s; beyond, where "
+        )
+        reason += f"the misfit is that makes {tests.sized(tests.size)} of all, nothing tells whether this is a minimum"
+        return Judgement(Verdict.UNFINISHED, reason, ["shorten the record, or tighten the solver's tolerances"])
     looked = Findings()
     misfitting = (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal
     if misfitting:
@@ -133,6 +140,17 @@ def _unfinished(model: ForwardModel, point: Array, seen: Sensitivity) -> str:
     except TimeIsUp:
         return "no time was left to see whether the answer is a minimum"
     return "" if better is None else sentence(model, point, better)
+
+
+def _fits_until(model: ForwardModel, point: Array, seen: Sensitivity) -> bool:
+    """Whether the residuals do not refute the model up to where its derivatives can be believed."""
+    assert seen.end is not None
+    part = model.until(seen.end)
+    kept = model.rows.time <= seen.end + 1e-12
+    kept = np.append(kept, np.ones(len(seen.residual) - len(kept), dtype=bool))
+    blocks = blocks_of(part, int(np.sum(kept)))
+    near = linearise(seen.jacobian[kept], seen.residual[kept], model.sizes(point), blocks, seen.error[kept])
+    return not residual_tests(part, seen.residual[kept], blocks, near.noise).wrong_model
 
 
 def _rejected(
