@@ -378,3 +378,13 @@ def test_machine_without_freedom() -> None:
     weld = {"kind": "weld", "first": {"body": "ground", "point": [0.0, 0.0]}, "second": {"body": "OA"}}
     scene = load_scene("single-pendulum").with_values({"joints": {"O": weld}})
     np.testing.assert_allclose(GaussEngine().simulate(scene, [0.5]).marker("A"), [[1.0, 0.0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("longest", [0.25, 0.15])
+def test_steps_that_end_at_the_longest_are_told_by_a_tolerance_that_shortens_them(longest: float) -> None:
+    """A tighter tolerance hardly moves a run whose steps are not its own. Truth: the tolerances of the solver."""
+    scene = load_scene("single-pendulum")
+    found = select(scene.with_values({"solver.max_step": longest}), 1e-4, [5.0])
+    true = found.trajectory.distance(get_engine("gauss").simulate(scene, [5.0]))
+    assert found.met
+    assert true / 1.2 < found.chosen.error < 1.2 * true

@@ -34,6 +34,8 @@ It is told for the first bending mode; in higher ones shear and rotary inertia a
 """
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
 """Of the adaptive integrator for rigid machines, from coarse to fine."""
+MORE_STEPS = 1.25
+"""A run of fewer steps than so many times those of a coarser tolerance does not tell how far that one is off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,8 +251,8 @@ def _rigid(runs: Runs, levels: Levels, tolerance: float, known: float) -> tuple[
             last = rung
             continue
         last.error = distance(last.trajectory, rung.trajectory) + known
-        if last.error == known and step_tolerance != TOLERANCES[-1]:
-            continue  # something else limits the steps, or nothing moves: the two runs are one
+        if trajectory.steps < MORE_STEPS * last.trajectory.steps and step_tolerance != TOLERANCES[-1]:
+            continue  # something else limits the steps, or nothing moves: the two runs are all but one
         if last.error <= WITHIN * tolerance:
             return last, f"the tolerance {step_tolerance:g} moves the markers by {last.error - known:.1g} m"
         last = rung
