@@ -16,6 +16,7 @@ from shoal.response.inputs import Inputs, Parameter
 from shoal.response.limits.choice import WAYS, probability
 from shoal.response.limits.estimate import weighted
 from shoal.response.limits.form import design_points
+from shoal.response.limits.importance import Outside
 from shoal.response.limits.limit import limit
 from shoal.response.limits.margins import Margins
 from shoal.response.marginals import Frozen, Uniform
@@ -23,17 +24,56 @@ from shoal.response.read import parameters
 from shoal.response.runs import Answers
 from shoal.scene import Scene, load_scene
 from shoal.trajectory import Array
-from shoal_validation.uncertain.limits import MOST, STATES, margins, plane, repeated
+from shoal_validation.uncertain.limits import MOST, STATES, cube, margins, plane, repeated
 from shoal_validation.uncertain.reached import REPETITIONS
 from thrown import ALONG, THROWN, UP
 
 
 @pytest.mark.parametrize("state", ["a plane, 1e-7", "curved away", "two unequal design points", "four branches"])
 def test_probabilities_of_closed_forms(state: str) -> None:
-    told = repeated(state, "auto", 40)
+    told = repeated(state, "auto", 20)
     assert told.held >= 0.9
     assert told.ratios.mean() == pytest.approx(1.0, abs=0.02)
     assert told.within >= 0.9
+
+
+@pytest.mark.parametrize("state", ["a sphere, 1e-6, eight parameters", "two rods in line, 1e-6"])
+def test_limits_that_surround_the_mean(state: str) -> None:
+    """Between any few design points lies most of the probability; it was left out, and nothing told."""
+    told = repeated(state, "auto", 8)
+    assert told.held >= 0.75
+    assert told.doubted == 0
+    assert np.abs(told.ratios - 1).max() < 0.1
+
+
+def test_more_design_points_than_are_found_are_a_doubt() -> None:
+    """Sixteen sides of a cube: some are missed, and what is told is then too low."""
+    function, exact = cube(4.0, 8)
+    for seed in range(6):
+        found = probability(margins(function, 8), "auto", seed)
+        assert found.doubt or exact <= found.estimate.interval[1][-1], seed
+
+
+@pytest.mark.parametrize("way", ["auto", "importance"])
+def test_a_design_point_around_which_no_run_passes_is_a_doubt(way: str) -> None:
+    """Three rods in line, turned at random by up to a turn and more: P = 9e-6, and first order says a third."""
+    run = margins(lambda x: 2.995 - np.cos(15 * stats.norm.cdf(x) - 6).sum(axis=1), 3)
+    found = probability(run, way, 0)
+    assert found.estimate.probability == 0
+    assert found.estimate.told.startswith("below 0.00")
+    assert "none of" in found.doubt
+
+
+def test_runs_drawn_all_around_are_those_that_lie_there() -> None:
+    """Beyond a distance in two of three directions: of the normal distribution given that, by the chi-squared one."""
+    axes = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0][:2]
+    outside = Outside(axes, 3.0)
+    assert outside.probability == pytest.approx(math.exp(-4.5))
+    places = outside.draw(4000, np.random.default_rng(1))
+    assert outside.reaches(places).all()
+    squares = np.sum((places @ axes.T) ** 2, axis=1)
+    assert stats.kstest(squares - 9, stats.chi2(2).cdf).pvalue > 0.01
+    assert stats.kstest(places @ np.cross(*axes), stats.norm.cdf).pvalue > 0.01
 
 
 @pytest.mark.slow
@@ -42,6 +82,7 @@ def test_intervals_hold_as_often_as_they_say(state: str) -> None:
     """95 % of many repetitions, within what these can tell."""
     told = repeated(state, "auto", REPETITIONS)
     assert 0.92 <= told.held <= 0.98
+    assert told.doubted <= 0.02
     assert told.runs <= MOST
     assert told.ratios.mean() == pytest.approx(1.0, abs=0.02)
     assert told.within >= 0.95

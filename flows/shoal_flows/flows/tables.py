@@ -63,11 +63,11 @@ def of_response(found: Response) -> str:
         told = (
             kept
             if one.passing is None
-            else f"passed {looked_at(one.times)} with probability {one.passing.estimate.probability:.3g}"
+            else f"passed {looked_at(one.times)} with probability {one.passing.estimate.told}"
         )
         if one.between is not None:
-            least, largest = one.between.estimates
-            told = f"passed {looked_at(one.times)} with a probability between {least:.3g} and {largest:.3g}"
+            least, largest = (each.told for each in one.estimates)
+            told = f"passed {looked_at(one.times)} with a probability between {least} and {largest}"
         said.append(f"limit {one.limit.text}: {told}")
     return "\n\n".join([shown, *(one for one in said if one)])
 

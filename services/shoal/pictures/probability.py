@@ -50,10 +50,6 @@ def probability(found: Judged) -> Figure:
     axes.set_ylabel("probability")
     if seen:
         axes.legend()
-    chances = " to ".join(_number(one.probability) for one in estimates)
+    chances = " to ".join(one.told for one in estimates)
     headline(figure, f"{found.limit.text} happens with probability {chances}, {looked_at(found.times)}")
     return figure
-
-
-def _number(chance: float) -> str:
-    return "0" if not np.isfinite(chance) or chance == 0 else f"{chance:.2g}"

@@ -78,14 +78,14 @@ def _limit(one: Judged) -> list[str]:
     shown = one.shown
     how = "–" if shown is None else ", ".join(f"{name} = {value:.5g}" for name, value in shown.parameters.items())
     if one.between is not None:
-        ends = (f"{low:.3g} to {high:.3g}" for low, high in (one.between.estimates, one.between.interval))
-        return [one.limit.text, *ends, how]
+        lower, upper = one.between.interval
+        chances = " to ".join(each.told for each in one.estimates)
+        return [one.limit.text, chances, f"{lower:.3g} to {upper:.3g}", how]
     if one.passing is None:
         says = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
         return [one.limit.text, says, f"{one.margin:.3g} {one.limit.unit}", how]
-    lower, upper = one.passing.estimate.interval
-    chance = one.passing.estimate.probability
-    return [one.limit.text, f"{chance:.3g}", f"{lower[-1]:.3g} to {upper[-1]:.3g}", how]
+    (low,), (high,) = (end[-1:] for end in one.passing.estimate.interval)
+    return [one.limit.text, one.passing.estimate.told, f"{low:.3g} to {high:.3g}", how]
 
 
 def _cases(found: Response) -> list[Worst]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import integrate, stats
+from scipy.stats import qmc
 from shoal.response.inputs import Inputs, Parameter
 from shoal.response.limits.choice import probability
 from shoal.response.limits.margins import Margins
@@ -25,11 +26,12 @@ MOST = 5000
 class Repeated:
     """One limit many times, each with a seed of its own.
 
-    held: share of the intervals that hold the exact probability; ratios: of what was told to that, (repetitions,);
-    runs: the most that one took
+    held: share of the intervals that hold the exact probability; doubted: share that is told to be in doubt; ratios: of
+    what was told to the exact probability, (repetitions,); runs: the most that one took
     """
 
     held: float
+    doubted: float
     ratios: Array
     runs: int
 
@@ -87,6 +89,34 @@ def two(one: float, other: float) -> tuple[Function, float]:
     return lambda x: np.minimum(one - x[:, 0], other + x[:, 1]), float(exact)
 
 
+def sphere(exact: float, about: int) -> tuple[Function, float]:
+    """About the origin, in the first so many parameters: passed in all directions alike, as by a kinetic energy."""
+    square = float(stats.chi2.isf(exact, about))
+    return lambda x: square - (x[:, :about] ** 2).sum(axis=1), exact
+
+
+def rods(near: float, count: int) -> tuple[Function, float]:
+    """The reach of rods in line, each turned by 0.1 rad of standard deviation.
+
+    Passed with about that probability; the exact one by the distance of the limit in many directions.
+    """
+    short = 0.01 * float(stats.chi2.isf(near, count)) / 2
+    ways = stats.norm.ppf(qmc.Sobol(count, seed=0).random(2**14))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    inner, outer = np.zeros(len(ways)), np.full(len(ways), 12.0)
+    for _ in range(40):
+        middle = (inner + outer) / 2
+        passed = (1 - np.cos(0.1 * middle[:, None] * ways)).sum(axis=1) > short
+        inner, outer = np.where(passed, inner, middle), np.where(passed, middle, outer)
+    exact = float(stats.chi(count).sf(outer).mean())
+    return lambda x: short - (1 - np.cos(0.1 * x)).sum(axis=1), exact
+
+
+def cube(distance: float, count: int) -> tuple[Function, float]:
+    """About the origin: two design points for every parameter."""
+    return lambda x: distance - np.abs(x).max(axis=1), float(1 - (1 - 2 * stats.norm.sf(distance)) ** count)
+
+
 STATES: dict[str, tuple[tuple[Function, float], int]] = {
     "a plane, 1e-3": (plane(3.09, 2), 2),
     "a plane, 1e-5, eight parameters": (plane(4.26, 8), 8),
@@ -97,6 +127,12 @@ STATES: dict[str, tuple[tuple[Function, float], int]] = {
     "two unequal design points": (two(3.5, 4.0), 4),
     "four branches": (branches(3.0), 2),
     "four branches, 7e-6": (branches(5.0), 2),
+    "a sphere, 1e-3, four parameters": (sphere(1e-3, 4), 4),
+    "a sphere, 1e-6, eight parameters": (sphere(1e-6, 8), 8),
+    "a sphere, 1e-4, twelve parameters": (sphere(1e-4, 12), 12),
+    "a sphere about three of eight parameters, 1e-5": (sphere(1e-5, 3), 8),
+    "two rods in line, 1e-6": (rods(1e-6, 2), 2),
+    "eight rods in line, 1e-4": (rods(1e-4, 8), 8),
 }
 """Name -> margins and the exact probability, and the number of parameters."""
 
@@ -104,11 +140,13 @@ STATES: dict[str, tuple[tuple[Function, float], int]] = {
 def repeated(state: str, way: str, times: int) -> Repeated:
     """One of `STATES`."""
     (function, exact), count = STATES[state]
-    held, ratios, most = 0, [], 0
+    held, doubted, ratios, most = 0, 0, [], 0
     for seed in range(times):
         run = margins(function, count)
-        estimate = probability(run, way, seed).estimate
+        found = probability(run, way, seed)
+        estimate = found.estimate
         lower, upper = estimate.interval
         held, most = held + int(lower[-1] <= exact <= upper[-1]), max(most, run.evaluations)
+        doubted += int(bool(found.doubt))
         ratios.append(estimate.probability / exact)
-    return Repeated(held / times, np.array(ratios), most)
+    return Repeated(held / times, doubted / times, np.array(ratios), most)

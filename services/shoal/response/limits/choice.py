@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,8 +13,8 @@ from shoal.errors import InputError
 from shoal.response.kept import TimeIsUpError
 from shoal.response.limits.counted import contradiction
 from shoal.response.limits.estimate import Estimate, weighted
-from shoal.response.limits.form import DesignPoint, design_points, distinct
-from shoal.response.limits.importance import Sample, adapted, around, sample
+from shoal.response.limits.form import SHARES, DesignPoint, design_points, distinct
+from shoal.response.limits.importance import Sample, adapted, sample
 from shoal.response.limits.margins import Margins, least
 from shoal.response.limits.subset import Levels, subset
 from shoal.response.runs import TooManyRunsError
@@ -27,12 +28,17 @@ STARTS = 6
 """Searches for design points."""
 DIFFERENT = 0.8
 """Cosine below which two runs beyond a limit lie in different directions."""
-ROUNDS = 3
+ROUNDS = 10
 """Of looking for further design points, and how many directions are looked in."""
 ASIDE = 128
 REACH = 2.0
 """Beyond the nearest one, in these directions."""
-MOST_POINTS = 12
+MOST_POINTS = 30
+"""Design points that are looked for."""
+SEVERAL = 3
+"""Design points from which on a search that has not ended may have missed some."""
+SEEN = 25
+"""Runs beyond the limit, of those drawn all around, that tell the probability whether or not points were missed."""
 FIRST = 0.3
 """Share of the runs of importance sampling that its proposals are fitted to."""
 LEAST = 0.3
@@ -81,8 +87,9 @@ def by_importance(margins: Margins, seed: int) -> Passing:
     points = form(margins, seed).points
     if not points:
         return Passing(_nothing("no design point"), [], "importance sampling", "no design point was found to sample at")
-    estimate = sample(margins, around(points), margins.left, seed + 1).estimate
-    return Passing(estimate, points, f"{estimate.why} around {_told(points)}", _coarse(estimate))
+    found = sample(margins, adapted(points, None), margins.left, seed + 1)
+    why = f"{found.estimate.why} around {_told(points)}"
+    return Passing(found.estimate, points, why, _weak(found, [], points, ended=True))
 
 
 def by_subset(margins: Margins, seed: int) -> Passing:
@@ -111,32 +118,33 @@ def auto(margins: Margins, seed: int) -> Passing:
     if rough.probability >= OFTEN:
         found = monte_carlo(margins, seed + 1)
         return Passing(found.estimate, found.points, f"{found.why}, as the limit is passed often", found.doubt)
-    points = _sought(margins, pilot, seed + 1)
+    points, ended = _sought(margins, pilot, seed + 1)
     if not points:
         return Passing(rough, [], rough.why)
-    proposal = around(points)
-    if len(pilot.places):
-        proposal = adapted(points, Sample(pilot.places, pilot.margins, np.ones(len(pilot.places))))
+    known = Sample(pilot.places, pilot.margins, np.ones(len(pilot.places))) if len(pilot.places) else None
     plain = np.random.default_rng(seed + 4).standard_normal((int(PLAIN * margins.left), len(margins.inputs)))
     rows = margins(plain)
-    first = sample(margins, proposal, int(FIRST * margins.left), seed + 2)
-    estimate = sample(margins, adapted(points, first), margins.left, seed + 3).estimate
-    if doubt := contradiction(estimate, rows):
-        return Passing(estimate, points, estimate.why, doubt, len(rows))
+    first = sample(margins, adapted(points, known), int(FIRST * margins.left), seed + 2)
+    last = sample(margins, adapted(points, first), margins.left, seed + 3)
+    estimate = last.estimate
+    doubt = contradiction(estimate, rows) or _weak(last, [first], points, ended=ended)
     why = f"{estimate.why} around {_told(points)}"
-    if not len(pilot.places) or not estimate.probability:
-        return Passing(estimate, points, why, _coarse(estimate), len(rows))
+    if doubt or known is None:
+        return Passing(estimate, points, why, doubt, len(rows))
     # Subset simulation may lose a place as well, but it finds none that is not there.
-    missing = math.log(rough.probability / estimate.probability)
-    if missing > DISAGREE * math.hypot(max(rough.coefficient, LEAST), estimate.coefficient):
+    chance = DISAGREE * math.hypot(max(rough.coefficient, LEAST), estimate.coefficient)
+    if not estimate.probability or math.log(rough.probability / estimate.probability) > chance:
         doubt = f"importance sampling says {estimate.probability:.1e} and subset simulation {rough.probability:.1e}"
         return Passing(estimate, points, why, doubt, len(rows))
     agrees = f"; {rough.why} says {rough.probability:.1e}"
-    return Passing(estimate, points, why + agrees, _coarse(estimate), len(rows))
+    return Passing(estimate, points, why + agrees, "", len(rows))
 
 
-def _sought(margins: Margins, pilot: Levels, seed: int) -> list[DesignPoint]:
-    """Design points below all runs that pass the limit, as far as they are known; those runs where there are none."""
+def _sought(margins: Margins, pilot: Levels, seed: int) -> tuple[list[DesignPoint], bool]:
+    """Design points below all runs that pass the limit, as far as they are known; those runs where there are none.
+
+    And whether the search has ended of itself: nothing that is known is left to explain, or nothing new was found.
+    """
     parameters = len(margins.inputs)
     whole = margins.most
     margins.most = margins.evaluations + int(FOR_POINTS * margins.left)
@@ -148,18 +156,22 @@ def _sought(margins: Margins, pilot: Levels, seed: int) -> list[DesignPoint]:
         ways = np.random.default_rng(seed).standard_normal((ASIDE, parameters))
         ways *= radius / np.linalg.norm(ways, axis=1)[:, None]
         known = np.concatenate([known, ways[least(margins(ways)) < 0]])
+    ended, step = False, 2 * parameters + len(SHARES)
     for _ in range(ROUNDS):
         hidden = known
         for point in points:
             hidden = hidden[hidden @ point.normal < point.beta]
-        if not len(hidden) or margins.left < len(starts := _apart(hidden)):
+        starts = _apart(hidden)
+        if not len(starts) or margins.left < step * len(starts) or len(points) >= MOST_POINTS:
+            ended = not len(starts)
             break
         more = distinct([*points, *design_points(margins, starts)])
         if len(more) == len(points):
+            ended = margins.left >= step * len(starts)
             break
         points = more[:MOST_POINTS]
     margins.most = whole
-    return points or [_where(place) for place in _apart(pilot.places)]
+    return points or [_where(place) for place in _apart(pilot.places)], ended
 
 
 WAYS: dict[str, Callable[[Margins, int], Passing]] = {
@@ -220,6 +232,21 @@ def _told(points: list[DesignPoint]) -> str:
     betas = ", ".join(f"{point.beta:.2f}" for point in points[:3]) + (", ..." if len(points) > 3 else "")
     what = "a design point" if len(points) == 1 else f"{len(points)} design points"
     return f"{what} (beta {betas})"
+
+
+def _weak(last: Sample, before: list[Sample], points: list[DesignPoint], *, ended: bool) -> str:
+    """Empty, or why runs around design points do not tell the probability. ended: whether the search for these did."""
+    estimate, sure = last.estimate, [point for point in points if point.converged]
+    if not estimate.probability and sure:
+        return f"there is {_told(sure)}, but none of {len(last.rows)} runs around it passes the limit"
+    seen = 0
+    for rows, probability in itertools.chain.from_iterable(one.outside for one in (last, *before)):
+        if doubt := contradiction(estimate, rows, outside=probability):
+            return doubt
+        seen += int((rows < 0).any(axis=1).sum())
+    if not ended and len(points) >= SEVERAL and seen < SEEN:
+        return f"there may be more design points than the {len(points)} that were found"
+    return _coarse(estimate)
 
 
 def _coarse(estimate: Estimate) -> str:

@@ -16,20 +16,23 @@ ROUGH = 2.0
 """A probability without an interval may be off by this factor."""
 
 
-def contradiction(estimate: Estimate, margins: Array, share: float = 1.0) -> str:
+def contradiction(estimate: Estimate, margins: Array, share: float = 1.0, outside: float = 1.0) -> str:
     """In words, empty where the number of runs that pass is a likely one (binomial tests of both ends, one-sided).
 
-    margins: of runs drawn from the distributions, (runs, instants); share: of them that counts as independent
+    margins: of runs drawn from the distributions, (runs, instants); share: of them that counts as independent;
+    outside: probability of that part of the distributions which they are drawn from: what passes may lie elsewhere, so
+    that few say nothing
     """
     lower, upper = ends(estimate)
     passed, made = int(np.any(margins < 0, axis=1).sum()), len(margins)
     count = int(share * made)
-    few = stats.binom.cdf(math.ceil(share * passed), count, lower)
-    many = stats.binom.sf(math.floor(share * passed) - 1, count, upper)
+    few = stats.binom.cdf(math.ceil(share * passed), count, lower) if outside == 1 else 1.0
+    many = stats.binom.sf(math.floor(share * passed) - 1, count, min(upper / outside, 1.0))
     if min(few, many) >= CHANCE:
         return ""
     said = f"{estimate.why} says {estimate.probability:.1e}"
-    return f"{said}, but of {made} plain runs {passed} pass it, a share of {passed / made:.1e}"
+    runs = "plain runs" if outside == 1 else f"runs from the outer {outside:.1e} of the distributions"
+    return f"{said}, but of {made} {runs} {passed} pass it, which makes {outside * passed / made:.1e}"
 
 
 def ends(estimate: Estimate) -> tuple[float, float]:

@@ -41,6 +41,13 @@ class Estimate:
         return float(self.deviation[-1])
 
     @property
+    def told(self) -> str:
+        """The probability in words: where no run has passed the limit, not 0 but what it is below."""
+        if self.probability == 0:
+            return f"below {float(self.interval[1][-1]):.2g}"
+        return "not known" if math.isnan(self.probability) else f"{self.probability:.3g}"
+
+    @property
     def interval(self) -> tuple[Array, Array]:
         """Bounds that hold with 95 % confidence, (instants,) each: of a lognormal variable."""
         with np.errstate(invalid="ignore", over="ignore"):

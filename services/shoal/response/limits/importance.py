@@ -3,20 +3,24 @@
 Proposals are mixtures of normal distributions: one around every design point (Melchers, Importance sampling in
 structural systems, Structural Safety 6, 1989), and some for the runs beyond the limit that belong to it, with their
 means and covariances (Ang, Ang and Tang, Optimal importance-sampling density estimator, 1992, in the form of cross
-entropy).
+entropy). Between them weights could be as large as they like, and too rare to be met: where a limit surrounds the
+origin, that is most of the probability. A part of every proposal therefore is the distribution itself beyond the
+distance of the nearest design point (Harbitz, An efficient sampling method for probability of failure calculation,
+Structural Safety 3, 1986), which bounds the weights there (Hesterberg, Weighted average importance sampling and
+defensive mixture distributions, Technometrics 37, 1995).
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import special
 from scipy.cluster import vq
 
-from shoal.response.inputs import BoolArray
+from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.limits.estimate import Estimate, weighted
 from shoal.response.limits.form import DesignPoint
 from shoal.response.limits.margins import Margins
@@ -32,57 +36,130 @@ PLAIN = 0.2
 """Share of the runs around design points where there are fitted distributions as well."""
 PARTS = (1, 2, 4, 6)
 """Fitted distributions for each design point; which number serves best, runs tell."""
+INSIDE = 0.98
+"""Share of the distance of the nearest place known beyond the limit, from which on runs are drawn all around."""
+FLAT = 0.05
+"""Of the largest singular value of the normals at design points: below, a limit does not depend on a direction."""
+OUTSIDE: dict[int, list[tuple[float, ...]]] = {1: [(0.2,), (0.9,)], 2: [(0.1, 0.1), (0.1, 0.8), (0.8, 0.1)]}
+"""Shares of the runs that are drawn all around, by the number of ways to do it; runs tell which serve best."""
+
+
+@dataclass(frozen=True)
+class Outside:
+    """The standard normal distribution beyond a distance from the origin in some directions: in each of them alike.
+
+    axes: orthonormal, of these directions, (directions, parameters)
+    """
+
+    axes: Array
+    radius: float
+
+    @property
+    def probability(self) -> float:
+        """Of all that lies there."""
+        return float(special.gammaincc(len(self.axes) / 2, self.radius**2 / 2))
+
+    def draw(self, count: int, random: np.random.Generator) -> Array:
+        """(count, parameters)."""
+        places = random.standard_normal((count, self.axes.shape[1]))
+        along = places @ self.axes.T
+        squares = 2 * special.gammainccinv(len(self.axes) / 2, random.random(count) * self.probability)
+        longer = np.sqrt(squares) / np.linalg.norm(along, axis=1) - 1
+        return np.asarray(places + (longer[:, None] * along) @ self.axes)
+
+    def reaches(self, places: Array) -> BoolArray:
+        """Which of them lie there."""
+        return np.asarray(np.linalg.norm(places @ self.axes.T, axis=1) >= self.radius)
+
+
+def outsides(points: list[DesignPoint], beyond: Array) -> list[Outside]:
+    """In all directions, and in those that the limit depends on at its design points, if these are fewer.
+
+    Just within the design points and the runs beyond the limit, (runs, parameters).
+    """
+    places = np.concatenate([[point.place for point in points], beyond])
+    parameters = places.shape[1]
+    _, sizes, axes = np.linalg.svd([point.normal for point in points])
+    rank = int(np.sum(sizes > FLAT * sizes[0]))
+    ways = [np.eye(parameters), axes[:rank]] if rank < parameters else [np.eye(parameters)]
+    return [Outside(way, INSIDE * float(np.linalg.norm(places @ way.T, axis=1).min())) for way in ways]
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """Of normal distributions. shares: (parts,); means: (parts, parameters); factors: Cholesky's, of covariances."""
+    """Of normal distributions, and of what lies outside.
+
+    shares: (parts,), of those that are normal; means: (parts, parameters); factors: Cholesky's, of covariances;
+    outside, wide: what lies there, each with its share of all runs
+    """
 
     shares: Array
     means: Array
     factors: Array
+    outside: list[Outside]
+    wide: tuple[float, ...]
 
     def beside(self, other: Mixture, share: float) -> Mixture:
-        """Both, of which the other has this share."""
-        return Mixture(
-            np.concatenate([(1 - share) * self.shares, share * other.shares]),
-            np.concatenate([self.means, other.means]),
-            np.concatenate([self.factors, other.factors]),
+        """The normal distributions of both, of which those of the other have this share."""
+        return replace(
+            self,
+            shares=np.concatenate([(1 - share) * self.shares, share * other.shares]),
+            means=np.concatenate([self.means, other.means]),
+            factors=np.concatenate([self.factors, other.factors]),
         )
 
-    def draw(self, count: int, random: np.random.Generator) -> Array:
-        """As many of each part as its share says, but for rounding, which chance decides, (count, parameters)."""
+    def draw(self, count: int, random: np.random.Generator) -> tuple[Array, IntArray]:
+        """As many of each part as its share says, but for rounding, which chance decides, (count, parameters).
+
+        And which part each is of: below 0 those outside, as `outside` is indexed from its end.
+        """
         edges = (random.random() + np.arange(count)) / count
-        part = np.searchsorted(np.cumsum(self.shares)[:-1], edges)
+        shares = np.concatenate([self.wide, (1 - sum(self.wide)) * self.shares])
+        part = np.searchsorted(np.cumsum(shares)[:-1], edges) - len(self.outside)
         normal = random.standard_normal((count, self.means.shape[1]))
-        return np.asarray(self.means[part] + np.einsum("nij,nj->ni", self.factors[part], normal))
+        inside = np.maximum(part, 0)
+        places = self.means[inside] + np.einsum("nij,nj->ni", self.factors[inside], normal)
+        for k, one in enumerate(self.outside):
+            here = part == k - len(self.outside)
+            places[here] = one.draw(int(here.sum()), random)
+        return places, part
 
     def weights(self, places: Array) -> Array:
         """Standard normal density over that of the mixture, (places,)."""
-        logarithms = []
-        for share, mean, factor in zip(self.shares, self.means, self.factors, strict=True):
+        square = 0.5 * np.sum(places**2, axis=1)
+        logarithms = [
+            np.where(one.reaches(places), np.log(share / one.probability), -np.inf)
+            for share, one in zip(self.wide, self.outside, strict=True)
+        ]
+        for share, mean, factor in zip((1 - sum(self.wide)) * self.shares, self.means, self.factors, strict=True):
             standard = np.linalg.solve(factor, (places - mean).T).T
-            logarithms.append(np.log(share) - 0.5 * np.sum(standard**2, axis=1) - np.log(np.abs(np.diag(factor))).sum())
-        return np.asarray(np.exp(-0.5 * np.sum(places**2, axis=1) - special.logsumexp(logarithms, axis=0)))
+            size = np.log(share) - np.log(np.abs(np.diag(factor))).sum()
+            logarithms.append(size - 0.5 * np.sum(standard**2, axis=1) + square)
+        return np.asarray(np.exp(-special.logsumexp(logarithms, axis=0)))
 
 
-def around(points: list[DesignPoint]) -> Mixture:
+def around(points: list[DesignPoint], outside: list[Outside]) -> Mixture:
     """One unit normal distribution around each design point, by their first-order probabilities."""
     means = np.array([point.place for point in points])
     shares = np.array([max(point.probability, 1e-300) for point in points])
     # None is left out: a first-order probability may be off by far.
     shares = shares / shares.sum() + 0.2 / len(points)
     parameters = means.shape[1]
-    return Mixture(shares / shares.sum(), means, np.broadcast_to(np.eye(parameters), (len(points), *[parameters] * 2)))
+    unit = np.broadcast_to(np.eye(parameters), (len(points), parameters, parameters))
+    return Mixture(shares / shares.sum(), means, unit, outside, OUTSIDE[len(outside)][0])
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Runs of a proposal: places, (runs, parameters), margins over time, (runs, instants), weights, (runs,)."""
+    """Runs of a proposal: places, (runs, parameters), margins over time, (runs, instants), weights, (runs,).
+
+    outside: margins of those that were drawn there, each with the probability of all that lies there
+    """
 
     places: Array
     rows: Array
     weights: Array
+    outside: tuple[tuple[Array, float], ...] = ()
 
     @property
     def estimate(self) -> Estimate:
@@ -106,23 +183,30 @@ class Sample:
 
 def sample(margins: Margins, proposal: Mixture, count: int, seed: int) -> Sample:
     """So many runs. Raises InputError, TooManyRunsError."""
-    places = proposal.draw(count, np.random.default_rng(seed))
-    return Sample(places, margins(places), proposal.weights(places))
+    places, part = proposal.draw(count, np.random.default_rng(seed))
+    rows, ways = margins(places), proposal.outside
+    outside = tuple((rows[part == k - len(ways)], way.probability) for k, way in enumerate(ways))
+    return Sample(places, rows, proposal.weights(places), outside)
 
 
-def adapted(points: list[DesignPoint], found: Sample) -> Mixture:
+def adapted(points: list[DesignPoint], found: Sample | None) -> Mixture:
     """A mixture with a part for the runs beyond the limit that are nearest to each design point.
 
-    Of several, the one that scatters least over runs that it was not fitted to.
+    Of several, the one that scatters least over runs that it was not fitted to. found: runs, None before there are any.
     """
-    parameters, beyond = len(points[0].place), found.beyond
+    parameters = len(points[0].place)
+    if found is None:
+        return around(points, outsides(points, np.zeros((0, parameters))))
+    beyond = found.beyond
     fitted, unseen = beyond.halves
-    best, least = around(points), _scatter(around(points), unseen)
-    for parts, prior in itertools.product(PARTS, (parameters + 1.0, 0.5 * parameters**2)):
-        scatter = _scatter(_fitted(points, fitted, parts, prior), unseen)
-        if scatter < least:
-            best, least = _fitted(points, beyond, parts, prior), scatter
-    return best
+    plain = around(points, outsides(points, beyond.places))
+    shapes = [(0, 0.0), *itertools.product(PARTS, (parameters + 1.0, 0.5 * parameters**2))]
+    tried = [(shape, _fitted(plain, fitted, *shape)) for shape in shapes]
+    shape, proposal = min(
+        ((shape, replace(one, wide=wide)) for shape, one in tried for wide in OUTSIDE[len(plain.outside)]),
+        key=lambda each: _scatter(each[1], unseen),
+    )
+    return replace(_fitted(plain, beyond, *shape), wide=proposal.wide)
 
 
 def _scatter(proposal: Mixture, of: Sample) -> float:
@@ -140,14 +224,16 @@ def _centres(beyond: Sample, parts: int) -> Array:
     return np.asarray(vq.kmeans(alike, guess)[0]) if len(guess) > 1 else guess
 
 
-def _fitted(points: list[DesignPoint], beyond: Sample, parts: int, prior: float) -> Mixture:
-    """parts: for each design point, as no single normal distribution follows a limit that bends.
+def _fitted(plain: Mixture, beyond: Sample, parts: int, prior: float) -> Mixture:
+    """With parts for each design point, as no single normal distribution follows a limit that bends.
 
-    prior: for how many observations of a unit covariance a part is taken, as few tell little of all directions
+    plain: around the design points, which is what no parts give; prior: for how many observations of a unit covariance
+    a part is taken, as few tell little of all directions
     """
-    plain = around(points)
-    several = parts > 1 and len(beyond.places) >= ENOUGH * parts * len(points)
-    centres = _centres(beyond, parts * len(points)) if several else plain.means
+    if not parts:
+        return plain
+    several = parts > 1 and len(beyond.places) >= ENOUGH * parts * len(plain.means)
+    centres = _centres(beyond, parts * len(plain.means)) if several else plain.means
     nearest = np.linalg.norm(beyond.places[:, None] - centres, axis=2).argmin(axis=1)
     shares, means, factors = [], [], []
     for k in range(len(centres)):
@@ -167,4 +253,5 @@ def _fitted(points: list[DesignPoint], beyond: Sample, parts: int, prior: float)
             factors.append(size * factor)
     if not means:
         return plain
-    return plain.beside(Mixture(np.array(shares) / sum(shares), np.array(means), np.array(factors)), 1 - PLAIN)
+    fitted = replace(plain, shares=np.array(shares) / sum(shares), means=np.array(means), factors=np.array(factors))
+    return plain.beside(fitted, 1 - PLAIN)

@@ -98,10 +98,11 @@ def _limit(judged: Judged) -> None:
         _between(title, judged, judged.between)
         how = "most probably with"
     elif judged.passing is not None:
-        lower, upper = judged.passing.estimate.interval
+        estimate = judged.passing.estimate
+        lower, upper = estimate.interval
         screen.say(
-            f"{title}: is passed {at} with probability {judged.passing.estimate.probability:.3g}, with 95 % confidence "
-            f"between {lower[-1]:.3g} and {upper[-1]:.3g}",
+            f"{title}: is passed {at} with probability {estimate.told}, with 95 % confidence between {lower[-1]:.3g} "
+            f"and {upper[-1]:.3g}",
             f"  by {judged.passing.why}; {judged.evaluations} runs",
             style="bold",
         )
@@ -120,10 +121,10 @@ def _limit(judged: Judged) -> None:
 
 def _between(title: str, judged: Judged, found: Between) -> None:
     """Two probabilities and the interval values that they are told at."""
-    (least, largest), (lower, upper) = found.estimates, found.interval
+    (least, largest), (lower, upper) = judged.estimates, found.interval
     screen.say(
-        f"{title}: is passed {looked_at(judged.times)} with a probability between {least:.3g} and "
-        f"{largest:.3g}, with 95 % confidence between {lower:.3g} and {upper:.3g}",
+        f"{title}: is passed {looked_at(judged.times)} with a probability between {least.told} and "
+        f"{largest.told}, with 95 % confidence between {lower:.3g} and {upper:.3g}",
         style="bold",
     )
     for name, at in (("least", found.at_lower), ("largest", found.at_upper)):
