@@ -33,4 +33,5 @@ def test_the_tip_of_a_chain_is_where_other_engines_see_it(run: Any, tolerance: f
 def test_every_row_of_the_benchmark_is_measured() -> None:
     rows = list(measure((5,), repeats=1))
     assert len({row.name for row in rows}) == len(rows) == 6
-    assert all(row.seconds > 0 and row.gap < 1e-5 for row in rows)
+    # A time is what two runs take more than one, which a busy machine may turn round.
+    assert all(np.isfinite(row.seconds) and row.gap < 1e-5 for row in rows)
