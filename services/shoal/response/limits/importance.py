@@ -40,7 +40,7 @@ INSIDE = 0.98
 """Share of the distance of the nearest place known beyond the limit, from which on runs are drawn all around."""
 FLAT = 0.05
 """Of the largest singular value of the normals at design points: below, a limit does not depend on a direction."""
-OUTSIDE: dict[int, list[tuple[float, ...]]] = {1: [(0.2,), (0.9,)], 2: [(0.1, 0.1), (0.1, 0.8), (0.8, 0.1)]}
+OUTSIDE: dict[int, list[tuple[float, ...]]] = {1: [(0.1,), (0.9,)], 2: [(0.05, 0.05), (0.1, 0.8), (0.8, 0.1)]}
 """Shares of the runs that are drawn all around, by the number of ways to do it; runs tell which serve best."""
 
 
