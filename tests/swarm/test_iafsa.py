@@ -64,6 +64,18 @@ def test_tolerance_ends_the_search_early() -> None:
     assert end.best_value < 1e-10
 
 
+def test_values_that_agree_end_the_search() -> None:
+    """About a minimum of 1, where closer fish gain nothing; not where all values are the same, which tells nothing."""
+    box = {"lower": np.full(2, -2.0), "upper": np.full(2, 2.0), "value_tolerance": 1e-6}
+    end = minimize(Iafsa(**box), lambda x: 1.0 + rosenbrock(x), rng=np.random.default_rng(0), iterations=1000)
+    assert end.finished
+    assert end.iteration < 100
+    assert end.best_value < 1.0 + 1e-6
+    assert np.ptp(end.memory_values) <= 1e-6 * end.best_value
+    plateau = minimize(Iafsa(**box), lambda x: np.ones(len(x)), rng=np.random.default_rng(0), iterations=5)
+    assert plateau.iteration == 5
+
+
 @pytest.mark.parametrize("wrong", [{"mutation": 1.5}, {"size": 1}, {"traditional": np.zeros(3)}])
 def test_wrong_settings_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ValueError, match="found"):

@@ -47,7 +47,7 @@ class Iafsa(Seeded):
 
     traditional, previous: they replace the last and the last but one fish. mutation: probability with which a fish
     mutates. tolerance: the search is finished when all memories lie within this fraction of the box; 0 for when they
-    coincide.
+    coincide. value_tolerance: or when their values, not all the same, agree to this fraction of the best.
     use_velocity: the term w v of eq. 17; use_mutation: the mutation.
     """
 
@@ -56,6 +56,7 @@ class Iafsa(Seeded):
     c2: float = ATTRACTION
     mutation: float = 0.7
     tolerance: float = 0.0
+    value_tolerance: float = 0.0
     use_velocity: bool = True
     use_mutation: bool = True
 
@@ -113,8 +114,13 @@ class Iafsa(Seeded):
             best=best,
             best_value=best_value,
             iteration=state.iteration + 1,
-            finished=bool(np.ptp(p, axis=0).max() <= self.tolerance),
+            finished=self._is_finished(p, f_p),
         )
+
+    def _is_finished(self, p: Array, f_p: Array) -> bool:
+        lowest, highest = float(f_p.min()), float(f_p.max())
+        alike = 0.0 < highest - lowest <= self.value_tolerance * lowest
+        return alike or bool(np.ptp(p, axis=0).max() <= self.tolerance)
 
     def _velocity(self, rng: np.random.Generator, v: Array, x: Array, p: Array, p_g: Array) -> Array:
         """Eq. 17 without its last term; each rand() is an independent number per fish and dimension."""
