@@ -27,7 +27,7 @@ from shoal.mechanics.integrators import facts
 from shoal.mechanics.persist import DAMPED, as_run
 from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import STEP_MARGIN, stable_step
-from shoal.scene import GROUND, Revolute, Rod, Scene, Slider, Solver
+from shoal.scene import GROUND, Revolute, Scene, Slider, Solver
 from shoal.scene.joints import places
 from shoal.scene.refined import refined, unbent
 from shoal.trajectory import Array, Status, Trajectory, plain
@@ -166,7 +166,7 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
             return Verification(None, None, scale, rejected=careful.message)
         (time_error, angle_error), notes[0] = _time_error(trajectory, careful, scene, scale, second)
     mesh_error = None
-    if any(_flexible(scene)):
+    if any(scene.flexible_rods):
         mesh_error, note = _mesh_error(trajectory, scene, scale, second)
         notes.append(note)
     friction_error, note = _friction_error(trajectory, scene, second)
@@ -195,7 +195,7 @@ def _mesh_error(trajectory: Trajectory, scene: Scene, scale: float, second: Seco
 
 def _bending_error(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[float | None, str]:
     """How far the markers are from where cables bring them in place of modal rods [m], which may bend far."""
-    modal = {name: rod for name, rod in _flexible(scene).items() if rod.element == "modal"}
+    modal = {name: rod for name, rod in scene.flexible_rods.items() if rod.element == "modal"}
     if not modal:
         return None, ""
     if any(np.any(scene.start(name).modes) or np.any(scene.start(name).mode_rates) for name in modal):
@@ -248,7 +248,7 @@ def _second(
     try:
         for scene in make():
             name = "dop853" if scene.solver.integrator == "auto" else scene.solver.integrator
-            if facts(name).adaptive and any(_flexible(scene)) and not _adaptive(trajectory):
+            if facts(name).adaptive and any(scene.flexible_rods) and not _adaptive(trajectory):
                 most = min(scene.solver.max_steps, expense.affordable(model, name, budget))
                 scene = scene.with_values({"solver.max_steps": most})
             else:
@@ -313,11 +313,6 @@ def _cut(trajectory: Trajectory, scene: Scene) -> bool:
     return trajectory.engine == "gauss" and (trajectory.steps - 1) * scene.solver.step > trajectory.times[-1]
 
 
-def _flexible(scene: Scene) -> dict[str, Rod]:
-    """The flexible rods of a scene."""
-    return {n: body for n, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
-
-
 def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) -> Iterator[Scene]:
     """The same mesh, with the usual treatment of constraints. factor: on the tolerance of an adaptive integrator.
 
@@ -336,7 +331,7 @@ def _careful(scene: Scene, trajectory: Trajectory, factor: float | None = None) 
             settings["solver.max_step"] = SHORTER * float(trajectory.times[-1]) / trajectory.steps
             settings["solver.max_steps"] = max(solver.max_steps, MORE * trajectory.steps)
         yield scene.with_values(settings)
-    elif not any(_flexible(scene)):
+    elif not any(scene.flexible_rods):
         # Tolerances that the run itself had no use for may be any.
         close = {path: min(scene.value(path), most) for path, most in CLOSE.items()}
         yield scene.with_values({**settings, **close, "solver.integrator": "auto"})
@@ -359,7 +354,7 @@ def _able(scene: Scene, step: float) -> Iterator[Scene]:
     The stable step of leapfrog is that of the start; loops and stretched rods have shorter ones, which none tells
     beforehand. Damping may leave it none that is of use.
     """
-    if not any(rod.element != "modal" for rod in _flexible(scene).values()):
+    if not any(rod.element != "modal" for rod in scene.flexible_rods.values()):
         yield scene.with_values({"solver.integrator": "auto"})
         return
     longest = min(step, STEP_MARGIN * stable_step(scene, "leapfrog"))

@@ -104,7 +104,15 @@ def conclude(
     notes = [
         judgement.message or outcome.message,
         *(_of_laws(model, near, known.laws, values) if fits else []),
-        *remarks(values, known.profiled, known.bent(model), near.tests, near.mesh if limits else None, near.theory),
+        *remarks(
+            values,
+            known.profiled,
+            known.bent(model),
+            near.tests,
+            near.mesh if limits else None,
+            near.theory,
+            bool(model.scene.flexible_rods),
+        ),
         *(one.sentence(near.at, model.names) for one in (*near.given, near.fields) if one is not None),
         *([undrawn] if drawn is None else [drawn.sentence(), *news(drawn, values)]),
         "the draws are about the first of them alone" * (drawn is not None and judgement.verdict is Verdict.AMBIGUOUS),

@@ -35,7 +35,7 @@ def convergence(estimates: Mapping[str, Estimate], title: str) -> Figure:
         error, estimate = min(floor, key=lambda pair: pair[0])
         level = estimate.measurement.first.things * error**2
         axes.axhline(level, color=GREY, linewidth=1, linestyle=(0, (1, 2)))
-        axes.annotate("mesh error of the model", (1, level), (0, -4), textcoords="offset points", va="top", color=GREY)
+        axes.annotate("error of mesh and steps", (1, level), (0, -4), textcoords="offset points", va="top", color=GREY)
         axes.set_ylim(bottom=min(level / 6, axes.get_ylim()[0]))
     low, high = axes.get_ylim()
     axes.set_ylim(low, max(2 * high, 100 * low))

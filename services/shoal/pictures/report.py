@@ -97,7 +97,7 @@ def _remarks(estimate: Estimate) -> list[str]:
     remarks = [*(f"Next: {step}." for step in estimate.advice), *sentences, *tests]
     if estimate.model_error_rms is not None:
         error = length(estimate.model_error_rms)
-        remarks.append(f"The mesh of the model is off by {error} (RMS); the intervals include it.")
+        remarks.append(f"Mesh and steps of the model are off by {error} (RMS); the intervals include it.")
     remarks += [
         f"Model for {length(stage['tolerance'])}: {stage['model']}, off by about {length(stage['error'])}; "
         f"{stage['evaluations']} simulations."

@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 from shoal.errors import InputError
 from shoal.scene import joints as joint_types
 from shoal.scene.amplitudes import check_amplitudes, check_place
-from shoal.scene.bodies import FRAMED, Body
+from shoal.scene.bodies import FRAMED, Body, Rod
 from shoal.scene.dimensions import Dimensions, check_dimensions, padded
 from shoal.scene.ended import End
 from shoal.scene.expect import Expectation, ExpectedValue
@@ -220,6 +220,11 @@ class Scene(Record):
     def starts_at_rest(self) -> bool:
         """Whether the start is the place of rest near the one that is stated."""
         return self.initial_from == "statics"
+
+    @property
+    def flexible_rods(self) -> dict[str, Rod]:
+        """The rods that bend, by their names."""
+        return {n: body for n, body in self.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
 
     def location(self, attachment: Attachment) -> Any:
         """Coordinates [m] of an attachment in its body's (or the ground's) frame, (d,); on a flexible rod (s, y)."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from shoal.scene.bodies import Rod
 from shoal.scene.refined import unbent
 from shoal.scene.scene import Scene
 
@@ -14,9 +13,8 @@ def with_shear(scene: Scene) -> Scene | None:
 
     None if there are none, or in space, which has no such element.
     """
-    flexible = {name: rod for name, rod in scene.bodies.items() if isinstance(rod, Rod) and rod.element != "rigid"}
     values: dict[str, Any] = {}
-    for name, rod in flexible.items():
+    for name, rod in scene.flexible_rods.items():
         if not rod.shears:
             count = rod.modes if rod.element == "modal" else rod.elements
             fields = {**rod.by_elements("simo-reissner", count), "quadrature": "full"}

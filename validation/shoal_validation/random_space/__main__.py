@@ -21,7 +21,7 @@ import argparse
 import sys
 from collections import Counter
 
-from shoal_validation.random_space.study import BEAMS, KINDS, drawn, flexible, judged, met
+from shoal_validation.random_space.study import BEAMS, KINDS, drawn, judged, met
 
 
 def main(arguments: list[str]) -> None:
@@ -37,7 +37,7 @@ def main(arguments: list[str]) -> None:
     first, last = map(int, asked.seeds.split(":"))
     counts: Counter[str] = Counter()
     for seed in range(first, last):
-        if (asked.kind in ("directors", *BEAMS) or asked.tolerance) and not flexible(drawn(seed, asked.kind)[1]):
+        if (asked.kind in ("directors", *BEAMS) or asked.tolerance) and not drawn(seed, asked.kind)[1].flexible_rods:
             continue
         found = met(seed, asked.tolerance, asked.kind) if asked.tolerance else judged(seed, asked.kind)
         counts[found.verdict] += 1

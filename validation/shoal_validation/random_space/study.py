@@ -11,7 +11,7 @@ from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
 from shoal.engines.verification import verified
 from shoal.errors import ComputationError, InputError
-from shoal.scene import Rod, Scene
+from shoal.scene import Scene
 from shoal.selection import select
 from shoal.trajectory import Trajectory
 
@@ -107,11 +107,6 @@ def drawn(seed: int, kind: str) -> tuple[str, Scene]:
     return "", with_directors(scene) if kind == "directors" else scene
 
 
-def flexible(scene: Scene) -> dict[str, Rod]:
-    """Its flexible rods."""
-    return {name: body for name, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"}
-
-
 def met(seed: int, tolerance: float, kind: str = "chains") -> Judged:
     """Ask for the machine of a seed, which has flexible rods, within a tolerance [m], and judge by Exudyn's rods."""
     _, scene = drawn(seed, kind)
@@ -143,7 +138,7 @@ def _by_newton_and_euler(seed: int) -> _Opinion:
 
 def _by_engines(scene: Scene) -> _Opinion:
     """`tree` where it can, else Exudyn on the same cables, else on finer ones."""
-    rods = flexible(scene)
+    rods = scene.flexible_rods
     cables = all(rod.element == "ancf-cable" for rod in rods.values())
     finer = {} if cables else {name: FINER * rod.elements for name, rod in rods.items()}
     try:
@@ -154,12 +149,12 @@ def _by_engines(scene: Scene) -> _Opinion:
 
 def _divided(scene: Scene, count: int) -> Scene:
     """The scene with so many elements of every flexible rod."""
-    return scene.with_values({f"bodies.{name}.elements": count for name in flexible(scene)})
+    return scene.with_values({f"bodies.{name}.elements": count for name in scene.flexible_rods})
 
 
 def _by_cables(scene: Scene) -> _Opinion:
     """Exudyn's cables on the finer of two meshes."""
-    coarse, fine = (_exudyn(scene, dict.fromkeys(flexible(scene), count)) for count in MESHES)
+    coarse, fine = (_exudyn(scene, dict.fromkeys(scene.flexible_rods, count)) for count in MESHES)
     for one in (coarse, fine):
         if (opinion := _Opinion("exudyn", one)).silence:
             return opinion
@@ -172,7 +167,7 @@ def _by_beams(scene: Scene) -> _Opinion:
     """Exudyn's geometrically exact beams on these elements and on half as long ones, extrapolated (of second order)."""
     runs = []
     for factor in (1, 2):
-        finer = {f"bodies.{name}.elements": factor * rod.elements for name, rod in flexible(scene).items()}
+        finer = {f"bodies.{name}.elements": factor * rod.elements for name, rod in scene.flexible_rods.items()}
         found = _by_exudyn("exudyn-ge", scene.with_values(finer), BEAM_STEP)
         if isinstance(found, str) or not found.ok:
             return _Opinion("beams", found)
@@ -187,7 +182,7 @@ def _exudyn(scene: Scene, cables: Mapping[str, int]) -> Trajectory | str:
     values: dict[str, object] = {}
     for rod, count in cables.items():
         values |= {f"bodies.{rod}.element": "ancf-cable", f"bodies.{rod}.elements": count}
-    return _by_exudyn("exudyn", scene.with_values(values), CABLE_STEP if flexible(scene) else RIGID_STEP)
+    return _by_exudyn("exudyn", scene.with_values(values), CABLE_STEP if scene.flexible_rods else RIGID_STEP)
 
 
 def _by_exudyn(engine: str, scene: Scene, step: float) -> Trajectory | str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from shoal.scene import Rod, Scene
+from shoal.scene import Scene
 
 KINDS: dict[str, dict[str, object]] = {
     "C": {"element": "ancf-cable", "quadrature": "full"},
@@ -27,9 +27,8 @@ def with_mesh(scene: Scene, mesh: str) -> Scene:
     """The scene with its flexible rods, in their order, meshed so; an empty name leaves it alone."""
     if not mesh:
         return scene
-    rods = [name for name, body in scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"]
     values: dict[str, object] = {}
-    for name, part in zip(rods, mesh.split("/"), strict=True):
+    for name, part in zip(scene.flexible_rods, mesh.split("/"), strict=True):
         count, kind = re.fullmatch(r"(\d+)([A-Z])", part).groups()  # type: ignore[union-attr]
         fields = {"elements": int(count), **KINDS[kind]}
         values |= {f"bodies.{name}.{field}": value for field, value in fields.items()}

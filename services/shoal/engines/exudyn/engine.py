@@ -23,7 +23,7 @@ from shoal.engines.interrupts import interruptible
 from shoal.engines.one_by_one import one_by_one
 from shoal.mechanics.halts import CROSSED
 from shoal.mechanics.start.start import facts
-from shoal.scene import Rod, Scene
+from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
 
 WEAK = "; generalized-alpha is only weakly stable at solver.spectral_radius 1, use 0.9"
@@ -222,7 +222,7 @@ class ExudynEngine:
 
     def _model(self, exu: Any, machine: Machine, steps: Steps) -> dict[str, Any]:
         integrator, radius = self._method(machine)
-        rods = [body for body in machine.scene.bodies.values() if isinstance(body, Rod) and body.element != "rigid"]
+        rods = machine.scene.flexible_rods.values()
         return {
             "exudyn": exu.__version__,
             "unknowns": machine.unknowns,

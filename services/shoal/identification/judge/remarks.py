@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from shoal.engines.verification import SMALLER
 from shoal.identification.judge.residual_tests import ResidualTests
 from shoal.identification.spread.profiles import Profile
 from shoal.identification.spread.value import Value
@@ -21,11 +22,13 @@ def remarks(
     tests: ResidualTests,
     mesh: float | None,
     theory: float | None,
+    bends: bool,
 ) -> list[str]:
     """A sentence for each other limit, or none.
 
     curved: parameters whose intervals are those of their profiles
-    mesh, theory: size of what a finer mesh and a fuller theory would change of the motion, None where neither limits
+    mesh, theory: size of what a finer mesh, with shorter steps, and a fuller theory would change of the motion, None
+    where neither limits; bends: whether the machine has a mesh, else it is the steps alone
     """
     found = []
     if better := ", ".join(name for name, profile in profiled.items() if profile.better):
@@ -33,14 +36,22 @@ def remarks(
     if curved:
         bent = ", ".join(curved)
         found.append(f"the misfit is no parabola within the interval of {bent}, which is that of the profile")
-    if mesh is not None and (excess := _excess(tests, mesh)):
+    if mesh is not None and not bends and (widened := _limited(parameters, "correction")):
+        change = f"changes the motion by about {tests.sized(mesh)} and widens the interval of {widened}"
+        found.append(f"the time error {change}: use {SMALLER}")
+    if mesh is not None and bends and (excess := _excess(tests, mesh)):
         wanted = (tests.noise if tests.noise_stated else mesh) / 3
         found.append(f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted:.1g} finds a better mesh")
-    limited = [n for n, v in parameters.items() if abs(v.theory or 0.0) > _NOTICED * (v.upper - v.lower) / 2]
-    if theory is not None and limited:
-        change = f"change the motion by about {tests.sized(theory)} and widen the interval of {', '.join(limited)}"
+    if theory is not None and (widened := _limited(parameters, "theory")):
+        change = f"change the motion by about {tests.sized(theory)} and widen the interval of {widened}"
         found.append(f"shear and rotary inertia, which slender beams neglect, {change}")
     return found
+
+
+def _limited(parameters: Mapping[str, Value], part: str) -> str:
+    """Whose intervals a part of the model's error widens, `correction` or `theory`."""
+    parts = {name: abs(getattr(value, part) or 0.0) for name, value in parameters.items()}
+    return ", ".join(n for n, v in parameters.items() if parts[n] > _NOTICED * (v.upper - v.lower) / 2)
 
 
 def _excess(tests: ResidualTests, mesh: float) -> str:

@@ -1,4 +1,4 @@
-"""The model's own error at an answer: what a finer mesh and a fuller theory would change of motion and answer."""
+"""The model's own error at an answer: what a finer mesh, shorter steps and a fuller theory would change of it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import numpy as np
 
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import WITH_SHEAR, slender_share
+from shoal.engines.verification import CLOSE
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
+from shoal.mechanics.integrators import facts
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Rod, Scene
 from shoal.scene.refined import refined
@@ -42,8 +44,9 @@ class Corrections:
 class ModelError:
     """Motion of a better model minus that of the one that was fitted, (rows,), with zeros for priors.
 
-    mesh: by twice as many elements; theory: by shear and rotary inertia, beyond what the mesh does. None for scenes
-    without any of it, and where the better model cannot be run.
+    mesh: by twice as many elements and shorter steps, of rigid machines by steps that follow them closely; theory: by
+    shear and rotary inertia, beyond what the mesh does. None for scenes without any of it, and where the better model
+    cannot be run.
     """
 
     mesh: Array | None
@@ -65,11 +68,10 @@ class ModelError:
 
 def model_error(model: ForwardModel, point: Array, predicted: Mapping[str, Array], residual: Array) -> ModelError:
     """At a point whose channels by recording, and residuals (rows,), are known."""
-    flexible = {
-        name: body for name, body in model.scene.bodies.items() if isinstance(body, Rod) and body.element != "rigid"
-    }
+    flexible = model.scene.flexible_rods
     if not flexible:
-        return ModelError(None, None)
+        closer = _closer(model)
+        return ModelError(None if closer is None else difference(_natively(model), point, predicted, closer), None)
     finer = _finer(model.scene)
     mesh = None if finer is None else difference(model, point, predicted, finer)
     slender = {name: rod for name, rod in flexible.items() if not rod.shears}
@@ -96,7 +98,26 @@ def _sheared(model: ForwardModel, point: Array, predicted: Mapping[str, Array]) 
     """By twice as many rods with shear and rotary inertia; None where they cannot be had."""
     stout = with_shear(model.scene)
     finer = None if stout is None else _finer(stout)
-    return None if finer is None else difference(replace(model, engine=GaussEngine()), point, predicted, finer)
+    return None if finer is None else difference(_natively(model), point, predicted, finer)
+
+
+def _natively(model: ForwardModel) -> ForwardModel:
+    return model if model.engine.name == GaussEngine().name else replace(model, engine=GaussEngine())
+
+
+def _closer(model: ForwardModel) -> Scene | None:
+    """The scene of a rigid machine, followed closely in time; None where it already is."""
+    solver = model.scene.solver
+    chooses = solver.integrator == "auto" or facts(solver.integrator).adaptive
+    close = _close(model.scene)
+    if chooses and not close and model.engine.name == GaussEngine().name:
+        return None
+    return model.scene.with_values({**close, "solver.integrator": solver.integrator if chooses else "auto"})
+
+
+def _close(scene: Scene) -> dict[str, float]:
+    """Tolerances of adaptive integrators that are too loose for a second run, by their paths."""
+    return {path: most for path, most in CLOSE.items() if scene.value(path) > most}
 
 
 def _finer(scene: Scene) -> Scene | None:
@@ -105,7 +126,7 @@ def _finer(scene: Scene) -> Scene | None:
     Inertia is not capped there, so that what capping costs counts in full.
     """
     try:
-        finer = scene.with_values({**refined(scene, 2), "solver.inertia_cap": False})
+        finer = scene.with_values({**refined(scene, 2), **_close(scene), "solver.inertia_cap": False})
         integrator = scene.solver.integrator
         limit = np.inf if integrator == "auto" else stable_step(finer, integrator)
         return finer.with_values({"solver.step": min(scene.solver.step / 2, _STABLE * limit)})

@@ -11,8 +11,8 @@ import numpy as np
 class Value:
     """An estimated number: its standard deviation, and a 95 % interval (Student's t) with the model's own error in it.
 
-    correction: what a mesh twice as fine would add to the value, None if not computed; it is not added, but is in
-    the interval
+    correction: what a mesh twice as fine with shorter steps would add to the value, of rigid machines the steps alone,
+    None if not computed; it is not added, but is in the interval
     theory: what shear and rotary inertia would add where slender beams neglect them; likewise
     unit: of all of them, empty where there is none or none is known
     fixed: whether the data limit it at all; an estimate tells neither deviation nor interval of what they do not

@@ -89,7 +89,7 @@ def _check_rod(scene: Scene, marker: str, quantity: str) -> None:
     name = scene.markers[marker].body
     rod = scene.bodies.get(name)
     if not isinstance(rod, Rod) or rod.element == "rigid":
-        bending = [each for each, one in scene.bodies.items() if isinstance(one, Rod) and one.element != "rigid"]
+        bending = scene.flexible_rods
         known = f"; flexible are {', '.join(bending)}" if bending else ""
         raise InputError(f"{quantity} is that of a flexible rod; {name}, with marker {marker}, is rigid{known}")
     if rod.element == "modal":

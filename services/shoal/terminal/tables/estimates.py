@@ -111,7 +111,8 @@ def _effort(estimate: Estimate) -> None:
         errors = (f"{name} {estimate.parameters[name].value - true:+.2e}" for name, true in estimate.truth.items())
         screen.say(f"against the truth of the computed data: {', '.join(errors)}")
     if estimate.model_error_rms is not None:
-        screen.say(f"the mesh of the model is off by {estimate.model_error_rms:.1e} m (RMS); the intervals include it")
+        error = f"{estimate.model_error_rms:.1e} m (RMS)"
+        screen.say(f"mesh and steps of the model are off by {error}; the intervals include it")
 
 
 def design_table(found: Design) -> None:
