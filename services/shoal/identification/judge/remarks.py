@@ -36,12 +36,18 @@ def remarks(
     if curved:
         bent = ", ".join(curved)
         found.append(f"the misfit is no parabola within the interval of {bent}, which is that of the profile")
-    if mesh is not None and not bends and (widened := _limited(parameters, "correction")):
-        change = f"changes the motion by about {tests.sized(mesh)} and widens the interval of {widened}"
-        found.append(f"the time error {change}: use {SMALLER}")
-    if mesh is not None and bends and (excess := _excess(tests, mesh)):
+    if mesh is not None:
+        excess = _excess(tests, mesh)
         wanted = (tests.noise if tests.noise_stated else mesh) / 3
-        found.append(f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted:.1g} finds a better mesh")
+        if excess and bends:
+            found.append(
+                f"the mesh error of {tests.sized(mesh)} {excess}; --tolerance {wanted:.1g} finds a better mesh"
+            )
+        widened = _limited(parameters, "correction")
+        if not bends and (excess or widened):
+            widens = f"widens the interval of {widened}" if widened else ""
+            change = " and ".join(part for part in (excess, widens) if part)
+            found.append(f"the time error of {tests.sized(mesh)} {change}: use {SMALLER}")
     if theory is not None and (widened := _limited(parameters, "theory")):
         change = f"change the motion by about {tests.sized(theory)} and widen the interval of {widened}"
         found.append(f"shear and rotary inertia, which slender beams neglect, {change}")
