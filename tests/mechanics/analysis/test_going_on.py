@@ -252,6 +252,29 @@ def test_a_drive_begins_anew() -> None:
     assert run.angle("hub") == pytest.approx([0.5, 1.0], abs=1e-9)
 
 
+def test_a_rod_goes_on_with_the_clamp_that_moves_it() -> None:
+    """The end's rates are those of its free nodes; a clamp of the ground was said to turn."""
+
+    def shaken(height: str) -> Scene:
+        rod = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.04, "density": 1000.0, "youngs_modulus": 2e7}
+        base = {"body": "ground", "point": "base"}
+        return Scene.parse(
+            {
+                "name": "shaken",
+                "bodies": {"A": {**rod, "element": "ancf-cable", "elements": 2}},
+                "joints": {"clamp": {"kind": "weld", "first": base, "second": {"body": "A"}}},
+                "ground_points": {"base": {"y": height}},
+                "markers": {"tip": {"body": "A", "point": "end"}},
+                "initial": {"A": {"angle": 0.5}},
+            }
+        )
+
+    engine, scene = get_engine("gauss"), shaken("0.2 * t * sin(5*t)")
+    whole, end = engine.simulate(scene, [0.02, 0.04]), end_of(scene, 0.02)
+    later = shaken("0.2 * (t + 0.02) * sin(5*(t + 0.02))").with_values({"initial.from": end})
+    assert engine.simulate(later, [0.0, 0.02]).points == pytest.approx(whole.points, abs=1e-12)
+
+
 def test_another_engine_refuses_it() -> None:
     scene = wheel().with_values({"initial.from": end_of(wheel(), 0.1)})
     with pytest.raises(

@@ -38,7 +38,7 @@ def place_rod(scene: Scene, name: str, rod: Rod, mine: list[JointPoint], pose: P
         joint = shared.get(node)
         position = result.new_vector(r, v) if joint is None else joint.where or result.make(joint, r, v)
         clamp = _clamp(scene, name, rod, node)
-        if clamp is not None and np.any(pose.turning):
+        if clamp is not None and np.any(pose.turning) and scene.initial_from is None:
             raise InputError(f"initial.{name}.rate: a rod welded to the ground does not turn there; leave the rate out")
         slopes = []
         for number, (value, rate) in enumerate(vectors):
