@@ -2,13 +2,19 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq, least_squares
+from shoal.engines import get_engine
 from shoal.identification import Problem, identify
 from shoal.identification.conclude import Wishes
+from shoal.identification.forward import ForwardModel
 from shoal.identification.methods.least_squares import descend
+from shoal.identification.recording.measurement import Measurement
 from shoal.identification.spread.bootstrap import block_length, bootstrap
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.profiles import profile
 from shoal.identification.spread.uncertainty import linearise, spread
+from shoal.scene import Scene
+from shoal.trajectory import Array
 from shoal_validation.coverage.cases import Case, cases
 
 CASES = {case.name: case for case in cases()}
@@ -34,6 +40,73 @@ def test_a_well_known_parameter_has_the_interval_of_linear_theory(name: str) -> 
         assert found.upper - end.point[k] == pytest.approx(half, rel=0.05)
         assert end.point[k] - found.lower == pytest.approx(half, rel=0.05)
         assert np.all(np.diff(found.values) > 0)
+
+
+TIMES = np.linspace(0.0, 1.2, 120)
+TURN, TORQUE, NOISE = 0.3, 0.1, 0.03
+
+
+def swing(spring: float, inertia: float, friction: float) -> Array:
+    """The angle of a disc on a torsion spring with a damper, let go from TURN under a constant torque."""
+    rest, decay = TORQUE / spring, friction / (2 * inertia)
+    rate = np.sqrt(complex(spring / inertia - decay**2))
+    return np.real(
+        rest + (TURN - rest) * np.exp(-decay * TIMES) * (np.cos(rate * TIMES) + decay / rate * np.sin(rate * TIMES))
+    )
+
+
+def test_the_profile_along_a_curved_valley_is_that_of_the_closed_form() -> None:
+    """Spring, inertia and damper scale together but for a weak torque: a fit that stalls on the way bounds nothing."""
+    ground, disc = {"body": "ground", "point": [0, 0]}, {"body": "disc"}
+    scene = {
+        "name": "torsion",
+        "gravity": [0, 0],
+        "bodies": {"disc": {"kind": "rigid-body", "mass": 1.0, "inertia": 0.03}},
+        "joints": {"axle": {"kind": "revolute", "first": ground, "second": disc, "friction": 0.06}},
+        "loads": {
+            "spring": {"kind": "torsion-spring", "first": ground, "second": disc, "stiffness": 10.0, "angle": 0},
+            "motor": {"kind": "torque", "at": disc, "torque": TORQUE},
+        },
+        "markers": {"disc": disc},
+        "initial": {"disc": {"angle": TURN}},
+    }
+    truth = {"spring": 10.0, "inertia": 0.03, "friction": 0.06}
+    paths = "loads.spring.stiffness", "bodies.disc.inertia", "joints.axle.friction"
+    bounds = {name: (true / 30, 30 * true) for name, true in truth.items()}
+    sought = {
+        name: {"path": path, "lower": bounds[name][0], "upper": bounds[name][1], "scale": "log"}
+        for name, path in zip(truth, paths, strict=True)
+    }
+    channels = [{"marker": "disc", "quantity": "angle", "column": "a"}]
+    stated = {"name": "t", "scene": "t", "parameters": sought, "channels": channels, "noise": NOISE}
+    problem = Problem.parse({**stated, "source": {"kind": "file"}}, "t")
+    seen = swing(**truth) + NOISE * np.random.default_rng(2).standard_normal(len(TIMES))
+    measurement = Measurement.single(TIMES, tuple(problem.channels), seen[:, None], "closed form", noise=NOISE)
+    model = ForwardModel(problem, Scene.parse(scene, "t"), get_engine("gauss"), measurement)
+    end = descend(model, np.log(list(truth.values())), lambda *_: None)
+    at = linearise(end.jacobian, end.residual, model.sizes(end.point), blocks_of(model, len(end.residual)))
+    found = profile(model, end.point, at, 0)
+
+    def misfit(spring: float) -> float:
+        """Least sum of squares over inertia and friction, which scale with the spring to begin with."""
+        rows = least_squares(
+            lambda p: swing(spring, *np.exp(p)) - seen,
+            end.point[1:] + np.log(spring) - end.point[0],
+            bounds=np.log([bounds["inertia"], bounds["friction"]]).T,
+            xtol=1e-12,
+        )
+        return 2 * float(rows.cost)
+
+    least = misfit(float(np.exp(end.point[0])))
+    half = float(spread(lambda p: float(p[0]), end.point, at).half)
+    threshold = half**2 / float(np.sum(at.pseudo_inverse[0] ** 2))
+    middle = float(np.exp(end.point[0]))
+    lower = brentq(lambda spring: misfit(spring) - least - threshold, 0.3 * middle, middle)
+    upper = brentq(lambda spring: misfit(spring) - least - threshold, middle, 20 * middle)
+    assert upper / middle > 1.2 * middle / lower
+    assert not found.open
+    assert found.lower == pytest.approx(lower, rel=0.03)
+    assert found.upper == pytest.approx(upper, rel=0.03)
 
 
 def test_a_parameter_without_effect_is_open_on_both_sides() -> None:

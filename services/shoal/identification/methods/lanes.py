@@ -28,7 +28,7 @@ _SMALL_STEP = 1e-9
 """Relative to the size of a parameter; a smaller step is the end."""
 _SMALL_GAIN = 1e-8
 """A step that promises to lower the fitness by less than this fraction is the end."""
-_LARGE_DAMPING = 1e12
+UNDAMPED, _LARGE_DAMPING = 1e-6, 1e12
 _APART = 0.02
 """Two starts are different if a parameter differs by more than this fraction of its range."""
 ENDS_APART = 1e-3
@@ -69,7 +69,7 @@ def descend_many(
     what its next step promises is more than `patience` times the best one's fitness. Those that leave early have not
     converged.
     """
-    searches = [_Search(model, *at) for at in zip(starts, *(first or differentiate_many(model, starts)), strict=True)]
+    searches = [Search(model, *at) for at in zip(starts, *(first or differentiate_many(model, starts)), strict=True)]
 
     def differentiate(_: Sequence[int], trials: Sequence[Array]) -> tuple[Sequence[Array], Sequence[Array]]:
         residuals, jacobians = differentiate_many(model, np.array(trials))
@@ -92,12 +92,12 @@ def descend_each(
 ) -> list[Descent]:
     """As `descend_many`, of several models with as many rows, from a start of each side by side; most: iterations."""
     first = differentiate(range(len(models)), starts)
-    searches = [_Search(*at) for at in zip(models, starts, *first, strict=True)]
+    searches = [Search(*at) for at in zip(models, starts, *first, strict=True)]
     return _descend(searches, differentiate, lambda *_: None, patience, most)
 
 
 def _descend(
-    searches: list[_Search], differentiate: Differentiate, progress: Progress, patience: float, most: int = _ITERATIONS
+    searches: list[Search], differentiate: Differentiate, progress: Progress, patience: float, most: int = _ITERATIONS
 ) -> list[Descent]:
     """Take steps until all have converged or left."""
     active, number = searches, {id(search): k for k, search in enumerate(searches)}
@@ -192,14 +192,18 @@ class Course(list[tuple[int, float, float]]):
 
 
 @dataclass
-class _Search:
-    """One descent between two calls of the model: `ask` for a trial point, then `tell` what was found there."""
+class Search:
+    """One descent between two calls of the model: `ask` for a trial point, then `tell` what was found there.
+
+    fixed: number of a parameter that stays where it is
+    """
 
     model: ForwardModel
     point: Array
     residual: Array
     jacobian: Array
-    damping: float = 1e-6
+    fixed: int | None = None
+    damping: float = UNDAMPED
     growth: float = 2.0
     converged: bool = False
     predicted: float = 0.0
@@ -223,6 +227,16 @@ class _Search:
         """Fitness after the step asked for last, if the model were linear."""
         return (self.cost - self.predicted) / self.model.rows.samples
 
+    @property
+    def possible(self) -> float:
+        """Cost that a step without damping would take away, were the model linear."""
+        return self.cost - squares(self.residual + self.jacobian @ self._step(UNDAMPED))
+
+    @property
+    def stuck(self) -> bool:
+        """Whether no step leads down, however short."""
+        return self.damping > _LARGE_DAMPING
+
     def ask(self) -> Array | None:
         """Where to look next, (parameters,), or None at the end."""
         if self.converged or not np.isfinite(self.cost):
@@ -230,13 +244,13 @@ class _Search:
         model = self.model
         self.scale = np.maximum(self.scale, np.linalg.norm(self.jacobian, axis=0))
         while True:
-            wanted = self.point + self._step()
+            wanted = self.point + self._step(self.damping)
             trial = np.clip(wanted, model.lower, model.upper)
             moved = trial - self.point
             self.predicted = self.cost - squares(self.residual + self.jacobian @ moved)
             # A step that a bound cuts may lead uphill: a shorter one does not.
             cut = np.any(trial != wanted) and self.predicted < _SMALL_GAIN * self.cost
-            if not cut or self.damping > _LARGE_DAMPING:
+            if not cut or self.stuck:
                 break
             self.damping = max(10 * self.damping, 1e-3)
         small = np.max(np.abs(moved) / model.sizes(self.point)) < _SMALL_STEP
@@ -254,26 +268,27 @@ class _Search:
         else:
             self.damping *= self.growth
             self.growth *= 2
-            self.converged = self.damping > _LARGE_DAMPING
+            self.converged = self.stuck
         self.rows.append((len(self.rows), self.fitness, cost / self.model.rows.samples))
 
     def descent(self) -> Descent:
         """What came out."""
         return Descent(self.point, self.residual, self.jacobian, self.fitness, self.rows, self.converged)
 
-    def _step(self) -> Array:
+    def _step(self, damping: float) -> Array:
         """Damped step, where parameters that stand at a bound and are driven against it stay there."""
         downhill = -self.jacobian.T @ self.residual
         held = (self.point <= self.model.lower) & (downhill < 0) | (self.point >= self.model.upper) & (downhill > 0)
+        held[[] if self.fixed is None else [self.fixed]] = True
         steeper = self.model.steepness(self.residual)
         jacobian = np.where(held, 0.0, steeper[:, None] * self.jacobian)
-        return damped_step(self.residual / steeper, jacobian, self.scale, self.damping)
+        return damped_step(self.residual / steeper, jacobian, self.scale, damping)
 
 
-def _apart(searches: Sequence[_Search]) -> list[_Search]:
+def _apart(searches: Sequence[Search]) -> list[Search]:
     """The searches without those that came to where a better one is."""
 
-    def apart(one: _Search, other: _Search) -> bool:
+    def apart(one: Search, other: Search) -> bool:
         return one.model is not other.model or distance(one.model, one.point, other.point) > _SAME
 
     return kept_apart(sorted(searches, key=lambda s: s.cost), apart)
@@ -300,7 +315,7 @@ def damped_step(residual: Array, jacobian: Array, scale: Array, damping: float) 
     return np.asarray(np.linalg.lstsq(stacked, wanted, rcond=None)[0] / scale)
 
 
-def _report(iteration: int, searches: Sequence[_Search], active: Sequence[_Search], progress: Progress) -> None:
+def _report(iteration: int, searches: Sequence[Search], active: Sequence[Search], progress: Progress) -> None:
     last = np.array([search.rows[-1][2] for search in active])
     progress(iteration, min(search.fitness for search in searches), mean_of(last))
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from shoal.identification.deadline import TimeIsUp
 from shoal.identification.forward import ForwardModel
-from shoal.identification.methods.lanes import damped_step, squares
+from shoal.identification.methods.lanes import Search
 from shoal.identification.methods.least_squares import differentiate
 from shoal.identification.spread.uncertainty import Linearisation, quantile
 from shoal.trajectory import Array, plain
@@ -25,7 +25,14 @@ _POINTS = 14
 _FIRST = 0.5
 """First step outward, in standard deviations; the next ones are longer by _GROWTH."""
 _GROWTH = 1.4
-_ITERATIONS = 8
+_SHORTER, _SHORTEST = 4.0, 1024.0
+"""A step that leads too far is divided by the first, down to the first step over the second."""
+_FAR = 4.0
+"""Rise from which on the place where it is one is looked for again with a shorter step."""
+_ITERATIONS, _CALLS = 50, 250
+"""Calls of the model for each fit of the others, and for a side, at most."""
+_SETTLED, _NEARLY = 1e-3, 0.05
+"""Of the threshold: a fit that promises to get better by less has settled; at its end the second will do."""
 _BELOW = 1e-3
 """Of the threshold: a fit that is better by more is another minimum."""
 
@@ -84,71 +91,81 @@ def profile(model: ForwardModel, point: Array, at: Linearisation, k: int) -> Pro
         threshold = threshold or 4.0 * float(residual @ residual) / len(residual)
         std = max(std, span / 20)
     step = _FIRST * min(max(std, 1e-9 * span), span / 10)
-    sides = [_side(model, point, k, direction * step, threshold) for direction in (-1.0, 1.0)]
-    values = np.concatenate([sides[0][0][::-1], [point[k]], sides[1][0]])
-    rise = np.concatenate([sides[0][1][::-1], [0.0], sides[1][1]])
-    ends = [_crossing(point[k], *side[:2]) for side in sides]
-    own = np.exp(values) if model.parameters.logarithmic[k] else values
-    low, high = (float(np.exp(end)) if model.parameters.logarithmic[k] else end for end, _ in ends)
-    place = min(sides, key=lambda side: side[3])[2]
-    return Profile(own, rise, low, high, ends[0][1], ends[1][1], bool(np.min(rise) < -_BELOW), place)
+    lower, upper = (_side(model, point, k, direction * step, threshold) for direction in (-1.0, 1.0))
+    sought = np.array([lower.end, *lower.values[::-1], point[k], *upper.values, upper.end])
+    low, *values, high = np.exp(sought) if model.parameters.logarithmic[k] else sought
+    rise = np.array([*lower.rises[::-1], 0.0, *upper.rises])
+    best = min((lower, upper), key=lambda side: side.lowest)
+    ends = float(low), float(high), lower.open, upper.open
+    return Profile(np.array(values), rise, *ends, best.lowest < -_BELOW, best.place)
 
 
-def _side(
-    model: ForwardModel, point: Array, k: int, step: float, threshold: float
-) -> tuple[Array, Array, Array, float]:
-    """Values of parameter k outward and the rises there, until the rise passes one or the bound is reached.
+@dataclass(frozen=True)
+class _Side:
+    """Values of a parameter outward, rises there, and where its interval ends, in the scale in which it is sought.
 
-    The last two are where the misfit is lowest, and the rise there.
+    open: whether no rise beyond one was found; place, lowest: where the misfit is lowest, and the rise there
     """
-    base = squares(model.uncounted(point[None])[0])
-    values, rises, last = list[float](), list[float](), point.copy()
-    lowest, place = 0.0, point
-    for _ in range(_POINTS):
-        moved = last.copy()
-        moved[k] = np.clip(last[k] + step, model.lower[k], model.upper[k])
-        if moved[k] == last[k]:
-            break
-        last, cost = _settle(model, moved, k)
-        values.append(float(last[k]))
-        rises.append(min((cost - base) / threshold, 1e6))
-        if rises[-1] < lowest:
-            lowest, place = rises[-1], last
-        if rises[-1] > 1.0:
-            break
-        step *= _GROWTH
-    return np.array(values), np.array(rises), place, lowest
+
+    values: list[float]
+    rises: list[float]
+    end: float
+    open: bool
+    place: Array
+    lowest: float
 
 
-def _settle(model: ForwardModel, point: Array, k: int) -> tuple[Array, float]:
-    """The others fitted with parameter k held: Levenberg-Marquardt from nearby."""
-    residual, jacobian = differentiate(model, point)
-    cost, damping = squares(residual), 1e-6
-    for _ in range(_ITERATIONS):
-        free = np.delete(np.arange(len(point)), k)
-        if not len(free) or not np.isfinite(cost):
+def _side(model: ForwardModel, point: Array, k: int, step: float, threshold: float) -> _Side:
+    """Outward until the rise passes one or the bound is reached.
+
+    A fit of the others that does not settle says nothing, and one whose rise is far beyond one says little of where it
+    is one: nearer values are tried. Where the fits settle nowhere, the side is open: a misfit that was not minimised
+    bounds nothing.
+    """
+    bound = float((model.lower if step < 0 else model.upper)[k])
+    last, shortest = Search(model, point, *differentiate(model, point), fixed=k), abs(step) / _SHORTEST
+    bound = float((model.lower if step < 0 else model.upper)[k])
+    base, calls = last.cost, 0
+    inside, outside = [(float(point[k]), 0.0)], list[tuple[float, float]]()
+    place, lowest = point, 0.0
+    while len(inside) <= _POINTS and calls < _CALLS and last.point[k] != bound:
+        found, settled = _settled(last, k, step, threshold)
+        calls += len(found.rows)
+        seen = float(found.point[k]), min((found.cost - base) / threshold, 1e6)
+        if settled and seen[1] > 1.0:
+            outside.append(seen)
+        if settled and seen[1] <= 1.0:
+            inside.append(seen)
+            last, step = found, step * (1.0 if outside else _GROWTH)
+            if seen[1] < lowest:
+                place, lowest = found.point, seen[1]
+        elif (settled and seen[1] <= _FAR) or abs(step) <= shortest:
             break
-        size = np.maximum(np.linalg.norm(jacobian[:, free], axis=0), 1e-300)
-        step = damped_step(residual, jacobian[:, free], size, damping)
-        trial = point.copy()
-        trial[free] = np.clip(point[free] + step, model.lower[free], model.upper[free])
-        trial_residual, trial_jacobian = differentiate(model, trial)
-        gain = cost - squares(trial_residual)
-        if gain > 0:
-            point, residual, jacobian, cost = trial, trial_residual, trial_jacobian, cost - gain
-            damping /= 10
-            if gain < 1e-4 * cost:
-                break
         else:
-            damping = max(damping, 1e-6) * 100
-    return point, cost
+            step /= _SHORTER
+    tried = [*inside[1:], *outside[-1:]]
+    values, rises = [value for value, _ in tried], [rise for _, rise in tried]
+    if not outside:
+        return _Side(values, rises, bound, True, place, lowest)
+    (near, low), (far, high) = inside[-1], outside[-1]
+    share = (1.0 - np.sqrt(max(low, 0.0))) / (np.sqrt(high) - np.sqrt(max(low, 0.0)))
+    return _Side(values, rises, float(near + share * (far - near)), False, place, lowest)
 
 
-def _crossing(middle: float, values: Array, rises: Array) -> tuple[float, bool]:
-    """Where the rise is one, by its square root between the last two points; and whether it never is."""
-    if not len(values) or rises[-1] <= 1.0:
-        return (float(values[-1]) if len(values) else float(middle)), True
-    roots = np.sqrt(np.maximum(np.concatenate([[0.0], rises]), 0.0))
-    places = np.concatenate([[middle], values])
-    share = (1.0 - roots[-2]) / (roots[-1] - roots[-2])
-    return float(places[-2] + share * (places[-1] - places[-2])), False
+def _settled(last: Search, k: int, step: float, threshold: float) -> tuple[Search, bool]:
+    """The others fitted with parameter k moved from a fit of them, and whether that is as good as it gets.
+
+    They start from where its derivatives lead them, so that they follow a valley. A motion that fails is no better
+    anywhere near.
+    """
+    model, moved = last.model, last.point.copy()
+    moved[k] = np.clip(moved[k] + step, model.lower[k], model.upper[k])
+    linear = last.residual + last.jacobian[:, k] * (moved[k] - last.point[k])
+    followed = Search(model, moved, linear, last.jacobian, fixed=k).ask()
+    start = moved if followed is None else followed
+    search = Search(model, start, *differentiate(model, start), fixed=k)
+    while np.isfinite(search.cost) and len(search.rows) < _ITERATIONS and search.possible > _SETTLED * threshold:
+        if (trial := search.ask()) is None:
+            break
+        search.tell(trial, *differentiate(model, trial))
+    return search, not np.isfinite(search.cost) or search.possible < _NEARLY * threshold
