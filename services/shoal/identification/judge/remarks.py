@@ -35,7 +35,7 @@ def remarks(
         found.append(f"a better fit than the answer was found on the profile of {better}")
     if curved:
         bent = ", ".join(curved)
-        found.append(f"the misfit is no parabola within the interval of {bent}, which is that of the profile")
+        found.append(f"the misfit is no parabola within the interval of {bent}, which holds that of the profile")
     if mesh is not None:
         excess = _excess(tests, mesh)
         wanted = (tests.noise if tests.noise_stated else mesh) / 3
