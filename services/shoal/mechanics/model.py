@@ -51,8 +51,9 @@ class Gates(NamedTuple):
 class Arrays(NamedTuple):
     """All a kernel needs of one tile of lanes. space: a tuple as long as vectors are.
 
-    method, baumgarte: how accelerations are found. elements: one structure a family. alike: the mass matrix where all
-    lanes have the same one.
+    method, baumgarte: how accelerations are found. mass_factor, mass_root: of the mass matrix with what flat bodies are
+    lent, which is in `lent`, empty where nothing is; refinements: how often that is taken back, see `least.lent`.
+    elements: one structure a family. alike: the mass matrix where all lanes have the same one.
     """
 
     home: Array
@@ -72,6 +73,8 @@ class Arrays(NamedTuple):
     mass: Array
     mass_factor: Array
     mass_root: Array
+    lent: Array
+    refinements: int
     alike: Alike
     weight: Array
     elements: tuple[Any, ...]
@@ -96,10 +99,11 @@ class Model:
     (rows, lanes) or (rows, 1). start_angles: relative angles at the start that angle forces count
     their turns from [rad], (forces, lanes) or (forces, 1). kinks: of every function, where it or a derivative jumps.
     owners: for each family of elements the body of every element. failed: lanes whose start contradicts the joints,
-    (lanes,) or (1,). frames: how bodies hang on the coordinates. mass_entries, stretching_entries: the lower triangles
-    of the mass matrix and of the rods' stiffness against stretching, see `Element`; the latter is empty where nobody
-    wants it. stated: the scene as it was given, in whose order the coordinates are numbered; scene: with the start that
-    agrees with its joints. slowed: axial modes whose inertia is raised, see `inertia_cap`.
+    (lanes,) or (1,). frames: how bodies hang on the coordinates. mass_entries, lent_entries, stretching_entries: the
+    lower triangles of the mass matrix, of what thin bodies are lent, and of the rods' stiffness against stretching, see
+    `Element`; the latter is empty where nobody wants it. flat: whether accelerations need what is lent. stated: the
+    scene as it was given, in whose order the coordinates are numbered; scene: with the start that agrees with its
+    joints. slowed: axial modes whose inertia is raised, see `inertia_cap`.
     """
 
     scene: Scene
@@ -114,6 +118,8 @@ class Model:
     held_rows: int
     derived: Derived
     mass_entries: dict[tuple[int, int], Array]
+    lent_entries: dict[tuple[int, int], Array]
+    flat: bool
     stretching_entries: dict[tuple[int, int], Array]
     weight: Array
     elements: tuple[Any, ...]
@@ -174,9 +180,20 @@ class Model:
         )
 
     @cached_property
+    def metric_entries(self) -> dict[tuple[int, int], Array]:
+        """The lower triangle of the mass matrix with what thin bodies are lent."""
+        lent = self.lent_entries
+        return self.mass_entries | {key: self.mass_entries.get(key, 0.0) + more for key, more in lent.items()}
+
+    @property
+    def _factored(self) -> dict[tuple[int, int], Array]:
+        """What accelerations are found with."""
+        return self.metric_entries if self.flat else self.mass_entries
+
+    @cached_property
     def mass_pattern(self) -> tuple[sparse.Pattern, dict[tuple[int, int], int]]:
         """Pattern of the factor of the mass matrix."""
-        return sparse.analyse(self.unknowns, self.mass_entries)
+        return sparse.analyse(self.unknowns, self._factored)
 
     @cached_property
     def mass_values(self) -> Array:
@@ -189,10 +206,10 @@ class Model:
         none, count = np.zeros(0, dtype=np.int64), self.constraints.size
         if count == 0 or (count <= saddle.FEW and self._redundant):
             return Saddle(0, 0, False, _EMPTY, none, np.zeros((0, 1)), none, none)
-        pattern, slots, place, entries = saddle.analyse(self.unknowns, self.mass_entries, self.constraints)
+        pattern, slots, place, entries = saddle.analyse(self.unknowns, self._factored, self.constraints)
         multiplier = np.zeros(len(place), dtype=np.int64)
         multiplier[place[self.unknowns :]] = 1
-        base = scatter(pattern, slots, self.mass_entries)
+        base = scatter(pattern, slots, self._factored)
         return Saddle(len(place), pattern.slots, count > saddle.SMALL, pattern, place, base, entries, multiplier)
 
     @property
@@ -244,11 +261,13 @@ class Model:
         return self.shared_tiles[len(tile)]
 
     def _tile(self, tile: Tile, lanes: slice) -> Arrays:
-        pattern, _ = self.mass_pattern
+        pattern, slots = self.mass_pattern
         mass = pack(self.mass_values, lanes, tile)
-        factor = mass.copy()
+        lent = pack(scatter(pattern, slots, self.lent_entries), lanes, tile) if self.flat else np.zeros(0)
+        metric = mass + lent if self.flat else mass
+        factor = metric.copy()
         _factor_mass(tile, pattern, factor)
-        inverse, whole = (part[: self.unknowns * len(tile)] for part in (factor, mass))
+        inverse, whole = (part[: self.unknowns * len(tile)] for part in (factor, metric))
         known = (inverse > 0) & np.isfinite(inverse)
         weightless = ~known | (np.where(known, inverse, 0.0) * whole >= _SINGULAR)
         if np.any(weightless):
@@ -273,12 +292,16 @@ class Model:
             mass,
             factor,
             np.sqrt(inverse),
+            lent,
+            REFINEMENTS if self.flat else 0,
             self._alike,
             pack(self.weight, lanes, tile),
             *packed(forces, lanes, tile),
         )
 
 
+REFINEMENTS = 4
+"""Each leaves the part `masses.THIN` of what there was to take back, so that round-off is left."""
 _SINGULAR = 1e14
 """Mass that a coordinate moves over what others do not move already: beyond it is round-off."""
 _DEPENDENT = 1e-7

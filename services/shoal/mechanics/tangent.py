@@ -34,6 +34,8 @@ class Held(NamedTuple):
 class Tangent(NamedTuple):
     """Pattern of H = c_M M + c_D D + K and the lists that assemble it, for one tile.
 
+    mass: M with what thin bodies are lent: iterations converge all the same, and a body that is all but flat does not
+    limit the stable step.
     `block` holds the square tangents of all elements, family by family, then those of the force elements: `blocks`
     rows. Its row source[s] adds to slot s, where none does, a row of zeros behind two such blocks; row more[k] adds to
     slot also[k], too. Share k adds part[k] * block[shared[k]] to slot[k], for elements whose rows are sums of
@@ -64,7 +66,7 @@ class Tangent(NamedTuple):
 def tangent_tile(model: Model, tile: Tile, lanes: slice, *, held: bool = False) -> Tangent:
     """Analyse the tangent of a model, and pack its numbers for one tile of lanes; held: with room for constraints."""
     found, blocks = _contributions(model)
-    entries = {key for key, *_ in found} | set(model.mass_entries)
+    entries = {key for key, *_ in found} | set(model.metric_entries)
     curved = _curvatures(model)
     entries |= {key for key, *_ in curved}
     if held and model.constraints.size:
@@ -86,7 +88,7 @@ def tangent_tile(model: Model, tile: Tile, lanes: slice, *, held: bool = False) 
     shares = [(slot[key], source, c) for key, source, c in found if not _is_one(c)]
     return Tangent(
         pattern,
-        pack(scatter(pattern, slot, model.mass_entries), lanes, tile),
+        pack(scatter(pattern, slot, model.metric_entries), lanes, tile),
         blocks,
         source,
         len(extra),

@@ -111,7 +111,7 @@ class Evaluator:
     @cached_property
     def mass(self) -> scipy.sparse.csc_array:
         """The mass matrix, (unknowns, unknowns)."""
-        return sparse.matrix(self._tangent.pattern, self._tangent.mass)
+        return sparse.matrix(self._arrays.pattern, self._arrays.mass)
 
     @cached_property
     def _rows(self) -> Sparse:

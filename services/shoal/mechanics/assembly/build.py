@@ -72,6 +72,8 @@ def build(scene: Scene, lanes: int = 1, horizon: float = 0.0) -> Model:
         held_rows=held_rows,
         derived=rows.derived(),
         mass_entries=masses.mass,
+        lent_entries=masses.lent if held.size else {},
+        flat=masses.flat and held.size > 0,
         stretching_entries=masses.stretching,
         weight=stacked(masses.weight),
         elements=masses.elements(),

@@ -16,7 +16,7 @@ from shoal.mechanics.elements.families import Collected
 from shoal.mechanics.elements.unstrained import unstrained
 from shoal.mechanics.frames import BeamFrame, ModalFrame, PointFrame, RigidFrame
 from shoal.mechanics.joints import Meet, conditions
-from shoal.mechanics.numerics.tile import Number
+from shoal.mechanics.numerics.tile import Array, Number
 from shoal.scene import GROUND, Body, RigidBody, Rod, Scene
 from shoal.scene.dimensions import padded
 
@@ -32,13 +32,16 @@ Entries = dict[tuple[int, int], Number]
 class Masses:
     """Matrices as entries (row, column), row >= column, the weight by unknown, and the flexible elements.
 
-    mass: the mass matrix; stretching: what `Element.stretching` gives, of all rods, where their inertia is capped.
+    mass: the mass matrix; lent: what thin bodies are lent besides, see `_lent`; flat: whether one of them is flat;
+    stretching: what `Element.stretching` gives, of all rods, where their inertia is capped.
     """
 
     def __init__(self, scene: Scene, placement: Placement, rows: Rows) -> None:
         self.scene, self.placement, self.rows = scene, placement, rows
         self.gravity = plane.vector(*padded(scene.gravity, scene.dimensions))
         self.mass: Entries = {}
+        self.lent: Entries = {}
+        self.flat = False
         self.stretching: Entries = {}
         self.weight: list[Number] = [0.0] * len(placement.positions)
         self.families = {kind: Collected() for kind in (FAMILIES if scene.dimensions == 2 else SPATIAL_FAMILIES)}
@@ -100,6 +103,9 @@ class Masses:
         matrix = [[mass, *(mass * one for one in x)], *rows]
         vectors = [frame.origin, *frame.directors]
         _add(self.mass, vectors, matrix)
+        lent, flat = _lent(moments)
+        self.flat = self.flat or flat
+        _add(self.lent, list(frame.directors), lent)
         self._add_load(vectors, matrix[0])
 
     def _add_rod(self, name: str, rod: Rod, frame: BeamFrame) -> None:
@@ -149,7 +155,10 @@ class Masses:
 
 
 THINNEST = 1e-11
-"""Of the largest second moment: less has none of them, so that every director has inertia."""
+"""Of the sum of the second moments: less has none of them, so that every director has inertia."""
+THIN, FLAT = 1e-3, 1e-5
+"""Of its second largest second moment: a body that has less as its smallest one is lent the rest up to the first. What
+is below the second cannot do without to find accelerations."""
 
 
 def second_moments(body: Rod | RigidBody) -> list[list[Number]]:
@@ -168,10 +177,36 @@ def second_moments(body: Rod | RigidBody) -> list[list[Number]]:
         inertia = body.inertia_matrix
         half = sum(inertia[k][k] for k in range(3)) / 2
         matrix = [[half * (i == j) - inertia[i][j] for j in range(3)] for i in range(3)]
-    trace = sum(matrix[k][k] for k in range(3))
-    for k in range(3):
-        matrix[k][k] = np.maximum(matrix[k][k], THINNEST * trace)
+    moments, axes = _principal(matrix)
+    for k in range(2):
+        missing = np.maximum(THINNEST * np.sum(moments, axis=-1) - moments[..., k], 0.0)
+        if np.any(missing):
+            more = _along(axes[..., k], missing)
+            matrix = [[matrix[i][j] + more[i][j] for j in range(3)] for i in range(3)]
     return matrix
+
+
+def _lent(matrix: list[list[Number]]) -> tuple[list[list[Number]], bool]:
+    """The second moment that a thin body is lent across its plane [kg m^2], and whether it is flat in some lane.
+
+    How the director there moves is told by the other two. Without inertia of its own, constraints that touch it look as
+    if they depended on each other, and round-off is felt. What is lent is taken back: in accelerations, where a body is
+    flat, as `least.lent` does; in implicit steps by their iteration.
+    """
+    moments, axes = _principal(matrix)
+    least, middle = moments[..., 0], moments[..., 1]
+    return _along(axes[..., 0], np.maximum(THIN * middle - least, 0.0)), bool(np.any(least < FLAT * middle))
+
+
+def _principal(matrix: list[list[Number]]) -> tuple[Array, Array]:
+    """Principal second moments from the smallest on, (..., 3), and their axes as columns, (..., 3, 3)."""
+    entries = np.stack(np.broadcast_arrays(*(entry for row in matrix for entry in row)), -1)
+    return np.linalg.eigh(entries.reshape(*entries.shape[:-1], 3, 3))
+
+
+def _along(axis: Array, moment: Array) -> list[list[Number]]:
+    """The matrix of a second moment along an axis, (..., 3)."""
+    return [[moment * axis[..., i] * axis[..., j] for j in range(3)] for i in range(3)]
 
 
 def _add(entries: Entries, vectors: list[Affine], matrix: list[list[Number]]) -> None:

@@ -24,16 +24,14 @@ PROXIMITY = 1e-6
 
 
 @njit(cache=True, error_model="numpy")
-def correct(method: int, rows: Array, target: Array, matrix: Array, scale: Array, multiplier: Array, y: Array) -> None:
-    """Move y to W y = target by one of the methods. matrix: (constraints, constraints) and scale: work space."""
+def prepare(method: int, rows: Array, matrix: Array, scale: Array) -> None:
+    """Bring rows to unit length by their scale, and factor the matrix of a method, (constraints, constraints)."""
     count, n = rows.shape
     for k in range(count):
         length = np.sqrt(dot(rows[k], rows[k]))
         scale[k] = 1.0 / length if length > 0.0 else 0.0
         for i in range(n):
             rows[k, i] *= scale[k]
-        multiplier[k] = 0.0
-    step = np.zeros(count)
     shift = 0.0
     if method == AUGMENTED:
         shift = 1.0 / PENALTY
@@ -44,6 +42,13 @@ def correct(method: int, rows: Array, target: Array, matrix: Array, scale: Array
             matrix[i, j] = dot(rows[i], rows[j])
         matrix[i, i] += shift
     _cholesky(matrix)
+
+
+@njit(cache=True, error_model="numpy")
+def correct(method: int, rows: Array, target: Array, matrix: Array, scale: Array, multiplier: Array, y: Array) -> None:
+    """Move y to W y = target by one of the methods, for which all is prepared; adds to the multipliers of its rows."""
+    count, n = rows.shape
+    step = np.zeros(count)
     for _ in range(1 if method == KKT else ITERATIONS):
         largest = 0.0
         for k in range(count):

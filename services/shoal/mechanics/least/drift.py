@@ -11,7 +11,7 @@ from numba import njit
 
 from shoal.mechanics import constraints, saddle
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import many, projection, together
+from shoal.mechanics.least import lent, many, projection, together
 from shoal.mechanics.least.work import GaussWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
@@ -128,6 +128,7 @@ def _move(tile: Tile, m: Arrays, w: GaussWork, tolerance: float) -> None:
             rank = together.orthonormalise(w.group, count, n, width, lane, w.response, SETTLING * tolerance)
             if rank != together.ALONE:
                 together.move(w.group, rank, count, n, width, lane, w.gap, w.extra)
+                lent.take_back_from_group(tile, m, w, lane, rank, w.extra)
                 alone = lane + len(EIGHT)
         if lane < alone:
             continue
@@ -137,5 +138,6 @@ def _move(tile: Tile, m: Arrays, w: GaussWork, tolerance: float) -> None:
         rank = projection.orthonormalise(s.rows, s.triangle, s.norms, s.order, SETTLING * tolerance)
         projection.components(rank, s.triangle, s.norms, s.order, s.weights, s.wanted)
         projection.move(rank, s.rows, s.wanted, s.y)
+        lent.take_back_from_lane(tile, m, w, s, lane, rank, True)
         for i in range(m.unknowns):
             w.extra[i * width + lane] = s.y[i]

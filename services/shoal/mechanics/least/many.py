@@ -13,7 +13,7 @@ from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
 from shoal.mechanics.numerics.pointers import pointer
 from shoal.mechanics.numerics.tile import Array, Tile
-from shoal.mechanics.numerics.vector import clear, copy, subtract
+from shoal.mechanics.numerics.vector import add, clear, copy, subtract
 
 STILL = 1e-9
 """A third derivative below this part of what its velocities could make it is none."""
@@ -34,6 +34,19 @@ def solve(tile: Tile, m: Arrays, w: GaussWork, load: Array, gap: Array, out: Arr
         copy(tile, out, i, room.x, s.place[i])
     for k in range(m.constraints.size):
         copy(tile, multiplier, k, room.x, s.place[n + k])
+    for _ in range(m.refinements):  # see `lent`
+        for i in range(n):
+            copy(tile, w.moved, i, room.x, s.place[i])
+        sparse.multiply(tile, m.pattern, m.lent, w.moved, w.lent)
+        for i in range(n):
+            copy(tile, room.x, s.place[i], w.lent, i)
+        for k in range(m.constraints.size):
+            clear(tile, room.x, s.place[n + k])
+        sparse.solve(tile, s.pattern, room.values, room.x, 0)
+        for i in range(n):
+            add(tile, out, i, room.x, s.place[i])
+        for k in range(m.constraints.size):
+            add(tile, multiplier, k, room.x, s.place[n + k])
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,7 +11,7 @@ from numba import njit
 from shoal.errors import InputError
 from shoal.mechanics import constraints, functions
 from shoal.mechanics.derived import derive
-from shoal.mechanics.least import alternatives, many, projection, together
+from shoal.mechanics.least import alternatives, lent, many, projection, together
 from shoal.mechanics.least.work import GaussWork, LaneWork, lane_work, load_lane, rows
 from shoal.mechanics.model import Arrays
 from shoal.mechanics.numerics import sparse
@@ -74,6 +74,7 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
                 rank = rank if _are_redundant(tile, m, w, v, lane, rank) else together.ALONE
             if rank != together.ALONE:
                 together.move(w.group, rank, count, n, width, lane, w.gap, a)
+                lent.take_back_from_group(tile, m, w, lane, rank, a)
                 together.multipliers(w.group, rank, count, width, lane, w.multiplier)
                 alone = lane + len(EIGHT)
         if lane < alone:
@@ -89,9 +90,13 @@ def constrain(tile: Tile, m: Arrays, w: GaussWork, t: float, q: Array, v: Array,
                 turned = turned or _turn(tile, m, w, v)
                 rank = _add_third_derivatives(tile, m, w, s, t, v, lane, rank)
             projection.move(rank, s.rows, s.wanted, s.y)
+            lent.take_back_from_lane(tile, m, w, s, lane, rank, orthogonal)
             projection.multipliers(first, s.triangle, s.norms, s.order, s.wanted, s.weights)
         else:
+            s.wanted[:] = 0.0
+            alternatives.prepare(m.method, s.rows, s.triangle, s.norms)
             alternatives.correct(m.method, s.rows, s.weights, s.triangle, s.norms, s.wanted, s.y)
+            lent.take_back_from_lane(tile, m, w, s, lane, 0, orthogonal)
             for k in range(count):
                 s.weights[k] = s.wanted[k] * s.norms[k]
         for i in range(m.unknowns):

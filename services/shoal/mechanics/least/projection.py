@@ -135,6 +135,17 @@ def move(rank: int, rows: Array, wanted: Array, y: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def take_out(rank: int, rows: Array, change: Array, y: Array) -> None:
+    """Take what is along the basis out of y, and off the change along the basis."""
+    n = rows.shape[1]
+    for j in range(rank):
+        part = dot(rows[j], y)
+        change[j] -= part
+        for i in range(n):
+            y[i] -= part * rows[j, i]
+
+
+@njit(cache=True, error_model="numpy")
 def multipliers(rank: int, triangle: Array, norms: Array, order: Index, change: Array, out: Array) -> None:
     """lambda with sum of lambda * row = -(change along the basis), change: from `move`; zero for dependent rows."""
     out[:] = 0.0

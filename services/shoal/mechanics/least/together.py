@@ -240,6 +240,21 @@ def move(w: GroupWork, rank: int, count: int, n: int, width: int, lane: int, gap
 
 
 @njit(cache=True, error_model="numpy")
+def take_out(w: GroupWork, rank: int, n: int, width: int, lane: int, y: Array) -> None:
+    """Take what is along the basis out of y, (unknowns, width), and off the change along the basis in w.wanted."""
+    e = len(EIGHT)
+    for i in range(n):
+        store(w.y, i * e, load(EIGHT, y, i * width + lane))
+    for j in range(rank):
+        basis = w.order[j] * n * e
+        part = _dot(n, w.rows, basis, w.y, 0)
+        store(w.wanted, j * e, load(EIGHT, w.wanted, j * e) - part)
+        _add(n, w.y, 0, -part, w.rows, basis)
+    for i in range(n):
+        store(y, i * width + lane, load(EIGHT, w.y, i * e))
+
+
+@njit(cache=True, error_model="numpy")
 def multipliers(w: GroupWork, rank: int, count: int, width: int, lane: int, out: Array) -> None:
     """lambda, (constraints, width), with sum of lambda * row = -(change along the basis), that of `move`."""
     e = len(EIGHT)

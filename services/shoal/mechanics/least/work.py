@@ -37,7 +37,8 @@ class GaussWork(NamedTuple):
     """Work space of one tile.
 
     jacobian, turning: C_q and dC_q/dt (entries, lanes). response: C_q' or H^-1 C_q' (constraints * unknowns, lanes).
-    gram: (constraints^2, lanes). multiplier, gap: (constraints, lanes). extra: (unknowns, lanes).
+    gram: (constraints^2, lanes). multiplier, gap: (constraints, lanes). extra, moved, lent: (unknowns, lanes), for
+    the two last see `lent`.
     """
 
     jacobian: Array
@@ -47,6 +48,8 @@ class GaussWork(NamedTuple):
     multiplier: Array
     gap: Array
     extra: Array
+    moved: Array
+    lent: Array
     lane: LaneWork
     group: GroupWork
     saddle: SaddleWork
@@ -55,13 +58,14 @@ class GaussWork(NamedTuple):
 def work_space(width: int, m: Arrays) -> GaussWork:
     """Room for the constraints of a model."""
     count, n, entries = m.constraints.size, m.unknowns, len(m.constraints.column)
-    sizes = entries, entries, count * n, count * count, count, count, n
-    jacobian, turning, response, gram, multiplier, gap, extra = (np.zeros(size * width) for size in sizes)
+    sizes = entries, entries, count * n, count * count, count, count
+    jacobian, turning, response, gram, multiplier, gap = (np.zeros(size * width) for size in sizes)
+    extra, moved, lent = (np.zeros(n * width) for _ in range(3))
     order = np.zeros(count, dtype=np.int64)
     first = np.zeros((count, n)), np.zeros((count, count)), np.zeros(count), order, np.zeros(count), np.zeros(count)
     lane = LaneWork(*first, np.zeros(n), np.zeros(n))
     group, room = together.room(width, count, n), saddle.room(m.saddle.size, m.saddle.slots, width)
-    return GaussWork(jacobian, turning, response, gram, multiplier, gap, extra, lane, group, room)
+    return GaussWork(jacobian, turning, response, gram, multiplier, gap, extra, moved, lent, lane, group, room)
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,0 +1,67 @@
+"""Flat bodies are lent mass, and it is taken back.
+
+A flat body moves no mass along the axis across its plane: the mass matrix is singular there, and only what holds its
+directors together tells how that axis moves. In the metric of such a matrix constraints on it look as if they depended
+on each other. So what is factored is M + N with lent mass N, and the acceleration a = a_0 + a_1 + ... by the true mass
+matrix follows from that by the other: each term is what the lent mass of the one before, N a_k, moves within the
+constraints. Wherever directors stay at right angles, the lent mass moves less than the part `masses.THIN` of the body's
+own energy, and the terms fall as fast.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from shoal.mechanics.least import alternatives, projection, together
+from shoal.mechanics.least.work import GaussWork, LaneWork
+from shoal.mechanics.model import Arrays
+from shoal.mechanics.numerics import sparse
+from shoal.mechanics.numerics.simd import EIGHT
+from shoal.mechanics.numerics.tile import Array, Tile
+
+
+@njit(cache=True, error_model="numpy")
+def take_back_from_lane(
+    tile: Tile, m: Arrays, w: GaussWork, s: LaneWork, lane: int, rank: int, orthogonal: bool
+) -> None:
+    """Refine y of one lane, which `projection.move` has moved along an orthonormal basis, else `alternatives`."""
+    width, n = len(tile), m.unknowns
+    for i in range(n):
+        s.row[i] = s.y[i]
+    for _ in range(m.refinements):
+        for i in range(n):
+            w.moved[i * width + lane] = s.row[i]
+        _load(tile, m, w)
+        for i in range(n):
+            s.row[i] = w.lent[i * width + lane]
+        if orthogonal:
+            projection.take_out(rank, s.rows, s.wanted, s.row)
+        else:
+            s.weights[:] = 0.0
+            alternatives.correct(m.method, s.rows, s.weights, s.triangle, s.norms, s.wanted, s.row)
+        for i in range(n):
+            s.y[i] += s.row[i]
+
+
+@njit(cache=True, error_model="numpy")
+def take_back_from_group(tile: Tile, m: Arrays, w: GaussWork, lane: int, rank: int, y: Array) -> None:
+    """The same of eight lanes of y, which `together.move` has moved."""
+    width, n = len(tile), m.unknowns
+    for i in range(n):
+        for k in range(i * width + lane, i * width + lane + len(EIGHT)):
+            w.moved[k] = y[k]
+    for _ in range(m.refinements):
+        _load(tile, m, w)
+        together.take_out(w.group, rank, n, width, lane, w.lent)
+        for i in range(n):
+            for k in range(i * width + lane, i * width + lane + len(EIGHT)):
+                w.moved[k] = w.lent[k]
+                y[k] += w.lent[k]
+
+
+@njit(cache=True, error_model="numpy")
+def _load(tile: Tile, m: Arrays, w: GaussWork) -> None:
+    """From w.moved, as D^1/2 L' a, to what the lent mass makes of it in w.lent, as D^-1/2 L^-1 N a."""
+    sparse.backward(tile, m.pattern, m.mass_factor, m.mass_root, w.moved, 0)
+    sparse.multiply(tile, m.pattern, m.lent, w.moved, w.lent)
+    sparse.forward(tile, m.pattern, m.mass_factor, m.mass_root, w.lent, 0)
