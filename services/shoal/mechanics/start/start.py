@@ -41,6 +41,8 @@ _UNITS: dict[Quantity, str] = {
     "rotation": "rad",
     "spin": "rad/s",
 }
+_ABOUT_Z: dict[Quantity, Quantity] = {"angle": "rotation", "rate": "spin"}
+"""In space what an angle and a rate are short for."""
 
 
 class Start(NamedTuple):
@@ -291,20 +293,42 @@ def _bending(frame: ModalFrame, q: Array, v: Array) -> tuple[tuple[float, ...], 
 
 
 def changes(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:
-    """What was stated and is not what is used: body -> quantity -> stated, used; round-off of any size [m] left out."""
+    """What was stated and is not what is used: body -> quantity -> stated, used; round-off of any size [m] left out.
+
+    An angle or rate in space is told as the rotation or spin where what is used is not about z.
+    """
     found: dict[str, Any] = {}
     turning, moving = _largest_stated(scene, "rate", "spin"), _largest_stated(scene, "velocity")
     rate = max(1.0, turning)
     least = {"position": size, "velocity": max(size * rate, moving), "rate": rate, "spin": rate}
     for name, start in () if isinstance(scene.initial_from, End) else scene.initial.items():
-        for quantity, unit in _UNITS.items():
-            stated, now = getattr(start, quantity), getattr(used[name], quantity)
-            if stated is None or now is None:
+        for quantity in _UNITS:
+            if getattr(start, quantity) is None:
+                continue
+            told, stated, now = _alike(quantity, getattr(start, quantity), used[name])
+            if now is None:
                 continue
             off = float(max(abs(a - b) for a, b in zip(np.atleast_1d(now), np.atleast_1d(stated), strict=False)))
-            if off > ROUND_OFF * max(float(np.max(np.abs(stated))), least.get(quantity, 1.0)):
-                found.setdefault(name, {})[quantity] = {"stated": stated, "used": now, "unit": unit}
+            small = ROUND_OFF * max(float(np.max(np.abs(stated))), least.get(quantity, 1.0))
+            if off > small:
+                if told != quantity and np.all(np.abs(now[:2]) <= small):
+                    told, stated, now = quantity, stated[2], now[2]
+                found.setdefault(name, {})[told] = {"stated": stated, "used": now, "unit": _UNITS[told]}
     return found
+
+
+def _alike(quantity: Quantity, stated: Any, used: InitialState) -> tuple[Quantity, Any, Any]:
+    """A quantity, what is stated of it, and what is used, as numbers that may be compared; None: that has none."""
+    if used.rotation is not None and quantity in _ABOUT_Z:
+        quantity, stated = _ABOUT_Z[quantity], (0.0, 0.0, stated)
+    now = getattr(used, quantity)
+    if quantity == "rotation" and now is not None:
+        # Of the rotation vectors of one attitude the one that is nearest.
+        turn = float(np.linalg.norm(now))
+        along = np.asarray(now if turn > 0 else stated) / (turn or float(np.linalg.norm(stated)) or 1.0)
+        whole = 2 * np.pi * float(np.rint((along @ np.asarray(stated) - turn) / (2 * np.pi)))
+        now = tuple((np.asarray(now) + whole * along).tolist()) if whole else now
+    return quantity, stated, now
 
 
 def _largest_stated(scene: Scene, *quantities: Quantity) -> float:
