@@ -11,6 +11,7 @@ from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.estimates import estimates
 from shoal.pictures.numbers import looked_at
+from shoal.pictures.start import reasons, remarks
 from shoal.response import Response
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory
@@ -27,7 +28,7 @@ def of_motion(motion: Trajectory) -> str:
     evidence = f"{motion.status[0]}; energy drift {motion.energy_drift[0]:.1e}, constraint drift "
     evidence += f"{motion.constraint_drift[0]:.1e}, {motion.steps} steps, {motion.wall_s:.3f} s"
     verification = motion.model.get("verification")
-    notes = [] if verification is None else list(estimates(verification))
+    notes = remarks(motion.model) + ([] if verification is None else list(estimates(verification)))
     return "\n\n".join([shown, evidence, *notes])
 
 
@@ -42,7 +43,8 @@ def of_sweep(result: Sweep) -> str:
     """The points, at most as many as a page can show."""
     rows = result.rows()
     shown = table(list(rows[0]), (row.values() for row in rows[:_ROWS]))
-    notes = [] if result.check is None else [f"{result.check}."]
+    notes = [*reasons(result), *filter(None, [result.elsewhere.told("points")])]
+    notes += [] if result.check is None else [f"{result.check}."]
     notes += [f"The first {_ROWS} of {len(rows)} points; all are in sweep.csv."] if len(rows) > _ROWS else []
     return "\n\n".join([shown, *notes])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -26,6 +27,7 @@ from shoal.scene.initial import (
     RATES,
     Begin,
     InitialState,
+    Quantity,
     check_start,
     end_of,
     guessed,
@@ -259,7 +261,8 @@ class Scene(Record):
         fresh = [path for path, value in values.items() if not self._has(path, value)]
         check_start(values.get(from_, self.initial_from), fresh)
         turned = [path for path in fresh if self._begins_there(path, values[path])]
-        data = self._guessing(fresh, turned).model_dump(mode="json")
+        loose = self._guessing(fresh, turned)
+        data = loose.model_dump(mode="json")
         for path, value in values.items():
             place: Any = data
             *parents, leaf = path.split(".")
@@ -274,7 +277,8 @@ class Scene(Record):
             said = {"bodies", f"bodies.{name}", f"bodies.{name}.element"} & set(values)
             if "element" not in body.model_fields_set and not said:
                 del data["bodies"][name]["element"]  # what was left unsaid stays so
-        return Scene.parse(data, self.name)
+        anew = {path.split(".")[1] for path in values if path.startswith(f"{INITIAL}.") and path.count(".") == 1}
+        return Scene.parse(data, self.name)._with_loosened(one for one in loose._loosened if one[0] not in anew)
 
     def with_lanes(self, values: Mapping[str, npt.NDArray[np.float64]]) -> Scene:
         """This scene with numbers replaced by arrays, one entry per lane (population member).
@@ -349,11 +353,33 @@ class Scene(Record):
         loose = (*POSES, *RATES) if moved & {*POSES} else RATES if moved & {*RATES} else ()
         if not loose:
             return self
-        initial = {}
+        initial, loosened = {}, {*self._loosened}
         for name, start in self.initial.items():
             guess = {*start.guess, *(q for q in loose if start.stated(q))} - {q for body, q in fresh if body == name}
             initial[name] = start.model_copy(update={"guess": tuple(q for q in (*POSES, *RATES) if q in guess)})
-        return self.model_copy(update={"initial": initial})
+            loosened |= {(name, q) for q in (*POSES, *RATES) if q in guess and q not in start.guess}
+        return self.model_copy(update={"initial": initial})._with_loosened(loosened)
+
+    @cached_property
+    def _loosened(self) -> frozenset[tuple[str, Quantity]]:
+        """Body and quantity of guesses that were statements before others were set; no field, as it moves nothing."""
+        return frozenset()
+
+    def _with_loosened(self, those: Iterable[tuple[str, Quantity]]) -> Self:
+        self.__dict__["_loosened"] = frozenset(those)
+        return self
+
+    def statements(self, varied: Iterable[str] = ()) -> tuple[tuple[str, Quantity], ...]:
+        """Body and quantity of what is stated of the start and was not stated as a guess.
+
+        Values that are guesses only because others were set after them are statements. varied: paths of values that
+        lanes will state.
+        """
+        split = [path.split(".") for path in varied]
+        fresh = [(p[1], q) for p in split if p[0] == INITIAL for q in (*POSES, *RATES) if p[2:3] == [q]]
+        found = [(name, q) for name, start in self.initial.items() for q in (*POSES, *RATES) if start.stated(q)]
+        guesses = {(name, q) for name, start in self.initial.items() for q in start.guess} - self._loosened
+        return tuple(dict.fromkeys(one for one in (*found, *fresh) if one in fresh or one not in guesses))
 
     def value(self, path: str) -> Any:
         """The field at a dotted path. Raises InputError."""
