@@ -36,7 +36,9 @@ def of_comparison(comparison: Comparison) -> str:
     """How far each pair of engines is apart."""
     rows = [("-".join(row["engines"]), row["marker"], row["largest"], row["final"]) for row in comparison.differences()]
     rows += [(engine, "refused", reason, "") for engine, reason in comparison.refused.items()]
-    return table(("engines", "marker", "largest distance [m]", "distance at the end [m]"), rows)
+    shown = table(("engines", "marker", "largest distance [m]", "distance at the end [m]"), rows)
+    notes = next(filter(None, (remarks(motion.model) for motion in comparison.trajectories.values())), [])
+    return "\n\n".join([shown, *notes])
 
 
 def of_sweep(result: Sweep) -> str:
@@ -59,7 +61,7 @@ def of_response(found: Response) -> str:
         if not brief or told in brief:
             ends.setdefault(f"{name.partition('.')[0]}.{of}", {})[told] = value
     shown = table(("at the end", *next(iter(ends.values()))), ((of, *told.values()) for of, told in ends.items()))
-    said = [f"{found.status}; {found.evaluations} runs; {found.why}", found.message]
+    said = [f"{found.status}; {found.evaluations} runs; {found.why}", found.message, found.mixes_starts]
     for one in found.limits:
         kept = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
         told = (

@@ -10,7 +10,7 @@ import numpy as np
 
 from shoal.scene import Scene
 from shoal.scene.initial import ABOUT_Z, UNITS, Quantity
-from shoal.trajectory import Array
+from shoal.trajectory import Array, Trajectory
 
 _TOLD = 3
 """So many values are named."""
@@ -90,6 +90,32 @@ class Stated:
             if number
         )
         return Elsewhere(len(away), int((away > 0).any(axis=1).sum()), values)
+
+
+class Tally:
+    """What is seen of runs that are made one batch after the other; stated: see there."""
+
+    def __init__(self, stated: Stated) -> None:
+        self.stated = stated
+        self._away: list[Array] = []
+
+    def of(self, motion: Trajectory) -> Array:
+        """How far every lane of a motion starts from each value, (lanes, values)."""
+        found = np.zeros((motion.lanes, len(self.stated.values)))
+        if found.size:
+            for lane in range(motion.lanes):
+                if changed := motion.changed(lane):
+                    found[lane] = self.stated.away(changed)
+        return found
+
+    def count(self, away: Array) -> None:
+        """Count runs that start so far from each value, (runs, values)."""
+        self._away.append(away)
+
+    @property
+    def elsewhere(self) -> Elsewhere:
+        """Of all runs that were counted."""
+        return self.stated.elsewhere(np.concatenate([np.zeros((0, len(self.stated.values))), *self._away]))
 
 
 def _apart(change: Mapping[str, Any]) -> float:

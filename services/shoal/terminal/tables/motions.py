@@ -115,6 +115,7 @@ def comparison_table(comparison: Comparison) -> None:
         table.add_row(name, *place, f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0]))
     screen.out.print(table)
     screen.say(*(f"{name} refused: {reason}" for name, reason in comparison.refused.items()))
+    screen.say(*next(filter(None, (remarks(trajectory.model) for trajectory in comparison.trajectories.values())), []))
     if len(comparison.trajectories) < 2:
         return
     table = screen.table("distances over all samples", "engines", "marker", "largest [m]", "final [m]")
