@@ -261,14 +261,15 @@ class Scene(Record):
         fresh = [path for path, value in values.items() if not self._has(path, value)]
         check_start(values.get(from_, self.initial_from), fresh)
         turned = [path for path in fresh if self._begins_there(path, values[path])]
-        loose = self._guessing(fresh, turned)
+        moved = [one for path in fresh for one in _stating(path, values[path])]
+        loose = self._guessing(moved, turned)
         data = loose.model_dump(mode="json")
         for path, value in values.items():
             place: Any = data
             *parents, leaf = path.split(".")
+            if parents[:1] == [INITIAL] and (body := [*parents, leaf][1]) in self.bodies:
+                data[INITIAL].setdefault(body, InitialState().model_dump(mode="json"))
             for depth, part in enumerate(parents):
-                if parents[: depth + 1] == ["initial", part] and part in self.bodies:
-                    place.setdefault(part, InitialState().model_dump(mode="json"))
                 if parents[:1] == ["initial"] and part == "velocity" and place.get(part) is None:
                     place[part] = [0.0, 0.0]
                 place = place[key(place, part, path, ".".join(parents[:depth]))]
@@ -412,6 +413,14 @@ def _counted(one: str, many: str, names: Mapping[str, Any]) -> str:
         return ""
     listed = f" {', '.join(names)}" if len(names) <= _FEW else ""
     return f"{len(names)} {one if len(names) == 1 else many}{listed}"
+
+
+def _stating(path: str, value: Any) -> list[str]:
+    """The path of a value; of a body's whole start the paths of what it states and is no guess."""
+    if not path.startswith(f"{INITIAL}.") or path.count(".") > 1 or not isinstance(value, Mapping):
+        return [path]
+    guess = value.get("guess") if isinstance(value.get("guess"), list | tuple) else ()
+    return [f"{path}.{q}" for q in (*POSES, *RATES) if value.get(q) is not None and q not in guess]
 
 
 def _places(path: list[str]) -> bool:
