@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shoal.engines import get_engine
+from shoal.engines.one_by_one import one_by_one
 from shoal.engines.sweep import sweep
 from shoal.pictures import files
 from shoal.scene import Scene
+from shoal.wire import packed, unpacked
 
 ANGLE, CRANK, LINE = 1.2, 0.3, 0.1
 """Stated angle [rad] and length [m] of the crank; height of the slider's line above its hinge [m]."""
@@ -67,6 +69,7 @@ def test_points_that_start_elsewhere_than_stated_are_told(dimensions: int, tmp_p
     set_first = slider_crank(dimensions).with_values({"joints.R.length": 0.5})
     again = sweep(set_first, {"joints.R.length": RODS}, get_engine("gauss"), 0.0)
     assert again.to_json()["starts"] == told["starts"]
+    assert unpacked(packed(again)).to_json() == again.to_json()
 
 
 def test_a_sweep_of_which_all_points_start_as_stated_says_nothing() -> None:
@@ -90,3 +93,20 @@ def test_points_that_cannot_be_put_together_have_a_reason_and_no_places() -> Non
         assert (row["reason"] == "") == reached
         assert reached or f"initial.crank.angle: {angle:g} rad cannot be kept" in row["reason"]
     assert "the first: initial.crank.angle: -0.5 rad cannot be kept" in found.complaint
+
+
+def test_lanes_of_a_motion_tell_it_wherever_they_are_computed() -> None:
+    """As JSON and one by one they are what each is alone."""
+    scene, engine, times = slider_crank(), get_engine("gauss"), np.array([0.001])
+    together = engine.simulate_many(scene, {"joints.R.length": RODS}, times)
+    crossed, single = unpacked(packed(together)), one_by_one(engine, scene, {"joints.R.length": RODS}, times)
+    for lane, length in enumerate(RODS):
+        alone = engine.simulate(scene.with_values({"joints.R.length": length}), times).changed()
+        assert ("crank" in alone) == SHORT[lane]
+        assert crossed.changed(lane) == together.changed(lane)
+        for other in (together.changed(lane), single.changed(lane)):
+            assert other.keys() == alone.keys()
+            for body, quantities in alone.items():
+                for name, change in quantities.items():
+                    assert other[body][name]["stated"] == change["stated"]
+                    assert other[body][name]["used"] == pytest.approx(change["used"], abs=1e-9)

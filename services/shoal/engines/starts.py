@@ -57,14 +57,19 @@ class Elsewhere:
         return {"runs": self.runs, "elsewhere": self.elsewhere, "values": values}
 
 
+@dataclass(frozen=True)
 class Stated:
     """What is stated of the start of a scene and is no guess, beside which runs are seen to start elsewhere.
 
-    varied: paths whose values the runs state
+    values: body and quantity of each
     """
 
-    def __init__(self, scene: Scene, varied: Iterable[str] = ()) -> None:
-        self.values = scene.statements(varied)
+    values: tuple[tuple[str, Quantity], ...] = ()
+
+    @classmethod
+    def of(cls, scene: Scene, varied: Iterable[str] = ()) -> Stated:
+        """Of a scene; varied: paths whose values the runs state."""
+        return cls(scene.statements(varied))
 
     def given_way(self, changed: Mapping[str, Any]) -> dict[tuple[str, Quantity], Mapping[str, Any]]:
         """Of what `Trajectory.changed` tells of a run, by body and quantity, that which was stated."""

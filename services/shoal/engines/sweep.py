@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +50,7 @@ class Sweep:
     grid: path -> value of every point, (points,); positions, displacements [m]: marker -> (points, 2), not a number
     where a point is not ok; check: what more careful runs of some points say, None if there were none
     reasons: why each point is not ok, empty for one that is; changes: what each point uses in place of what is stated
-    of its start, see `Trajectory.changed`
+    of its start, see `Trajectory.changed`; stated: what of that counts
     """
 
     scene: Scene
@@ -64,6 +64,7 @@ class Sweep:
     check: SpotCheck | None = None
     reasons: tuple[str, ...] = ()
     changes: tuple[Mapping[str, Any], ...] = ()
+    stated: Stated = field(default_factory=Stated)
 
     @property
     def ok(self) -> bool:
@@ -88,9 +89,9 @@ class Sweep:
     @property
     def elsewhere(self) -> Elsewhere:
         """How many of the points that may be believed start elsewhere than stated."""
-        stated = Stated(self.scene, self.grid)
         good = (one for one, status in zip(self.changes, self.status, strict=False) if status is Status.OK)
-        return stated.elsewhere(np.array([stated.away(one) for one in good]).reshape(-1, len(stated.values)))
+        away = np.array([self.stated.away(one) for one in good])
+        return self.stated.elsewhere(away.reshape(-1, len(self.stated.values)))
 
     @cached_property
     def begun(self) -> dict[str, tuple[Array, str]]:
@@ -98,11 +99,11 @@ class Sweep:
 
         Names are `start.BODY.QUANTITY`, of vectors one for each component.
         """
-        stated, found = Stated(self.scene, self.grid), dict[str, tuple[Array, str]]()
+        found: dict[str, tuple[Array, str]] = {}
         for point, changed in enumerate(self.changes):
             if self.status[point] is not Status.OK:
                 continue
-            for (body, quantity), change in stated.given_way(changed).items():
+            for (body, quantity), change in self.stated.given_way(changed).items():
                 used = np.atleast_1d(change["used"])
                 ends = [""] if used.size == 1 else [f".{axis}" for axis in "xyz"[: used.size]]
                 for end, value in zip(ends, used, strict=True):
@@ -176,6 +177,7 @@ def sweep(
         trajectory.wall_s,
         reasons=trajectory.reasons,
         changes=tuple(trajectory.changes),
+        stated=Stated.of(scene, grid),
     )
 
 

@@ -119,7 +119,7 @@ def uncertain(
     wanted = as_scene(scene)
     wanted = wanted.with_values(values) if values else wanted
     inputs = Inputs(parameters(vary, wanted), correlations)
-    starts = Tally(Stated(wanted, [path for one in inputs.parameters for path in one.factors]))
+    starts = Tally(Stated.of(wanted, [path for one in inputs.parameters for path in one.factors]))
     get_way(limit_method)
     if allocate and len(limits) != 1:
         raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")

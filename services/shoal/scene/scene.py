@@ -267,8 +267,8 @@ class Scene(Record):
         for path, value in values.items():
             place: Any = data
             *parents, leaf = path.split(".")
-            if parents[:1] == [INITIAL] and (body := [*parents, leaf][1]) in self.bodies:
-                data[INITIAL].setdefault(body, InitialState().model_dump(mode="json"))
+            if parents[:1] == [INITIAL] and (started := [*parents, leaf][1]) in self.bodies:
+                data[INITIAL].setdefault(started, InitialState().model_dump(mode="json"))
             for depth, part in enumerate(parents):
                 if parents[:1] == ["initial"] and part == "velocity" and place.get(part) is None:
                     place[part] = [0.0, 0.0]
@@ -419,8 +419,9 @@ def _stating(path: str, value: Any) -> list[str]:
     """The path of a value; of a body's whole start the paths of what it states and is no guess."""
     if not path.startswith(f"{INITIAL}.") or path.count(".") > 1 or not isinstance(value, Mapping):
         return [path]
-    guess = value.get("guess") if isinstance(value.get("guess"), list | tuple) else ()
-    return [f"{path}.{q}" for q in (*POSES, *RATES) if value.get(q) is not None and q not in guess]
+    guess = value.get("guess")
+    loose = guess if isinstance(guess, list | tuple) else ()
+    return [f"{path}.{q}" for q in (*POSES, *RATES) if value.get(q) is not None and q not in loose]
 
 
 def _places(path: list[str]) -> bool:
