@@ -225,7 +225,7 @@ class Machine:
         return dict(plain(told))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Changes(Sequence[Mapping[str, Any]]):
     """What every lane of a model uses in place of what is stated, as `start.changes` tells it; worked out when asked.
 
@@ -239,6 +239,14 @@ class Changes(Sequence[Mapping[str, Any]]):
 
     def __len__(self) -> int:
         return self.model.lanes
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and self._told == list(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return repr(self._told)
 
     @cached_property
     def _told(self) -> list[dict[str, Any]]:
