@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
@@ -52,6 +52,9 @@ class Trajectory:
     end: the whole state at the last instant, from which `initial_from` lets a scene go on; None where it is not known,
         as of several lanes and of other engines
     states: coordinates and rates at `times`, of runs of the native engine that were asked for them, else None
+    changes: what each lane uses in place of what is stated of its start, as `model["initial_changes"]` tells it of a
+        single one; empty of a single lane, and where the engine does not tell it
+    reasons: why each lane is not ok, empty for one that is; none where the engine tells `message` only
     """
 
     engine: str
@@ -70,6 +73,8 @@ class Trajectory:
     rates: Array | None = None
     end: Mapping[str, Any] | None = None
     states: Any = None
+    changes: Sequence[Mapping[str, Any]] = ()
+    reasons: tuple[str, ...] = ()
 
     @property
     def axes(self) -> str:
@@ -89,6 +94,17 @@ class Trajectory:
     def __repr__(self) -> str:
         what = f"{self.lanes} lanes" if self.lanes > 1 else str(self.status[0])
         return f"Trajectory({', '.join(self.markers)}; {len(self.times)} samples, {self.engine}, {what})"
+
+    def reason(self, lane: int) -> str:
+        """Why a lane is not ok; empty if it is."""
+        if self.status[lane] is Status.OK:
+            return ""
+        return self.reasons[lane] if self.reasons else self.message
+
+    def changed(self, lane: int = 0) -> Mapping[str, Any]:
+        """What of its stated start a lane does not keep: body -> quantity -> stated, used, unit."""
+        changed: Mapping[str, Any] = self.changes[lane] if self.changes else self.model.get("initial_changes", {})
+        return changed
 
     def marker(self, name: str, lane: int = 0) -> Array:
         """Path of one marker [m], (samples, d). Raises InputError."""

@@ -1,7 +1,8 @@
 """The library's results as JSON and back, to the last bit: what a service answers to `shoal.Client`.
 
 What JSON has stays as it is. All else is an object whose key `@` says what it was: `array` (NumPy's own format, in
-base64), `number` (not finite), `complex`, `tuple`, `pairs` (a mapping; any comes back as a dictionary),
+base64), `number` (not finite), `complex`, `tuple`, `pairs` (a mapping; any comes back as a dictionary, other sequences
+as lists),
 `distribution` (of scipy) or the class of this package that it is one of. Nothing is executed, and no class of another
 package is made.
 """
@@ -10,7 +11,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import StrEnum
 from pkgutil import resolve_name
@@ -39,7 +40,7 @@ def packed(value: Any) -> Any:
             "is": base64.b64encode(file.getvalue()).decode(),
             "scalar": isinstance(value, np.generic),
         }
-    if type(value) is list:
+    if isinstance(value, Sequence) and not isinstance(value, tuple | str):
         return [packed(one) for one in value]
     if type(value) is tuple:
         return {KIND: "tuple", "is": [packed(one) for one in value]}

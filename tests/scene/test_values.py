@@ -65,6 +65,33 @@ def test_what_is_set_last_makes_guesses_of_the_rest_that_it_may_move() -> None:
     assert Scene.parse(later.model_dump(mode="json")) == later
 
 
+@pytest.mark.parametrize("states", [True, False])
+def test_a_whole_start_is_set_as_its_quantities_are(states: bool) -> None:
+    """Whether or not the scene states one of that body; what it states is kept, and makes guesses of the rest."""
+    scene = SCENE.with_values({"initial": {"OA": {"angle": 0.5}, **({"AB": {"angle": 0.1}} if states else {})}})
+    assert scene.with_values({"initial.AB": {"angle": 0.7}}) == scene.with_values({"initial.AB.angle": 0.7})
+    guess = scene.with_values({"initial.AB": {"angle": 0.7, "guess": ["angle"]}})
+    assert (guess.initial["AB"].guess, guess.initial["OA"].guess) == (("angle",), ())
+    with pytest.raises(InputError, match=r"initial\.AC: no such field"):
+        scene.with_values({"initial.AC": {"angle": 0.7}})
+
+
+def test_statements_of_the_start_are_known_after_other_values_were_set() -> None:
+    """What setting a value turns into a guess is still one; what was stated or set as a guess is none."""
+    stated = {"OA": {"angle": 0.5, "rate": 1.0, "guess": ["rate"]}, "AB": {"angle": 0.1}}
+    scene = SCENE.with_values({"initial": stated})
+    assert scene.statements() == (("OA", "angle"), ("AB", "angle"))
+    later = scene.with_values({"bodies.OA.length": 1.2}).with_values({"gravity": [0.0, 0.0]})
+    assert later.initial["AB"].guess == ("angle",)
+    assert later.statements() == scene.statements()
+    assert later.statements(["initial.OA.rate", "initial.AB.velocity.0"])[1:] == (
+        ("OA", "rate"),
+        ("AB", "angle"),
+        ("AB", "velocity"),
+    )
+    assert later.with_values({"initial.AB": {"angle": 0.2, "guess": ["angle"]}}).statements() == (("OA", "angle"),)
+
+
 def test_a_drive_that_begins_as_before_makes_no_guesses() -> None:
     """What it does later moves no start; another slope at the start moves rates alone, another value poses as well."""
     data = SCENE.model_dump(mode="json")

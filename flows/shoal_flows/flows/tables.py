@@ -11,6 +11,7 @@ from shoal.identification.design import Design
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.pictures.estimates import estimates
 from shoal.pictures.numbers import looked_at
+from shoal.pictures.start import reasons, remarks
 from shoal.response import Response
 from shoal.selection import Selection
 from shoal.trajectory import Trajectory
@@ -27,7 +28,7 @@ def of_motion(motion: Trajectory) -> str:
     evidence = f"{motion.status[0]}; energy drift {motion.energy_drift[0]:.1e}, constraint drift "
     evidence += f"{motion.constraint_drift[0]:.1e}, {motion.steps} steps, {motion.wall_s:.3f} s"
     verification = motion.model.get("verification")
-    notes = [] if verification is None else list(estimates(verification))
+    notes = remarks(motion.model) + ([] if verification is None else list(estimates(verification)))
     return "\n\n".join([shown, evidence, *notes])
 
 
@@ -35,14 +36,17 @@ def of_comparison(comparison: Comparison) -> str:
     """How far each pair of engines is apart."""
     rows = [("-".join(row["engines"]), row["marker"], row["largest"], row["final"]) for row in comparison.differences()]
     rows += [(engine, "refused", reason, "") for engine, reason in comparison.refused.items()]
-    return table(("engines", "marker", "largest distance [m]", "distance at the end [m]"), rows)
+    shown = table(("engines", "marker", "largest distance [m]", "distance at the end [m]"), rows)
+    notes = next(filter(None, (remarks(motion.model) for motion in comparison.trajectories.values())), [])
+    return "\n\n".join([shown, *notes])
 
 
 def of_sweep(result: Sweep) -> str:
     """The points, at most as many as a page can show."""
     rows = result.rows()
     shown = table(list(rows[0]), (row.values() for row in rows[:_ROWS]))
-    notes = [] if result.check is None else [f"{result.check}."]
+    notes = [*reasons(result), *filter(None, [result.elsewhere.told("points")])]
+    notes += [] if result.check is None else [f"{result.check}."]
     notes += [f"The first {_ROWS} of {len(rows)} points; all are in sweep.csv."] if len(rows) > _ROWS else []
     return "\n\n".join([shown, *notes])
 
@@ -57,7 +61,7 @@ def of_response(found: Response) -> str:
         if not brief or told in brief:
             ends.setdefault(f"{name.partition('.')[0]}.{of}", {})[told] = value
     shown = table(("at the end", *next(iter(ends.values()))), ((of, *told.values()) for of, told in ends.items()))
-    said = [f"{found.status}; {found.evaluations} runs; {found.why}", found.message]
+    said = [f"{found.status}; {found.evaluations} runs; {found.why}", found.message, found.mixes_starts]
     for one in found.limits:
         kept = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
         told = (

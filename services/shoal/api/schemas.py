@@ -32,6 +32,8 @@ class Motion(BaseModel):
     status, energy_drift, constraint_drift: one per lane; steps: time steps; wall_s: of the computation
     model: what was computed; its `verification` holds the estimated errors [m], of lanes the largest of a few of them
     selection: with a tolerance, how the model was found; end: of one scene, the state at which another run may go on
+    reasons, changes: one per lane, where lanes were asked for: why it is not ok (empty if it is), and what it uses in
+    place of what the scene states of its start, as `initial_changes` of the `model` of one scene
     Numbers that are not finite are null.
     """
 
@@ -51,6 +53,8 @@ class Motion(BaseModel):
     model: dict[str, Any]
     selection: dict[str, Any] | None = None
     end: dict[str, Any] | None = None
+    reasons: list[str] = []
+    changes: list[dict[str, Any]] = []
 
 
 class Table(Asked):

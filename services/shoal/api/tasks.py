@@ -153,6 +153,10 @@ def _motion(request: Simulate, trajectory: Trajectory, selection: dict[str, Any]
     }
     same = ("engine", "markers", "status", "steps", "wall_s", "message", "model")
     stated = {name: getattr(trajectory, name) for name in same}
+    if request.lanes is not None:
+        each = range(trajectory.lanes)
+        stated["reasons"] = [trajectory.reason(lane) for lane in each]
+        stated["changes"] = [plain(trajectory.changed(lane)) for lane in each]
     return to_json({**stated, **arrays, "selection": selection, "end": trajectory.end and dict(trajectory.end)})
 
 

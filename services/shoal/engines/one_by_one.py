@@ -87,4 +87,6 @@ def _side_by_side(runs: Sequence[Trajectory], wall_s: float) -> Trajectory:
         message=next((f"lane {lane}: {run.message}" for lane, run in enumerate(runs) if not run.ok), ""),
         model=next((run.model for run in runs if run.model), {}),
         states=first,
+        changes=[run.changed() for run in runs],
+        reasons=tuple(run.reason(0) for run in runs),
     )

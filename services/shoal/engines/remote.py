@@ -186,4 +186,5 @@ def trajectory_of(found: dict[str, Any]) -> Trajectory:
     optional: dict[str, Any] = {name: np.array(found[name], dtype=float) for name in known}
     status = tuple(Status(one) for one in found["status"])
     markers, end = tuple(found["markers"]), found.get("end")
-    return Trajectory(**plain, **arrays, **optional, markers=markers, status=status, end=end)
+    lanes: dict[str, Any] = {"reasons": tuple(found.get("reasons", ())), "changes": found.get("changes", ())}
+    return Trajectory(**plain, **arrays, **optional, **lanes, markers=markers, status=status, end=end)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shoal.arguments import check, mapping, numbers
 from shoal.engines.contract import Engine, sampling_times
+from shoal.engines.starts import Elsewhere, Stated
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory, plain
@@ -45,8 +47,10 @@ class SpotCheck:
 class Sweep:
     """Marker positions and displacements from the start at `time` [s] over a grid.
 
-    grid: path -> value of every point, (points,); positions, displacements [m]: marker -> (points, 2)
-    check: what more careful runs of some points say, None if there were none
+    grid: path -> value of every point, (points,); positions, displacements [m]: marker -> (points, 2), not a number
+    where a point is not ok; check: what more careful runs of some points say, None if there were none
+    reasons: why each point is not ok, empty for one that is; changes: what each point uses in place of what is stated
+    of its start, see `Trajectory.changed`; stated: what of that counts
     """
 
     scene: Scene
@@ -58,6 +62,9 @@ class Sweep:
     status: tuple[Status, ...]
     wall_s: float
     check: SpotCheck | None = None
+    reasons: tuple[str, ...] = ()
+    changes: tuple[Mapping[str, Any], ...] = ()
+    stated: Stated = field(default_factory=Stated)
 
     @property
     def ok(self) -> bool:
@@ -69,11 +76,47 @@ class Sweep:
         """Why not all of it can be believed; empty if nothing speaks against it."""
         wrong = [status for status in self.status if status is not Status.OK]
         if wrong:
-            return f"{len(wrong)} of {len(self.status)} points: {', '.join(sorted(set(wrong)))}"
+            why = next(filter(None, self.reasons), "")
+            told = f"{len(wrong)} of {len(self.status)} points: {', '.join(sorted(set(wrong)))}"
+            return f"{told}; the first: {why}" if why else told
         return self.check.complaint if self.check is not None else ""
 
+    @property
+    def message(self) -> str:
+        """Why not all of it can be believed, and whether some points start elsewhere than stated; empty if neither."""
+        return "; ".join(filter(None, (self.complaint, self.elsewhere.told("points"))))
+
+    @property
+    def elsewhere(self) -> Elsewhere:
+        """How many of the points that may be believed start elsewhere than stated."""
+        good = (one for one, status in zip(self.changes, self.status, strict=False) if status is Status.OK)
+        away = np.array([self.stated.away(one) for one in good])
+        return self.stated.elsewhere(away.reshape(-1, len(self.stated.values)))
+
+    @cached_property
+    def begun(self) -> dict[str, tuple[Array, str]]:
+        """Where points start that do not keep a stated value: name -> values, (points,), not a number at others; unit.
+
+        Names are `start.BODY.QUANTITY`, of vectors one for each component.
+        """
+        found: dict[str, tuple[Array, str]] = {}
+        for point, changed in enumerate(self.changes):
+            if self.status[point] is not Status.OK:
+                continue
+            for (body, quantity), change in self.stated.given_way(changed).items():
+                used = np.atleast_1d(change["used"])
+                ends = [""] if used.size == 1 else [f".{axis}" for axis in "xyz"[: used.size]]
+                for end, value in zip(ends, used, strict=True):
+                    name = f"start.{body}.{quantity}{end}"
+                    column, _ = found.setdefault(name, (np.full(len(self.status), np.nan), change["unit"]))
+                    column[point] = value
+        return found
+
     def rows(self) -> list[dict[str, Any]]:
-        """The table: one row a point, with the values, positions, displacements and status."""
+        """The table: one row a point, with the values, positions, displacements and status.
+
+        Where some points start elsewhere than stated it says where (`begun`), where some are not ok it has the reason.
+        """
         table = []
         for k, status in enumerate(self.status):
             row: dict[str, Any] = {path: float(values[k]) for path, values in self.grid.items()}
@@ -81,7 +124,9 @@ class Sweep:
                 moved = self.displacements[marker]
                 for prefix, vectors in (("", positions), ("d", moved)):
                     row |= {f"{marker}.{prefix}{axis}": part for axis, part in zip("xyz", vectors[k], strict=False)}
-            table.append(plain({**row, "status": str(status)}))
+            row |= {name: values[k] for name, (values, _) in self.begun.items()}
+            why = {"reason": self.reasons[k]} if any(self.reasons) else {}
+            table.append(plain({**row, "status": str(status), **why}))
         return table
 
     def to_pandas(self) -> pd.DataFrame:
@@ -94,11 +139,13 @@ class Sweep:
         """The object that `shoal sweep --json` prints."""
         return {
             "status": "ok" if self.ok else "failed",
+            "message": self.message,
             "scene": self.scene.name,
             "engine": self.engine,
             "time": self.time,
             "rows": self.rows(),
             "verification": None if self.check is None else plain(asdict(self.check)),
+            "starts": self.elsewhere.to_json(),
             "wall_s": self.wall_s,
         }
 
@@ -116,10 +163,21 @@ def sweep(
     # Time zero as a second instant gives the start, from which displacements count.
     times = np.array([0.0, instant]) if instant > 0 else np.array([0.0])
     trajectory = _gone_on(engine, scene, grid, engine.simulate_many(scene, grid, times))
-    positions = {name: trajectory.points[-1, k].T for k, name in enumerate(trajectory.markers)}
-    displacements = {name: positions[name] - trajectory.points[0, k].T for k, name in enumerate(trajectory.markers)}
+    good = np.array([one is Status.OK for one in trajectory.status])
+    points = np.where(good, trajectory.points, np.nan)
+    positions = {name: points[-1, k].T for k, name in enumerate(trajectory.markers)}
     return Sweep(
-        scene, trajectory.engine, instant, grid, positions, displacements, trajectory.status, trajectory.wall_s
+        scene,
+        trajectory.engine,
+        instant,
+        grid,
+        positions,
+        {name: positions[name] - points[0, k].T for k, name in enumerate(trajectory.markers)},
+        trajectory.status,
+        trajectory.wall_s,
+        reasons=trajectory.reasons,
+        changes=tuple(trajectory.changes),
+        stated=Stated.of(scene, grid),
     )
 
 
@@ -127,8 +185,15 @@ def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Tra
     """Points that failed side by side go on as a scene alone does: one finds the settings, the others take them."""
     from shoal.mechanics.persist import as_run
 
-    started = time.perf_counter()
+    started, lanes = time.perf_counter(), found.lanes
     points, status = found.points.copy(), list(found.status)
+    reasons, changes = [found.reason(k) for k in range(lanes)], [found.changed(k) for k in range(lanes)]
+
+    def take(run: Trajectory, places: Iterable[int]) -> None:
+        for lane, place in enumerate(places):
+            points[..., place], status[place] = run.points[..., lane], run.status[lane]
+            reasons[place], changes[place] = run.reason(lane), run.changed(lane)
+
     left = np.flatnonzero([one is not Status.OK for one in status])
     for _ in range(LONE):
         if scene.solver.integrator != "auto" or not left.size:
@@ -137,14 +202,15 @@ def _gone_on(engine: Engine, scene: Scene, grid: Mapping[str, Array], found: Tra
         values = {path: float(at[first]) for path, at in grid.items()}
         try:
             alone = engine.simulate(scene.with_values(values), found.times)
-        except InputError:
+        except InputError as error:
+            reasons[first] = str(error)
             continue
-        points[..., first], status[first] = alone.points[..., 0], alone.status[0]
+        take(alone, [int(first)])
         if left.size and alone.ok:
             run = engine.simulate_many(as_run(scene, alone), {path: at[left] for path, at in grid.items()}, found.times)
-            points[..., left] = run.points
-            for number, one in zip(left, run.status, strict=True):
-                status[number] = one
+            take(run, left.tolist())
             left = left[[one is not Status.OK for one in run.status]]
     wall_s = found.wall_s + time.perf_counter() - started
-    return replace(found, points=points, status=tuple(status), wall_s=wall_s)
+    return replace(
+        found, points=points, status=tuple(status), wall_s=wall_s, reasons=tuple(reasons), changes=tuple(changes)
+    )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
@@ -127,7 +128,7 @@ class Machine:
                 march(part)
         else:
             list(_pool(workers).map(march, parts))
-        status, message = limits.verdict(numbers, self.choice, moved.failed)
+        status, reasons = limits.verdict(numbers, self.choice, moved.failed)
         largest = np.maximum.reduce(numbers, axis=1)
         facts = pickle.loads(self._told[single])
         facts["evaluations"] = int(largest[EVALUATIONS])
@@ -145,10 +146,12 @@ class Machine:
             constraint_drift=numbers[CONSTRAINT_DRIFT],
             steps=int(largest[STEPS]),
             wall_s=clock.now() - begin,
-            message=message,
+            message=next(filter(None, reasons), ""),
             model=facts,
             end=ended,
             states=states,
+            changes=() if single else Changes(moved),
+            reasons=reasons,
         )
 
     @cached_property
@@ -220,6 +223,47 @@ class Machine:
         redundant = () if start.is_direct(scene) else redundant_joints(start.complete(scene).scene)
         told = start.facts(scene, used, float(reaches.size(scene))) | {"redundant_joints": list(redundant)}
         return dict(plain(told))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Changes(Sequence[Mapping[str, Any]]):
+    """What every lane of a model uses in place of what is stated, as `start.changes` tells it; worked out when asked.
+
+    A lane that has no start changes nothing.
+    """
+
+    model: Model
+
+    def __getitem__(self, lane: Any) -> Any:
+        return self._told[lane]
+
+    def __len__(self) -> int:
+        return self.model.lanes
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and self._told == list(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return repr(self._told)
+
+    @cached_property
+    def _told(self) -> list[dict[str, Any]]:
+        model, lanes = self.model, self.model.lanes
+        stated = model.stated
+        if stated.dimensions == 2 and not stated.starts_at_rest and start.is_direct(stated):
+            return [{} for _ in range(lanes)]
+        q, v = (np.broadcast_to(x, (len(x), lanes)) for x in (model.q0, model.v0))
+        space = stated.dimensions == 3
+        used = spatial.begun(model.frames, q, v) if space else start.begun(model.frames, model.scene, q, v)
+        found = start.changes(stated, used, reaches.size(stated), lanes)
+        failed = np.broadcast_to(model.failed, lanes)
+        return [{} if none else one for one, none in zip(found, failed, strict=True)]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A model holds addresses of this process.
+        return list, (self._told,)
 
 
 def check_step(scene: Scene, choice: Choice) -> None:

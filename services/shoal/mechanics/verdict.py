@@ -81,20 +81,20 @@ class Limits:
         moving = 0.5 * self._mass * (RESOLVED * tolerance) ** 2
         return self._still + moving + self._weight * SINKING * tolerance * end + 1e-300
 
-    def verdict(self, numbers: Array, choice: Choice, failed: Flags) -> tuple[tuple[Status, ...], str]:
-        """Status of every lane, and the reason for the first that is not ok; failed: lanes that have no start."""
+    def verdict(self, numbers: Array, choice: Choice, failed: Flags) -> tuple[tuple[Status, ...], tuple[str, ...]]:
+        """Status of every lane, and why it is not ok; failed: lanes that have no start."""
         lanes = numbers.shape[1]
         fine = numbers[_JUDGED] <= self._fine
         if fine.all() and not failed.any():
-            return (Status.OK,) * lanes, ""
+            return (Status.OK,) * lanes, ("",) * lanes
         # Lanes may be machines of different lengths.
         reach = np.broadcast_to(self._reach(numbers[ENERGY_SCALE]), lanes)
         failed = np.broadcast_to(failed, lanes)
-        statuses, message = [Status.OK] * lanes, ""
+        statuses, reasons = [Status.OK] * lanes, [""] * lanes
         for lane in np.flatnonzero(~fine.all(axis=0) | failed):
             statuses[lane], reason = self._judged(choice, numbers[:, lane], float(reach[lane]), bool(failed[lane]))
-            message = message or reason + self._remark
-        return tuple(statuses), message
+            reasons[lane] = reason + self._remark
+        return tuple(statuses), tuple(reasons)
 
     def _judged(self, choice: Choice, numbers: Array, reach: float, failed: bool) -> tuple[Status, str]:
         """Status of one lane, whose numbers are (NUMBERS,), and the reason if it is not ok."""

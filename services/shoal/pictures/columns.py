@@ -70,7 +70,8 @@ def _about(scene: Scene, engine: str, status: str, message: str) -> dict[str, An
 def of_sweep(result: Sweep) -> Columns:
     """Values, positions and displacements from the start of every marker, and the status, of every point."""
     rows = result.rows()
-    units = {name: "m" for name in rows[0] if name not in result.grid and name != "status"}
+    texts, begun = ("status", "reason"), {name: unit for name, (_, unit) in result.begun.items()}
+    units = {name: "m" for name in rows[0] if name not in result.grid and name not in texts} | begun
     return {name: (_column([row[name] for row in rows]), units.get(name, "")) for name in rows[0]}
 
 
@@ -83,7 +84,7 @@ def about_sweep(result: Sweep) -> dict[str, str | float]:
     """As of a motion."""
     check = result.check
     told = {
-        **_about(result.scene, result.engine, "ok" if result.ok else "failed", result.complaint),
+        **_about(result.scene, result.engine, "ok" if result.ok else "failed", result.message),
         "time_s": result.time,
         "time_error_m": None if check is None else check.time_error,
         "mesh_error_m": None if check is None else check.mesh_error,
@@ -121,7 +122,10 @@ def motion_to_netcdf(motion: Trajectory, scene: Scene) -> bytes:
 
 
 def sweep_to_netcdf(result: Sweep) -> bytes:
-    """Over point and marker: positions and displacements; over point: the values and the status."""
+    """Over point and marker: positions and displacements; over point: the values, the status, and why it is not ok.
+
+    And where points start that do not keep what is stated.
+    """
     import xarray as xr
 
     markers = list(result.positions)
@@ -131,6 +135,10 @@ def sweep_to_netcdf(result: Sweep) -> bytes:
         stacked = np.stack([found[name] for name in markers], axis=1)
         for k, axis in zip(range(stacked.shape[2]), "xyz", strict=False):
             data[f"{prefix}{axis}"] = ("point", "marker"), stacked[:, :, k], {"units": "m"}
+    for name, (used, unit) in result.begun.items():
+        data[name] = "point", used, {"units": unit}
+    if any(result.reasons):
+        data["reason"] = "point", list(result.reasons)
     return _netcdf(data, about_sweep(result))
 
 

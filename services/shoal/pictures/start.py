@@ -1,11 +1,18 @@
-"""What the start of a run needs to have said about it, in words."""
+"""What the start of a run needs to have said about it, and why points of a sweep are not ok, in words."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from shoal.engines.sweep import Sweep
+
+REASONS = 4
+"""So many reasons of points that failed are told."""
 
 
 def remarks(model: Mapping[str, Any]) -> list[str]:
@@ -18,6 +25,13 @@ def remarks(model: Mapping[str, Any]) -> list[str]:
     if joints := model.get("redundant_joints"):
         found.append(f"redundant joints: {', '.join(joints)}; the motion is unique, their forces are the least ones")
     return found
+
+
+def reasons(sweep: Sweep) -> list[str]:
+    """Why points of a sweep are not ok, and how many for each reason, the most frequent first."""
+    counted = Counter(filter(None, sweep.reasons)).most_common()
+    found = [f"{number} point{'s' * (number > 1)}: {reason}" for reason, number in counted[:REASONS]]
+    return found + ([f"{len(counted) - REASONS} more reasons"] if len(counted) > REASONS else [])
 
 
 def _written(value: Any) -> str:

@@ -39,7 +39,9 @@ def _says(result: Sweep, marker: str, moved: Array) -> str:
         return f"{result.scene.name}: no point of the sweep can be trusted {after}"
     most = int(np.nanargmax(size))
     place = ", ".join(f"{path} = {values[most]:.3g}" for path, values in result.grid.items())
-    return f"{result.scene.name}: {after} {marker} has moved farthest, {length(float(size[most]))}, from {place}"
+    far = f"{result.scene.name}: {after} {marker} has moved farthest, {length(float(size[most]))}, from {place}"
+    left = sum(status is not Status.OK for status in result.status)
+    return far + (f"; {left} of {len(result.status)} points failed" if left else "")
 
 
 def _lines(result: Sweep, marker: str) -> Figure:

@@ -174,7 +174,8 @@ def _allocated(found: Response) -> list[str]:
 
 
 def _remarks(found: Response) -> list[str]:
-    remarks = [f"{one.limit.text}: {one.passing.why}." for one in found.limits if one.passing is not None]
+    remarks = [f"{found.mixes_starts}."] if found.mixes_starts else []
+    remarks += [f"{one.limit.text}: {one.passing.why}." for one in found.limits if one.passing is not None]
     remarks += [f"{one.limit.text}: {one.note}." for one in found.limits if one.note]
     for one in found.limits:
         if one.between is not None:

@@ -33,21 +33,27 @@ class Keep:
             self.memory.close()
 
     def __call__(
-        self, label: str, values: Mapping[str, Array], run: Callable[[Mapping[str, Array]], Answers]
+        self, label: str, values: Mapping[str, Array], run: Callable[[Mapping[str, Array]], Answers], stated: int = 0
     ) -> Answers:
-        """What is known of these runs, else what making them tells. label: of what is told. Raises TimeIsUpError."""
+        """What is known of these runs, else what making them tells. Raises TimeIsUpError.
+
+        label: of what is told; stated: of so many values of the start runs tell how far they are away
+        """
         points = np.stack(list(values.values()))
         known = None if self.memory is None else self.memory.recall(label, points)
         if known is not None:
-            good = known[:-1, -1] == 1.0
+            good, told = known[:-1, -1] == 1.0, known.shape[1] - 1 - stated
             why = "" if good.all() else "they failed before the study was broken off"
-            return Answers(known[:-1, :-1].copy(), good, int(known[-1, -1]), why)
+            away = known[:-1, told:-1].copy() if stated else None
+            return Answers(known[:-1, :told].copy(), good, int(known[-1, -1]), why, away)
         if self.end is not None and clock.now() > self.end:
             self.over = True
             raise TimeIsUpError
         found = run(values)
         if self.memory is not None:
-            last = np.zeros((1, found.values.shape[1] + 1))
+            parts = [found.values, *([found.away] if found.away is not None and stated else []), found.good]
+            rows = np.column_stack(parts)
+            last = np.zeros((1, rows.shape[1]))
             last[0, -1] = found.repeated
-            self.memory.keep(label, points, np.concatenate([np.column_stack([found.values, found.good]), last]))
+            self.memory.keep(label, points, np.concatenate([rows, last]))
         return found

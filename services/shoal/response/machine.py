@@ -10,6 +10,7 @@ import numpy as np
 
 from shoal.engines.contract import Engine
 from shoal.engines.one_by_one import one_by_one
+from shoal.engines.starts import Tally
 from shoal.errors import InputError, UnstableStepError
 from shoal.response.inputs import BoolArray, IntArray
 from shoal.response.kept import Keep
@@ -34,7 +35,7 @@ class Machine:
 
     columns: their number along each of the three; told: what is told instead, (lanes, columns), of the motion of a
     scene with some values of its lanes; keep: of the runs; fixed: values of parameters that are set in the scene, in
-    words, by which these are told apart
+    words, by which these are told apart; starts: counts the runs that start elsewhere than stated
     """
 
     scene: Scene
@@ -43,6 +44,7 @@ class Machine:
     told: Callable[[Trajectory, Scene, Mapping[str, Array]], Array] = field(default_factory=lambda: _columns)
     keep: Keep | None = None
     fixed: str = ""
+    starts: Tally | None = None
 
     def at(self, values: Mapping[str, float]) -> Machine:
         """The same machine with these values. Raises InputError."""
@@ -74,8 +76,15 @@ class Machine:
 
     def _known(self, values: Mapping[str, Array]) -> Answers:
         if self.keep is None:
-            return self._some(values)
-        return self.keep(repr(getattr(self.told, "__self__", "markers")) + self.fixed, values, self._some)
+            found = self._some(values)
+        else:
+            label, stated = repr(getattr(self.told, "__self__", "markers")) + self.fixed, 0
+            if self.starts is not None and (stated := len(self.starts.stated.values)):
+                label += repr(self.starts.stated.values)
+            found = self.keep(label, values, self._some, stated)
+        if self.starts is not None and found.away is not None:
+            self.starts.count(found.away[found.good])
+        return found
 
     def _some(self, values: Mapping[str, Array]) -> Answers:
         lanes = np.arange(len(next(iter(values.values()))))
@@ -103,7 +112,11 @@ class Machine:
         missing = np.full_like(next(iter(done.values())).values, np.nan)
         found = np.array([done[lane].values if lane in done else missing for lane in lanes.tolist()])
         failed = _left(lanes, done)
-        return Answers(found, np.isin(lanes, failed, invert=True), repeated, why if failed.size else "")
+        away = None
+        if self.starts is not None:
+            none = np.zeros(len(self.starts.stated.values))
+            away = np.array([done[lane].away if lane in done else none for lane in lanes.tolist()])
+        return Answers(found, np.isin(lanes, failed, invert=True), repeated, why if failed.size else "", away)
 
     def _run(self, scene: Scene, values: Mapping[str, Array], lanes: IntArray) -> tuple[dict[int, _Lane], str]:
         """Some lanes, without those whose step is too long; why the first failed. Raises InputError."""
@@ -126,15 +139,17 @@ class Machine:
         self, motion: Trajectory, scene: Scene, values: Mapping[str, Array], lanes: IntArray
     ) -> dict[int, _Lane]:
         told, good = self.told(motion, scene, values), _good(motion)
-        each = zip(lanes.tolist(), told, good.tolist(), strict=True)
-        return {lane: _Lane(row, well) for lane, row, well in each}
+        away = np.zeros((len(lanes), 0)) if self.starts is None else self.starts.of(motion)
+        each = zip(lanes.tolist(), told, good.tolist(), away, strict=True)
+        return {lane: _Lane(row, well, off) for lane, row, well, off in each}
 
 
 class _Lane(NamedTuple):
-    """values: (columns,); good: whether they may be believed."""
+    """values: (columns,); good: whether they may be believed; away: from what is stated of the start, see `Answers`."""
 
     values: Array
     good: bool
+    away: Array
 
 
 def _left(lanes: IntArray, done: Mapping[int, _Lane]) -> IntArray:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shoal.engines.starts import Elsewhere
 from shoal.errors import InputError
 from shoal.response.allocation import Allocation
 from shoal.response.boxes import Boxes
@@ -59,7 +60,8 @@ class Response:
     mesh_error, step_error: of extremal runs [m], None where not estimated; stated: the scene with its model in the
     middle; engine: its name; limits: of what must not happen;
     allocation: tolerances that keep the limit, where they were asked for; finer: which bounds a finer mesh moves, where
-    a model was asked for; controls: runs all over the box of intervals that test what was foretold
+    a model was asked for; controls: runs all over the box of intervals that test what was foretold; elsewhere: how many
+    of the runs, those for limits among them, start elsewhere than the scene states
     """
 
     status: str
@@ -88,6 +90,12 @@ class Response:
     boxes: Boxes | None = None
     finer: Finer | None = None
     controls: int = 0
+    elsewhere: Elsewhere | None = None
+
+    @property
+    def mixes_starts(self) -> str:
+        """That some runs start elsewhere than stated, in words; empty if none does."""
+        return "" if self.elsewhere is None else self.elsewhere.told()
 
     @property
     def ok(self) -> bool:
@@ -229,6 +237,7 @@ class Response:
                     put(f"{index}_lower", sides[0], "random")
                     put(f"{index}_upper", sides[1], "random")
         about = {"scene": self.scene, "status": self.status, "method": self.method, "why": self.why}
+        about |= {"starts": self.mixes_starts} if self.mixes_starts else {}
         numbers = {"horizon": self.horizon, "evaluations": self.evaluations, "seed": self.seed}
         if self.unseen is not None:
             numbers["unseen"] = self.unseen
@@ -238,7 +247,7 @@ class Response:
         """The object that `shoal uncertain --json` prints."""
         return {
             "status": self.status,
-            "message": self.message,
+            "message": "; ".join(filter(None, (self.message, self.mixes_starts))),
             "scene": self.scene,
             "method": self.method,
             "why": self.why,
@@ -260,6 +269,7 @@ class Response:
             "finer_mesh": None if self.finer is None else {**self.finer.to_json(), "moved": self.moved()},
             "limits": [one.to_json() for one in self.limits],
             "allocation": None if self.allocation is None else self.allocation.to_json(),
+            "starts": None if self.elsewhere is None else self.elsewhere.to_json(),
         }
 
     def _parameters(self) -> dict[str, Any]:

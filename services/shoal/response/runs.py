@@ -22,13 +22,15 @@ class Answers:
     """Of several runs.
 
     values: (runs, columns); good: which may be believed, (runs,); repeated: how many took smaller steps; why: of the
-    first that may not be believed
+    first that may not be believed; away: how far each starts from what is stated of its start, (runs, stated values),
+    None where nobody looks
     """
 
     values: Array
     good: BoolArray
     repeated: int = 0
     why: str = ""
+    away: Array | None = None
 
 
 class TooManyRunsError(Exception):

@@ -16,6 +16,7 @@ from shoal.arguments import check
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
 from shoal.engines.spot_checks import larger
+from shoal.engines.starts import Stated, Tally
 from shoal.engines.verification import WRONG, verified
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import clock, reach
@@ -118,6 +119,7 @@ def uncertain(
     wanted = as_scene(scene)
     wanted = wanted.with_values(values) if values else wanted
     inputs = Inputs(parameters(vary, wanted), correlations)
+    starts = Tally(Stated.of(wanted, [path for one in inputs.parameters for path in one.factors]))
     get_way(limit_method)
     if allocate and len(limits) != 1:
         raise InputError(f"allocate: needs one limit, found {len(limits)}; state it with --limit")
@@ -125,7 +127,7 @@ def uncertain(
     if tolerance is not None:
         wanted = _modelled(wanted, inputs, tolerance, when, engine, asked)
     keep = _keep(wanted, when, engine, checkpoint, end)
-    machine = Machine(wanted, when, get_engine(engine), keep=keep)
+    machine = Machine(wanted, when, get_engine(engine), keep=keep, starts=starts)
     for one in asked:
         require(machine, one, inputs)
     count_t, count_m, count_q = machine.columns
@@ -215,6 +217,7 @@ def uncertain(
         boxes=answer.boxes,
         finer=finer,
         controls=answer.runs.controls,
+        elsewhere=starts.elsewhere,
     )
     if status == "gap-not-reached" and bounds is not None and gap is not None:
         response = replace(response, message=message + _named(response.missed(gap)))

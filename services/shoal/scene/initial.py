@@ -15,6 +15,16 @@ INITIAL, FROM = "initial", "from"
 Quantity = Literal["angle", "rate", "position", "velocity", "rotation", "spin"]
 POSES: tuple[Quantity, ...] = ("angle", "position", "rotation")
 RATES: tuple[Quantity, ...] = ("rate", "velocity", "spin")
+UNITS: dict[Quantity, str] = {
+    "angle": "rad",
+    "position": "m",
+    "rate": "rad/s",
+    "velocity": "m/s",
+    "rotation": "rad",
+    "spin": "rad/s",
+}
+ABOUT_Z: dict[Quantity, Quantity] = {"angle": "rotation", "rate": "spin"}
+"""In space what an angle and a rate are short for."""
 
 
 class InitialState(Record):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -26,6 +27,7 @@ from shoal.scene.initial import (
     RATES,
     Begin,
     InitialState,
+    Quantity,
     check_start,
     end_of,
     guessed,
@@ -259,13 +261,15 @@ class Scene(Record):
         fresh = [path for path, value in values.items() if not self._has(path, value)]
         check_start(values.get(from_, self.initial_from), fresh)
         turned = [path for path in fresh if self._begins_there(path, values[path])]
-        data = self._guessing(fresh, turned).model_dump(mode="json")
+        moved = [one for path in fresh for one in _stating(path, values[path])]
+        loose = self._guessing(moved, turned)
+        data = loose.model_dump(mode="json")
         for path, value in values.items():
             place: Any = data
             *parents, leaf = path.split(".")
+            if parents[:1] == [INITIAL] and (started := [*parents, leaf][1]) in self.bodies:
+                data[INITIAL].setdefault(started, InitialState().model_dump(mode="json"))
             for depth, part in enumerate(parents):
-                if parents[: depth + 1] == ["initial", part] and part in self.bodies:
-                    place.setdefault(part, InitialState().model_dump(mode="json"))
                 if parents[:1] == ["initial"] and part == "velocity" and place.get(part) is None:
                     place[part] = [0.0, 0.0]
                 place = place[key(place, part, path, ".".join(parents[:depth]))]
@@ -274,7 +278,8 @@ class Scene(Record):
             said = {"bodies", f"bodies.{name}", f"bodies.{name}.element"} & set(values)
             if "element" not in body.model_fields_set and not said:
                 del data["bodies"][name]["element"]  # what was left unsaid stays so
-        return Scene.parse(data, self.name)
+        anew = {path.split(".")[1] for path in values if path.startswith(f"{INITIAL}.") and path.count(".") == 1}
+        return Scene.parse(data, self.name)._with_loosened(one for one in loose._loosened if one[0] not in anew)
 
     def with_lanes(self, values: Mapping[str, npt.NDArray[np.float64]]) -> Scene:
         """This scene with numbers replaced by arrays, one entry per lane (population member).
@@ -349,11 +354,33 @@ class Scene(Record):
         loose = (*POSES, *RATES) if moved & {*POSES} else RATES if moved & {*RATES} else ()
         if not loose:
             return self
-        initial = {}
+        initial, loosened = {}, {*self._loosened}
         for name, start in self.initial.items():
             guess = {*start.guess, *(q for q in loose if start.stated(q))} - {q for body, q in fresh if body == name}
             initial[name] = start.model_copy(update={"guess": tuple(q for q in (*POSES, *RATES) if q in guess)})
-        return self.model_copy(update={"initial": initial})
+            loosened |= {(name, q) for q in (*POSES, *RATES) if q in guess and q not in start.guess}
+        return self.model_copy(update={"initial": initial})._with_loosened(loosened)
+
+    @cached_property
+    def _loosened(self) -> frozenset[tuple[str, Quantity]]:
+        """Body and quantity of guesses that were statements before others were set; no field, as it moves nothing."""
+        return frozenset()
+
+    def _with_loosened(self, those: Iterable[tuple[str, Quantity]]) -> Self:
+        self.__dict__["_loosened"] = frozenset(those)
+        return self
+
+    def statements(self, varied: Iterable[str] = ()) -> tuple[tuple[str, Quantity], ...]:
+        """Body and quantity of what is stated of the start and was not stated as a guess.
+
+        Values that are guesses only because others were set after them are statements. varied: paths of values that
+        lanes will state.
+        """
+        split = [path.split(".") for path in varied]
+        fresh = [(p[1], q) for p in split if p[0] == INITIAL for q in (*POSES, *RATES) if p[2:3] == [q]]
+        found = [(name, q) for name, start in self.initial.items() for q in (*POSES, *RATES) if start.stated(q)]
+        guesses = {(name, q) for name, start in self.initial.items() for q in start.guess} - self._loosened
+        return tuple(dict.fromkeys(one for one in (*found, *fresh) if one in fresh or one not in guesses))
 
     def value(self, path: str) -> Any:
         """The field at a dotted path. Raises InputError."""
@@ -386,6 +413,15 @@ def _counted(one: str, many: str, names: Mapping[str, Any]) -> str:
         return ""
     listed = f" {', '.join(names)}" if len(names) <= _FEW else ""
     return f"{len(names)} {one if len(names) == 1 else many}{listed}"
+
+
+def _stating(path: str, value: Any) -> list[str]:
+    """The path of a value; of a body's whole start the paths of what it states and is no guess."""
+    if not path.startswith(f"{INITIAL}.") or path.count(".") > 1 or not isinstance(value, Mapping):
+        return [path]
+    guess = value.get("guess")
+    loose = guess if isinstance(guess, list | tuple) else ()
+    return [f"{path}.{q}" for q in (*POSES, *RATES) if value.get(q) is not None and q not in loose]
 
 
 def _places(path: list[str]) -> bool:

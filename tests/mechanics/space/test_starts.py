@@ -130,3 +130,32 @@ def test_a_rod_on_a_turning_hub_starts_as_a_rigid_body_as_in_the_plane(driven: b
         tips.append(found.marker("E")[:, :2])
     assert tips[1] == pytest.approx(tips[0], abs=1e-6)
     assert np.linalg.norm(tips[1][-1]) - 1.0 == pytest.approx(1000.0 * rate**2 / (3 * 2e9), rel=0.05)
+
+
+@pytest.mark.parametrize("turns", [0, 1])
+@pytest.mark.parametrize("short", [True, False])
+def test_what_a_start_in_space_changes_is_told_as_it_is_stated(short: bool, turns: int) -> None:
+    """A bar that a rod of length d holds at the angle arccos((1 + 4 - d^2) / 4); whole turns of the bar are nothing."""
+    ground = {"body": "ground", "point": [0.0, 0.0, 0.0]}
+    bar = {"kind": "rigid-body", "mass": 1.0, "inertia": [0.1, 0.1, 0.1], "named_points": {"end": [1.0, 0.0, 0.0]}}
+    stated, asked = 2 * math.pi * turns + math.acos((5 - 1.5**2) / 4), math.acos((5 - 1.4**2) / 4)
+    turned = {"angle": stated, "rate": 5.0} if short else {"rotation": [0, 0, stated], "spin": [0, 0, 5.0]}
+    scene = Scene.parse({
+        "name": "held", "dimensions": 3, "bodies": {"a": bar},
+        "joints": {
+            "O": {"first": ground, "second": {"body": "a"}},
+            "d": {"kind": "distance", "first": {"body": "ground", "point": [2.0, 0.0, 0.0]},
+                  "second": {"body": "a", "point": "end"}, "length": 1.5},
+        },
+        "markers": {"e": {"body": "a", "point": "end"}}, "initial": {"a": turned},
+    })  # fmt: skip
+    told = simulate(scene.with_values({"joints.d.length": 1.4}), np.array([0.001])).model
+    pose, speed = ("angle", "rate") if short else ("rotation", "spin")
+    assert set(told["initial_changes"]["a"]) == {pose, speed}
+    changed = told["initial_changes"]["a"][pose]
+    assert changed["stated"] == turned[pose]
+    assert np.atleast_1d(changed["used"])[-1] == pytest.approx(2 * math.pi * turns + asked, abs=1e-9)
+    assert told["initial_correction"] == pytest.approx(stated - 2 * math.pi * turns - asked, abs=1e-9)
+    assert told["initial_rate_correction"] == pytest.approx(5.0, abs=1e-9)
+    held = scene.with_values({"initial.a.rate" if short else "initial.a.spin": 0.0 if short else [0, 0, 0]})
+    assert simulate(held, np.array([0.001])).model["initial_changes"] == {}

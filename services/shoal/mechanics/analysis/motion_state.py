@@ -61,7 +61,7 @@ def states(scene: Scene, times: Sequence[float]) -> tuple[Evaluator, list[State]
         stops = halting(scene.solver.model_copy(update={"step": step}), model, choice.name, time)
         rows, tolerance = model.marker_rows.ravel(), scene.solver.rank_tolerance
         record = march(SINGLE, scheme, arrays, room, step, steps, np.array([time]), rows, tolerance, stops)
-        (status,), reason = limits.verdict(_numbers(model, record, limits, time), choice, model.failed)
+        (status,), (reason,) = limits.verdict(_numbers(model, record, limits, time), choice, model.failed)
         if status is not Status.OK:
             raise ComputationError(f"{scene.name}: the motion up to {time:g} s is rejected ({status}): {reason}")
         q, v = room.z[:n].copy(), room.zdot[:n].copy()

@@ -14,16 +14,17 @@ import numpy as np
 
 from shoal.errors import InputError
 from shoal.mechanics import plane
+from shoal.mechanics.affine import Affine
 from shoal.mechanics.frames import Frame, ModalFrame
 from shoal.mechanics.joints import Meet, of_scene
-from shoal.mechanics.numerics.tile import Array, Flags
+from shoal.mechanics.numerics.tile import Array, Flags, Number
 from shoal.mechanics.start.closure import Rows
 from shoal.mechanics.start.poses import ROUNDING, Assembly, Statement
 from shoal.mechanics.start.rates import Velocities
 from shoal.mechanics.start.strained import gives_way, numbers_of_start, require_numbers
 from shoal.scene import GROUND, InitialState, Scene
 from shoal.scene.ended import End
-from shoal.scene.initial import POSES, RATES, Quantity
+from shoal.scene.initial import ABOUT_Z, POSES, RATES, UNITS, Quantity
 from shoal.scene.joints import places
 from shoal.scene.paths import lanes_of
 
@@ -33,14 +34,6 @@ _SLACK = 1e-3
 """Part of the largest pull on a statement below which one is not pulled."""
 ROUND_OFF = 1e-9
 """Changes below this, relative to the value, 1 rad, the size or the speed of the machine, are not spoken of."""
-_UNITS: dict[Quantity, str] = {
-    "angle": "rad",
-    "position": "m",
-    "rate": "rad/s",
-    "velocity": "m/s",
-    "rotation": "rad",
-    "spin": "rad/s",
-}
 
 
 class Start(NamedTuple):
@@ -232,7 +225,7 @@ def _rates_refused(velocities: Velocities, broken: list[Statement]) -> InputErro
     joint = next((name for name in names if last not in velocities.run(joint=name).broken), "")
     told = velocities.run(without=last).rates[0, last.columns]
     told = np.where(np.abs(told) > ROUND_OFF * velocities.speed, told, 0.0)
-    wants = f"joint {joint} asks for {_written(told)} {_UNITS[last.quantity]}" if joint else "they cannot both hold"
+    wants = f"joint {joint} asks for {_written(told)} {UNITS[last.quantity]}" if joint else "they cannot both hold"
     return _contradiction([*guilty, last], wants)
 
 
@@ -241,7 +234,7 @@ def _contradiction(guilty: list[Statement], why: str, fewest: bool = True) -> In
     *others, last = guilty
     if not others:
         return InputError(f"{_stated(last)}: {why}; leave it out and it follows from the joints")
-    value = f"{last.path}: {_written(last.values[0])} {_UNITS[last.quantity]}"
+    value = f"{last.path}: {_written(last.values[0])} {UNITS[last.quantity]}"
     listed = ", ".join(f"{one.path} = {_written(one.values[0])}" for one in others[:3])
     more = f" and {len(others) - 3} more" if len(others) > 3 else ""
     out = "one of them out and it follows" if fewest else "some of them out and they follow"
@@ -249,7 +242,7 @@ def _contradiction(guilty: list[Statement], why: str, fewest: bool = True) -> In
 
 
 def _stated(one: Statement) -> str:
-    return f"{one.path}: {_written(one.values[0])} {_UNITS[one.quantity]} cannot be kept"
+    return f"{one.path}: {_written(one.values[0])} {UNITS[one.quantity]} cannot be kept"
 
 
 def _written(values: Array) -> str:
@@ -258,23 +251,26 @@ def _written(values: Array) -> str:
 
 
 def begun(frames: Mapping[str, Frame], scene: Scene, q: Array, v: Array) -> dict[str, InitialState]:
-    """The state of every body at the coordinates q and rates v of a machine, each (unknowns,); scene: started."""
+    """The state of every body at the coordinates q and rates v of a machine, each (unknowns,); scene: started.
+
+    Of (unknowns, lanes) its numbers are arrays, without modes.
+    """
     found = {}
     origin = (0.0,) * plane.DIMENSIONS
     for name, frame in frames.items():
         modes, mode_rates = tuple[float, ...](), tuple[float, ...]()
         if isinstance(frame, ModalFrame):
             place, axis = frame.origin, frame.directors[0]
-            modes, mode_rates = _bending(frame, q, v)
+            modes, mode_rates = _bending(frame, q, v) if q.ndim == 1 else (modes, mode_rates)
         else:
             place, axis = frame.point(origin), frame.direction(origin)
-        near, along = scene.start(name).angle, axis.at(q)
-        turn = float(plane.angle(along)) - near
+        near, along, turning = scene.start(name).angle, place_at(axis, q), rate_at(axis, v)
+        turn = plane.angle(along) - near
         found[name] = InitialState.model_construct(
-            angle=float(near + turn - 2 * np.pi * np.rint(turn / (2 * np.pi))),
-            rate=float(plane.cross(along, axis.rate(v)) / sum(along**2)),
-            position=tuple(place.at(q).tolist()),
-            velocity=tuple(place.rate(v).tolist()),
+            angle=_number(near + turn - 2 * np.pi * np.rint(turn / (2 * np.pi))),
+            rate=_number(plane.cross(along, turning) / sum(along**2)),
+            position=tuple(map(_number, place_at(place, q))),
+            velocity=tuple(map(_number, rate_at(place, v))),
             modes=modes,
             mode_rates=mode_rates,
             guess=(),
@@ -290,32 +286,87 @@ def _bending(frame: ModalFrame, q: Array, v: Array) -> tuple[tuple[float, ...], 
     return modes, tuple(float(e @ one.rate(v) + turning @ one.at(q)) for one, _ in frame.measured)
 
 
-def changes(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:
-    """What was stated and is not what is used: body -> quantity -> stated, used; round-off of any size [m] left out."""
-    found: dict[str, Any] = {}
-    turning, moving = _largest_stated(scene, "rate", "spin"), _largest_stated(scene, "velocity")
-    rate = max(1.0, turning)
-    least = {"position": size, "velocity": max(size * rate, moving), "rate": rate, "spin": rate}
+def _number(x: Any) -> Any:
+    """A number of Python, or an array over lanes as it is."""
+    return x if np.ndim(x) else float(x)
+
+
+def place_at(vector: Affine, q: Array) -> Array:
+    """A vector at coordinates, (d,) of (unknowns,) or (d, lanes) of (unknowns, lanes)."""
+    return vector.at(q) if q.ndim == 1 else _summed(vector, vector.constant, q)
+
+
+def rate_at(vector: Affine, v: Array) -> Array:
+    """Its rate of change at rates of the coordinates, likewise."""
+    return vector.rate(v) if v.ndim == 1 else _summed(vector, 0.0 * vector.constant, v)
+
+
+def _summed(vector: Affine, constant: Array, q: Array) -> Array:
+    total = sum((c * q[unknown] for unknown, c in vector.terms.items()), constant)
+    return np.broadcast_to(total, (len(total), q.shape[1]))
+
+
+def changes(scene: Scene, used: Mapping[str, InitialState], size: Number, lanes: int = 1) -> list[dict[str, Any]]:
+    """What was stated and is not what is used, of every lane: body -> quantity -> stated, used.
+
+    Round-off of any size [m] is left out. An angle or rate in space is told as the rotation or spin where what is used
+    is not about z.
+    """
+    found: list[dict[str, Any]] = [{} for _ in range(lanes)]
+    turning, moving = (_largest_stated(scene, lanes, *some) for some in (("rate", "spin"), ("velocity",)))
+    pace = np.maximum(1.0, turning)
+    least = {"position": size, "velocity": np.maximum(size * pace, moving), "rate": pace, "spin": pace}
     for name, start in () if isinstance(scene.initial_from, End) else scene.initial.items():
-        for quantity, unit in _UNITS.items():
-            stated, now = getattr(start, quantity), getattr(used[name], quantity)
-            if stated is None or now is None:
+        for quantity in UNITS:
+            if getattr(start, quantity) is None:
                 continue
-            off = float(max(abs(a - b) for a, b in zip(np.atleast_1d(now), np.atleast_1d(stated), strict=False)))
-            if off > ROUND_OFF * max(float(np.max(np.abs(stated))), least.get(quantity, 1.0)):
-                found.setdefault(name, {})[quantity] = {"stated": stated, "used": now, "unit": unit}
+            told, stated, now = _alike(quantity, getattr(start, quantity), used[name], lanes)
+            if now is None:
+                continue
+            off = np.max(np.abs(now[: len(stated)] - stated[: len(now)]), axis=0)
+            small = ROUND_OFF * np.maximum(np.max(np.abs(stated), axis=0), least.get(quantity, 1.0))
+            about_z = np.broadcast_to(told == quantity or np.all(np.abs(now[:2]) <= small, axis=0), lanes)
+            for lane in np.flatnonzero(off > small):
+                name_told = quantity if about_z[lane] else told
+                parts = stated[:, lane].tolist(), now[:, lane].tolist()
+                one, other = (part[-1] if name_told in ABOUT_Z else tuple(part) for part in parts)
+                found[lane].setdefault(name, {})[name_told] = {"stated": one, "used": other, "unit": UNITS[name_told]}
     return found
 
 
-def _largest_stated(scene: Scene, *quantities: Quantity) -> float:
-    """The largest of these that a body is stated to have, else zero."""
+def _alike(quantity: Quantity, stated: Any, used: InitialState, lanes: int) -> tuple[Quantity, Array, Array | None]:
+    """A quantity, what is stated of it, and what is used, (components, lanes) that may be compared; None: has none."""
+    if used.rotation is not None and quantity in ABOUT_Z:
+        quantity, stated = ABOUT_Z[quantity], (0.0, 0.0, stated)
+    wanted, now = _rows(stated, lanes), getattr(used, quantity)
+    if now is None:
+        return quantity, wanted, None
+    now = _rows(now, lanes)
+    if quantity == "rotation":
+        # Of the rotation vectors of one attitude the one that is nearest.
+        turn = np.linalg.norm(now, axis=0)
+        along = np.where(turn > 0, now, wanted)
+        along = along / np.maximum(np.linalg.norm(along, axis=0), 1e-300)
+        now = now + 2 * np.pi * np.rint((np.sum(along * wanted, axis=0) - turn) / (2 * np.pi)) * along
+    return quantity, wanted, now
+
+
+def _rows(value: Any, lanes: int) -> Array:
+    """The components of a quantity, (components, lanes)."""
+    parts = value if isinstance(value, tuple | list) else (value,)
+    return np.stack([np.broadcast_to(np.asarray(part, dtype=float), lanes) for part in parts])
+
+
+def _largest_stated(scene: Scene, lanes: int, *quantities: Quantity) -> Array:
+    """The largest of these that a body is stated to have, else zero, (lanes,)."""
     stated = (getattr(start, quantity) for start in scene.initial.values() for quantity in quantities)
-    return max((float(np.max(np.abs(value))) for value in stated if value is not None), default=0.0)
+    sizes = [np.max(np.abs(_rows(value, lanes)), axis=0) for value in stated if value is not None]
+    return np.max(sizes, axis=0) if sizes else np.zeros(lanes)
 
 
 def facts(scene: Scene, used: Mapping[str, InitialState], size: float) -> dict[str, Any]:
     """The start of every body as it was used, and what of it the scene states otherwise; size: of the machine [m]."""
-    found = changes(scene, used, size)
+    (found,) = changes(scene, used, size)
     return {
         "initial": {name: one.model_dump(exclude={"guess"}) for name, one in used.items()},
         "initial_changes": found,

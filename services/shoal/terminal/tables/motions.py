@@ -8,7 +8,7 @@ import numpy as np
 
 from shoal.pictures.choice import rows, tells_places
 from shoal.pictures.estimates import estimates
-from shoal.pictures.start import remarks
+from shoal.pictures.start import reasons, remarks
 from shoal.terminal import screen
 
 if TYPE_CHECKING:
@@ -84,9 +84,12 @@ def sweep_table(sweep: Sweep) -> None:
     )
     for row in sweep.rows():
         numbers = [f"{row[path]:.6g}" for path in sweep.grid]
-        moved = [row[f"{last}.d{axis}"] for axis in axes]
+        moved = (row[f"{last}.d{axis}"] for axis in axes)
         table.add_row(*numbers, *("-" if m is None else f"{m:.6f}" for m in moved), row["status"])
     screen.out.print(table)
+    screen.say(*reasons(sweep))
+    if sweep.elsewhere:
+        screen.say(sweep.elsewhere.told("points"))
     if sweep.check is not None:
         screen.say(str(sweep.check))
 
@@ -112,6 +115,7 @@ def comparison_table(comparison: Comparison) -> None:
         table.add_row(name, *place, f"{trajectory.energy_drift[0]:.0e}", time, str(trajectory.status[0]))
     screen.out.print(table)
     screen.say(*(f"{name} refused: {reason}" for name, reason in comparison.refused.items()))
+    screen.say(*next(filter(None, (remarks(trajectory.model) for trajectory in comparison.trajectories.values())), []))
     if len(comparison.trajectories) < 2:
         return
     table = screen.table("distances over all samples", "engines", "marker", "largest [m]", "final [m]")

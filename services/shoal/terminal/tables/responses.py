@@ -55,7 +55,10 @@ def response_table(response: Response) -> None:
         _limit(judged)
     if response.allocation is not None:
         _allocation(response.allocation)
-    screen.say(f"status {response.status}; {response.evaluations} runs in {response.wall_s:.2f} s; {response.why}")
+    mixed = f", but {response.mixes_starts}" if response.mixes_starts else ""
+    screen.say(
+        f"status {response.status}{mixed}; {response.evaluations} runs in {response.wall_s:.2f} s; {response.why}"
+    )
     for joint in response.inputs.joints:
         if joint.left:
             screen.say(

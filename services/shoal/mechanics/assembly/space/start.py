@@ -32,6 +32,7 @@ from shoal.mechanics.assembly.space.values import (
 from shoal.mechanics.assembly.terms import Mesh, Term
 from shoal.mechanics.frames import BeamFrame, Frame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array, stacked
+from shoal.mechanics.start.start import place_at, rate_at
 from shoal.mechanics.start.strained import gives_way, require_numbers
 from shoal.scene import InitialState, Scene
 from shoal.scene.initial import Quantity
@@ -390,24 +391,39 @@ _RATES: tuple[Quantity, ...] = ("velocity", "spin", "rate")
 
 
 def begun(frames: dict[str, Frame], q: Array, v: Array) -> dict[str, InitialState]:
-    """State of every body at the coordinates q and rates v of a machine, each (unknowns,); rods have no attitude."""
+    """State of every body at the coordinates q and rates v of a machine, each (unknowns,); rods have no attitude.
+
+    Of (unknowns, lanes) its numbers are arrays.
+    """
     found = {}
     for name, frame in frames.items():
         place = frame.point((0.0, 0.0, 0.0))
-        turn: list[float] | None = None
-        spin: list[float] | None = None
+        turn: list[Any] | None = None
+        spin: list[Any] | None = None
         if isinstance(frame, RigidFrame):
-            directors = np.array([one.at(q) for one in frame.directors])
-            turning = np.array([one.rate(v) for one in frame.directors])
-            turn = turns.vector_of(directors.T).tolist()
-            spin = (0.5 * np.sum(np.cross(directors, turning), axis=0)).tolist()
+            directors = np.array([place_at(one, q) for one in frame.directors])
+            turning = np.array([rate_at(one, v) for one in frame.directors])
+            turn = _told(_vectors(directors.swapaxes(0, 1)))
+            spin = _told(0.5 * np.sum(np.cross(directors, turning, axis=1), axis=0))
         found[name] = InitialState.model_construct(
             angle=None,
             rate=None,
-            position=tuple(place.at(q).tolist()),
-            velocity=tuple(place.rate(v).tolist()),
+            position=tuple(_told(place_at(place, q))),
+            velocity=tuple(_told(rate_at(place, v))),
             rotation=None if turn is None else (turn[0], turn[1], turn[2]),
             spin=None if spin is None else (spin[0], spin[1], spin[2]),
             guess=(),
         )
     return found
+
+
+def _vectors(rotation: Array) -> Array:
+    """The rotation vector [rad] of a matrix (3, 3), or of all lanes (3, 3, lanes)."""
+    if rotation.ndim == 2:
+        return turns.vector_of(rotation)
+    return np.stack([turns.vector_of(rotation[..., lane]) for lane in range(rotation.shape[2])], axis=1)
+
+
+def _told(vector: Array) -> list[Any]:
+    """Components: numbers of Python, or arrays over lanes."""
+    return vector.tolist() if vector.ndim == 1 else list(vector)

@@ -1,0 +1,129 @@
+"""Runs that start elsewhere than their scene states: which values give way, in how many of them, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shoal.scene import Scene
+from shoal.scene.initial import ABOUT_Z, UNITS, Quantity
+from shoal.trajectory import Array, Trajectory
+
+_TOLD = 3
+"""So many values are named."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A stated value of the start that runs do not keep.
+
+    runs: how many; by: how far what they use is away at most, in `unit`
+    """
+
+    path: str
+    runs: int
+    by: float
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.path} by up to {self.by:.3g} {self.unit}"
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """So many of some runs start elsewhere than stated, as the joints demand it; values: what gives way."""
+
+    runs: int
+    elsewhere: int
+    values: tuple[Value, ...]
+
+    def __bool__(self) -> bool:
+        return self.elsewhere > 0
+
+    def told(self, runs: str = "runs") -> str:
+        """In words, empty if all runs start as stated; runs: what they are called."""
+        if not self:
+            return ""
+        more = len(self.values) - _TOLD
+        values = ", ".join(map(str, self.values[:_TOLD])) + (f" and {more} more" if more > 0 else "")
+        return f"{self.elsewhere} of {self.runs} {runs} start elsewhere than stated, as the joints demand: {values}"
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain data: how many, and by path of a value how many runs, how far at most, and its unit."""
+        values = {one.path: {"runs": one.runs, "by": one.by, "unit": one.unit} for one in self.values}
+        return {"runs": self.runs, "elsewhere": self.elsewhere, "values": values}
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What is stated of the start of a scene and is no guess, beside which runs are seen to start elsewhere.
+
+    values: body and quantity of each
+    """
+
+    values: tuple[tuple[str, Quantity], ...] = ()
+
+    @classmethod
+    def of(cls, scene: Scene, varied: Iterable[str] = ()) -> Stated:
+        """Of a scene; varied: paths whose values the runs state."""
+        return cls(scene.statements(varied))
+
+    def given_way(self, changed: Mapping[str, Any]) -> dict[tuple[str, Quantity], Mapping[str, Any]]:
+        """Of what `Trajectory.changed` tells of a run, by body and quantity, that which was stated."""
+        found = {}
+        for body, quantity in self.values:
+            quantities = changed.get(body, {})
+            for name in (quantity, ABOUT_Z.get(quantity)):
+                if name in quantities:
+                    found[body, quantity] = quantities[name]
+        return found
+
+    def away(self, changed: Mapping[str, Any]) -> Array:
+        """How far a run starts from each value, zero where it keeps it, (values,)."""
+        found = self.given_way(changed)
+        return np.array([_apart(found[one]) if one in found else 0.0 for one in self.values])
+
+    def elsewhere(self, away: Array) -> Elsewhere:
+        """Of runs that start so far from each value, (runs, values)."""
+        count, most = (away > 0).sum(axis=0), away.max(axis=0, initial=0.0)
+        values = tuple(
+            Value(f"initial.{body}.{quantity}", int(number), float(by), UNITS[quantity])
+            for (body, quantity), number, by in zip(self.values, count, most, strict=True)
+            if number
+        )
+        return Elsewhere(len(away), int((away > 0).any(axis=1).sum()), values)
+
+
+class Tally:
+    """What is seen of runs that are made one batch after the other; stated: see there."""
+
+    def __init__(self, stated: Stated) -> None:
+        self.stated = stated
+        self._away: list[Array] = []
+
+    def of(self, motion: Trajectory) -> Array:
+        """How far every lane of a motion starts from each value, (lanes, values)."""
+        found = np.zeros((motion.lanes, len(self.stated.values)))
+        if found.size:
+            for lane in range(motion.lanes):
+                if changed := motion.changed(lane):
+                    found[lane] = self.stated.away(changed)
+        return found
+
+    def count(self, away: Array) -> None:
+        """Count runs that start so far from each value, (runs, values)."""
+        self._away.append(away)
+
+    @property
+    def elsewhere(self) -> Elsewhere:
+        """Of all runs that were counted."""
+        return self.stated.elsewhere(np.concatenate([np.zeros((0, len(self.stated.values))), *self._away]))
+
+
+def _apart(change: Mapping[str, Any]) -> float:
+    stated, used = np.atleast_1d(change["stated"]), np.atleast_1d(change["used"])
+    both = min(stated.size, used.size)
+    return float(np.max(np.abs(used[:both] - stated[:both])))
