@@ -79,6 +79,16 @@ def test_a_limit_that_is_kept_is_kept_at_the_instants_looked_at(
     assert (below.note, below.shown is not None and below.shown.between is None) == ("", True)
 
 
+@pytest.mark.parametrize(("limit", "passes"), [("abs(P.vy) < 1e-4", 0.5), ("abs(P.vy) < 0", None), ("P.vy < -4", None)])
+def test_a_quantity_that_changes_sign_passes_its_least_size_between_instants(limit: str, passes: float | None) -> None:
+    """At 5 m/s upwards vy vanishes at its top after 0.5 s, for a tenth of the time between two of 200 instants."""
+    found = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, [0.1, 0.3, 0.74, 0.89], limits=[limit])
+    (judged,) = found.limits
+    assert judged.kept
+    assert judged.shown is not None
+    assert judged.shown.between == (passes if passes is None else pytest.approx(passes, abs=2e-3))
+
+
 def test_netcdf(intervals: Response, distributions: Response, tmp_path: Path) -> None:
     """The same numbers by name, as another reader finds them."""
     xr = pytest.importorskip("xarray")
