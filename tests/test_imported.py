@@ -138,6 +138,18 @@ def test_the_command_writes_a_scene_and_lists_the_rest(tmp_path: Path) -> None:
     assert Scene.parse(yaml.safe_load(out.read_text())).dimensions == 3
 
 
+def test_what_mujoco_warns_of_is_a_note(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    """Such as an attribute that it will not have for long; in one line without its source."""
+    text = LOOP.replace("<mujoco>", '<mujoco><compiler settotalmass="3"/>')
+    path, out = written(tmp_path, text, "loop.xml"), tmp_path / "made.yaml"
+    done = CliRunner().invoke(main, ["import", str(path), "--out", str(out)])
+    assert done.exit_code == 0
+    assert not recwarn.list
+    (note,) = [line for line in done.stderr.splitlines() if "settotalmass" in line]
+    assert note.startswith("note: MuJoCo says: ")
+    assert "UserWarning" not in done.stderr
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -125,6 +125,15 @@ def test_a_limit_that_is_never_passed() -> None:
     assert "none has passed" in found.why
 
 
+def test_a_quantity_that_does_not_vary_is_told() -> None:
+    """With random numbers of the size of round-off on it, and what it is below as the probability has it."""
+    found = probability(margins(lambda x: 1 + 1e-14 * x[:, 0], 2), "auto", 0)
+    assert found.estimate.probability == 0.0
+    assert "all stay 1 away from the limit: nothing that varies seems to change its quantity" in found.why
+    varies = probability(margins(lambda x: 1 + x[:, 0] ** 2, 2), "auto", 0)
+    assert f"whose probability is {varies.estimate.told} or" in varies.why
+
+
 def test_where_all_runs_pass_the_limit_some_others_may_not() -> None:
     """As many as may hide from n runs: 1 - 0.025^(1 / n) of all (Clopper and Pearson)."""
     found = weighted(np.full((1000, 1), -1.0), np.ones(1000), "")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shoal.pictures import files
+from shoal.pictures.probability import probability
 from shoal.response import Response, uncertain
 from shoal.scene import Scene
 from shoal.terminal.tables import response_table
@@ -79,6 +80,16 @@ def test_a_limit_that_is_kept_is_kept_at_the_instants_looked_at(
     assert (below.note, below.shown is not None and below.shown.between is None) == ("", True)
 
 
+@pytest.mark.parametrize(("limit", "passes"), [("abs(P.vy) < 1e-4", 0.5), ("abs(P.vy) < 0", None), ("P.vy < -4", None)])
+def test_a_quantity_that_changes_sign_passes_its_least_size_between_instants(limit: str, passes: float | None) -> None:
+    """At 5 m/s upwards vy vanishes at its top after 0.5 s, for a tenth of the time between two of 200 instants."""
+    found = uncertain(Scene.parse(THROWN), {UP: (4.99, 5.01)}, [0.1, 0.3, 0.74, 0.89], limits=[limit])
+    (judged,) = found.limits
+    assert judged.kept
+    assert judged.shown is not None
+    assert judged.shown.between == (passes if passes is None else pytest.approx(passes, abs=2e-3))
+
+
 def test_netcdf(intervals: Response, distributions: Response, tmp_path: Path) -> None:
     """The same numbers by name, as another reader finds them."""
     xr = pytest.importorskip("xarray")
@@ -95,3 +106,23 @@ def test_netcdf(intervals: Response, distributions: Response, tmp_path: Path) ->
                 assert found.statistics is not None
                 median = data["quantiles"].sel(marker="P", axis="y", quantile=0.5).values
                 assert np.array_equal(median, found.column("P", "y", found.statistics.quantiles)[3])
+
+
+@pytest.mark.parametrize(("way", "known"), [("auto", True), ("form", False)])
+def test_a_limit_that_no_run_has_passed_is_drawn_below_what_it_may_be(way: str, known: bool) -> None:
+    """At the instants looked at; no probability is below zero, and one that is not known may be anything."""
+    found = uncertain(
+        *(Scene.parse(THROWN), {UP: "normal(5,0.2)"}, [0.25, 0.75]),
+        limits=["P.x > 9"],
+        limit_runs=300,
+        limit_method=way,
+    )
+    (judged,) = found.limits
+    assert judged.passing is not None
+    (axes,) = probability(judged).axes
+    most = judged.passing.estimate.interval[1][-1]
+    assert bool(most < 1) is known
+    low, high = axes.get_ylim()
+    assert -0.1 * most < low <= 0 < most <= high < 1.2 * most
+    first, last = axes.get_xlim()
+    assert 0 < first < 0.25 < 0.75 < last < 1

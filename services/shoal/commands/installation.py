@@ -107,6 +107,8 @@ def import_scene(file: Path, out: Out) -> None:
         part.write_text(yaml.safe_dump(found.scene, sort_keys=False), encoding="utf-8")
     for line in found.left_out:
         click.echo(f"left out: {line}", err=True)
+    for line in found.warnings:
+        click.echo(f"note: MuJoCo says: {line}", err=True)
     click.echo(path)
 
 

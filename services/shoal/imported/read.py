@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,10 +28,11 @@ from shoal.scene import GROUND, Scene
 
 @dataclass(frozen=True)
 class Imported:
-    """A scene as data, and a line for everything of its file that is not in it."""
+    """A scene as data, a line for everything of its file that is not in it, and what MuJoCo warns of."""
 
     scene: dict[str, Any]
     left_out: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
 
 def read(file: Path) -> Imported:
@@ -44,7 +46,8 @@ def read(file: Path) -> Imported:
     if not file.is_file():
         raise InputError(f"{file}: no such file")
     try:
-        model = mujoco.MjSpec.from_file(str(file)).compile()
+        with warnings.catch_warnings(record=True, action="always") as told:
+            model = mujoco.MjSpec.from_file(str(file)).compile()
     except ValueError as error:
         raise InputError(f"{file}: {' '.join(str(error).split())}") from None
     switch_off(mujoco, model)
@@ -52,7 +55,7 @@ def read(file: Path) -> Imported:
     parts = _parts(source)
     scene = _scene(source, parts, re.sub(r"[^A-Za-z0-9_-]", "-", file.stem))
     _rest(scene, Scene.parse(scene, str(file)), parts.away)
-    return Imported(scene, tuple(parts.left_out))
+    return Imported(scene, tuple(parts.left_out), tuple(" ".join(str(one.message).split()) for one in told))
 
 
 def _parts(source: Source) -> Parts:

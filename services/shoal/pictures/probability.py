@@ -22,24 +22,21 @@ def probability(found: Judged) -> Figure:
     """
     figure, axes = canvas()
     estimates = found.estimates
-    rare = estimates[-1].probability < RARE
+    seen = any((one.passed > 0).any() for one in estimates)
+    rare = seen and estimates[-1].probability < RARE
     labels = ["passed by then"] if len(estimates) == 1 else ["least probable", "most probable"]
-    seen = False
     for estimate, label, colour in zip(estimates, labels, (BLUE, VERMILION), strict=False):
-        some = estimate.passed > 0
-        seen = seen or bool(some.any())
-        some |= np.full(len(some), not rare and bool(some.any()))
-        lower, upper = estimate.interval
-        low, high, passed = (np.where(some, of, np.nan) for of in (lower, upper, estimate.passed))
+        some = (estimate.passed > 0) | (not rare)
+        drawn = (np.where(some, of, np.nan) for of in (*estimate.interval, estimate.passed))
+        low, high, passed = (np.broadcast_to(of, found.times.shape) for of in drawn)
         band(axes, found.times, low, high, color=colour, alpha=0.25, linewidth=0)
         if some.any():
             label = f"{label}; band: 95 % confidence"
             curve(axes, found.times, passed, color=colour, label=label)
     most = estimates[-1]
     if not seen:
-        below = most.interval[1][-1]
-        axes.text(0.5, 0.5, f"no run has passed it; below {below:.1e}", ha="center", transform=axes.transAxes)
-    if seen and rare:
+        axes.text(0.5, 0.5, f"no run has passed it; {most.told}", ha="center", transform=axes.transAxes)
+    if rare:
         least = min(one.probability for one in estimates if one.probability > 0)
         axes.set_yscale("log")
         axes.set_ylim(least * 1e-4, most.interval[1][-1] * 3)

@@ -267,6 +267,53 @@ def test_a_shallow_truss_snaps_through() -> None:
     assert "snapped" in found.message
 
 
+@pytest.mark.parametrize("start", [3.0, -2.6, 0.4])
+def test_a_body_under_a_force_that_follows_comes_to_rest_from_afar(start: float) -> None:
+    """Weight, a hinge's spring and a force that turns with the body: the one angle where their torques cancel."""
+    spring = {"kind": "torsion-spring", "first": GROUND, "second": {"body": "rod"}, "stiffness": 6.0, "cubic": 8.0,
+              "angle": -0.5}  # fmt: skip
+    found = _solved(_pendulum(start, loads={"spring": spring, **_force(9.0, 4.0, follows=True)}))
+
+    def torque(a: float) -> float:
+        return 4.0 - 6.0 * (a + 0.5) - 8.0 * (a + 0.5) ** 3 - 9.81 / 2 * np.cos(a)
+
+    grid = np.linspace(-4, 4, 4001)
+    assert np.count_nonzero(np.diff(np.sign(torque(grid)))) == 1
+    assert found.angle("tip") == pytest.approx(brentq(torque, -4, 4, xtol=1e-14), abs=1e-9)
+
+
+def test_two_bodies_under_a_force_that_follows_come_to_rest_from_afar() -> None:
+    """The follower force bears the outer body, so that the inner one hangs by what is left."""
+    force, mass = 2.0, 1.0
+    data = _pendulum(2.5, loads={}).model_dump(mode="json")
+    data["bodies"]["bob"] = data["bodies"]["rod"]
+    data["joints"]["A"] = {"first": TIP, "second": {"body": "bob"}}
+    end = {"body": "bob", "point": "end"}
+    data["loads"] = {"load": {"kind": "force", "at": end, "force": [0.0, force], "follows": True}}
+    data["initial"]["bob"] = {"angle": -2.8}
+    data["markers"]["bob"] = end
+    found = _solved(Scene.parse(data))
+    outer = np.arctan2(-np.sqrt((mass * 9.81 / 2) ** 2 - force**2), force)
+    across, along = force * -np.sin(outer), force * np.cos(outer) - 1.5 * mass * 9.81
+    assert np.cos(found.angle("bob")) == pytest.approx(np.cos(outer), abs=1e-9)
+    np.testing.assert_allclose(found.marker("tip"), np.array([across, along]) / np.hypot(across, along), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        pytest.param({"kind": "torque", "at": {"body": "rod"}, "torque": 8.0}, id="torque", marks=pytest.mark.slow),
+        pytest.param({"kind": "force", "at": TIP, "force": [0.0, 8.0], "follows": True}, id="follower"),
+    ],
+)
+def test_what_turns_without_end_is_told_with_what_turns_it(load: dict[str, Any]) -> None:
+    """More than the weight can hold at any angle, m g L / 2 = 4.9 N m."""
+    found = statics(_pendulum(0.0, loads={"drive": load}))
+    assert found.status is Held.UNHELD
+    assert "nothing holds rod against drive" in found.message
+    assert "turns" in found.message
+
+
 def test_commands_tell_a_stable_rest_from_an_answer_that_is_none() -> None:
     def shoal(*arguments: str) -> Any:
         return CliRunner().invoke(main, list(arguments))

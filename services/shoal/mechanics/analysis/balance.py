@@ -3,6 +3,9 @@
 Both work in a basis Z of the free directions with Z' M Z = I, so that lengths are in kg^1/2 m and the eigenvalues of
 the reduced stiffness Z' (K + sum lambda_k C_k,qq) Z are squared frequencies. Descent replaces them by their absolute
 values, so that it leaves saddles and maxima (Dauphin et al. 2014), and shortens its step as Levenberg and Marquardt do.
+Loads that follow the motion have no potential: with them the machine creeps, as if damped so strongly that inertia
+counts for nothing, by implicit steps that grow as it comes to rest (pseudo-transient continuation, Kelley and Keyes
+1998).
 """
 
 from __future__ import annotations
@@ -27,6 +30,8 @@ LONGEST = 0.2
 """Longest step of the descent, as a fraction of the machine's size,"""
 WIDEST = 1.5
 """and its largest turn [rad] of any body or section, so that turns can be counted."""
+NARROW = 0.3
+"""The largest turn [rad] in one step of a machine that creeps, which keeps to its way."""
 FAR = 30.0
 """A machine whose bodies have moved (rms) by so many times its own size falls for ever."""
 STRAINED = 1e-9
@@ -37,6 +42,10 @@ BALANCED = 1e-5
 """Forces of which a smaller part than this is left are in balance."""
 OFF = 16.0
 """So many times what is left of the forces may be off by, over the machine's size, is the stiffness off."""
+
+
+FALLS = "falls without end"
+"""Why a machine that has gone `FAR` does not come to rest."""
 
 
 class View(NamedTuple):
@@ -222,8 +231,39 @@ class Balance:
             if held and correction < CLOSE:
                 return Found(q, True, iteration, correction)
             if self._way(q - begin) > FAR * self.unit:
-                return Found(q, False, iteration, correction, "falls without end")
+                return Found(q, False, iteration, correction, FALLS)
         return Found(q, False, most, correction, f"not at rest after {most} steps downhill")
+
+    def creep(
+        self, q: Array, turn: Callable[[Array, Array], float], follow: Callable[[Array], None], most: int = 400
+    ) -> Found:
+        """Go where the forces pull, M dq/ds = Q, until nothing pulls any more; turn, follow: see `descend`.
+
+        No step is so long that it would go back to a place that pushes away.
+        """
+        q, _ = self.restore(q)
+        begin, view, slower, correction = q, self.look(q), 1.0, np.inf
+        for iteration in range(1, most + 1):
+            if self.residual(view) < SEEN**1.3:
+                return Found(q, True, iteration, correction)
+            stiffness = self.hessian(q, view)
+            pushed = max(0.0, -2.0 * float(np.min(scipy.linalg.eigvals(stiffness).real)))
+            pull = float(np.linalg.norm(view.unbalanced)) / (LONGEST * self.unit)
+            while True:
+                shift = max(slower * pull, pushed)
+                y = np.linalg.solve(stiffness + shift * np.eye(len(stiffness)), view.unbalanced)
+                correction = float(np.linalg.norm(y)) / self.unit
+                trial, gap = self.restore(q + view.freedom.basis @ y)
+                if (gap < 1e-10 and turn(q, trial) < NARROW) or correction < CLOSE:
+                    break
+                slower = 4.0 * shift / pull
+            follow(trial)
+            q, view, slower = trial, self.look(trial), max(1.0, slower / 4.0)
+            if correction < CLOSE or (correction < STALLED and self.residual(view) < SEEN):
+                return Found(q, True, iteration, correction)
+            if self._way(q - begin) > FAR * self.unit:
+                return Found(q, False, iteration, correction, FALLS)
+        return Found(q, False, most, correction, f"not at rest after {most} steps")
 
     def _way(self, move: Array) -> float:
         """How far a move goes [kg^1/2 m]; among its components are curvatures, which may be large."""

@@ -2,7 +2,9 @@
 
 Two meshes differ by less than the coarser one is off, as the finer one is off, too: by d / (f - 1), where d is how far
 they differ and f the factor by which that falls with each doubling. No factor above that of second order is believed,
-though cables and quintic elements converge faster: an error is rather told too large than too small.
+though cables and quintic elements converge faster: an error is rather told too large than too small. Nor is a distance
+that fell by more: an error of second order and a faster one of the other sign, such as a tapered cable has, cancel on
+some mesh, and the distance is small there by chance.
 """
 
 from __future__ import annotations
@@ -34,8 +36,10 @@ def beyond(gap: float, last: float = np.nan) -> float:
 
     gap: how far the two differ; last: how far the coarser one differs from one of half its elements, nan if not known
     """
-    fall = np.clip(last / gap, *FALLS) if np.isfinite(last) and gap > 0 else UNSEEN
-    return gap / (float(fall) - 1.0)
+    if not np.isfinite(last):
+        return gap / (UNSEEN - 1.0)
+    fall = float(np.clip(last / gap if gap > 0 else np.inf, *FALLS))
+    return max(gap, last / FALLS[1]) / (fall - 1.0)
 
 
 def of_equilibrium(found: Equilibrium, scene: Scene) -> Equilibrium:

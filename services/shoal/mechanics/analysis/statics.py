@@ -2,8 +2,8 @@
 
 A machine that its own stiffness holds is loaded step by step by Newton's method; steps are halved where a step does
 not converge, turns a body by too much or ends in an unstable place. A machine without stiffness of its own (a
-pendulum, a chain), and one that snaps through, goes down in its potential instead. Dry friction is left out, and
-drives stand still where they are at the stated time.
+pendulum, a chain), and one that snaps through, goes down in its potential instead, or creeps where its loads have none.
+Dry friction is left out, and drives stand still where they are at the stated time.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import scipy.linalg
 from shoal.arguments import check
 from shoal.mechanics import plane
 from shoal.mechanics.analysis import left_out
-from shoal.mechanics.analysis.balance import BALANCED, Balance, Found, View
+from shoal.mechanics.analysis.balance import BALANCED, FALLS, Balance, Found, View
 from shoal.mechanics.analysis.damped import small
 from shoal.mechanics.analysis.equilibrium import Equilibrium, Held
 from shoal.mechanics.analysis.evaluate import Evaluator, points
@@ -30,6 +30,7 @@ from shoal.mechanics.frames import BeamFrame, PointFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
 from shoal.scene import Attachment, Scene
+from shoal.scene.loads import Torque
 
 TURN = 0.8
 """Largest turn [rad] of any body or section in one load step."""
@@ -45,6 +46,8 @@ ALIKE = 1e-3
 """in the sum of all modes whose squared frequencies differ by less than this from the lowest."""
 PULLED = 1e-3
 """Part of the unbalanced forces from which they tell to which side a machine buckles."""
+TURNS = 5.0
+"""A body that has made so many full turns about z and is still not at rest is held by nothing."""
 GAPE = 1e-9
 """Joints that gape by more than this [m, relative to the machine's size] are not closed."""
 
@@ -69,7 +72,9 @@ class _Search:
         scene = self.placement.scene
         self.scene, self.evaluator, self.time = scene, evaluator, time
         unknowns = evaluator.model.unknowns
-        self.directions = points(_directions(self.placement), unknowns)
+        every = _directions(self.placement)
+        self.directions = points([one for of_body in every.values() for one in of_body], unknowns)
+        self.owners = [name for name, of_body in every.items() for _ in of_body]
         self.marker_points = points([self.placement.point(scene, at) for at in scene.markers.values()], unknowns)
         self.marker_lines = points([self.placement.direction(scene, at) for at in scene.markers.values()], unknowns)
         angles = start_angle if scene.dimensions == plane.DIMENSIONS else self._start_angle
@@ -78,6 +83,8 @@ class _Search:
         self.balance = Balance(evaluator, time, span(scene), mass)
         self.iterations = self.steps = 0
         self.spinning: list[str] = []
+        self.wound = np.zeros(len(self.owners))
+        self.last = self.directions.at(evaluator.model.q0[:, 0])
 
     def run(self, leave_unstable: bool) -> Equilibrium:
         q = self._assembled()
@@ -94,13 +101,10 @@ class _Search:
             if straight.converged and self._turn(start, straight.q) < TURN:
                 found = straight
         if found is None or not found.converged:
-            if has_potential:
-                if found is not None:
-                    message = "snapped or buckled on the way; "
-                    q = self._nudged(found.q)
-                found = self._descended(q)
-            elif found is None:
-                found = self._count(self.balance.newton(q))
+            if found is not None:
+                message = "snapped or buckled on the way; "
+                q = self._nudged(found.q) if has_potential else found.q
+            found = self._descended(q)
         for attempt in range(4):
             if not found.converged:
                 break
@@ -151,10 +155,18 @@ class _Search:
         view = self.balance.look(found.q)
         residual = self.balance.residual(view)
         if not found.converged:
-            if found.message == "falls without end":
+            if found.message == FALLS:
                 moved = found.q - self.evaluator.model.q0[:, 0]
                 return self._ending(found.q, Held.UNHELD, f"nothing holds {self._movers(moved)}; it falls without end")
-            return self._ending(found.q, Held.FAILED, message + found.message, found)
+            driving, turns = self._driving(), np.abs(self.wound) / (2 * np.pi)
+            if np.max(turns, initial=0.0) > TURNS:
+                name, most = self.owners[int(np.argmax(turns))], np.max(turns)
+                text = f"nothing holds {name} against {driving}; after {most:.0f} turns it goes on turning"
+                return self._ending(found.q, Held.UNHELD, text)
+            message += found.message
+            if self.evaluator.follows:
+                message += f" under what follows its motion ({driving}); a start nearer to rest may help"
+            return self._ending(found.q, Held.FAILED, message, found)
         if residual > BALANCED:
             text = f"{message}the forces do not balance, {residual:.1g} of them is left"
             return self._ending(found.q, Held.FAILED, text, found)
@@ -233,8 +245,9 @@ class _Search:
         return self._count(found)
 
     def _descended(self, q: Array) -> Found:
-        """Where the potential is lowest, downhill from q."""
-        return self._count(self.balance.descend(q, self._turn, self._follow))
+        """Where the potential is lowest, downhill from q, or where the machine stops that creeps from there."""
+        go = self.balance.creep if self.evaluator.follows else self.balance.descend
+        return self._count(go(q, self._turn, self._follow))
 
     def _loaded(self, q: Array) -> Found | None:
         """Load step by step; None if the unloaded machine has no stiffness that holds it."""
@@ -318,13 +331,21 @@ class _Search:
         square = float(change @ (self.evaluator.mass @ change))
         return float(np.sqrt(max(0.0, square))) / float(self.balance.unit)
 
+    def _driving(self) -> str:
+        """The loads that can turn a body without end."""
+        loads = self.scene.loads.items()
+        names = [name for name, load in loads if isinstance(load, Torque) or getattr(load, "follows", False)]
+        return ", ".join(names) or "its loads"
+
     def _follow(self, q: Array) -> None:
-        """Count the turns of springs and markers."""
+        """Count the turns of springs, bodies and markers."""
         self.evaluator.remember(q)
+        here = self.directions.at(q)
+        self.wound += _remainder(plane.angle(here.T) - plane.angle(self.last.T))
+        self.last = here
         if self.spinning and not self.evaluator.model.flexible:
             self._leave_out_spins(q)
-        change = plane.angle(self.marker_lines.at(q).T) - self.angles
-        self.angles = self.angles + change - 2 * np.pi * np.rint(change / (2 * np.pi))
+        self.angles = self.angles + _remainder(plane.angle(self.marker_lines.at(q).T) - self.angles)
 
     def _leave_out_spins(self, q: Array) -> None:
         """What bodies may turn about their own axes from q on is no motion of the machine."""
@@ -342,17 +363,23 @@ class _Search:
         return ", ".join(ranked[:4]) + (", ..." if len(ranked) > 4 else "")
 
 
-def _directions(placement: Placement) -> list[Any]:
-    """The direction of every rigid body and of every node of a rod."""
-    found: list[Any] = []
-    for frame in placement.frames.values():
+def _remainder(change: Array) -> Array:
+    """Angles [rad] less full turns."""
+    return np.asarray(change - 2 * np.pi * np.rint(change / (2 * np.pi)))
+
+
+def _directions(placement: Placement) -> dict[str, list[Any]]:
+    """Those of every body: of a rigid one, and of every node of a rod."""
+    found: dict[str, list[Any]] = {}
+    for name, frame in placement.frames.items():
+        found[name] = []
         if isinstance(frame, RigidFrame):
-            found += frame.directors[: len(frame.directors) - 1]
+            found[name] += frame.directors[: len(frame.directors) - 1]
         elif isinstance(frame, BeamFrame):
             count = len(frame.nodes)
-            found += [frame.direction((float(frame.length) * k / (count - 1), 0.0)) for k in range(count)]
+            found[name] += [frame.direction((float(frame.length) * k / (count - 1), 0.0)) for k in range(count)]
             if frame.element.director is not None:
-                found += [node[2] for node in frame.nodes]
+                found[name] += [node[2] for node in frame.nodes]
     return found
 
 

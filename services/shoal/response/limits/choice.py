@@ -225,7 +225,7 @@ def _where(place: Array) -> DesignPoint:
 
 
 def _nothing(why: str) -> Estimate:
-    return Estimate(np.array([np.nan]), np.array([np.nan]), why)
+    return Estimate(np.array([np.nan]), np.array([np.nan]), why, unseen=1.0)
 
 
 def _told(points: list[DesignPoint]) -> str:

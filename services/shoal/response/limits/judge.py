@@ -22,7 +22,9 @@ from shoal.trajectory import Array, Trajectory
 MOST = 5_000
 """Runs for the probability of a limit unless another number is asked for."""
 FINER = 200
-"""Instants at which the run nearest to a limit is looked at, from the first instant to the last."""
+"""Instants at which the run nearest to a limit is looked at, from the first instant to the last,"""
+CLOSER = 3
+"""and so often at most, each time between the two where it may come nearest, such as where a quantity changes sign."""
 Reach = Callable[[Model, float], tuple[Array, Array, Array, int, int]]
 """Of the margins of a model over time, from a bound of some size: the least that runs attain, that may be, (instants,);
 the germs of the former, (instants, parameters); runs made, and how many failed."""
@@ -112,11 +114,25 @@ def judge(
 
 def _between(limit: Limit, machine: Machine, shown: Shown) -> float | None:
     """When [s] a run passes a limit first of all instants between those of a machine; None if at none."""
-    when = np.linspace(machine.times[0], machine.times[-1], FINER)
+    begin, end = float(machine.times[0]), float(machine.times[-1])
     scene = limit.scene(machine.scene.with_values(shown.values))
-    motion = limit.engine(machine.engine, scene).simulate(scene, limit.instants(when))
-    passed = Watch(limit, len(when)).margins(motion, scene, {})[0] < 0
-    return float(when[passed.argmax()]) if motion.ok and passed.any() else None
+    engine = limit.engine(machine.engine, scene)
+    for _ in range(CLOSER):
+        when = np.linspace(begin, end, FINER)
+        motion = engine.simulate(scene, limit.instants(when))
+        if not motion.ok:
+            return None
+        margins = Watch(limit, len(when)).margins(motion, scene, {})[0]
+        if (passed := margins < 0).any():
+            return float(when[passed.argmax()])
+        steps = np.abs(np.diff(margins))
+        # As steep as beside it, the margin may go down so far before the next instant.
+        within = margins - np.maximum(np.append(steps, 0.0), np.append(0.0, steps))
+        nearest = int(within.argmin())
+        if within[nearest] >= 0:
+            return None
+        begin, end = float(when[max(nearest - 1, 0)]), float(when[min(nearest + 1, FINER - 1)])
+    return None
 
 
 def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Inputs, named: Array) -> Shown:

@@ -25,6 +25,8 @@ LEVELS = 12
 BETWEEN = 1.3
 """The deviation is larger than what Au and Beck's formula tells, which leaves out that the chains of a level begin
 where those before it ended: by so much at most, over the closed forms of the tests."""
+SAME = 1e-8
+"""Margins that differ by less than this part of the least one do not depend on what varies."""
 ACCEPTED = 0.44
 """Share of the moves of a chain that is aimed at."""
 
@@ -55,6 +57,7 @@ def subset(margins: Margins, count: int, seed: int) -> Levels:
     g = least(rows)
     plain = u[np.argsort(g, kind="stable")]
     lost = float(np.mean(np.isnan(rows).any(axis=1)))
+    nearest, farthest = _ends(g)
     weight, variance, spread, levels = 1.0, 0.0, 0.6, 0
     chains = np.arange(count)[:, None]
     while True:
@@ -71,6 +74,7 @@ def subset(margins: Margins, count: int, seed: int) -> Levels:
             break
         chains = np.arange(count).reshape(length, seeds).T
         levels += 1
+        nearest, farthest = min(nearest, _ends(g)[0]), max(farthest, _ends(g)[1])
     beyond = g < 0
     first = first_passages(np.nan_to_num(rows, nan=np.inf))
     instants = rows.shape[1]
@@ -78,11 +82,20 @@ def subset(margins: Margins, count: int, seed: int) -> Levels:
     deviation = np.full(instants, np.inf)
     for k in np.flatnonzero(share):
         deviation[k] = BETWEEN * math.sqrt(variance + _variance(first <= k, chains))
-    why = f"subset simulation with {levels + 1} levels of {count} runs"
-    if not beyond.any():
-        why += f"; none has passed the limit, whose probability is below {weight:.0e} or not reached by its chains"
+    why = f"subset simulation with {levels + 1} level{'s' if levels else ''} of {count} runs"
+    if not beyond.any() and 0 <= farthest - nearest <= SAME * nearest:
+        why += f"; all stay {nearest:.4g} away from the limit: nothing that varies seems to change its quantity"
+    elif not beyond.any():
+        below = f"{weight * SHARE:.2g}"
+        why += f"; none has passed the limit, whose probability is below {below} or not reached by its chains"
     estimate = Estimate(weight * share, deviation, why, weight * SHARE, lost)
     return Levels(estimate, u[beyond], rows[beyond], plain)
+
+
+def _ends(g: Array) -> tuple[float, float]:
+    """The least and the largest margin of runs that have not failed."""
+    known = g[np.isfinite(g)]
+    return float(known.min(initial=np.inf)), float(known.max(initial=-np.inf))
 
 
 def _chains(
