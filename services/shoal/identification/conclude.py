@@ -19,8 +19,7 @@ from shoal.identification.judge.rivals import valley
 from shoal.identification.judge.turns import with_nearest_turns
 from shoal.identification.judge.verdict import Judgement, Verdict, judge
 from shoal.identification.lengthening import lengthened
-from shoal.identification.methods.auto import FRACTAL, LARGE
-from shoal.identification.methods.growth import growth
+from shoal.identification.methods.growth import FRACTAL, LARGE, growth
 from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread import intervals
