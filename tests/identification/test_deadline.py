@@ -104,6 +104,11 @@ def test_wherever_time_ends_the_best_so_far_is_the_answer(
     if found.verdict is Verdict.FAILED:
         assert "stopped after 1 s" in found.message or "no time was left" in found.message
         assert not any(value.identifiable for value in found.parameters.values()) or calls > 1
+    tests = found.residual_tests
+    if tests.made:
+        assert tests.size**2 * tests.rows == pytest.approx(found.fitness * len(found.measurement.first.times))
+    else:
+        assert tests.sentences() == []
 
 
 def test_where_nothing_was_found_the_cost_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

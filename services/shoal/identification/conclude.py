@@ -95,7 +95,7 @@ def conclude(
     )
     fits, judgement = judgement.verdict.trusted, _refuted(judgement, foretold)
     drawn, undrawn = _drawn(model, near, judgement, wishes.sample, seed)
-    correlation = autocorrelation(near.seen.residual, near.blocks)
+    correlation = autocorrelation(near.seen.residual, near.blocks) if near.tests.made else np.nan
     draws = wishes.bootstrap if near.known else 0
     rng = np.random.default_rng(seed)
     # Away from the minimum the mesh is not what limits the fit.
