@@ -223,7 +223,7 @@ def _judged(model: ForwardModel, near: Evidence, known: _Known) -> Judgement:
     if near.possible:
         return judge(model, known.outcome, near.seen, near.at, near.tests, known.values, known.combinations)
     why = f" ({model.failure})" if model.failure else ""
-    return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at the bounds and the scene")
+    return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at starts, bounds and the scene")
 
 
 def _refuted(judgement: Judgement, foretold: list[Prediction]) -> Judgement:

@@ -55,6 +55,11 @@ class Sensitivity:
         """Whether two steps agree in every direction."""
         return self.doubt <= AGREED
 
+    @property
+    def possible(self) -> bool:
+        """Whether the point can be simulated at all."""
+        return bool(np.all(np.isfinite(self.residual)))
+
 
 def sensitivity(model: ForwardModel, point: Array, residual: Array | None = None) -> Sensitivity:
     """Central differences, in each direction with the neighbouring steps that agree best. Not counted.
@@ -66,7 +71,7 @@ def sensitivity(model: ForwardModel, point: Array, residual: Array | None = None
     """
     residual = model.uncounted(point[None])[0] if residual is None else residual
     seen = _seen(model, point, residual, _apart)
-    if seen.reliable or growth(model, seen.jacobian) > LARGE:
+    if seen.reliable or not seen.possible or growth(model, seen.jacobian) > LARGE:
         return seen
     beside = _seen(model, point, residual, _side_by_side)
     return beside if beside.reliable else seen
@@ -104,7 +109,7 @@ def believed(model: ForwardModel, point: Array, residual: Array | None = None) -
     Intervals that rest on the beginning are too wide rather than too narrow: what follows is not held to tell anything.
     """
     seen = sensitivity(model, point, residual)
-    if seen.reliable:
+    if seen.reliable or not seen.possible:
         return seen
     for end in _SHORTER * model.measurement.end:
         part = model.until(float(end))
