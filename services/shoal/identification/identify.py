@@ -33,6 +33,7 @@ from shoal.identification.recording.source import EngineSource
 from shoal.identification.spread.posterior import require_sampler
 from shoal.mechanics import clock
 from shoal.memory import Memory
+from shoal.trajectory import Array
 from shoal.versions import versions
 
 Watch = Callable[[int, float, float, int], None]
@@ -127,9 +128,13 @@ def _assembled(model: ForwardModel) -> tuple[ForwardModel, list[str]]:
 def _closes(model: ForwardModel) -> bool:
     """Whether the machine can be assembled where a search begins, in every recording."""
     aside = model.aside(engine=get_engine("gauss"), deadline=None)
-    starts = starting_points(aside)
-    seen = (aside.observe(starts, name, np.zeros(1)) for name in model.measurement.recordings)
-    return bool(np.any(np.all([np.any(np.isfinite(one), axis=(1, 2)) for one in seen], axis=0)))
+
+    def closed(starts: Array) -> bool:
+        seen = (aside.observe(starts, name, np.zeros(1)) for name in model.measurement.recordings)
+        return bool(np.any(np.all([np.any(np.isfinite(one), axis=(1, 2)) for one in seen], axis=0)))
+
+    # Poses that the first samples allow take longer.
+    return closed(aside.parameters.start[None]) or closed(starting_points(aside))
 
 
 def _paced(model: ForwardModel) -> ForwardModel:
