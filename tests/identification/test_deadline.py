@@ -19,14 +19,14 @@ TIMES = np.linspace(0.0, 1000.0, 11)[1:]
 
 
 class Clock:
-    """A clock that only simulations move: `pace` seconds for each simulated second."""
+    """A clock that only simulations move: `pace` seconds for each simulated second, and `fixed` for each run."""
 
     def __init__(self, pace: float) -> None:
-        self.now, self.pace, self.ends = 0.0, pace, list[float]()
+        self.now, self.pace, self.fixed, self.ends = 0.0, pace, 0.0, list[float]()
         self.steps = list[int]()
 
     def run(self, scene: Any, times: Any) -> Any:
-        self.now += self.pace * float(times[-1])
+        self.now += self.fixed + self.pace * float(times[-1])
         self.ends.append(float(times[-1]))
         self.steps.append(scene.solver.max_steps)
         return SimpleNamespace(steps=int(100 * times[-1]))
@@ -54,6 +54,15 @@ def test_a_run_for_which_there_is_time_is_made_once_its_pace_is_known(clock: Clo
     assert clock.ends.count(1000.0) == 3
     assert len(clock.ends) == 4
     assert clock.steps[-1] < SCENE.solver.max_steps, "other parameters may need shorter steps"
+
+
+def test_what_every_run_costs_is_not_multiplied_by_its_length(clock: Clock) -> None:
+    """Two seconds of assembling and ten of motion are twelve; by the pace of the beginning they were 522."""
+    clock.fixed = 2.0
+    limited = Deadline(30.0)
+    limited.run("kind", SCENE, TIMES, clock.run)
+    assert clock.ends[-1] == 1000.0
+    assert limited.cost == pytest.approx(12.0)
 
 
 def test_pauses_do_not_count_and_the_answer_has_a_little_more(clock: Clock) -> None:
@@ -104,6 +113,11 @@ def test_wherever_time_ends_the_best_so_far_is_the_answer(
     if found.verdict is Verdict.FAILED:
         assert "stopped after 1 s" in found.message or "no time was left" in found.message
         assert not any(value.identifiable for value in found.parameters.values()) or calls > 1
+    tests = found.residual_tests
+    if tests.made:
+        assert tests.size**2 * tests.rows == pytest.approx(found.fitness * len(found.measurement.first.times))
+    else:
+        assert tests.sentences() == []
 
 
 def test_where_nothing_was_found_the_cost_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,6 +52,10 @@ def test_where_nothing_can_be_simulated_the_reason_is_told() -> None:
     estimate = identify(strict, method="least-squares", measurement=measurement)
     assert estimate.verdict is Verdict.FAILED
     assert "no parameter set could be simulated (energy is off by" in estimate.message
+    # There is no residual, and nothing is said of its size.
+    assert estimate.residual_tests.sentences() == []
+    assert set(estimate.to_json()["residual_tests"].values()) == {None}
+    assert estimate.to_json()["residual_autocorrelation"] is None
 
 
 def test_both_elbow_branches_are_looked_at() -> None:

@@ -19,8 +19,7 @@ from shoal.identification.judge.rivals import valley
 from shoal.identification.judge.turns import with_nearest_turns
 from shoal.identification.judge.verdict import Judgement, Verdict, judge
 from shoal.identification.lengthening import lengthened
-from shoal.identification.methods.auto import FRACTAL, LARGE
-from shoal.identification.methods.growth import growth
+from shoal.identification.methods.growth import FRACTAL, LARGE, growth
 from shoal.identification.methods.lanes import Descent, descend_many
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread import intervals
@@ -96,7 +95,7 @@ def conclude(
     )
     fits, judgement = judgement.verdict.trusted, _refuted(judgement, foretold)
     drawn, undrawn = _drawn(model, near, judgement, wishes.sample, seed)
-    correlation = autocorrelation(near.seen.residual, near.blocks)
+    correlation = autocorrelation(near.seen.residual, near.blocks) if near.tests.made else np.nan
     draws = wishes.bootstrap if near.known else 0
     rng = np.random.default_rng(seed)
     # Away from the minimum the mesh is not what limits the fit.
@@ -224,7 +223,7 @@ def _judged(model: ForwardModel, near: Evidence, known: _Known) -> Judgement:
     if near.possible:
         return judge(model, known.outcome, near.seen, near.at, near.tests, known.values, known.combinations)
     why = f" ({model.failure})" if model.failure else ""
-    return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at the bounds and the scene")
+    return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at starts, bounds and the scene")
 
 
 def _refuted(judgement: Judgement, foretold: list[Prediction]) -> Judgement:

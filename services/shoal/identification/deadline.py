@@ -86,17 +86,29 @@ class Deadline:
         return found
 
     def _probe(self, kind: object, scene: Scene, times: Array, run: Run) -> None:
-        """See the pace by the beginning of a record, a longer one while what every run costs may be most of it."""
-        part = _PROBE
-        while True:
+        """See the pace by the beginning of a record, a longer one while what every run costs may be most of it.
+
+        Where there is no time for a longer one, a shorter one tells what every run costs, such as assembling it.
+        """
+
+        def spent_on(part: float) -> tuple[float, Trajectory]:
             begin = clock.now()
             found = run(scene, times[-1:] * part)
-            spent = clock.now() - begin
+            return clock.now() - begin, found
+
+        part, end = _PROBE, float(times[-1])
+        while True:
+            spent, found = spent_on(part)
             self._paces.pop(kind, None)
-            self._learn(kind, spent, part * float(times[-1]), found)
-            if spent / part <= self.remaining or part >= _LONGEST or 4 * spent > _SHARE * self.remaining:
+            self._learn(kind, spent, part * end, found)
+            if spent / part <= self.remaining:
                 return
+            if part >= _LONGEST or 4 * spent > _SHARE * self.remaining:
+                break
             part *= 4
+        shorter, _ = spent_on(part / 4)
+        whole = shorter + max(spent - shorter, 0.0) / (part - part / 4) * (1.0 - part / 4)
+        self._paces[kind] = (min(whole, spent / part) / end, *self._paces[kind][1:])
 
     def _learn(self, kind: object, spent: float, simulated: float, found: Trajectory) -> None:
         """Note seconds for a simulated second and for a step, and steps a second; a single slow run counts for half."""

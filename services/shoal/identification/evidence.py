@@ -24,8 +24,8 @@ class Evidence:
     """Of a point (parameters,).
 
     predicted: channels there by recording, (samples, channels)
-    residual: there, (rows,); nan where it cannot be simulated
-    seen: the same with zeros in place of nan, and its Jacobian
+    residual: there, (rows,); not finite where it cannot be simulated, or no time was left to
+    seen: the same, zeros where it is not finite, and its Jacobian
     looked: whether there was time for derivatives
     possible: whether the point can be simulated
     blocks: the series of the residuals
@@ -67,9 +67,10 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
     predicted = {name: _predicted(model, point, name) for name in model.measurement.recordings}
     residual = model.compared(point[None], {name: seen[None] for name, seen in predicted.items()})[0]
     looked = unless_late(lambda: believed(model, point, residual), None)
-    seen = looked or _unseen(model)
-    possible = bool(np.all(np.isfinite(seen.residual)))
-    if not possible:
+    seen = looked or _unseen(model, residual)
+    tested = bool(np.all(np.isfinite(residual)))
+    possible = tested or looked is None
+    if not tested:
         seen = replace(seen, residual=np.zeros_like(seen.residual), jacobian=np.zeros_like(seen.jacobian))
     blocks = blocks_of(model, len(seen.residual))
     at = linearise(seen.jacobian, seen.residual, model.sizes(point), blocks, seen.error)
@@ -84,7 +85,9 @@ def evidence(model: ForwardModel, point: Array) -> Evidence:
     limit = float(np.linalg.norm([parts[0] or 0.0, parts[1] or 0.0, *unshown]))
     chosen = float(np.linalg.norm([size for size, one in zip(unshown, known, strict=True) if one.one_of_many]))
     refined = error.refined(seen.residual, seen.jacobian, at.pseudo_inverse)
-    tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined, chosen)
+    tests = ResidualTests.not_made(model)
+    if tested:
+        tests = residual_tests(model, seen.residual, blocks, at.noise, limit, refined, chosen)
     told = float(np.sqrt(np.sum(np.any(seen.jacobian != 0.0, axis=1))))
     at = replace(at, systematic=tests.excess * told)
     beside = reduce(lambda so_far, one: one.spread(so_far), given, at)
@@ -98,11 +101,10 @@ def _size(model: ForwardModel, rows: Array | None) -> float | None:
     return None if rows is None else rms_of(rows[: len(model.rows.time)])
 
 
-def _unseen(model: ForwardModel) -> Sensitivity:
+def _unseen(model: ForwardModel, residual: Array) -> Sensitivity:
     """What is known of the neighbourhood of an answer where there is no time to look: nothing."""
-    rows = len(model.rows.time) + len(model.parameters.priors)
-    nothing = np.zeros((rows, len(model.names)))
-    return Sensitivity(np.zeros(rows), nothing, np.inf, np.inf, nothing)
+    nothing = np.zeros((len(residual), len(model.names)))
+    return Sensitivity(residual, nothing, np.inf, np.inf, nothing)
 
 
 def _predicted(model: ForwardModel, point: Array, name: str) -> Array:

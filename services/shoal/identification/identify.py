@@ -33,6 +33,7 @@ from shoal.identification.recording.source import EngineSource
 from shoal.identification.spread.posterior import require_sampler
 from shoal.mechanics import clock
 from shoal.memory import Memory
+from shoal.trajectory import Array
 from shoal.versions import versions
 
 Watch = Callable[[int, float, float, int], None]
@@ -91,6 +92,8 @@ def identify(
         model = ForwardModel(problem, scene, get_engine(engine), measurement, deadline)
         if deadline is not None:
             model.warm_up()
+    model, begun = _assembled(model)
+    notes += begun
     unless_late(lambda: check_constant(model.measurement, model.at_start), None)
     if paces:
         model = _paced(model)
@@ -102,6 +105,36 @@ def identify(
         wall = clock.now() - begin
         estimate = conclude(model, outcome, name, seed, wall, stages, wishes)
         return replace(estimate, notes=[*notes, *estimate.notes])
+
+
+def _assembled(model: ForwardModel) -> tuple[ForwardModel, list[str]]:
+    """The model, begun from the scene's own values where those it begins from close no loop, and a note if so."""
+    sought = dict(model.problem.parameters)
+    for name, parameter in sought.items():
+        own = None if parameter.path is None or parameter.of_measurement else model.scene.value(parameter.path)
+        if parameter.start is None and own is not None and parameter.lower <= own <= parameter.upper:
+            sought[name] = parameter.model_copy(update={"start": float(own)})
+    begun = [name for name, parameter in sought.items() if parameter is not model.problem.parameters[name]]
+    loops = len(model.scene.joints) > len(model.scene.bodies)
+    if not begun or not loops or _closes(model):
+        return model, []
+    other = replace(model, problem=model.problem.model_copy(update={"parameters": sought}))
+    if not _closes(other):
+        return model, []
+    what = f"the search starts from the scene's own {', '.join(begun)}"
+    return other, [f"{what}: in the middle of the bounds the machine cannot be assembled"]
+
+
+def _closes(model: ForwardModel) -> bool:
+    """Whether the machine can be assembled where a search begins, in every recording."""
+    aside = model.aside(engine=get_engine("gauss"), deadline=None)
+
+    def closed(starts: Array) -> bool:
+        seen = (aside.observe(starts, name, np.zeros(1)) for name in model.measurement.recordings)
+        return bool(np.any(np.all([np.any(np.isfinite(one), axis=(1, 2)) for one in seen], axis=0)))
+
+    # Poses that the first samples allow take longer.
+    return closed(aside.parameters.start[None]) or closed(starting_points(aside))
 
 
 def _paced(model: ForwardModel) -> ForwardModel:
@@ -142,8 +175,16 @@ def _search(
         known = unless_late(lambda: with_aliases(model, found), found)
         outcome = unless_late(lambda: with_mirror_images(model, known), known)
     if model.refusal and not np.isfinite(outcome.fitness):
-        raise InputError(model.refusal)
+        raise InputError(_refused(model))
     return model, outcome, stages
+
+
+def _refused(model: ForwardModel) -> str:
+    """Why nothing could be simulated, and what to state where that may be due to where the search began."""
+    middle = [name for name, parameter in model.problem.parameters.items() if parameter.start is None]
+    if not middle:
+        return model.refusal
+    return f"parameters: give {', '.join(middle)} a `start` where the machine can be simulated ({model.refusal})"
 
 
 def _best_so_far(model: ForwardModel) -> Outcome:

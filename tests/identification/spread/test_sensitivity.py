@@ -1,5 +1,6 @@
 """Derivatives against two independent ways: CasADi's exact ones, and variational equations by short segments."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -21,6 +22,7 @@ from shoal.identification.spread import intervals
 from shoal.identification.spread.covariance import blocks_of
 from shoal.identification.spread.sensitivity import believed, sensitivity
 from shoal.identification.spread.uncertainty import linearise
+from shoal.mechanics.numerics.tile import WIDE
 from shoal.scene import Scene
 from shoal_validation.coverage.cases import tip
 from shoal_validation.inverse_precision.cases import rigid_problem, textbook
@@ -215,11 +217,24 @@ def test_a_misfit_only_where_no_derivatives_hold_is_not_held_against_the_model(
     assert found.verdict is verdict
     if verdict is Verdict.UNFINISHED:
         assert near.tests.wrong_model
-        assert f"the model fits the first {near.seen.end:.3g} s" in found.message
+        assert f"the motion is chaotic: the model fits the first {near.seen.end:.3g} s" in found.message
         return
     assert not near.tests.wrong_model
     for value, true in zip(values.values(), CHAOTIC, strict=True):
         assert value.lower + 0.001 < true < value.upper - 0.001
+
+
+@pytest.mark.parametrize(("magnified", "cause"), [(1e3, "the motion is chaotic"), (2.0, "the solver's steps are too")])
+def test_the_cause_of_derivatives_that_do_not_hold_is_told(magnified: float, cause: str) -> None:
+    """Only a motion that magnifies deviations is chaotic; else it is the solver that makes derivatives rough."""
+    model = model_of(np.array([0.5, 0.2]), 1.0)
+    seen = sensitivity(model, np.array([0.5, 0.2]))
+    share = np.linspace(0.0, 1.0, len(seen.residual))[:, None]
+    rough = replace(seen, jacobian=np.ones_like(seen.jacobian) * magnified**share, doubt=0.5)
+    near = evidence(model, np.array([0.5, 0.2]))
+    outcome = Outcome(near.point, float(model.cost(near.residual[None])[0]), [], "")
+    values = intervals.parameters(model, near.point, near.at, near.correction)
+    assert cause in judge(model, outcome, rough, near.at, near.tests, values, []).message
 
 
 def test_derivatives_that_hold_are_those_of_the_whole_record() -> None:
@@ -246,6 +261,35 @@ def test_the_jacobian_of_a_linear_model_with_equal_singular_values_is_its_matrix
     )
     seen = sensitivity(cast(ForwardModel, linear), np.zeros(4))
     assert seen.reliable
+    assert seen.jacobian == pytest.approx(matrix, abs=1e-9)
+
+
+def test_an_error_that_lanes_of_a_tile_share_is_none_of_the_derivatives() -> None:
+    """Lanes that share iterations share what these leave, here 1e-10 of the motion; the weakest direction has 1e-5.
+
+    Judged by the matrix of the linear model itself.
+    """
+    rng = np.random.default_rng(0)
+    left, right = np.linalg.qr(rng.standard_normal((30, 4)))[0], np.linalg.qr(rng.standard_normal((4, 4)))[0]
+    matrix = left * [1.0, 0.2, 0.03, 1e-5] @ right.T
+
+    def motion(points: np.ndarray) -> np.ndarray:
+        tiles = -(-len(points) // len(WIDE))
+        left_over = np.repeat(1e-10 * rng.standard_normal((tiles, 30)), len(WIDE), axis=0)
+        return points @ matrix.T + left_over[: len(points)]
+
+    linear = SimpleNamespace(
+        sizes=np.ones_like,
+        lower=-np.ones(4),
+        upper=np.ones(4),
+        box_at=lambda point: (point - 1.0, point + 1.0),
+        uncounted=motion,
+        rows=SimpleNamespace(signal=1.0, time=np.arange(30.0), recording=np.zeros(30, dtype=int)),
+        parameters=SimpleNamespace(initial=np.zeros(4, dtype=bool)),
+        measurement=SimpleNamespace(recordings={"one": SimpleNamespace(times=np.arange(30.0))}),
+    )
+    seen = sensitivity(cast(ForwardModel, linear), np.zeros(4))
+    assert seen.doubt < 1e-4
     assert seen.jacobian == pytest.approx(matrix, abs=1e-9)
 
 

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shoal.errors import InputError
+from shoal.mechanics.assembly.space import start
+from shoal.mechanics.assembly.space.values import jacobian
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
 
@@ -159,3 +162,35 @@ def test_what_a_start_in_space_changes_is_told_as_it_is_stated(short: bool, turn
     assert told["initial_rate_correction"] == pytest.approx(5.0, abs=1e-9)
     held = scene.with_values({"initial.a.rate" if short else "initial.a.spin": 0.0 if short else [0, 0, 0]})
     assert simulate(held, np.array([0.001])).model["initial_changes"] == {}
+
+
+def test_a_loop_that_no_poses_close_is_given_up_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two rods of 1 m between balls 3 m apart. Each of 17 searches went through all of its 60 iterations."""
+    rod = {"kind": "rod", "length": 1.0, "height": 0.02, "width": 0.02, "density": 2700.0}
+    ball = {"kind": "spherical"}
+    scene = {
+        "name": "too short",
+        "dimensions": 3,
+        "bodies": {"a": rod, "b": rod},
+        "joints": {
+            "O": {**ball, "first": {"body": "ground", "point": [0.0, 0.0, 0.0]}, "second": {"body": "a"}},
+            "A": {**ball, "first": {"body": "a", "point": "end"}, "second": {"body": "b"}},
+            "B": {
+                **ball,
+                "first": {"body": "b", "point": "end"},
+                "second": {"body": "ground", "point": [3.0, 0.0, 0.0]},
+            },
+        },
+        "markers": {"A": {"body": "a", "point": "end"}},
+        "solver": {"duration": 1.0},
+    }
+    asked = list[int]()
+
+    def counted(*arguments: Any) -> Any:
+        asked.append(1)
+        return jacobian(*arguments)
+
+    monkeypatch.setattr(start, "jacobian", counted)
+    with pytest.raises(InputError, match="cannot be assembled; no poses near the stated ones close it"):
+        start.place_started(Scene.parse(scene, "too short"))
+    assert len(asked) < 17 * 30

@@ -79,6 +79,18 @@ class ResidualTests:
     chance_as_it_is: float = 1.0
     unresolved: bool = False
 
+    @classmethod
+    def not_made(cls, model: ForwardModel) -> ResidualTests:
+        """Of an answer whose residual is not known: nothing but the data is."""
+        stated = model.rows.noise
+        noise, size = np.nan if stated is None else stated, np.nan
+        return cls(size, noise, stated is not None, model.rows.signal, 0.0, np.nan, np.nan, 0, len(model.rows.time))
+
+    @property
+    def made(self) -> bool:
+        """Whether there was a residual to test."""
+        return bool(np.isfinite(self.size))
+
     @property
     def explained(self) -> float:
         """What noise and mesh explain."""
@@ -131,7 +143,9 @@ class ResidualTests:
         return f"{size:.2g} {self.unit}".strip()
 
     def sentences(self) -> list[str]:
-        """The tests in words."""
+        """The tests in words; none where there was nothing to test."""
+        if not self.made:
+            return []
         kind = "the stated noise" if self.noise_stated else "the noise that the data show without a model"
         size = f"{self.sized(self.size)} (RMS for each channel), " if self.unit else ""
         times = self.size / max(self.noise, 1e-300)
@@ -154,9 +168,10 @@ class ResidualTests:
         return "that of the model's own error, without which it is like white noise"
 
     def to_json(self) -> dict[str, Any]:
-        """All fields, and what follows from them."""
+        """All fields, and what follows from them; null where there was nothing to test."""
         told = {"ratio": self.ratio, "systematic": self.systematic, "wrong_model": self.wrong_model}
-        return plain({**asdict(self), **told})  # type: ignore[no-any-return]
+        found: dict[str, Any] = plain({**asdict(self), **told})
+        return found if self.made else dict.fromkeys(found)
 
 
 def residual_tests(

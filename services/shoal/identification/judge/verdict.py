@@ -17,6 +17,7 @@ from shoal.identification.judge.rivals import ALIAS, relation, rivals_of, within
 from shoal.identification.judge.stationarity import downhill, sentence
 from shoal.identification.judge.stretch import odd_stretch
 from shoal.identification.judge.suspects import Findings, Suspect, suspects
+from shoal.identification.methods.growth import LARGE, growth
 from shoal.identification.methods.lanes import Descent
 from shoal.identification.methods.outcome import Outcome
 from shoal.identification.spread.covariance import blocks_of
@@ -90,11 +91,10 @@ def judge(
         advice = ["end the search by least squares, as --method hybrid, auto and least-squares do"]
         return Judgement(Verdict.UNFINISHED, unfinished, advice)
     if tests.wrong_model and seen.end is not None and _fits_until(model, outcome.point, seen):
-        reason = (
-            f"the motion is chaotic, or its steps coarse: the model fits the first {seen.end:.3g} s; beyond, where "
-        )
+        cause, remedy = _rough(model, seen)
+        reason = f"{cause}: the model fits the first {seen.end:.3g} s; beyond, where "
         reason += f"the misfit is that makes {tests.sized(tests.size)} of all, nothing tells whether this is a minimum"
-        return Judgement(Verdict.UNFINISHED, reason, ["shorten the record, or tighten the solver's tolerances"])
+        return Judgement(Verdict.UNFINISHED, reason, [remedy])
     looked = Findings()
     misfitting = (tests.limited or tests.wrong_model) and tests.size > _NEGLIGIBLE * tests.signal
     if misfitting:
@@ -125,7 +125,7 @@ def judge(
         )
         advice = [f"{', or '.join(more)}, or narrow the bounds to the set that is meant"]
         return Judgement(Verdict.AMBIGUOUS, message, advice, found)
-    judged = _identifiable(seen, tests, with_refits(parameters, looked.refits), unknown, found, odd)
+    judged = _identifiable(model, seen, tests, with_refits(parameters, looked.refits), unknown, found, odd)
     return replace(judged, refits=looked.refits)
 
 
@@ -207,7 +207,16 @@ def _against(tests: ResidualTests) -> str:
     return f"and not by noise; the data vary by {tests.sized(tests.signal)}"
 
 
+def _rough(model: ForwardModel, seen: Sensitivity) -> tuple[str, str]:
+    """Why derivatives by two steps differ, and what to do: the motion magnifies deviations, or the solver is rough."""
+    if growth(model, seen.jacobian) > LARGE:
+        return "the motion is chaotic", "shorten the record, or tighten the solver's tolerances"
+    cause = "the solver's steps are too coarse for derivatives, or the motion jumps"
+    return cause, "shorten solver.step, or tighten the solver's tolerances"
+
+
 def _identifiable(
+    model: ForwardModel,
     seen: Sensitivity,
     tests: ResidualTests,
     parameters: Mapping[str, Value],
@@ -228,8 +237,9 @@ def _identifiable(
         advice.append("measure longer or with less noise, or add what is known as a prior")
     if not seen.reliable:
         known = f"rest on the first {seen.end:.3g} s" if seen.end is not None else "are in doubt"
-        notes.append(f"the motion is chaotic, or its steps coarse: the intervals {known}")
-        advice.append("shorten the motion, or tighten the solver's tolerances")
+        cause, remedy = _rough(model, seen)
+        notes.append(f"{cause}: the intervals {known}")
+        advice.append(remedy)
     if tests.limited and tests.size > _NEGLIGIBLE * tests.signal > 0.0:
         share = 100 * tests.excess / tests.signal
         size = f"{tests.sized(tests.excess)} ({share:.2g} % of the signal)"

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel, Progress
-from shoal.identification.methods.growth import growth, swings
+from shoal.identification.methods.growth import FRACTAL, LARGE, growth, swings
 from shoal.identification.methods.lanes import descend_many, differentiate_many, differing, distinct
 from shoal.identification.methods.least_squares import PATIENCE, differentiate, from_starts
 from shoal.identification.methods.multiple_shooting import multiple_shooting
@@ -20,10 +20,6 @@ from shoal.identification.methods.starts import scatter, starting_points
 from shoal.identification.recording.units import of_channels
 from shoal.trajectory import Array
 
-LARGE = 30.0
-"""A deviation that grows by more than this over the record makes single shooting over all of it fail."""
-FRACTAL = 1e3
-"""From this growth on false minima are everywhere, and to list those near by tells nothing."""
 _UNEXPLAINED = 0.05
 """Of the spread of the data: a fit that leaves more, and more than noise, is none."""
 _NOISES = 3.0

@@ -7,6 +7,10 @@ import numpy as np
 from shoal.identification.forward import ForwardModel
 from shoal.trajectory import Array
 
+LARGE = 30.0
+"""A deviation that grows by more than this over the record makes single shooting over all of it fail."""
+FRACTAL = 1e3
+"""From this growth on false minima are everywhere, and to list those near by tells nothing."""
 _PARTS = 10
 """Of a record, compared with the first of them."""
 

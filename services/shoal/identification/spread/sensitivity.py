@@ -6,11 +6,13 @@ orders of magnitude); a step that is too small drowns in round-off. Both show wh
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shoal.identification.forward import ForwardModel
+from shoal.identification.methods.growth import LARGE, growth
 from shoal.trajectory import Array
 
 _STEPS = 10.0 ** np.arange(-3.0, -12.0, -1.0)
@@ -21,14 +23,14 @@ _SURE = 1e-4
 """Relative difference of two derivatives between which no other step need decide."""
 AGREED = 1e-2
 """Relative difference of two derivatives that count as one."""
-
-
 _NOTHING = 1e-6
 _ROUNDS = 4
 _WELL_CONDITIONED = 1e3
 _NONE = 1e-200
 _SHORTER = 0.75 ** np.arange(1, 9)
 """Parts of a record that are tried where the derivatives of the whole cannot be believed."""
+
+EitherSide = Callable[[ForwardModel, Array, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -53,11 +55,30 @@ class Sensitivity:
         """Whether two steps agree in every direction."""
         return self.doubt <= AGREED
 
+    @property
+    def possible(self) -> bool:
+        """Whether the point can be simulated at all."""
+        return bool(np.all(np.isfinite(self.residual)))
+
 
 def sensitivity(model: ForwardModel, point: Array, residual: Array | None = None) -> Sensitivity:
     """Central differences, in each direction with the neighbouring steps that agree best. Not counted.
 
     residual: at the point, (rows,), where it is known.
+
+    What they differ by where the motion magnifies no deviation is what the solver's iterations leave. Lanes of a tile
+    share that, so that it is in no difference of two neighbours, and these decide then.
+    """
+    residual = model.uncounted(point[None])[0] if residual is None else residual
+    seen = _seen(model, point, residual, _apart)
+    if seen.reliable or not seen.possible or growth(model, seen.jacobian) > LARGE:
+        return seen
+    beside = _seen(model, point, residual, _side_by_side)
+    return beside if beside.reliable else seen
+
+
+def _seen(model: ForwardModel, point: Array, residual: Array, either_side: EitherSide) -> Sensitivity:
+    """Derivatives at a point of known residuals (rows,).
 
     Errors along the strongest direction would hide the weakest, so that the differences are repeated along the
     singular directions found, until these stay. At a bound the difference is taken to the inner side, and the parameter
@@ -66,13 +87,12 @@ def sensitivity(model: ForwardModel, point: Array, residual: Array | None = None
     sizes = model.sizes(point)
     basis = turned = np.eye(len(point))
     free = np.flatnonzero(np.minimum(point - model.lower, model.upper - point) > _STEPS[0] * sizes)
-    residual = model.uncounted(point[None])[0] if residual is None else residual
-    columns, doubt, error = _differences(model, point, sizes, basis, _USUAL)
+    columns, doubt, error = _differences(model, point, sizes, basis, _USUAL, either_side)
     if np.max(doubt) < _SURE and (growth := _growth(columns)) < _WELL_CONDITIONED:
         return Sensitivity(residual, columns / sizes, float(np.max(doubt)), growth, error / sizes)
     for _ in range(_ROUNDS):
         basis = turned
-        columns, doubt, error = _differences(model, point, sizes, basis, _STEPS)
+        columns, doubt, error = _differences(model, point, sizes, basis, _STEPS, either_side)
         growth = _growth(columns[:, free])
         right = np.linalg.svd(columns[:, free], full_matrices=False)[2]
         if growth < _WELL_CONDITIONED or np.max(np.abs(np.abs(right) - np.eye(len(free)))) < AGREED / growth:
@@ -89,7 +109,7 @@ def believed(model: ForwardModel, point: Array, residual: Array | None = None) -
     Intervals that rest on the beginning are too wide rather than too narrow: what follows is not held to tell anything.
     """
     seen = sensitivity(model, point, residual)
-    if seen.reliable:
+    if seen.reliable or not seen.possible:
         return seen
     for end in _SHORTER * model.measurement.end:
         part = model.until(float(end))
@@ -111,17 +131,29 @@ def _growth(columns: Array) -> float:
     return float(singular[0] / singular[-1]) if singular[-1] > _NONE * singular[0] else np.inf
 
 
+def _apart(model: ForwardModel, ahead: Array, behind: Array) -> tuple[Array, Array]:
+    """Residuals (points, rows) at points on either side of others, (points, parameters) each. Not counted."""
+    seen = model.uncounted(np.concatenate([ahead, behind]))
+    return seen[: len(ahead)], seen[len(ahead) :]
+
+
+def _side_by_side(model: ForwardModel, ahead: Array, behind: Array) -> tuple[Array, Array]:
+    """As `_apart`, with the two sides of each point in neighbouring lanes."""
+    seen = model.uncounted(np.stack([ahead, behind], axis=1).reshape(-1, ahead.shape[1]))
+    return seen[::2], seen[1::2]
+
+
 def _differences(
-    model: ForwardModel, point: Array, sizes: Array, basis: Array, widths: Array
+    model: ForwardModel, point: Array, sizes: Array, basis: Array, widths: Array, either_side: EitherSide
 ) -> tuple[Array, Array, Array]:
     """Derivatives of the residuals along the columns of `basis` (scaled parameters), and doubt and error of each."""
     count = len(point)
     steps = np.concatenate([step * sizes * basis.T for step in widths])
     ahead, behind = (_inside(model, point, move) for move in (steps, -steps))
-    seen = model.uncounted(np.concatenate([point + ahead, point + behind]))
+    seen = either_side(model, point + ahead, point + behind)
     width = np.linalg.norm((ahead - behind) / sizes, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        slopes = (seen[: len(steps)] - seen[len(steps) :]) / width[:, None]
+        slopes = (seen[0] - seen[1]) / width[:, None]
     slopes = slopes.reshape(len(widths), count, -1)
     columns, doubts = np.zeros((slopes.shape[2], count)), np.full(count, np.inf)
     errors = np.zeros_like(columns)

@@ -45,6 +45,8 @@ ROUNDING = 1e-4
 STRAIN = 1e-6
 """Nodes of a flexible rod that closing the joints would move by more, relative to the size of the machine, are not."""
 ITERATIONS = 60
+STALLED, FALLS = 10, 0.9
+"""Iterations without a fall of the worst gap to this part of it: from there on no poses are near that close."""
 ATTEMPTS = 16
 DEPENDENT = 1e-9
 """Singular values below this, relative to the largest, are of rows that depend on others."""
@@ -237,11 +239,16 @@ class _Closing:
         held = _dense(stated, len(q))
         wanted = np.array([one.value for one in stated])
         small = CLOSED * self.scale
+        least, since = np.inf, 0
         for _ in range(most):
             gap = np.array([value_of(term, q, lane) for term in self.terms])
             away = held @ q - wanted
             if np.all(np.abs(gap) <= small) and np.all(np.abs(away) <= CLOSED * max(self.size, 1.0)):
                 return q
+            off = float(np.max(np.abs(np.concatenate([gap / self.scale, away])), initial=0.0))
+            least, since = (off, 0) if off < FALLS * least else (least, since + 1)
+            if since >= STALLED:
+                return None
             rows = np.vstack([jacobian(self.terms, q, lane) / self.scale[:, None], held])
             move = np.linalg.lstsq(rows, -np.concatenate([gap / self.scale, away]), DEPENDENT)[0]
             longest = float(np.max(np.abs(move), initial=0.0))
