@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from shoal_validation.random_space.study import Judged, drawn, flexible, judged, met
+from shoal_validation.random_space.study import Judged, drawn, judged, met
 
 MANY, LINKAGES = 200, 110
 FINE = ("right", "refused", "not judged")
-BENDING = [seed for seed in range(30) if flexible(drawn(seed, "chains")[1])]
+BENDING = [seed for seed in range(30) if drawn(seed, "chains")[1].flexible_rods]
 """Machines with flexible rods."""
 
 

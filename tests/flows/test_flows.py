@@ -59,7 +59,7 @@ def test_a_study_is_a_parent_run_with_a_child_per_method(study: Any) -> None:
 def test_fitness_and_trajectory_are_series(study: Any) -> None:
     (swarm,) = [c for c in _children(study.run_id) if c.data.params["method"] == "iafsa-unseeded"]
     best = [m.value for m in _client().get_metric_history(swarm.info.run_id, "fitness/best")]
-    assert len(best) == 101
+    assert len(best) == swarm.data.metrics["final/evaluations"] / 40 <= 101
     assert best == sorted(best, reverse=True)
     tip = _client().get_metric_history(swarm.info.run_id, "tip/x")
     assert 50 <= len(tip) <= 300
