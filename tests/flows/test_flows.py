@@ -265,7 +265,7 @@ def test_what_is_taken_from_the_library_is_kept_with_the_run(tmp_path: Path) -> 
     found = run.run_flow("identify", {"problem": "start", "methods": "least-squares", "data": "swing"})
     assert found.fits[0].estimate.parameters["theta"].value == pytest.approx(0.3, abs=1e-9)
     tags = _client().get_run(found.run_id).data.tags
-    assert (tags["problem"], tags["mlflow.runName"]) == ("start", "start · identify")
+    assert (tags["problem"], tags["mlflow.runName"]) == ("start of the arm", "start of the arm · identify")
     (tmp_path / "arm.yaml").write_text(yaml.safe_dump({**machine, "gravity": [0.0, -1.62]}))
     library.add(tmp_path / "arm.yaml")
     for entry in library.entries():
