@@ -91,7 +91,8 @@ def profile(model: ForwardModel, point: Array, at: Linearisation, k: int) -> Pro
         threshold = threshold or 4.0 * float(residual @ residual) / len(residual)
         std = max(std, span / 20)
     step = _FIRST * min(max(std, 1e-9 * span), span / 10)
-    lower, upper = (_side(model, point, k, direction * step, threshold) for direction in (-1.0, 1.0))
+    answer = Search(model, point, *differentiate(model, point), fixed=k)
+    lower, upper = (_side(answer, k, direction * step, threshold) for direction in (-1.0, 1.0))
     sought = np.array([lower.end, *lower.values[::-1], point[k], *upper.values, upper.end])
     low, *values, high = np.exp(sought) if model.parameters.logarithmic[k] else sought
     rise = np.array([*lower.rises[::-1], 0.0, *upper.rises])
@@ -115,23 +116,21 @@ class _Side:
     lowest: float
 
 
-def _side(model: ForwardModel, point: Array, k: int, step: float, threshold: float) -> _Side:
-    """Outward until the rise passes one or the bound is reached.
+def _side(answer: Search, k: int, step: float, threshold: float) -> _Side:
+    """Outward from the answer until the rise passes one or the bound is reached.
 
     A fit of the others that does not settle says nothing, and one whose rise is far beyond one says little of where it
     is one: nearer values are tried. Where the fits settle nowhere, the side is open: a misfit that was not minimised
     bounds nothing.
     """
-    bound = float((model.lower if step < 0 else model.upper)[k])
-    last, shortest = Search(model, point, *differentiate(model, point), fixed=k), abs(step) / _SHORTEST
-    bound = float((model.lower if step < 0 else model.upper)[k])
-    base, calls = last.cost, 0
-    inside, outside = [(float(point[k]), 0.0)], list[tuple[float, float]]()
-    place, lowest = point, 0.0
+    model, last, calls = answer.model, answer, 0
+    bound, shortest = float((model.lower if step < 0 else model.upper)[k]), abs(step) / _SHORTEST
+    inside, outside = [(float(answer.point[k]), 0.0)], list[tuple[float, float]]()
+    place, lowest = answer.point, 0.0
     while len(inside) <= _POINTS and calls < _CALLS and last.point[k] != bound:
         found, settled = _settled(last, k, step, threshold)
         calls += len(found.rows)
-        seen = float(found.point[k]), min((found.cost - base) / threshold, 1e6)
+        seen = float(found.point[k]), min((found.cost - answer.cost) / threshold, 1e6)
         if settled and seen[1] > 1.0:
             outside.append(seen)
         if settled and seen[1] <= 1.0:
