@@ -292,3 +292,26 @@ def test_who_waits_for_the_compiler_is_told(monkeypatch: pytest.MonkeyPatch) -> 
         notes.tell("  march of Leapfrog, single: 9.1 s")
     notes.tell("  nobody listens")
     assert heard.file.getvalue() == "  march of Leapfrog, single: 9.1 s\n"  # type: ignore[attr-defined]
+
+
+def test_no_table_breaks_a_word_at_any_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numbers and names of any length, drawn at random: every word stands whole in one line."""
+    rng = np.random.default_rng(20)
+    for _ in range(60):
+        columns = int(rng.integers(1, 9))
+        words = [
+            [
+                " ".join(f"{rng.normal() * 10.0 ** rng.integers(-12, 12):.{rng.integers(1, 9)}g}" for _ in range(count))
+                for count in rng.integers(1, 4, columns)
+            ]
+            for _ in range(int(rng.integers(1, 4)))
+        ]
+
+        def draw(rows: list[list[str]] = words) -> None:
+            table = screen.table("title", *(f"torque of {k} [N m]" for k in range(len(rows[0]))))
+            for row in rows:
+                table.add_row(*row)
+            screen.out.print(table)
+
+        text = printed(draw, monkeypatch, int(rng.integers(20, 140)), log=True)
+        assert {word for row in words for cell in row for word in cell.split()} <= {*text.split()}

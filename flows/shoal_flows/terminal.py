@@ -12,6 +12,7 @@ from rich import box
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from shoal.terminal.screen import FittingTable
 
 from shoal_flows import remembered
 from shoal_flows.events import Listener
@@ -208,4 +209,4 @@ def _differences(console: Console, results: list[Compared]) -> None:
 
 
 def _table(title: str) -> Table:
-    return Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    return FittingTable(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)

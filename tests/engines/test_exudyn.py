@@ -424,3 +424,36 @@ def test_a_narrow_law_of_a_spring_is_not_leapt_over(width, shorter):
     refused = ExudynEngine().simulate(narrow, [0.9, 1.0])
     assert not refused.ok
     assert "narrow part of an elastic law; solver.step needs" in refused.message
+
+
+@pytest.mark.parametrize("engine", [FAST, BEAM], ids=["cable", "beam"])
+def test_a_soft_start_of_a_stiff_rod_follows_the_rigid_closed_form(engine):
+    """Rods of any stiffness and mesh whose load grows from zero: I angle'' = F L sin(w t), small angles, no gravity."""
+    rng = np.random.default_rng(19)
+    for _ in range(6):
+        modulus, length, side = 10.0 ** rng.uniform(9.0, 12.0), rng.uniform(0.3, 3.0), rng.uniform(0.02, 0.04)
+        place, elements = rng.uniform(-20.0, 20.0, 2), int(rng.integers(1, 13))
+        rod = {**CABLE, "length": length, "height": side, "width": side, "density": 2700.0}
+        inertia = 2700.0 * side**2 * length**3 / 3
+        # So slow that the rod bends as at rest, and so weak that it turns by a thousandth of a radian.
+        w = 0.02 * np.pi**2 * side / length**2 * np.sqrt(modulus / 2700.0 / 12)
+        force = 1e-3 * inertia * w**2 / length
+        scene = Scene.parse(
+            {
+                "name": "soft-start",
+                "gravity": [0.0, 0.0],
+                "bodies": {"arm": {**rod, "youngs_modulus": modulus, "elements": elements}},
+                "joints": {"O": {"first": {"body": "ground", "point": place.tolist()}, "second": {"body": "arm"}}},
+                "loads": {
+                    "f": {"kind": "force", "at": {"body": "arm", "point": "end"}, "force": [0.0, force],
+                          "scale": f"sin({w}*t)"}
+                },
+                "markers": {"tip": {"body": "arm", "point": "end"}},
+                "solver": {"duration": 2.0 / w, "samples": 4, "step": 0.002 / w},
+            }
+        )  # fmt: skip
+        found = engine.simulate(scene)
+        assert found.ok, found.message
+        turned = force * length / inertia * (found.times / w - np.sin(w * found.times) / w**2)
+        tip = found.marker("tip") - place
+        assert np.max(np.abs(tip[:, 1] - length * np.sin(turned))) < 0.01 * length * np.max(turned)

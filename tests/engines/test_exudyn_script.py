@@ -238,3 +238,13 @@ def test_tables_as_python(smooth: bool) -> None:
     for t in np.linspace(0.0, 1.0, 41):
         assert value(t) == pytest.approx(course.value(t), abs=1e-13)
         assert slope(t) == pytest.approx(course.slope(t), abs=1e-11)
+
+
+def test_a_load_that_grows_from_zero(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The engine and its script end Newton's iteration by the same tolerance, that of the machine's own forces."""
+    stiff = {**CABLE, "youngs_modulus": 2e12}
+    push = {"kind": "force", "at": {"body": "arm", "point": "end"}, "force": [0.0, 0.1], "scale": "sin(3*t)"}
+    arm = {"O": {"first": GROUND, "second": {"body": "arm"}}}
+    machine = scene(gravity=[0.0, 0.0], bodies={"arm": stiff}, joints=arm, loads={"push": push},
+                    markers={"tip": {"body": "arm", "point": "end"}})  # fmt: skip
+    agrees(machine, tmp_path, capsys, within=1e-6)

@@ -66,12 +66,22 @@ def compile_for(engine: str, lanes: Iterable[int], *scenes: Scene) -> None:
         notes.before_models(compile_all)
 
 
-class _Fitting(Table):
-    """A table that breaks no word: on a terminal too narrow for that its columns stand below each other."""
+class FittingTable(Table):
+    """A table that breaks no word, and so no number: where it would have to, its columns stand below each other."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        needed = Measurement.get(console, options.update(width=_ENOUGH), self).minimum
-        if needed <= options.max_width:
+        wide = options.update(width=_ENOUGH)
+        for column in self.columns:
+            column.width = None
+        sizes = [
+            [Measurement.get(console, wide, cell) for cell in (column.header, *column.cells)] for column in self.columns
+        ]
+        words = [max(size.minimum for size in cells) for cells in sizes]
+        room = options.max_width - (Measurement.get(console, wide, self).minimum - sum(words))
+        if sum(words) <= room:
+            # Rich by itself shortens the widest columns, whatever words these have.
+            for column, width in zip(self.columns, _shared(words, sizes, room), strict=True):
+                column.width = width
             yield from super().__rich_console__(console, options)
             return
         for row in zip(*(column.cells for column in self.columns), strict=True):
@@ -80,10 +90,21 @@ class _Fitting(Table):
             yield ""
 
 
+def _shared(words: list[int], sizes: list[list[Measurement]], room: int) -> list[int]:
+    """Widths of columns [characters]: of the longest word at least, of the longest cell where there is room."""
+    widths, spare = list(words), room - sum(words)
+    wanted = [max(size.maximum for size in cells) - word for cells, word in zip(sizes, words, strict=True)]
+    order = sorted(range(len(words)), key=lambda k: wanted[k])
+    for rank, k in enumerate(order):
+        more = min(wanted[k], spare // (len(order) - rank))
+        widths[k], spare = widths[k] + more, spare - more
+    return widths
+
+
 def table(title: str, *headings: str) -> Table:
     """An empty table; its title is printed at once, so that it is not folded to the width of the table."""
     out.print(title, style="bold")
-    made = _Fitting(box=box.SIMPLE_HEAD, pad_edge=False)
+    made = FittingTable(box=box.SIMPLE_HEAD, pad_edge=False)
     for index, heading in enumerate(headings):
         made.add_column(escape(heading), justify="left" if index == 0 else "right", overflow="fold")
     return made

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from shoal.errors import InputError
+from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.simulate import simulate
 from shoal.scene import Scene
 
@@ -72,3 +73,33 @@ def test_what_a_scene_states_against_its_welds_is_refused(foot: str, start: Any,
     scene = angled(3, {}, (None, 0.2), foot).model_dump(mode="json", exclude_unset=True)
     with pytest.raises(InputError, match=message):
         simulate(Scene.parse(scene | {"initial": start}), np.array([0.0]))
+
+
+def test_a_bracket_held_more_than_once_stays_and_its_joints_bear_its_weight() -> None:
+    """Welds, balls and hinges at random places of one body: forces and moments about the origin balance its weight."""
+    rng = np.random.default_rng(20)
+    for _ in range(6):
+        centre, gravity = rng.normal(size=3), rng.normal(size=3)
+        places = [[0.0, 0.0, 0.0], *rng.normal(size=(int(rng.integers(1, 4)), 3)).tolist()]
+        kinds = ["weld", *rng.choice(["weld", "spherical", "revolute"], len(places) - 1)]
+        scene = Scene.parse({
+            "name": "bracket", "dimensions": 3, "gravity": gravity.tolist(),
+            "bodies": {"b": {"kind": "rigid-body", "mass": 2.0, "inertia": 0.01, "centre_of_mass": centre.tolist()}},
+            "joints": {
+                f"J{k}": {"kind": kind, "first": {"body": "ground", "point": place},
+                          "second": {"body": "b", "point": place}}
+                for k, (kind, place) in enumerate(zip(kinds, places, strict=True))
+            },
+            "markers": {"m": {"body": "b", "point": centre.tolist()}},
+            "initial": {"b": {"rotation": [0.0, 0.0, 0.0]}},
+        })  # fmt: skip
+        found = simulate(scene, np.array([0.1]))
+        assert found.ok, found.message
+        assert found.points[0, 0, :, 0] == pytest.approx(centre, abs=1e-12)
+        assert set(found.model["redundant_joints"]) >= {f"J{k}" for k in range(1, len(places))}
+        (state,) = reactions(scene, [0.1])
+        borne = [(np.array(state.joints[f"J{k}"].force), np.array(state.joints[f"J{k}"].torque), np.array(place))
+                 for k, place in enumerate(places)]  # fmt: skip
+        assert sum(force for force, _, _ in borne) == pytest.approx(-2.0 * gravity, abs=1e-9)
+        moment = sum(torque + np.cross(place, force) for force, torque, place in borne)
+        assert moment == pytest.approx(-2.0 * np.cross(centre, gravity), abs=1e-9)

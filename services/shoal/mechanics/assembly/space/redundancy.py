@@ -65,8 +65,9 @@ def _shares(found: list[Row], unknowns: int) -> Array:
     """The part of every row in all dependences, (rows,)."""
     import scipy.sparse
 
-    parts = [(row, *slope) for row, (_, slopes_of_row) in enumerate(found) for slope in slopes_of_row]
-    rows, columns, values = (np.array(one) for one in zip(*parts, strict=True))
+    rows = np.repeat(np.arange(len(found)), [len(slopes_of_row) for _, slopes_of_row in found])
+    columns = np.array([unknown for _, slopes_of_row in found for unknown, _ in slopes_of_row], dtype=int)
+    values = np.array([value for _, slopes_of_row in found for _, value in slopes_of_row], dtype=float)
     slope = scipy.sparse.csr_array((values, (rows, columns)), shape=(len(found), unknowns))
     length = np.sqrt(np.asarray((slope * slope).sum(axis=1)).ravel()) + 1e-300
     slope = scipy.sparse.diags_array(1 / length) @ slope
