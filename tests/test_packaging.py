@@ -10,7 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from shoal import home
+from shoal.cli import main
 from shoal.errors import InputError
 
 ROOT = Path(__file__).parents[1]
@@ -82,9 +84,52 @@ def test_home_is_the_folder_asked_for(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setenv("SHOAL_HOME", str(tmp_path / "deep" / "home"))
     assert home.home() == tmp_path / "deep" / "home"
     assert home.home().is_dir()
-    monkeypatch.delenv("SHOAL_HOME")
+    assert home.origin() == "$SHOAL_HOME"
+
+
+def installed(folder: Path, environment: dict[str, str], code: str, cwd: Path) -> str:
+    """What a program prints that imports the package from below a folder."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("SHOAL_", "XDG_"))}
+    command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(folder)!r}); {code}"]
+    done = subprocess.run(command, env=kept | environment, cwd=cwd, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+@pytest.mark.parametrize("stated", [False, True])
+@pytest.mark.parametrize("checkout", [False, True])
+def test_home_is_the_same_from_every_folder(tmp_path: Path, checkout: bool, stated: bool) -> None:
+    """Of a checkout by where the package lies, else of the user; kernels of the user are in the cache directory."""
+    package = tmp_path / ("checkout/services" if checkout else "site-packages")
+    shutil.copytree(ROOT / "services/shoal", package / "shoal", ignore=shutil.ignore_patterns("__pycache__"))
+    if checkout:
+        shutil.copy(ROOT / "pyproject.toml", tmp_path / "checkout")
+    places = [tmp_path / "work", tmp_path / "elsewhere", package]
+    for place in places[:2]:
+        (place / ".shoal").mkdir(parents=True)
+    environment = {"HOME": str(tmp_path / "user"), **({"SHOAL_HOME": str(tmp_path / "stated")} if stated else {})}
+    code = "from shoal import home; print(home.home(), home.kernel_cache().parent, sep='\\n')"
+    (found,) = {installed(package, environment, code, place) for place in places}
+    data, cache = tmp_path / "user/.local/share/shoal", tmp_path / "user/.cache/shoal"
+    if checkout:
+        data = cache = tmp_path / "checkout/.shoal"
+    if stated:
+        data = cache = tmp_path / "stated"
+    assert found.splitlines() == [str(data), str(cache)]
+
+
+def test_a_state_folder_that_is_no_longer_used_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In one line, wherever it holds a library or runs; not an empty one, nor the home itself."""
     monkeypatch.chdir(tmp_path)
-    assert home.home() == tmp_path / ".shoal"
+    monkeypatch.delenv("SHOAL_HOME")
+    monkeypatch.setattr(home, "_of_checkout", lambda: tmp_path / "home")
+    assert home.unused_home() == ""
+    (tmp_path / ".shoal/library/scenes").mkdir(parents=True)
+    assert CliRunner().invoke(main, ["scenes"]).stderr == f"note: {home.unused_home()}\n"
+    assert home.unused_home().startswith(f"{tmp_path}/.shoal holds a library that this command does not use")
+    (tmp_path / ".shoal/mlflow.db").touch()
+    assert "holds a library and runs" in home.unused_home()
+    monkeypatch.setattr(home, "_of_checkout", lambda: tmp_path / ".shoal")
+    assert home.unused_home() == ""
 
 
 def test_home_that_cannot_be_made_is_refused_and_kernels_go_elsewhere(

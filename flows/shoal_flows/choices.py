@@ -1,20 +1,24 @@
-"""The names that forms offer: told to Prefect's server again whenever the library has changed.
+"""The names that forms offer: sent to Prefect's server again whenever the library has changed.
 
 A deployment's form is a JSON schema that the server keeps. Lists in it that depend on the library carry a mark, by
-which they are found and replaced, without Prefect and without the flows.
+which they are found and replaced, without Prefect and without the flows. They also carry the identity of the library
+that they were made from, which is the worker's: names of any other library are not offered, as its runs would fail.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from socket import gethostname
 from typing import Any
 from urllib.request import Request, urlopen
 
 from shoal.home import stated_home
+from shoal.shelf import shelf
 
-MARK = "x-shoal-names"
+MARK, LIBRARY = "x-shoal-names", "x-shoal-library"
 SECONDS = 2.0
 """A server that takes longer is left with the names that it has."""
 _SERVER = "prefect-server"
@@ -28,7 +32,6 @@ def names(kind: str, own: Iterable[str] | None = None) -> list[str]:
     from shoal.identification.problem import built_in_problems
     from shoal.response.stated import built_in_studies
     from shoal.scene.load import built_in_scenes
-    from shoal.shelf import shelf
 
     built_in = {
         "scenes": built_in_scenes,
@@ -39,25 +42,69 @@ def names(kind: str, own: Iterable[str] | None = None) -> list[str]:
     return [*built_in(), *([entry.name for entry in shelf().entries(kind)] if own is None else own)]
 
 
-def refresh(own: Names | None = None) -> int:
-    """Tell the server the names that there are; returns how many deployments have changed. Quiet where there is none.
+def library() -> dict[str, str]:
+    """Return what a form states of the library here: its identity, folder and host; empty if it has no identity."""
+    identity = shelf().identity()
+    return {"identity": identity, "folder": str(shelf().root), "host": gethostname()} if identity else {}
 
-    own: names of the library, else of the one here
+
+def refresh(own: Names | None = None, identity: str | None = None) -> str:
+    """Replace the names in the forms of the server, if there is one; return why they were left as they are, or "".
+
+    own: names of a library and identity: the identity of that library; both of the one here by default
     """
-    server = address()
-    if server is None:
-        return 0
-    changed = 0
-    try:
-        for deployment in _asked(f"{server}/deployments/filter", "POST", {}):
+    different = ""
+    with _tolerant():
+        for deployment in _deployments():
             schema = deployment.get("parameter_openapi_schema")
+            if different := different or _difference(schema, identity):
+                continue
             if _renewed(schema, own):
-                where = f"{server}/deployments/{deployment['id']}"
+                where = f"{address()}/deployments/{deployment['id']}"
                 _asked(where, "PATCH", {"parameter_openapi_schema": schema})
-                changed += 1
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        pass  # what answers is no server of Prefect's, or none that lets us
-    return changed
+    return different
+
+
+def difference() -> str:
+    """Return a line if the worker behind the server has another library than this process, else ""."""
+    with _tolerant():
+        return next(filter(None, (_difference(one.get("parameter_openapi_schema")) for one in _deployments())), "")
+    return ""
+
+
+def _deployments() -> list[Any]:
+    server = address()
+    return [] if server is None else list(_asked(f"{server}/deployments/filter", "POST", {}))
+
+
+def _difference(schema: Any, identity: str | None = None) -> str:
+    theirs: Mapping[str, str] = next(_found(schema, LIBRARY), {})
+    ours = shelf().identity() if identity is None else identity
+    if not theirs or theirs["identity"] == ours:
+        return ""
+    which = f"the library {shelf().root}" if identity is None else "the library of that service"
+    return (
+        f"Prefect's worker at {address()} uses the library {theirs['folder']} on {theirs['host']}, not {which}: its "
+        "forms offer, and its runs find, the names of its own library only; set SHOAL_HOME or SHOAL_LIBRARY alike"
+    )
+
+
+def _found(schema: Any, key: str) -> Iterator[Any]:
+    """The values of a key anywhere in a schema."""
+    if isinstance(schema, dict):
+        if key in schema:
+            yield schema[key]
+        schema = list(schema.values())
+    if isinstance(schema, list):
+        for one in schema:
+            yield from _found(one, key)
+
+
+@contextmanager
+def _tolerant() -> Iterator[None]:
+    """Ignore what answers if it is no server of Prefect's, or none that permits the request."""
+    with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
+        yield
 
 
 def address() -> str | None:

@@ -1,4 +1,4 @@
-"""What a running flow tells whoever listens in the same process: one line when work starts, one when it ends."""
+"""Progress of a running flow for listeners in the same process: a line when work starts, when it ends, and notes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 Listener = Callable[[str, str], None]
-"""Called with the name of the work and `started`, `done` or `failed`; from any thread."""
+"""Called with the name of the work and `started`, `done` or `failed`, or with a line and `note`; from any thread."""
 
 _listeners: list[Listener] = []
 
@@ -31,6 +31,11 @@ def work(name: str) -> Iterator[None]:
         _tell(name, "failed")
         raise
     _tell(name, "done")
+
+
+def note(line: str) -> None:
+    """Pass on a line that belongs to no work, or to what is within it."""
+    _tell(line, "note")
 
 
 def _tell(name: str, what: str) -> None:

@@ -36,7 +36,7 @@ def held(parameter: str, kind: str, given: str) -> str:
     elif given.startswith(("http://", "https://")):
         files = _of_service(parameter, kind, given)
     elif located(kind, given) == given and not Path(given).is_file():
-        what = f"{library.KINDS[kind].one}, nor file where this runs"
+        what = f"{library.KINDS[kind].one}, nor file where this runs, nor entry of its library {shelf().root}"
         raise InputError(f"{parameter}: {unknown(given, what, [one for one in names(kind) if one])}")
     else:
         files = library.gathered(kind, given, name, whole=True)

@@ -10,7 +10,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 from shoal.errors import ComputationError, InputError, ShoalError
 from shoal.scene.load import read_yaml
 
-from shoal_flows import events, server, workers
+from shoal_flows import choices, events, server, workers
 from shoal_flows.terminal import following, notice, show
 
 
@@ -47,6 +47,8 @@ def run_flow(name: str, parameters: Mapping[str, Any]) -> Any:
     with events.work("kernels (compiled on first use)"):
         ready.result()
     server.wait()
+    if server.shared() and (different := choices.difference()):
+        events.note(different)
     try:
         # Who imported Prefect before has let it read the settings too early.
         with use_profile(get_settings_context().profile, include_current_context=False):

@@ -32,6 +32,8 @@ def following(what: str) -> Iterator[Listener]:
     """A line that names what runs, on a terminal; in a log file a line for everything that ended."""
     console = Console(stderr=True, highlight=False)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    if not console.is_terminal:
+        console.print(f"{what}: starting", soft_wrap=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         bar = progress.add_task(f"{what}: starting")
         running: list[str] = []
@@ -41,7 +43,9 @@ def following(what: str) -> Iterator[Listener]:
         def note(name: str, state: str) -> None:
             nonlocal ended
             with lock:
-                if state == "started":
+                if state == "note":
+                    console.print(name, soft_wrap=True, markup=False)
+                elif state == "started":
                     running.append(name)
                 else:
                     running.remove(name)

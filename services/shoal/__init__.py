@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shoal import library
     from shoal.client import Client
+    from shoal.errors import ComputationError, InputError, ShoalError
     from shoal.identification import Estimate, Measurement, Problem, Recording, load_problem, problem_names
     from shoal.notebook import (
         compare,
@@ -31,11 +32,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Client",
+    "ComputationError",
     "Estimate",
+    "InputError",
     "Measurement",
     "Problem",
     "Recording",
     "Scene",
+    "ShoalError",
     "Trajectory",
     "compare",
     "design",
@@ -71,6 +75,10 @@ def __getattr__(name: str) -> Any:
         import shoal.library as library
 
         return library
+    from shoal import errors
+
+    if hasattr(errors, name):
+        return getattr(errors, name)
     from shoal import notebook, scene, trajectory
 
     for place in (notebook, scene, trajectory):

@@ -29,6 +29,7 @@ from shoal.commands.inverse import design, identify
 from shoal.commands.library import library
 from shoal.commands.uncertain import uncertain
 from shoal.errors import ComputationError, InputError, ShoalError
+from shoal.home import unused_home
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """No room: on the disk, for this user, in this file."""
@@ -140,3 +141,5 @@ def main() -> None:
 
     SCENE and PROBLEM are a name (see `shoal scenes`; `shoal library add` makes more) or a YAML file.
     """
+    if unused := unused_home():
+        click.echo(f"note: {unused}", err=True)

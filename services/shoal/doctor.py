@@ -20,7 +20,7 @@ from urllib.request import Request, urlopen
 import numpy as np
 
 from shoal.errors import ShoalError
-from shoal.home import compiled, home, kernel_cache
+from shoal.home import compiled, home, kernel_cache, origin, unused_home
 from shoal.ports import PORTS
 
 _PACKAGES = {
@@ -71,7 +71,7 @@ def _python() -> Check:
 
 def _folder() -> Check:
     try:
-        return Check("state folder", True, str(home()))
+        return Check("state folder", True, f"{home()} ({origin()})", unused_home())
     except ShoalError as error:
         return Check("state folder", False, "not writable", str(error))
 
@@ -86,7 +86,7 @@ def _native() -> Check:
     gap = abs(float(trajectory.marker("B")[-1, 0]) - 2.676161)
     right = trajectory.ok and gap < 1e-5
     found = f"right within {gap:.0e} m; kernels {'were' if known else 'now'} compiled"
-    return Check("native solver", right, found, "" if right else "remove the folder .shoal/kernels-* and try again")
+    return Check("native solver", right, found, "" if right else f"remove the folder {kernel_cache()} and try again")
 
 
 def _cache() -> Check:
@@ -95,7 +95,7 @@ def _cache() -> Check:
     size = sum(file.stat().st_size for file in current.rglob("*") if file.is_file())
     others = [folder for folder in current.parent.glob("kernels-*") if folder != current]
     older = f"; {len(others)} older that may be removed" if others else ""
-    return Check("compile cache", True, f"{current.name}, {size / 1e6:.0f} MB{older}")
+    return Check("compile cache", True, f"{current}, {size / 1e6:.0f} MB{older}")
 
 
 def check_engine(name: str, close: float = CLOSE) -> Check:

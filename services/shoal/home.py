@@ -1,4 +1,4 @@
-"""Where Shoal keeps its state: everything lies below one folder, nothing in the user's own folders."""
+"""Folders of Shoal's state: the home (library, runs, results, logs) and the cache of compiled kernels."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import platform
 import re
 import tempfile
 from pathlib import Path
+from typing import Literal
 
 from shoal.errors import InputError
 from shoal.versions import versions
@@ -18,7 +19,7 @@ _IMPORT = re.compile(r"^\s*from shoal\.((?:mechanics|engines\.tree)[\w.]*) impor
 
 
 def home() -> Path:
-    """The folder of all state, made on demand: $SHOAL_HOME, else ./.shoal. Raises InputError."""
+    """Return the folder of all state, made on demand; see `stated_home`. Raises InputError."""
     folder = stated_home()
     if not _writable(folder):
         raise InputError(f"SHOAL_HOME: cannot write to {folder}; set SHOAL_HOME to a folder that you may write to")
@@ -26,22 +27,77 @@ def home() -> Path:
 
 
 def stated_home() -> Path:
-    """The same folder, whether or not it is there."""
-    return Path(os.environ.get("SHOAL_HOME") or ".shoal").expanduser().absolute()
+    """Return the same folder, whether or not it exists: $SHOAL_HOME, else `.shoal` of the checkout, else the user's.
+
+    It never depends on the current directory: a library or a run must be found from every folder. A checkout is
+    recognised by where this package lies (an editable installation), so that the program `.venv/bin/shoal`, the make
+    targets and the tests of one checkout share one home and compile their kernels once.
+    """
+    return _stated() or _of_checkout() or _of_user("data")
+
+
+def origin() -> str:
+    """Return which rule of `stated_home` chose the folder, in words."""
+    if _stated():
+        return "$SHOAL_HOME"
+    return "of this checkout" if _of_checkout() else "of this user"
+
+
+def unused_home() -> str:
+    """Return a line that names a `.shoal` in the current directory with a library or runs that is not the home, or "".
+
+    Until November 2026 the home was `.shoal` of the current directory; what was kept there must not be lost silently.
+    """
+    folder, used = Path(".shoal").absolute(), stated_home()
+    kept = [what for name, what in _WORTH_KEEPING.items() if _holds(folder / name)]
+    if _stated() or not kept or folder.resolve() == used.resolve():
+        return ""
+    return (
+        f"{folder} holds {' and '.join(kept)} that this command does not use: its home is {used}; move the content "
+        f"there, or set SHOAL_HOME={folder}"
+    )
+
+
+_WORTH_KEEPING = {"library": "a library", "mlflow.db": "runs"}
+
+
+def _holds(path: Path) -> bool:
+    """Whether there is a file, or a folder that is not empty."""
+    try:
+        return path.is_file() or any(path.iterdir())
+    except OSError:
+        return False
+
+
+def _stated() -> Path | None:
+    text = os.environ.get("SHOAL_HOME")
+    return Path(text).expanduser().absolute() if text else None
+
+
+def _of_checkout() -> Path | None:
+    """`.shoal` of the checkout that this package is imported from; None for an installed copy, or a read-only one."""
+    root = _PACKAGE.parents[1]
+    editable = _PACKAGE.parent.name == "services" and (root / "pyproject.toml").is_file()
+    return root / ".shoal" if editable and os.access(root, os.W_OK) else None
+
+
+def _of_user(kind: Literal["data", "cache"]) -> Path:
+    from platformdirs import user_cache_path, user_data_path
+
+    return (user_data_path if kind == "data" else user_cache_path)("shoal", appauthor=False)
 
 
 def kernel_cache(package: Path = _PACKAGE) -> Path:
-    """The folder of the compiled kernels, made on demand. package: the folder of their sources.
+    """Return the folder of the compiled kernels, made on demand: in the home, or in the user's cache directory.
+
+    package: the folder of their sources.
 
     Its name changes with everything the machine code depends on. Numba itself only looks at the file
-    of each kernel, so it would go on using one whose callee in another file has changed. Where the
-    home cannot be written to, a private folder among the temporary files takes its place.
+    of each kernel, so it would go on using one whose callee in another file has changed. Where
+    nothing can be written there, a private folder among the temporary files takes its place.
     """
     name = f"kernels-{_fingerprint(package)}"
-    try:
-        folder = home() / name
-    except InputError:
-        return _private_temporary(name)
+    folder = (_stated() or _of_checkout() or _of_user("cache")) / name
     return folder if _writable(folder) else _private_temporary(name)
 
 

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from uuid import uuid4
 
 from shoal.errors import InputError
 from shoal.home import stated_home
@@ -31,6 +32,7 @@ LARGEST = 50_000_000
 _FILE = re.compile(r"\w[\w .,+()=-]{0,59}")
 _DEEPEST, _MOST = 4, 100
 _HELD, _CURRENT, _NEW, _DAY = "held", "current", ".new-", 86400.0
+_IDENTITY = ".identity"
 
 
 @dataclass(frozen=True)
@@ -193,6 +195,22 @@ class Shelf:
             with suppress(OSError):
                 if now - path.stat().st_mtime > _DAY:
                     shutil.rmtree(path)
+
+    def identity(self, *, make: bool = False) -> str:
+        """Return the mark that tells this library from any other, by whatever path it is reached, or "" if it has none.
+
+        Containers and machines reach one folder by different paths, and different folders by one path. make: give it
+        one where there is none and it can be written to.
+        """
+        file = self.root / _IDENTITY
+        with suppress(OSError, InputError, UnicodeDecodeError):
+            if make and not file.exists():
+                self.root.mkdir(parents=True, exist_ok=True)
+                with self._alone():
+                    if not file.exists():
+                        _replace(file, uuid4().hex.encode())
+            return file.read_text(encoding="utf-8").strip()
+        return ""
 
     @contextmanager
     def _alone(self) -> Iterator[None]:

@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from shoal import library
+from shoal.cli import main
 from shoal.errors import InputError
 from shoal.scene.load import scene_library
+from shoal.shelf import shelf
 from shoal_flows import choices, inputs
 
 PENDULUM = (scene_library() / "single-pendulum.yaml").read_text(encoding="utf-8")
@@ -65,16 +68,16 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_nobody_is_told_where_there_is_no_server(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert choices.refresh() == 0
+def test_nothing_is_sent_where_there_is_no_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert choices.refresh() == ""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         monkeypatch.setenv("PREFECT_API_URL", f"http://127.0.0.1:{taken.getsockname()[1]}/api")
-        assert choices.refresh() == 0
+        assert choices.refresh() == ""
         taken.listen()  # and never answers
         begin = time.monotonic()
         monkeypatch.setattr(choices, "SECONDS", 0.2)
-        assert choices.refresh() == 0
+        assert choices.refresh() == ""
         assert time.monotonic() - begin < 30.0
 
 
@@ -82,7 +85,7 @@ def test_nobody_is_told_where_there_is_no_server(monkeypatch: pytest.MonkeyPatch
 def test_a_server_of_something_else_is_left_alone(url: str, answer: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PREFECT_API_URL", url)
     ANSWERS["/deployments/filter"] = answer
-    assert choices.refresh() == 0
+    assert choices.refresh() == choices.difference() == ""
     assert CHANGED == []
 
 
@@ -92,11 +95,42 @@ def test_only_lists_of_names_are_renewed(url: str) -> None:
     listed = {"enum": ["old"], choices.MARK: "recordings"}
     forms = [{"properties": {"data": {"anyOf": [listed, {"type": "string"}]}, "engine": {"enum": ["gauss"]}}}, {}]
     ANSWERS["/deployments/filter"] = [{"id": k, "parameter_openapi_schema": form} for k, form in enumerate(forms)]
-    assert choices.refresh({"recordings": ["run"]}) == 1
+    assert choices.refresh({"recordings": ["run"]}) == ""
     listed["enum"] = ["", "run"]
     assert [told["parameter_openapi_schema"] for told in CHANGED] == forms[:1]
     choices.remember(None)
-    assert choices.refresh() == 0
+    assert choices.refresh() == ""
+    assert len(CHANGED) == 1
+
+
+def form(names: list[str]) -> dict[str, Any]:
+    listed = {"enum": names, choices.MARK: "recordings", choices.LIBRARY: choices.library()}
+    return {"properties": {"data": {"anyOf": [{"type": "string"}, listed]}}}
+
+
+def test_forms_offer_the_names_of_the_library_that_the_worker_has(
+    url: str, place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By whatever path it is reached. Another home, or the library of another service, changes nothing and says so."""
+    monkeypatch.setenv("PREFECT_API_URL", url)
+    identity = shelf().identity(make=True)
+    assert identity == shelf().identity() != ""
+    ANSWERS["/deployments/filter"] = [{"id": 1, "parameter_openapi_schema": form(["old"])}]
+    (place / "link").symlink_to(place / "library")
+    for folder in (place / "link", place / "library"):
+        monkeypatch.setenv("SHOAL_LIBRARY", str(folder))
+        assert choices.difference() == choices.refresh({"recordings": ["run"]}) == ""
+        assert choices.refresh({"recordings": ["run"]}, identity) == ""
+    assert len(CHANGED) == 4
+    monkeypatch.setenv("SHOAL_LIBRARY", str(place / "other"))
+    for made in (False, True):
+        assert bool(shelf().identity(make=made)) == made
+        assert f"uses the library {place / 'library'} on " in choices.difference()
+        assert f", not the library {place / 'other'}:" in choices.refresh()
+    assert ", not the library of that service:" in choices.refresh({"recordings": ["theirs"]}, "another")
+    added = CliRunner().invoke(main, ["library", "add", str(scene_library() / "single-pendulum.yaml"), "--name", "arm"])
+    assert (added.exit_code, added.stderr) == (0, f"note: {choices.difference()}\n")
+    assert len(CHANGED) == 4
 
 
 def test_an_entry_is_taken_from_the_library_of_a_service(url: str, place: Path) -> None:

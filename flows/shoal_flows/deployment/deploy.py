@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 from shoal.errors import ShoalError
+from shoal.shelf import shelf
 
 from shoal_flows.deployment import alert
 
@@ -18,6 +19,7 @@ def main() -> int:
     except ShoalError as error:
         sys.stderr.write(f"deploy: {error}\n")
         return error.exit_status
+    shelf().identity(make=True)
     command = [sys.executable, "-m", "prefect", "--no-prompt", "deploy", "--all"]
     if status := subprocess.run(command, check=False).returncode:
         return status

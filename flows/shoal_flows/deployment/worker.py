@@ -16,8 +16,9 @@ from contextlib import suppress
 from uuid import uuid4
 
 from shoal.errors import ShoalError
+from shoal.shelf import shelf
 
-from shoal_flows import alive, settings
+from shoal_flows import alive, choices, settings
 from shoal_flows.left import end_left
 
 _GRACE = 4.0
@@ -30,6 +31,9 @@ def main(arguments: Sequence[str]) -> int:
         settings.apply()
         if ended := end_left():
             sys.stderr.write(f"worker: {ended} runs that were broken off are ended\n")
+        shelf().identity(make=True)
+        if different := choices.difference():
+            sys.stderr.write(f"worker: {different}, then state the deployments again (make up)\n")
     except ShoalError as error:
         sys.stderr.write(f"worker: {error}\n")
         return error.exit_status

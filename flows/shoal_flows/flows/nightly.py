@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from prefect import flow
+from prefect import flow, get_run_logger
 from shoal_validation.nightly.hold import hold
 from shoal_validation.nightly.line import Line
 from shoal_validation.nightly.page import headline
@@ -13,6 +13,7 @@ from shoal_validation.nightly.plan import plan
 from shoal_validation.nightly.result import Night
 from shoal_validation.nightly.run import compiled
 
+from shoal_flows import events
 from shoal_flows.flows.parameters import ALL, Only
 from shoal_flows.flows.shown import Bar, ended, progress, show_result
 from shoal_flows.flows.tables import table
@@ -50,14 +51,21 @@ def nightly(only: Only = ALL, quick: bool = False) -> Validated:
     """
     problem = None if only == ALL else only
     lines = plan(problem, quick)
-    if problem is None:
-        compiled()
     with progress(len(lines), "lines of the night") as bar:
+        if problem is None:
+            with events.work("kernels (compiled on first use)"):
+                compiled(_said)
         held = hold(lines, quick=quick, only=problem, progress=_note(bar))
     night = held.night
     result = Validated(night, log_night(night, held.text))
     show_result(headline(night), f"{_changes(night)}{_table(night)}", result)
     return ended(result)
+
+
+def _said(line: str) -> None:
+    """Pass on a line of the compilation, to a terminal and to the log of the run."""
+    events.note(line)
+    get_run_logger().info(line)
 
 
 def _note(bar: Bar) -> Any:

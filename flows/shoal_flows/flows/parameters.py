@@ -19,7 +19,7 @@ from shoal.trajectory import Array
 from shoal_validation.nightly.plan import IDENTIFICATION
 from shoal_validation.problems import PROBLEMS
 
-from shoal_flows.choices import MARK, names
+from shoal_flows.choices import LIBRARY, MARK, library, names
 from shoal_flows.exports import FORMS
 
 
@@ -32,7 +32,7 @@ def _named(kind: str, own: str) -> Any:
 
     The field stands first: some of Prefect's forms return to the first that a text fits whenever it is changed.
     """
-    listed = {"type": "string", "title": "by name", "enum": names(kind), MARK: kind}
+    listed = {"type": "string", "title": "by name", "enum": names(kind), MARK: kind, LIBRARY: library()}
     return WithJsonSchema({"anyOf": [{"type": "string", "title": own}, listed]})
 
 

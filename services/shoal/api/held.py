@@ -23,7 +23,8 @@ def library(bench: Bench, asked: LibraryTask, note: Note) -> bytes:
     """Do what is asked and say what is there then. Raises InputError, NoSuch, TooMuch."""
     if asked.operation == "list":
         entries = [own.about(entry) for entry in own.entries()]
-        return to_json({"scenes": built_in_scenes(), "problems": built_in_problems(), "entries": entries})
+        names = {"scenes": built_in_scenes(), "problems": built_in_problems()}
+        return to_json({"identity": shelf().identity(), **names, "entries": entries})
     kind = own.kind_of(asked.kind).folder
     if asked.operation == "put":
         return to_json(own.about(_put(kind, asked, 1_000_000 * bench.settings.library_mb)))

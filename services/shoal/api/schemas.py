@@ -94,8 +94,12 @@ class LibraryEntry(BaseModel):
 
 
 class Library(BaseModel):
-    """Built-in names, and the entries of this installation's own library."""
+    """Built-in names, and the entries of this installation's own library.
 
+    identity: tells this library from others; empty before anything made it.
+    """
+
+    identity: str
     scenes: list[str]
     problems: list[str]
     entries: list[LibraryEntry]

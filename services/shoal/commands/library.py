@@ -126,8 +126,8 @@ def push(url: str, names: tuple[str, ...], kind: str | None, as_json: bool) -> N
         for one in chosen:
             tell(f"{_title(one)} to {url}")
             service.put_entry(one.kind, one.name, one.files())
-        there = service.ask("GET", "/v1/library", read=_names)
-    _changed(there)
+        there = service.ask("GET", "/v1/library", read=dict)
+    _changed(_names(there), there.get("identity", ""))
     told: dict[str, Any] = {"url": url, "entries": [library.about(one) for one in chosen]}
     screen.show(told, as_json, lambda: screen.say(*(f"{_title(one)}, version {one.version}" for one in chosen)))
 
@@ -139,13 +139,15 @@ def _names(found: dict[str, Any]) -> dict[str, list[str]]:
     return {kind: [entry["name"] for entry in found["entries"] if entry["kind"] == kind] for kind in KINDS}
 
 
-def _changed(names: dict[str, list[str]] | None = None) -> None:
-    """Tell whoever shows the names of the library; names: by kind, else those of the library here.
+def _changed(names: dict[str, list[str]] | None = None, identity: str | None = None) -> None:
+    """Update whatever shows the names of a library; print why something was not updated.
 
-    Other packages add whom to call by the entry points of the group `shoal.library`.
+    names: by kind, identity: of that library; else those of the library here. Other packages add functions by the
+    entry points of the group `shoal.library`; each returns a line for the user, or "".
     """
     for point in entry_points(group="shoal.library"):
-        point.load()(names)
+        if note := point.load()(names, identity):
+            click.echo(f"note: {note}", err=True)
 
 
 def _title(entry: Any) -> str:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Self
 
 import numpy as np
+from shoal.mechanics import notes
 from shoal.trajectory import Status
 
 from shoal_validation.nightly.measure import Measured, attempt
@@ -80,7 +82,8 @@ def _serve(pipe: Connection) -> None:
         except EOFError:
             return
         try:
-            found = attempt(run)
+            with notes.telling(lambda line: print(line, file=sys.stderr, flush=True)):  # noqa: T201 - progress
+                found = attempt(run)
         except Exception as error:
             # A defect in one line is its result, not the end of the night.
             found = Measured(str(Status.FAILED), np.nan, np.nan, f"{type(error).__name__}: {error}")
