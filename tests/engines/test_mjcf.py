@@ -112,7 +112,10 @@ def distances(scene: Scene, folder: Path) -> tuple[float, float]:
     path = folder / "machine.xml"
     path.write_text(text.text)
     found = read(path)
-    assert all(line.startswith("geoms: ") for line in found.left_out)
+    numerics = ("<option>: integrator, iterations, timestep, tolerance (", "<flag>: energy (", "<tendon>: ")
+    soft = tuple(f"<{kind}>: " for kind in ("connect", "weld", "joint"))
+    assert not found.missing
+    assert all(line.startswith(("geoms: ", *numerics, *soft)) for line in found.left_out), found.left_out
     back = simulate(Scene.parse({**found.scene, "solver": scene.solver.model_dump()}), times)
     assert back.ok, back.message
     away = 0.0

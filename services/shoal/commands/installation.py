@@ -93,20 +93,29 @@ def export(scene: str, to: str, values: Values, verify: bool, out: Out) -> None:
 
 @click.command("import")
 @click.argument("file", type=click.Path(path_type=Path))
+@click.option("--partial", is_flag=True, help="Write the scene although constraints of the file are not in it.")
 @options.out(".yaml", otherwise="; else the file's name")
-def import_scene(file: Path, out: Out) -> None:
-    """Write the machine of FILE (URDF, or MuJoCo's MJCF) as a scene. What a scene has not is listed on stderr."""
+def import_scene(file: Path, partial: bool, out: Out) -> None:
+    """Write the machine of FILE (URDF, or MuJoCo's MJCF) as a scene. What has no counterpart is listed on stderr."""
     import yaml
 
+    from shoal.errors import InputError
     from shoal.imported import read
     from shoal.whole import whole
 
     found = read(file)
+    if found.missing and not partial:
+        others = f" (and {len(found.missing) - 1} more)" if len(found.missing) > 1 else ""
+        what = f"{found.missing[0]}{others} has no counterpart: the scene would be another machine"
+        raise InputError(f"{file}: {what}; --partial writes the rest")
     path = out or Path(f"{found.scene['name']}.yaml")
     with whole(path) as part:
         part.write_text(yaml.safe_dump(found.scene, sort_keys=False), encoding="utf-8")
     for line in found.left_out:
-        click.echo(f"left out: {line}", err=True)
+        mark = "; the scene is another machine" if line in found.missing else ""
+        click.echo(f"left out: {line}{mark}", err=True)
+    for line in found.notes:
+        click.echo(f"note: {line}", err=True)
     for line in found.warnings:
         click.echo(f"note: MuJoCo says: {line}", err=True)
     click.echo(path)

@@ -23,15 +23,16 @@ def absent(source: Source) -> Iterator[str]:
         ("sensors", model.nsensor),
         ("cameras", model.ncam),
         ("lights", model.nlight),
-        ("flexible bodies", model.nflex),
     ):
         if count:
             yield f"{what}: {count}"
+    if model.nmocap:
+        yield f"mocap bodies: {model.nmocap}; they stand where the file draws them"
     if model.opt.density or model.opt.viscosity:
         yield f"the medium: density {model.opt.density:g}, viscosity {model.opt.viscosity:g}"
     if model.npair and not disables(model, source.mujoco.mjtDisableBit.mjDSBL_CONTACT):
         yield f"contact pairs: {model.npair}"
     if model.nplugin:
         yield f"plugins: {model.nplugin}"
-    if np.any(model.body_gravcomp):
-        yield "gravity compensation of bodies"
+    for body in np.flatnonzero(model.body_gravcomp):
+        yield f"body {source.names[body]}: gravity compensation {model.body_gravcomp[body]:g}"

@@ -16,7 +16,9 @@ from shoal.scene import GROUND
 def add_actuators(source: Source, parts: Parts) -> None:
     """Adds the forces [N] and torques [N m] of actuators that are constant; a line with the number of the others."""
     left = 0
-    names = source.called(source.mujoco.mjtObj.mjOBJ_ACTUATOR, source.model.nu, "actuator")
+    # nu counts control signals, of which an actuator may have several or none.
+    count = len(source.model.actuator_trntype)
+    names = source.called(source.mujoco.mjtObj.mjOBJ_ACTUATOR, count, "actuator")
     for number, name in enumerate(names):
         load = _load(source, number)
         if load is None:
@@ -24,7 +26,7 @@ def add_actuators(source: Source, parts: Parts) -> None:
         else:
             parts.loads[name if name not in parts.loads else f"{name}-push"] = load
     if left:
-        parts.left_out.append(f"actuators: {left}")
+        parts.left_out.append(f"actuators: {left}; what they do moves or holds the machine")
 
 
 def _load(source: Source, number: int) -> dict[str, Any] | None:
@@ -48,6 +50,9 @@ def _is_constant(source: Source, number: int) -> bool:
         and not model.actuator_gainprm[number][0]
         and not np.any(model.actuator_biasprm[number][1:])
         and not model.actuator_forcelimited[number]
+        and not model.actuator_damping[number]
+        and not np.any(model.actuator_dampingpoly[number])
+        and not model.actuator_armature[number]
         and not disables(model, mujoco.mjtDisableBit.mjDSBL_ACTUATION)
         and not model.opt.disableactuator >> int(model.actuator_group[number]) & 1
     )

@@ -1,46 +1,93 @@
-"""Loops that close, by `connect` and `weld` of bodies."""
+"""Equalities: loops closed by `connect` and `weld` of bodies, and gears by linear ones of two hinges."""
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from shoal.imported.axes import are_parallel
 from shoal.imported.parts import Parts
-from shoal.imported.rounding import ROUNDED
+from shoal.imported.rounding import ROUNDED, numbers
 from shoal.imported.source import Array, Source
+from shoal.scene.joints import MOST_TEETH
 
 
 def add_equalities(source: Source, parts: Parts) -> None:
-    """Adds the joints of loops, after the tendons: welds and balls that are closed at the start; lines for others."""
+    """Add the joints of equalities, after the tendons: closed loops and gears; lines for others."""
     model, kinds = source.model, source.mujoco.mjtEq
     for number, name in enumerate(source.called(source.mujoco.mjtObj.mjOBJ_EQUALITY, model.neq, "loop")):
         if number in parts.kept:
             continue
         kind = kinds(model.eq_type[number])
         what = f"equality {name}: {kind.name.removeprefix('mjEQ_').lower()}"
-        of_bodies = model.eq_objtype[number] == source.mujoco.mjtObj.mjOBJ_BODY
-        if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) or not of_bodies:
-            parts.left_out.append(what)
-        elif not model.eq_active0[number]:
+        joint: dict[str, Any] | None = None
+        if not model.eq_active0[number]:
             parts.left_out.append(f"{what}, not active")
-        elif (joint := _joint(source, number, kind == kinds.mjEQ_WELD)) is None:
-            parts.left_out.append(f"{what} in another pose than that of the start")
+            continue
+        if kind == kinds.mjEQ_JOINT:
+            joint, what = _gear(source, number), f"{what} {_coupled(source, number)}"
+        elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+            joint = _joint(source, number, kind == kinds.mjEQ_WELD)
+            what += " in another pose than that of the start" * (joint is None)
+        if joint is None:
+            parts.miss(what)
         else:
             parts.joints[name if name not in parts.joints else f"loop-{name}"] = joint
 
 
-def _joint(source: Source, number: int, weld: bool) -> dict[str, Any] | None:
-    """The joint of an equality of two bodies, if they stand as it holds them. A weld without torque is a ball."""
+def _coupled(source: Source, number: int) -> str:
+    """Return which joints an equality couples, as a sentence of a report says it."""
+    driven, driving = (int(one[number]) for one in (source.model.eq_obj1id, source.model.eq_obj2id))
+    follows = f" follows {source.joint_names[driving]}" if driving >= 0 else " is held"
+    return f"{source.joint_names[driven]}{follows}"
+
+
+def _gear(source: Source, number: int) -> dict[str, Any] | None:
+    """The gear of a linear equality of two hinges on the ground."""
     model = source.model
-    one, other, data = model.eq_obj1id[number], model.eq_obj2id[number], model.eq_data[number]
-    # The anchor of a weld lies in the second body, that of a connection in the first; then follows the other's.
-    near, far = (data[3:6], data[:3]) if weld else (data[:3], data[3:6])
-    place = _place(source, one, near)
+    driven, driving = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+    offset, ratio, *curved = model.eq_data[number][:5]
+    if driving < 0 or np.any(model.jnt_type[[driven, driving]] != int(source.mujoco.mjtJoint.mjJNT_HINGE)):
+        return None
+    if offset or any(curved) or abs(Fraction(ratio).limit_denominator(MOST_TEETH) - ratio) > 1e-9 * abs(ratio):
+        return None
+    bodies = [int(model.jnt_bodyid[one]) for one in (driving, driven)]
+    carried = any(source.owners[model.body_parentid[body]] for body in bodies)
+    if not ratio or carried or any(len(source.own(body)) != 1 for body in bodies):
+        return None
+    axis, second = source.data.xaxis[driving], source.data.xaxis[driven]
+    if parallel := are_parallel(axis, second):
+        ratio *= np.sign(axis @ second)
+    sides = zip(("first", "second"), bodies, (driving, driven), strict=True)
+    places = {side: source.at(body, source.data.xanchor[one]) for side, body, one in sides}
+    axes = {"axis": numbers(axis)} | ({} if parallel else {"second_axis": numbers(second)})
+    return {"kind": "gear", **places, "ratio": float(ratio), **axes}
+
+
+def _joint(source: Source, number: int, weld: bool) -> dict[str, Any] | None:
+    """The joint of an equality of two bodies or sites, if they stand as it holds them.
+
+    A weld without torque is a ball.
+    """
+    model, places = source.model, source.data.site_xpos
+    one, other, data = int(model.eq_obj1id[number]), int(model.eq_obj2id[number]), model.eq_data[number]
     rigid = weld and data[10] != 0
-    gap = np.linalg.norm(place - _place(source, other, far))
-    if gap > ROUNDED or (rigid and _turned(source, one, other, data[6:10]) > ROUNDED):
+    if model.eq_objtype[number] == source.mujoco.mjtObj.mjOBJ_SITE:
+        frames = (Rotation.from_matrix(source.data.site_xmat[site].reshape(3, 3)) for site in (one, other))
+        place, turned = places[one], _angle(*frames)
+        gap = np.linalg.norm(place - places[other])
+        one, other = (int(model.site_bodyid[site]) for site in (one, other))
+    else:
+        # The anchor of a weld lies in the second body, that of a connection in the first; then follows the other's.
+        near, far = (data[3:6], data[:3]) if weld else (data[:3], data[3:6])
+        place = _place(source, one, near)
+        gap = np.linalg.norm(place - _place(source, other, far))
+        first, second = (Rotation.from_quat(source.data.xquat[body], scalar_first=True) for body in (one, other))
+        turned = _angle(first * Rotation.from_quat(data[6:10], scalar_first=True), second) if rigid else 0.0
+    if gap > ROUNDED or (rigid and turned > ROUNDED):
         return None
     return {
         "kind": "weld" if rigid else "spherical",
@@ -55,8 +102,6 @@ def _place(source: Source, body: int, local: Array) -> Array:
     return place
 
 
-def _turned(source: Source, one: int, other: int, relative: Array) -> float:
-    """The angle [rad] by which the second body's rotation against the first is off a relative one."""
-    first, second = (Rotation.from_quat(source.data.xquat[body], scalar_first=True) for body in (one, other))
-    off = (first * Rotation.from_quat(relative, scalar_first=True)).inv() * second
-    return float(off.magnitude())
+def _angle(one: Rotation, other: Rotation) -> float:
+    """Return the angle [rad] between two orientations."""
+    return float((one.inv() * other).magnitude())

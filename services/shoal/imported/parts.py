@@ -16,7 +16,14 @@ class Parts:
     loads: dict[str, Any] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     """A line for everything that has no counterpart."""
+    missing: list[str] = field(default_factory=list)
+    """Those of them that hold bodies: without them the machine has other degrees of freedom."""
     kept: set[int] = field(default_factory=set)
     """Equalities that joints stand for already, as MuJoCo counts them."""
     away: dict[str, float] = field(default_factory=dict)
     """Of torsion springs that do not rest at the start, the angle [rad] from there to where they do."""
+
+    def miss(self, line: str) -> None:
+        """Note a constraint that has no counterpart."""
+        self.missing.append(line)
+        self.left_out.append(line)

@@ -13,49 +13,82 @@ import numpy as np
 from shoal.errors import InputError
 from shoal.imported.absent import absent
 from shoal.imported.actuators import add_actuators
+from shoal.imported.audit import MJCF, URDF, constraints, unread
 from shoal.imported.axes import Axes
 from shoal.imported.bodies import initial, is_mass, mass, rigid
 from shoal.imported.equalities import add_equalities
 from shoal.imported.hanging import hang
+from shoal.imported.markup import Element, parse, with_includes
 from shoal.imported.parts import Parts
 from shoal.imported.rounding import numbers
 from shoal.imported.source import Source
 from shoal.imported.springs import add_resistance
 from shoal.imported.switches import switch_off
 from shoal.imported.tendons import add_tendons
+from shoal.imported.urdf import urdf_spec
 from shoal.scene import GROUND, Scene
 
 
 @dataclass(frozen=True)
 class Imported:
-    """A scene as data, a line for everything of its file that is not in it, and what MuJoCo warns of."""
+    """A scene as data, and a report of what of its file is not in it.
+
+    left_out: a line for everything that has no counterpart; missing: those of them that hold bodies, without which the
+    scene has other degrees of freedom than the file: another machine; notes: assumptions where the file is silent;
+    warnings: those of MuJoCo
+    """
 
     scene: dict[str, Any]
     left_out: tuple[str, ...]
+    missing: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
 
 def read(file: Path) -> Imported:
-    """The scene of a URDF or MJCF file at its own start, in metres, kilograms, seconds and radians.
+    """Return the scene of a URDF or MJCF file at its own start, in metres, kilograms, seconds and radians.
 
-    Raises InputError if there is no such file, if MuJoCo refuses it, or if it has bodies or joints that no scene has,
-    and ModuleNotFoundError without MuJoCo.
+    Raises InputError if there is no such file, if MuJoCo refuses it, if nothing in it moves, or if it has bodies or
+    joints that no scene has, and ModuleNotFoundError without MuJoCo.
     """
     import mujoco
 
     if not file.is_file():
         raise InputError(f"{file}: no such file")
+    written = file.read_bytes()
+    root = parse(file, written)
     try:
         with warnings.catch_warnings(record=True, action="always") as told:
-            model = mujoco.MjSpec.from_file(str(file)).compile()
+            if root.tag == "robot":
+                spec, notes = urdf_spec(mujoco, file, written, root)
+            else:
+                spec, notes = mujoco.MjSpec.from_file(str(file)), []
+            model = spec.compile()
     except ValueError as error:
-        raise InputError(f"{file}: {' '.join(str(error).split())}") from None
+        said = " ".join(str(error).split())
+        shape = root.tag == "robot" and "opening file" in said
+        more = "; it would give a link its mass: give that link an <inertial> instead" if shape else ""
+        raise InputError(f"{file}: {said}{more}") from None
     switch_off(mujoco, model)
     source = Source.of(mujoco, model)
     parts = _parts(source)
+    if not parts.bodies:
+        raise InputError(f"{file}: nothing in it moves{''.join(f'; {note}' for note in notes)}")
+    _audit(file, root, parts)
     scene = _scene(source, parts, re.sub(r"[^A-Za-z0-9_-]", "-", file.stem))
     _rest(scene, Scene.parse(scene, str(file)), parts.away)
-    return Imported(scene, tuple(parts.left_out), tuple(" ".join(str(one.message).split()) for one in told))
+    warned = tuple(" ".join(str(one.message).split()) for one in told)
+    return Imported(scene, tuple(parts.left_out), tuple(parts.missing), tuple(notes), warned)
+
+
+def _audit(file: Path, root: Element, parts: Parts) -> None:
+    """List what of the file's XML is not translated."""
+    if root.tag == "robot":
+        for line in constraints(root):
+            parts.miss(line)
+        parts.left_out += unread(root, URDF)
+    else:
+        parts.left_out += unread(with_includes(root, file.parent), MJCF)
 
 
 def _parts(source: Source) -> Parts:
@@ -75,6 +108,8 @@ def _parts(source: Source) -> Parts:
     add_tendons(source, parts)
     add_equalities(source, parts)
     add_actuators(source, parts)
+    if model.nflex:
+        parts.miss(f"flexible bodies: {model.nflex}")
     parts.left_out += absent(source)
     return parts
 

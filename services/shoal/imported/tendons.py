@@ -18,7 +18,9 @@ def add_tendons(source: Source, parts: Parts) -> None:
     for number, name in enumerate(names):
         low, high = source.model.tendon_lengthspring[number]
         if not _is_straight(source, number) or low != high:
-            parts.left_out.append(f"tendon {name}: more than a spring between two sites")
+            acts = _law(source, number) or source.model.tendon_limited[number]
+            add = parts.miss if acts else parts.left_out.append
+            add(f"tendon {name}: more than a spring between two sites")
             continue
         parts.left_out += [f"tendon {name}: its {what}" for what in _further(source, number)]
         first = source.model.tendon_adr[number]
