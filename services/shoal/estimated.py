@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.regular import require_regular
 
 LARGEST = 200_000_000
 """Bytes of such a file; a larger one is none."""
@@ -21,6 +22,7 @@ def read_estimate(path: Path, asked: str, part: str) -> dict[str, Any]:
     asked: what the file was named in, which begins every refusal. Raises InputError.
     """
     wanted = "give what `shoal identify --out FILE.json` wrote"
+    require_regular(path, asked)
     try:
         if path.stat().st_size > LARGEST:
             raise InputError(f"{asked}: {path} is no estimate: it is too large")

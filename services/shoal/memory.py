@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from shoal.errors import ComputationError, InputError
+from shoal.regular import require_regular
 from shoal.trajectory import Array
 
 _MAGIC = b"shoal-checkpoint-2\n"
@@ -34,6 +35,7 @@ class Memory:
         self.path, self._of = path, of
         self.recalled = 0
         self._known: dict[bytes, Array] = {}
+        require_regular(path, "checkpoint")
         begin = _MAGIC + fingerprint.encode() + b"\n"
         try:
             kept = self._load(begin) if path.exists() and path.stat().st_size else 0

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shoal.errors import InputError
+from shoal.regular import require_regular
 from shoal.table_units import Units, is_unit_line, of_columns
 from shoal.trajectory import Array
 
@@ -92,6 +93,7 @@ def load_table(path: Path, columns: list[str] | None = None, *, largest: int | N
     largest: bytes, unpacked; LARGEST if not stated
     """
     largest = LARGEST if largest is None else largest
+    require_regular(path, "data")
     try:
         with path.open("rb") as file:
             data = file.read(largest + 1)

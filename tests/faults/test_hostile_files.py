@@ -104,6 +104,36 @@ def test_a_recording_that_is_no_file_is_not_read(what: str, tmp_path: Path) -> N
     assert result.stderr == f"shoal: {path}: cannot be read: not a file\n"
 
 
+SIGNALLED = """name: s
+bodies: {OA: {kind: rigid-rod, length: 1.0, mass: 1.0}}
+joints: {O: {first: {body: ground, point: [0, 0]}, second: {body: OA}}}
+markers: {A: {body: OA, point: end}}
+initial: {OA: {angle: 0.1}}
+"""
+TORQUE = "loads: {m: {kind: torque, at: {body: OA}, torque: {path: pipe.csv, column: x}}}"
+
+
+def test_no_option_or_field_waits_for_a_pipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody writes into it, and no time limit would end the wait."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("pipe.csv", "pipe.json", "pipe.bin"):
+        os.mkfifo(name)
+    Path("signal.yaml").write_text(SIGNALLED + TORQUE)
+    Path("from.yaml").write_text(SIGNALLED.replace("OA: {angle: 0.1}", "from: pipe.json"))
+    for arguments in (
+        ["identify", "kaheman-single", "--data", "pipe.csv", "--time-limit", "5"],
+        ["identify", "kaheman-single", "--values", "pipe.json"],
+        ["simulate", "signal.yaml"],
+        ["simulate", "from.yaml"],
+        ["uncertain", "single-pendulum", "--vary", "initial.OA.angle~empirical(pipe.csv)"],
+        ["uncertain", "single-pendulum", "--vary", "initial.OA.angle=0:1", "--checkpoint", "pipe.bin"],
+    ):
+        result = CliRunner().invoke(main, arguments)
+        assert (result.exit_code, result.stdout) == (2, ""), (arguments, result.exception)
+        assert len(result.stderr.splitlines()) == 1
+        assert "cannot be read: a pipe, which may never end; save it to a file first" in result.stderr, result.stderr
+
+
 def test_what_is_just_not_too_much_is_read(tmp_path: Path) -> None:
     """A table of the most rows, a scene that uses aliases, and a file of the largest size."""
     rows = ", ".join(f"[{k / 1000:.3f}, {k % 7}.25]" for k in range(20_000))

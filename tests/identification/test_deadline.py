@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from importlib import import_module
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +12,9 @@ import numpy as np
 import pytest
 from shoal.errors import InputError
 from shoal.identification import Problem, Verdict, identify
+from shoal.identification.conclude import Wishes
 from shoal.identification.deadline import Deadline, TimeIsUp, unless_late
+from shoal.mechanics.simulate import simulate
 from shoal.scene import load_scene
 
 SCENE = load_scene("single-pendulum")
@@ -125,3 +128,104 @@ def test_where_nothing_was_found_the_cost_is_told(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(Hurried, "left", 0)
     with pytest.raises(InputError, match="time_limit: nothing was found in 1 s"):
         identify(problem(), time_limit=1.0)
+
+
+class Expiring(Deadline):
+    """A limit that is over after so many looks at the clock, wherever they are; the answer gets a few more."""
+
+    looks, grace = 0, 0
+
+    @property
+    def remaining(self) -> float:
+        if self._end == -np.inf:
+            return -np.inf
+        type(self).looks -= 1
+        return 1e3 if type(self).looks >= 0 else -1.0
+
+    def extend(self) -> None:
+        if not self._extended:
+            self._extended = True
+            type(self).looks = max(type(self).looks, 0) + type(self).grace
+
+
+def exchanged(folder: Path) -> Problem:
+    """A double pendulum whose markers are exchanged in the recording: the longest way to a verdict."""
+    scene = load_scene("rigid-double-pendulum")
+    times = np.linspace(0.0, 1.0, 60)
+    moved = simulate(scene, times)
+    noise = np.random.default_rng(0).normal(0.0, 1e-3, (len(times), 4))
+    columns = np.column_stack([times, np.column_stack([moved.marker(name) for name in ("B", "A")]) + noise])
+    path = folder / "exchanged.csv"
+    np.savetxt(path, columns, delimiter=",", header="t,Ax,Ay,Bx,By", comments="")
+    channels = [{"marker": m, "quantity": q, "column": f"{m}{q}"} for m in "AB" for q in "xy"]
+    return problem(channels=channels, source={"kind": "file", "path": str(path)})
+
+
+CASES: dict[str, tuple[dict[str, Any], int]] = {
+    "auto": ({}, 24),
+    "multi-start": ({"method": "multi-start"}, 174),
+    "all wishes": ({"wishes": Wishes(profiles=True, bootstrap=5, sample=20)}, 310),
+    "held out": ({"hold_out": [(1.5, 2.0)]}, 57),
+    "tolerance": ({"tolerance": 1e-3}, 42),
+    "exchanged": ({"method": "multi-start"}, 1800),
+}
+"""What is asked for, and about how often the clock is looked at until the end."""
+
+
+def ends_clearly(case: str, looks: int, grace: int, folder: Path) -> None:
+    """Assert that the time may end at this look: an answer with a status, or one line that names the limit."""
+    asked = exchanged(folder) if case == "exchanged" else problem()
+    Expiring.looks, Expiring.grace = looks, grace
+    try:
+        found = identify(asked, time_limit=1.0, **CASES[case][0])
+    except InputError as error:
+        refused = str(error)
+    else:
+        refused = ""
+    if refused:
+        assert refused.startswith("time_limit: nothing was found in 1 s")
+        return
+    assert np.isfinite(found.fitness)
+    if Expiring.looks < 0 and found.verdict is Verdict.FAILED:
+        assert "no parameter set could be simulated" not in found.message
+        assert "stopped after 1 s" in found.message or "time was left" in found.message, found.message
+    if found.verdict.trusted:
+        assert np.isfinite([[p.lower, p.upper] for p in found.parameters.values()]).all()
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case != "exchanged"])
+def test_at_whatever_look_the_time_ends_the_answer_has_a_status(
+    case: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(import_module("shoal.identification.identify"), "Deadline", Expiring)
+    rng = np.random.default_rng(len(case))
+    for looks in rng.integers(0, CASES[case][1], 2).tolist():
+        ends_clearly(case, looks, int(rng.integers(0, 12)), tmp_path)
+    printed = capfd.readouterr()
+    assert "Traceback" not in printed.out + printed.err
+
+
+def test_time_that_ends_while_an_answer_is_written_up_is_no_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever that is: what needs no further run is the answer."""
+    module = import_module("shoal.identification.conclude")
+    combinations = module.combinations
+
+    def late(model: Any, *rest: Any) -> Any:
+        if model.deadline.remaining > 0.0:
+            raise TimeIsUp
+        return combinations(model, *rest)
+
+    monkeypatch.setattr(module, "combinations", late)
+    found = identify(problem(), time_limit=1e3)
+    assert found.verdict is Verdict.FAILED
+    assert "no time was left to judge the answer" in found.message
+    assert np.isfinite(found.fitness)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_the_time_may_end_at_any_look(case: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(import_module("shoal.identification.identify"), "Deadline", Expiring)
+    most, rng = CASES[case][1], np.random.default_rng(0)
+    for looks in range(0, most, max(most // 30, 1)):
+        ends_clearly(case, looks, int(rng.integers(0, 30)), tmp_path)

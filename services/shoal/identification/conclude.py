@@ -221,7 +221,9 @@ def _known(model: ForwardModel, outcome: Outcome, near: Evidence, profiles_too: 
 def _judged(model: ForwardModel, near: Evidence, known: _Known) -> Judgement:
     """The verdict; a failure where the answer cannot be simulated."""
     if near.possible:
-        return judge(model, known.outcome, near.seen, near.at, near.tests, known.values, known.combinations)
+        given = near.seen, near.at, near.tests, known.values, known.combinations
+        late = Judgement(Verdict.FAILED, "no time was left to judge the answer", ["allow more time"])
+        return unless_late(lambda: judge(model, known.outcome, *given), late)
     why = f" ({model.failure})" if model.failure else ""
     return Judgement(Verdict.FAILED, f"no parameter set could be simulated{why}; look at starts, bounds and the scene")
 

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
+import numpy as np
+
 from shoal.mechanics import clock
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory
@@ -49,6 +51,10 @@ class Deadline:
         if not self._extended:
             self._end += _OVER * self.limit + _GRACE
             self._extended = True
+
+    def spend(self) -> None:
+        """End all time that is left: every further simulation is refused."""
+        self._end = -np.inf
 
     @contextmanager
     def paused(self) -> Iterator[None]:

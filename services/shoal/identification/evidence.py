@@ -64,9 +64,10 @@ class Evidence:
 
 def evidence(model: ForwardModel, point: Array) -> Evidence:
     """Around a point, as far as time allows."""
-    predicted = {name: _predicted(model, point, name) for name in model.measurement.recordings}
+    foreseen = unless_late(lambda: _predicted(model, point), None)
+    predicted = foreseen or _unpredicted(model)
     residual = model.compared(point[None], {name: seen[None] for name, seen in predicted.items()})[0]
-    looked = unless_late(lambda: believed(model, point, residual), None)
+    looked = None if foreseen is None else unless_late(lambda: believed(model, point, residual), None)
     seen = looked or _unseen(model, residual)
     tested = bool(np.all(np.isfinite(residual)))
     possible = tested or looked is None
@@ -107,7 +108,11 @@ def _unseen(model: ForwardModel, residual: Array) -> Sensitivity:
     return Sensitivity(residual, nothing, np.inf, np.inf, nothing)
 
 
-def _predicted(model: ForwardModel, point: Array, name: str) -> Array:
-    """Channels of a recording at an answer, (samples, channels); nan where there is no time to run it."""
-    nothing = np.full((1, *model.measurement.recordings[name].values.shape), np.nan)
-    return np.asarray(unless_late(lambda: model.observe(point[None], name), nothing)[0])
+def _predicted(model: ForwardModel, point: Array) -> dict[str, Array]:
+    """Return the channels of each recording at an answer, (samples, channels). Raises TimeIsUp."""
+    return {name: np.asarray(model.observe(point[None], name)[0]) for name in model.measurement.recordings}
+
+
+def _unpredicted(model: ForwardModel) -> dict[str, Array]:
+    """Return nan for the channels of each recording, where there is no time to run it."""
+    return {name: np.full(recording.values.shape, np.nan) for name, recording in model.measurement.recordings.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Callable, Mapping
 from contextlib import closing, nullcontext
 from dataclasses import replace
@@ -39,6 +40,9 @@ from shoal.versions import versions
 Watch = Callable[[int, float, float, int], None]
 """Called with (iteration, best fitness, mean fitness of the iteration, evaluations so far)."""
 
+_WORTH_A_NOTE = 1.0
+"""Seconds of compiling."""
+
 
 def identify(
     problem: Problem,
@@ -70,6 +74,7 @@ def identify(
     wishes: what is to be known beyond the answer;
     progress: is told how the search goes. Raises InputError, ComputationError.
     """
+    begun_at, counted_from = time.monotonic(), clock.now()
     check(seed=seed, tolerance=tolerance, time_limit=time_limit, bootstrap=wishes.bootstrap, sample=wishes.sample)
     name = method or problem.method
     search = get_method(name)
@@ -103,8 +108,21 @@ def identify(
         begin = clock.now()
         model, outcome, stages = _search(model, search, np.random.default_rng(seed), tolerance, paces, progress)
         wall = clock.now() - begin
-        estimate = conclude(model, outcome, name, seed, wall, stages, wishes)
-        return replace(estimate, notes=[*notes, *estimate.notes])
+        estimate = _concluded(model, outcome, name, seed, wall, stages, wishes)
+    compiled = time.monotonic() - begun_at - (clock.now() - counted_from)
+    if deadline is not None and compiled >= _WORTH_A_NOTE:
+        notes.append(f"compiling kernels took {compiled:.0f} s, which the limit of {deadline.limit:g} s does not count")
+    return replace(estimate, notes=[*notes, *estimate.notes])
+
+
+def _concluded(model: ForwardModel, outcome: Outcome, *how: Any) -> Estimate:
+    """The estimate of an outcome; where the time ends while it is made, what needs no further run."""
+    try:
+        return conclude(model, outcome, *how)
+    except TimeIsUp:
+        assert model.deadline is not None
+        model.deadline.spend()
+        return conclude(model, replace(outcome, ended=False, message="no time was left to judge the answer"), *how)
 
 
 def _assembled(model: ForwardModel) -> tuple[ForwardModel, list[str]]:

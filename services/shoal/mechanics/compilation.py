@@ -66,7 +66,7 @@ class _Listener(event.Listener):  # type: ignore[misc]
         self._begin = time.perf_counter()
         if not self._told and event.data["dispatcher"].__name__ in SECONDS:
             self._told = True
-            tell("compiling what the solver lacks for this machine, once")
+            tell("compiling what the solver lacks for this machine, once, which time limits do not count")
 
     def on_end(self, event: Any) -> None:
         """A kernel is done, or could not be compiled."""

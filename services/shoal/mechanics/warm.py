@@ -111,7 +111,8 @@ def ahead(wanted: Iterable[Kernel], note: Note) -> None:
     workers = min(os.cpu_count() or 1, len(missing))
     wait = max(missing[0].seconds, sum(one.seconds for one in missing) / workers)
     cores = f"{workers} cores" if workers > 1 else "one core"
-    note(f"compiling {len(missing)} kernels for this machine, once: about {wait:.0f} s on {cores}")
+    what = f"compiling {len(missing)} kernels for this machine, once"
+    note(f"{what}: about {wait:.0f} s on {cores}, which time limits do not count")
     try:
         with clock.stopped(), ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
             for number, done in enumerate(as_completed([pool.submit(_compile, one) for one in missing]), 1):

@@ -12,6 +12,7 @@ import numpy as np
 from scipy import stats
 
 from shoal.errors import InputError
+from shoal.regular import require_regular
 from shoal.response.inputs import Correlations, Parameter
 from shoal.response.marginals import Empirical, Frozen, Interval, Marginal, Normal, Uniform
 from shoal.response.posterior import from_posterior, is_source
@@ -268,6 +269,7 @@ def _distribution(name: str, text: str) -> Marginal:
 
 
 def _empirical(name: str, file: str, text: str) -> Marginal:
+    require_regular(Path(file), f"vary: {name}~{text}")
     try:
         lines = [line for line in Path(file).read_text().splitlines() if line.strip() and not line.startswith("#")]
         data = np.loadtxt(lines[_is_name(lines) :], delimiter=",", ndmin=1, dtype=float)

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationError
 
 from shoal.errors import InputError
+from shoal.regular import require_regular
 from shoal.response.read import correlations, prices
 from shoal.scene import Scene, load_scene
 from shoal.scene.load import LARGEST, read_yaml, unknown
@@ -122,6 +123,7 @@ def scene_of(stated: str, document: Path) -> str:
 def load_study(given: str) -> Stated:
     """A study by its name, built in or in the library, or from a file. Raises InputError."""
     document = Path(document_of(given))
+    require_regular(document, "study")
     try:
         if document.stat().st_size > LARGEST:
             raise InputError(f"{given}: larger than the {LARGEST} bytes that are read")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shoal.errors import InputError
+from shoal.regular import require_regular
 from shoal.scene.record import Record
 from shoal.shelf import LARGEST
 
@@ -81,6 +82,7 @@ def mesh_of(body: Any) -> dict[str, int]:
 
 def read_end(path: Path) -> Any:
     """What the JSON of a run (`shoal simulate --json`, `--out FILE.json`) tells of its end. Raises InputError."""
+    require_regular(path, "initial.from")
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST + 1)

@@ -180,7 +180,7 @@ def _rejected(
     if said:
         reason += f"; {said}"
         advice.insert(0 if found and found[0].after > _LOUD * tests.explained else len(advice), do)
-    if (exchange := exchanged(model)) is not None:
+    if (exchange := unless_late(lambda: exchanged(model), None)) is not None:
         reason += f"; {exchange}"
         advice.append("check which column is which marker")
     advice.append("look for another minimum (--method multi-start)")

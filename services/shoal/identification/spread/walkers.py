@@ -86,7 +86,10 @@ def sampler(density: LogDensity, near: Independent, walkers: int, alike: bool) -
     # Halves are every other walker, so that each has its part of every ensemble, in order.
     among = [_apart(move(randomize_split=False)) for move in (DEMove, StretchMove)]
     moves = list(zip((MHMove(near.propose), *among), _MOVES[alike], strict=True))
-    return EnsembleSampler(walkers, len(near.centre), density, moves=moves, vectorize=True)
+    found = EnsembleSampler(walkers, len(near.centre), density, moves=moves, vectorize=True)
+    # The wrapper around it prints every exception with all points to stdout, also the expected one of a deadline.
+    found.log_prob_fn = density
+    return found
 
 
 def _apart(move: Any) -> Any:
