@@ -28,13 +28,13 @@ def friction(scene: Scene, reactions: Reactions | None) -> str:
     return f"dry friction is left out ({', '.join(told)}): it may stick at other places, too"
 
 
-def driven(evaluator: Evaluator, q: Array, t: float) -> str:
-    """Which drives move at time t [s]; empty where none does."""
+def driving(evaluator: Evaluator, q: Array, t: float) -> list[str]:
+    """Names of joints and ground points whose drives move at time t [s]."""
     rates = zip(evaluator.model.constraint_names, evaluator.at(q, t=t).rate, strict=False)
-    names = dict.fromkeys(name for name, rate in rates if abs(rate) > STILL)
+    return list(dict.fromkeys(name for name, rate in rates if abs(rate) > STILL))
+
+
+def driven(evaluator: Evaluator, q: Array, t: float) -> str:
+    """Which drives move at time t [s], as a remark; empty where none does."""
+    names = driving(evaluator, q, t)
     return f"the motion of {', '.join(names)} at t = {t:g} s is left out" if names else ""
-
-
-def moving(rates: Array) -> str:
-    """Whether a start has rates, (unknowns,); empty where it is at rest."""
-    return "the motion of the start is left out" if np.max(np.abs(rates), initial=0.0) > STILL else ""

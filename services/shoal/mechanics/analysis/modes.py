@@ -1,4 +1,4 @@
-"""Eigenfrequencies and shapes of small motions about a state at rest.
+"""Eigenfrequencies and shapes of small motions about a state at rest, or about a steady motion (see `steady`).
 
 In a basis Z of the directions that the constraints leave free, Z' M Z = I, small motions obey
 y'' + Z' D Z y' + Z' (K + sum lambda_k C_k,qq) Z y = 0 with the lambda that hold the state. About a state that is not an
@@ -7,7 +7,7 @@ equilibrium these are the motions relative to its fall. Dry friction is left out
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -23,6 +23,9 @@ from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.singular import crossing
 from shoal.mechanics.analysis.small_motions import hides, pull
 from shoal.mechanics.analysis.statics import statics
+from shoal.mechanics.analysis.steady import Steady, steady_motion
+from shoal.mechanics.analysis.whirl import whirls
+from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.numerics.tile import Array
 from shoal.mechanics.reach import span
@@ -36,6 +39,8 @@ Complex = npt.NDArray[np.complex128]
 ABOUT = ("equilibrium", "start")
 COARSE = 0.5
 """An eigenvalue whose mesh error is above this part of it is not known."""
+MOVED = 1e-6
+"""A place farther from the start than this part of the machine's size is another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +50,8 @@ class Mode:
     eigenvalue [1/s]: imaginary part the frequency of the oscillation [rad/s], real part its growth. shape: displacement
     of the coordinates, real and with shape' M shape = 1 where nothing is damped, (unknowns,). points: displacement
     of the markers, (markers, d); angles: their turns, (markers,). hidden: whether the eigenvalue is 0 only as far as
-    round-off lets tell, which a motion that matters may hide behind.
+    round-off lets tell, which a motion that matters may hide behind. whirl: of a machine that turns, forward, backward
+    or none; rotating: whether the eigenvalue is that in the turning frame, as the motion has several at rest.
     """
 
     eigenvalue: complex
@@ -53,6 +59,8 @@ class Mode:
     points: Complex
     angles: Complex
     hidden: bool = False
+    whirl: str = ""
+    rotating: bool = False
 
     @property
     def angular_frequency(self) -> float:
@@ -75,6 +83,11 @@ class Mode:
         return 0.0 - self.eigenvalue.real / abs(self.eigenvalue) if self.eigenvalue else 0.0
 
     @property
+    def frame(self) -> str:
+        """The frame that the eigenvalue is stated in: fixed or rotating."""
+        return "rotating" if self.rotating else "fixed"
+
+    @property
     def kind(self) -> str:
         """Oscillating, creeping back, free (nothing pulls back), untold (free or slower than can be told), unstable."""
         if self.eigenvalue.real > 1e-9 * abs(self.eigenvalue):
@@ -88,8 +101,8 @@ class Mode:
 class Modes:
     """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
 
-    mesh_errors: how far each eigenvalue is from the limit of ever finer meshes, relative; empty if not known. moving:
-    which motion of the machine is left out
+    mesh_errors: how far each eigenvalue is from the limit of ever finer meshes, relative; empty if not known. speed:
+    of the steady motion that they are about [rad/s], None at rest
     """
 
     scene: Scene
@@ -100,7 +113,7 @@ class Modes:
     markers: tuple[str, ...]
     modes: tuple[Mode, ...]
     mesh_errors: tuple[float, ...] = ()
-    moving: str = ""
+    speed: float | None = None
 
     @property
     def ok(self) -> bool:
@@ -109,13 +122,11 @@ class Modes:
 
     @property
     def verdict(self) -> tuple[str, str]:
-        """The status (ok, unbalanced, moving, unstable, cannot-be-told or coarse-mesh), and why it is not ok."""
+        """The status (ok, unbalanced, unstable, cannot-be-told or coarse-mesh), and why it is not ok."""
         kinds = [mode.kind for mode in self.modes]
         coarse = [number for number, error in enumerate(self.mesh_errors, 1) if error > COARSE]
         if not self.balanced and self.about != "start":
             return "unbalanced", "the forces do not balance"
-        if self.moving:
-            return "moving", self.moving
         if "unstable" in kinds:
             return "unstable", "it does not stay there: a motion grows"
         if "untold" in kinds:
@@ -145,6 +156,8 @@ class Modes:
                 "damping_ratio": mode.damping_ratio,
                 "growth": mode.eigenvalue.real,
                 "mesh_error": self.mesh_errors[number] if self.mesh_errors else np.nan,
+                "whirl": mode.whirl,
+                "frame": mode.frame,
             }
             for number, mode in enumerate(self.modes)
         ]
@@ -158,6 +171,7 @@ class Modes:
             "message": self.message if why in self.message else "; ".join(filter(None, (self.message, why))),
             "about": self.about,
             "balanced": self.balanced,
+            "speed": self.speed,
             "modes": [
                 {
                     "kind": mode.kind,
@@ -166,6 +180,8 @@ class Modes:
                     "damped_frequency": mode.damped_frequency,
                     "damping_ratio": mode.damping_ratio,
                     "growth": mode.eigenvalue.real,
+                    "whirl": mode.whirl,
+                    "frame": mode.frame,
                     "mesh_error": self.mesh_errors[number] if self.mesh_errors else None,
                     "shape": {
                         name: {
@@ -188,12 +204,30 @@ def modes(
     count: int = 10,
     leave_unstable: bool = True,
 ) -> Modes:
-    """The lowest modes about the static equilibrium, or about the start of the scene, with drives at time [s].
+    """The lowest modes about the equilibrium, or about the start of the scene, with loads and drives at time [s].
 
-    Raises InputError if the scene cannot be modelled, ComputationError if there is no equilibrium or it is singular.
+    Where the start moves, the equilibrium is that of its steady motion, near the start. Raises InputError if the scene
+    cannot be modelled, ComputationError if there is no equilibrium, it is singular, or the motion is not steady.
     """
     one_of("about", about, ABOUT)
     check(time=time, count=count)
+    evaluator = Evaluator.of(scene, horizon=time)
+    if is_moving(evaluator, time):
+        q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
+        return modes_of_motion(scene, evaluator, q, v, about=about, time=time, count=count)[0]
+    return modes_at_rest(scene, about=about, time=time, count=count, leave_unstable=leave_unstable)
+
+
+def is_moving(evaluator: Evaluator, time: float) -> bool:
+    """Return whether the start has rates or a drive moves at time [s]."""
+    q, v = evaluator.model.q0[:, 0], evaluator.model.v0[:, 0]
+    return bool(np.max(np.abs(v), initial=0.0) > left_out.STILL or left_out.driving(evaluator, q, time))
+
+
+def modes_at_rest(
+    scene: Scene, *, about: str = "equilibrium", time: float = 0.0, count: int = 10, leave_unstable: bool = True
+) -> Modes:
+    """The lowest modes of a machine at rest, of whose start the rates are left out."""
     if about == "equilibrium":
         equilibrium = statics(scene, time, leave_unstable=leave_unstable)
         if not equilibrium.balanced:
@@ -203,8 +237,34 @@ def modes(
     q, gap = _balance(scene, evaluator, time).restore(evaluator.model.q0[:, 0].copy())
     if gap > 1e-9:
         raise ComputationError(f"{scene.name}: the joints cannot be closed at the start; they gape by {gap:.2g}")
-    found = _modes(scene, evaluator, q, time, count, "start", left_out.friction(scene, None))
-    return replace(found, moving=found.moving or left_out.moving(evaluator.model.v0[:, 0]))
+    return _modes(scene, evaluator, q, time, count, "start", left_out.friction(scene, None))
+
+
+def modes_of_motion(
+    scene: Scene, evaluator: Evaluator, q: Array, v: Array, *, about: str, time: float, count: int
+) -> tuple[Modes, Steady]:
+    """The lowest modes about the steady motion that begins at coordinates q with rates v, and that motion."""
+    placement = place(scene)
+    motion = steady_motion(scene, placement, evaluator, q, v, time, seek=about == "equilibrium")
+    metric, freedom = motion.metric, motion.here().freedom
+    if names := crossing(evaluator, metric, freedom, motion.q, time):
+        raise ComputationError(_singular(scene, names))
+    at, turning = _seen(scene, placement, evaluator, motion.q)
+    told = tuple(
+        Mode(one.value, one.shape, at @ one.shape, turning @ one.shape, False, one.whirl, one.rotating)
+        for one in whirls(motion, placement)[:count]
+    )
+    axis = ", ".join(f"{part:.4g}" for part in np.round(motion.axis, 9) + 0.0)
+    parts = [f"about the steady motion at {motion.speed:.6g} rad/s about ({axis})" if motion.speed else
+             "about the steady motion that advances"]  # fmt: skip
+    if motion.moved > MOVED * span(scene):
+        parts.append(f"its place is {motion.moved:.2g} m from the start")
+    if any(mode.rotating for mode in told):
+        parts.append("frequencies of frame rotating are those in the turning frame")
+    if dry := left_out.friction(scene, None):
+        parts.append(dry)
+    markers = tuple(scene.markers)
+    return Modes(scene, about, True, "; ".join(parts), motion.q, markers, told, speed=motion.speed), motion
 
 
 def modes_about(equilibrium: Equilibrium, *, count: int = 10) -> Modes:
@@ -224,25 +284,34 @@ def _modes(scene: Scene, evaluator: Evaluator, q: Array, time: float, count: int
     balance = _balance(scene, evaluator, time)
     view = balance.look(q)
     if names := crossing(evaluator, balance.metric, view.freedom, q, time):
-        why = f"there {', '.join(names)} may move in more ways than beside it"
-        raise ComputationError(f"{scene.name}: no small motions about a singular place: {why}")
+        raise ComputationError(_singular(scene, names))
     roots = small(balance, q, view)
     squares = np.abs(roots.values) ** 2
     hidden = [
         not value and hides(level**2, squares, pull(scene))
         for value, level in zip(roots.values, roots.levels, strict=True)
     ]
-    placement, unknowns = place(scene), evaluator.model.unknowns
-    at = points([placement.point(scene, side) for side in scene.markers.values()], unknowns).matrix
-    lines = points([placement.direction(scene, side) for side in scene.markers.values()], unknowns)
-    turning = lines.turning(q)
+    at, turning = _seen(scene, place(scene), evaluator, q)
     told = tuple(
         Mode(complex(value), shape, at @ shape, turning @ shape, unknown)
         for value, shape, unknown in list(zip(roots.values, roots.shapes.T, hidden, strict=True))[:count]
     )
     balanced = balance.residual(view) <= BALANCED
-    return Modes(
-        scene, about, balanced, message, q, tuple(scene.markers), told, moving=left_out.driven(evaluator, q, time)
+    return Modes(scene, about, balanced, message, q, tuple(scene.markers), told)
+
+
+def _seen(scene: Scene, placement: Placement, evaluator: Evaluator, q: Array) -> tuple[Array, Array]:
+    """Displacements and turns of the markers by the coordinates, (markers, d, unknowns) and (markers, unknowns)."""
+    unknowns = evaluator.model.unknowns
+    at = points([placement.point(scene, side) for side in scene.markers.values()], unknowns).matrix
+    lines = points([placement.direction(scene, side) for side in scene.markers.values()], unknowns)
+    return at, lines.turning(q)
+
+
+def _singular(scene: Scene, names: tuple[str, ...]) -> str:
+    return (
+        f"{scene.name}: no small motions about a singular place: "
+        f"there {', '.join(names)} may move in more ways than beside it"
     )
 
 

@@ -185,11 +185,13 @@ def _exerted(title: str, headings: list[str], reactions: Reactions, values: Arra
 
 def modes_table(modes: Modes) -> None:
     """Frequencies, slowest first."""
-    headings = ("mode", "frequency [Hz]", "[rad/s]", "damping ratio", "growth [1/s]", "kind")
+    turning = ("whirl", "frame") if modes.speed is not None else ()
+    headings = ("mode", "frequency [Hz]", "[rad/s]", "damping ratio", "growth [1/s]", "kind", *turning)
     table = screen.table(f"{modes.scene.name}: small motions about the {modes.about}", *headings)
     for number, mode in enumerate(modes.modes, 1):
         numbers = (mode.frequency, mode.angular_frequency, mode.damping_ratio, mode.eigenvalue.real)
-        table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind)
+        seen = (mode.whirl or "-", mode.frame) if turning else ()
+        table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind, *seen)
     screen.out.print(table)
     if modes.message:
         screen.say(modes.message)
