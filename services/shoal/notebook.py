@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from shoal.identification import Estimate, Problem
     from shoal.identification.carried import Carried
     from shoal.identification.design import Design
+    from shoal.mechanics.analysis.campbell import Campbell
     from shoal.mechanics.analysis.equilibrium import Equilibrium
     from shoal.mechanics.analysis.joint_reactions import Reactions
     from shoal.mechanics.analysis.modes import Modes
@@ -229,18 +230,24 @@ def modes(
     *,
     count: int = 10,
     about: Literal["equilibrium", "start"] = "equilibrium",
+    speeds: Times | None = None,
     values: Values | None = None,
     verify: bool = True,
-) -> Modes:
+) -> Modes | Campbell:
     """The `count` lowest eigenfrequencies of a scene with their shapes, about its equilibrium or its start.
 
-    values: fields of the scene to set, by dotted path; verify: estimate the error of the mesh by a second run on twice
-    as many elements. Raises InputError.
+    Where the start moves they are those about its steady motion. speeds: of the body that turns fastest [rad/s], for a
+    Campbell diagram; at 0 the machine is at rest. values: fields of the scene to set, by dotted path; verify: estimate
+    the error of the mesh by a second run on twice as many elements. Raises InputError.
     """
-    from shoal.mechanics.analysis.mesh_error import of_modes
+    from shoal.mechanics.analysis.campbell import campbell
+    from shoal.mechanics.analysis.mesh_error import of_campbell, of_modes
     from shoal.mechanics.analysis.modes import modes
 
     wanted = _scene(scene, values)
+    if speeds is not None:
+        diagram = campbell(wanted, list(speeds), about=about, count=count)
+        return of_campbell(diagram, wanted) if verify else diagram
     found = modes(wanted, about=about, count=count)
     return of_modes(found, wanted) if verify else found
 

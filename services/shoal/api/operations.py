@@ -200,10 +200,14 @@ class Statics(AtRest):
 
 
 class Modes(AtRest):
-    """The `count` lowest eigenfrequencies and their shapes, about the equilibrium or the start."""
+    """The `count` lowest eigenfrequencies and their shapes, about the equilibrium or the start.
+
+    speeds: of the body that turns fastest [rad/s], for a Campbell diagram
+    """
 
     count: Annotated[int, limited("count", le=1000)] = 10
     about: Literal["equilibrium", "start"] = "equilibrium"
+    speeds: Annotated[list[Annotated[float, Field(ge=0)]], Field(min_length=1, max_length=1000)] | None = None
 
 
 class Reactions(OfScene):

@@ -41,20 +41,41 @@ def statics(
 @click.argument("scene")
 @click.option("--count", default=10, show_default=True, type=options.limited("count"), help="How many, lowest first.")
 @click.option("--about", default="equilibrium", show_default=True, type=click.Choice(["equilibrium", "start"]))
+@click.option(
+    "--speeds",
+    cls=options.Once,
+    metavar="LOW:HIGH:COUNT",
+    callback=options.speeds,
+    help="Campbell diagram: the modes at speeds [rad/s] of the body that turns fastest at the start; 0 is at rest.",
+)
 @options.values
 @options.verify
 @options.as_json
+@options.out(".json", ".png", ".html")
 def modes(
-    scene: str, count: int, about: Literal["equilibrium", "start"], values: Values, verify: bool, as_json: bool
+    scene: str,
+    count: int,
+    about: Literal["equilibrium", "start"],
+    speeds: list[float] | None,
+    values: Values,
+    verify: bool,
+    as_json: bool,
+    out: Out,
 ) -> None:
-    """Eigenfrequencies [Hz], damping and mode shapes of SCENE at rest. About its equilibrium, or its start."""
+    """Eigenfrequencies [Hz], damping and mode shapes of SCENE, about its equilibrium or its start.
+
+    Where the start moves they are those about its steady motion, with gyroscopic and centrifugal terms.
+    """
     from shoal.notebook import modes
+    from shoal.pictures import files
     from shoal.scene import load_scene
     from shoal.terminal import screen, tables
 
     wanted = load_scene(scene).with_values(values)
     with screen.working(f"modes of {wanted.name}"):
-        found = modes(wanted, about=about, count=count, verify=verify)
+        found = modes(wanted, about=about, count=count, speeds=speeds, verify=verify)
+    if out is not None:
+        files.modes(found, out)
     screen.show(found.to_json(), as_json, lambda: tables.modes_table(found))
     check_trusted(found.ok, found.verdict[1])
 

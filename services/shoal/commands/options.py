@@ -77,6 +77,25 @@ def axes(context: click.Context, parameter: click.Parameter, pairs: tuple[str, .
     return {path: _axis(path, text) for path, text in key_value(context, parameter, pairs).items()}
 
 
+def speeds(context: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> list[float] | None:
+    """LOW:HIGH:COUNT, or V,V,..., as speeds in rad/s."""
+    text: str | None = once(context, parameter, given)
+    if text is None:
+        return None
+    low, *others = text.split(":")
+    try:
+        if len(others) == 2 and 1 <= int(others[1]) <= 1000:
+            first, step = float(low), (float(others[0]) - float(low)) / max(int(others[1]) - 1, 1)
+            found = [first + k * step for k in range(int(others[1]))]
+        else:
+            found = [] if others else [float(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if not found or not all(0.0 <= speed < math.inf for speed in found):
+        raise click.BadParameter(f"{text!r} is not LOW:HIGH:COUNT nor a list of speeds in rad/s, such as 0:300:31")
+    return found
+
+
 def _axis(path: str, text: str) -> Any:
     import numpy as np
 

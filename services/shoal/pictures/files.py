@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from shoal.engines.sweep import Sweep
     from shoal.identification import Estimate, Problem
     from shoal.identification.design import Design
+    from shoal.mechanics.analysis.campbell import Campbell
     from shoal.mechanics.analysis.equilibrium import Equilibrium
+    from shoal.mechanics.analysis.modes import Modes
     from shoal.pictures.answer import Answer
     from shoal.response import Response
     from shoal.scene import Scene
@@ -204,7 +206,21 @@ def equilibrium(found: Equilibrium, path: Path) -> None:
     save(path, {".json": _json(found), ".png": lambda: _plotted(found)})
 
 
-def _plotted(result: Estimate | Sweep | Comparison | Equilibrium) -> bytes:
+def modes(found: Modes | Campbell, path: Path) -> None:
+    """The modes, or a Campbell diagram as a picture or a page. Raises InputError for a picture of one speed."""
+    from shoal.mechanics.analysis.campbell import Campbell
+
+    if path.suffix == ".json":
+        save(path, {".json": _json(found)})
+    elif isinstance(found, Campbell):
+        from shoal.pictures.campbell import page
+
+        save(path, {".png": lambda: _plotted(found), ".html": lambda: page(found)})
+    else:
+        raise InputError(f"out: {path} holds a Campbell diagram; add --speeds LOW:HIGH:COUNT, or write a .json")
+
+
+def _plotted(result: Estimate | Sweep | Comparison | Equilibrium | Campbell) -> bytes:
     """The picture that a notebook shows."""
     from shoal.pictures.inline import plot
     from shoal.pictures.style import png
@@ -212,6 +228,8 @@ def _plotted(result: Estimate | Sweep | Comparison | Equilibrium) -> bytes:
     return png(plot(result).figure)
 
 
-def _json(result: Trajectory | Design | Sweep | Comparison | Response | Equilibrium) -> Callable[[], str]:
+def _json(
+    result: Trajectory | Design | Sweep | Comparison | Response | Equilibrium | Modes | Campbell,
+) -> Callable[[], str]:
     """What `--json` prints, one number a line."""
     return lambda: json_text(result.to_json(), indent=1)

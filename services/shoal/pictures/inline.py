@@ -15,7 +15,9 @@ from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
 from shoal.errors import InputError
 from shoal.identification import Estimate
+from shoal.mechanics.analysis.campbell import Campbell
 from shoal.mechanics.analysis.equilibrium import Equilibrium
+from shoal.pictures.campbell import campbell
 from shoal.pictures.drawn import Drawn
 from shoal.pictures.engines import engines
 from shoal.pictures.motion import Motion, scene_motion
@@ -67,6 +69,11 @@ def _(trajectory: Trajectory) -> Picture:
 @plot.register
 def _(equilibrium: Equilibrium) -> Picture:
     return Picture(rest(equilibrium))
+
+
+@plot.register
+def _(diagram: Campbell) -> Picture:
+    return Picture(campbell(diagram))
 
 
 @plot.register

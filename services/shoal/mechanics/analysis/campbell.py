@@ -44,7 +44,7 @@ class Campbell:
         """The status (ok or that of the first speed without trusted modes), and why it is not ok."""
         for speed, found in zip(self.speeds, self.modes, strict=True):
             if found is None:
-                return "not-steady", f"at {speed:g} rad/s: {self.reasons[speed]}"
+                return "moving", f"at {speed:g} rad/s: {self.reasons[speed]}"
             status, why = found.verdict
             if status not in ("ok", "unstable"):
                 return status, f"at {speed:g} rad/s: {why}"
@@ -63,7 +63,7 @@ class Campbell:
 
     @property
     def critical_speeds(self) -> list[float]:
-        """Speeds [rad/s] at which a forward whirl has the frequency of the rotation, interpolated between given ones."""
+        """Speeds [rad/s] at which a forward whirl has the frequency of the rotation, interpolated linearly."""
         found: list[float] = []
         whirls = [
             [mode.eigenvalue.imag for mode in one.modes if mode.whirl == "forward"] if one else [] for one in self.modes
@@ -90,7 +90,7 @@ class Campbell:
             "about": self.about,
             "critical_speeds": self.critical_speeds,
             "speeds": [
-                (one.to_json() if one else {"status": "not-steady", "message": self.reasons[speed], "modes": []})
+                (one.to_json() if one else {"status": "moving", "message": self.reasons[speed], "modes": []})
                 | {"speed": speed}
                 for speed, one in zip(self.speeds, self.modes, strict=True)
             ],
@@ -122,7 +122,9 @@ def campbell(
                 f"initial.{next(iter(scene.bodies))}.{'rate: 1' if scene.dimensions == 2 else 'spin: [1, 0, 0]'}"
             )
         if driven := left_out.driving(evaluator, q, 0.0):
-            raise InputError(f"speeds: the drive {driven[0]} says how fast the machine turns; change it by --set instead")
+            raise InputError(
+                f"speeds: the drive {driven[0]} says how fast the machine turns; change it by --set instead"
+            )
     found: list[Modes | None] = []
     reasons: dict[float, str] = {}
     begin, rates, begun = q, v, 0.0

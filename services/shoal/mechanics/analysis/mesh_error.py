@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shoal.mechanics.analysis.campbell import Campbell, campbell
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.modes import Modes, modes
 from shoal.mechanics.analysis.statics import statics
@@ -61,7 +62,22 @@ def of_modes(found: Modes, scene: Scene) -> Modes:
     if not found.ok or (fine := finer(scene)) is None:
         return found
     second = modes(fine, about="start" if found.about == "start" else "equilibrium", count=len(found.modes))
-    if not second.ok or len(second.modes) < len(found.modes):
+    return _of(found, second) if second.ok else found
+
+
+def of_campbell(found: Campbell, scene: Scene) -> Campbell:
+    """The same at every speed of a Campbell diagram."""
+    if not found.ok or (fine := finer(scene)) is None:
+        return found
+    count = max((len(one.modes) for one in found.modes if one), default=1)
+    second = campbell(fine, found.speeds, about="start" if found.about == "start" else "equilibrium", count=count)
+    pairs = zip(found.modes, second.modes, strict=True)
+    return replace(found, modes=tuple(one and (_of(one, other) if other else one) for one, other in pairs))
+
+
+def _of(found: Modes, second: Modes) -> Modes:
+    """Modes with the errors that follow from those on a finer mesh."""
+    if len(second.modes) < len(found.modes):
         return found
     pairs = zip(found.modes, second.modes, strict=False)
     gaps = (_apart(one.eigenvalue, other.eigenvalue) for one, other in pairs)

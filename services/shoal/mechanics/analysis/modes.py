@@ -7,7 +7,7 @@ equilibrium these are the motions relative to its fall. Dry friction is left out
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -23,7 +23,7 @@ from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.singular import crossing
 from shoal.mechanics.analysis.small_motions import hides, pull
 from shoal.mechanics.analysis.statics import statics
-from shoal.mechanics.analysis.steady import Steady, steady_motion
+from shoal.mechanics.analysis.steady import NotSteadyError, Steady, steady_motion
 from shoal.mechanics.analysis.whirl import whirls
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.assembly.placement import place
@@ -102,7 +102,8 @@ class Modes:
     """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
 
     mesh_errors: how far each eigenvalue is from the limit of ever finer meshes, relative; empty if not known. speed:
-    of the steady motion that they are about [rad/s], None at rest
+    of the steady motion that they are about [rad/s], None at rest; moving: why the motion of the start, which is left
+    out, is no steady one
     """
 
     scene: Scene
@@ -114,6 +115,7 @@ class Modes:
     modes: tuple[Mode, ...]
     mesh_errors: tuple[float, ...] = ()
     speed: float | None = None
+    moving: str = ""
 
     @property
     def ok(self) -> bool:
@@ -122,11 +124,13 @@ class Modes:
 
     @property
     def verdict(self) -> tuple[str, str]:
-        """The status (ok, unbalanced, unstable, cannot-be-told or coarse-mesh), and why it is not ok."""
+        """The status (ok, unbalanced, moving, unstable, cannot-be-told or coarse-mesh), and why it is not ok."""
         kinds = [mode.kind for mode in self.modes]
         coarse = [number for number, error in enumerate(self.mesh_errors, 1) if error > COARSE]
         if not self.balanced and self.about != "start":
             return "unbalanced", "the forces do not balance"
+        if self.moving:
+            return "moving", f"{self.moving}; these modes are those at rest, which --speeds 0 takes as the answer"
         if "unstable" in kinds:
             return "unstable", "it does not stay there: a motion grows"
         if "untold" in kinds:
@@ -206,16 +210,21 @@ def modes(
 ) -> Modes:
     """The lowest modes about the equilibrium, or about the start of the scene, with loads and drives at time [s].
 
-    Where the start moves, the equilibrium is that of its steady motion, near the start. Raises InputError if the scene
-    cannot be modelled, ComputationError if there is no equilibrium, it is singular, or the motion is not steady.
+    Where the start moves, they are those about its steady motion; where it moves otherwise, those at rest, which are
+    not the answer (see `Modes.verdict`). Raises InputError if the scene cannot be modelled, ComputationError if there
+    is no equilibrium, it is singular, or small motions about a steady one are periodic in time.
     """
     one_of("about", about, ABOUT)
     check(time=time, count=count)
-    evaluator = Evaluator.of(scene, horizon=time)
+    evaluator, moving = Evaluator.of(scene, horizon=time), ""
     if is_moving(evaluator, time):
         q, v = (part[:, 0].copy() for part in (evaluator.model.q0, evaluator.model.v0))
-        return modes_of_motion(scene, evaluator, q, v, about=about, time=time, count=count)[0]
-    return modes_at_rest(scene, about=about, time=time, count=count, leave_unstable=leave_unstable)
+        try:
+            return modes_of_motion(scene, evaluator, q, v, about=about, time=time, count=count)[0]
+        except NotSteadyError as error:
+            moving = str(error).removeprefix(f"{scene.name}: ")
+    found = modes_at_rest(scene, about=about, time=time, count=count, leave_unstable=leave_unstable)
+    return replace(found, moving=moving)
 
 
 def is_moving(evaluator: Evaluator, time: float) -> bool:

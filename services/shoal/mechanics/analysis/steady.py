@@ -1,13 +1,14 @@
 """Steady motions (relative equilibria) of machines whose bodies turn and advance at constant rates.
 
-A steady motion is q(s) = exp(A s) q0 along an affine field X(q) = A q + a. The field is composed of twists: each body is
-carried about axes fixed in space (from the left), and a rigid body turns about axes of its own (from the right), as far
-as the coordinates that bodies share allow. With q = exp(A s) p the equations of motion become
+A steady motion is q(s) = exp(A s) q0 along an affine field X(q) = A q + a. The field is composed of twists: each body
+is carried about axes fixed in space (from the left), and a rigid body turns about axes of its own (from the right), as
+far as the coordinates that bodies share allow. With q = exp(A s) p the equations of motion become
 M (p'' + 2 A p' + A X) = Q(p, X + p') - C_q' lambda. They are independent of time where the tangents do not change along
 the motion: a round rotor on any bearings turns from the right and keeps its bearings at rest; a rotor of any shape on
-bearings that are the same about the axis is carried from the left, with its bearings, in a rotating frame. Where neither
+bearings that are the same about the axis is carried from the left, with its bearings, in a turning frame. Where neither
 holds, small motions have periodic coefficients (Floquet), and the motion is refused.
-Marsden and Ratiu, Introduction to Mechanics and Symmetry, 1999; Lalanne and Ferraris, Rotordynamics Prediction, 1998.
+Marsden and Ratiu, Introduction to Mechanics and Symmetry, 1999; Lalanne and Ferraris, Rotordynamics
+Prediction in Engineering, 1998.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 
 from shoal.errors import ComputationError
 from shoal.mechanics import plane
 from shoal.mechanics import rotation as turns
-from shoal.mechanics.analysis.balance import BALANCED, CLOSE, STALLED
+from shoal.mechanics.analysis.balance import BALANCED, CLOSE, STALLED, STRAINED
 from shoal.mechanics.analysis.evaluate import Evaluator, points
 from shoal.mechanics.analysis.freedom import Freedom, Metric
 from shoal.mechanics.analysis.small_motions import ROUND, Tangent
@@ -44,8 +46,14 @@ ANGLE = 1e-3
 """Half the step of differences along the motion [rad]."""
 LOOSE = 1e-9
 """Stiffnesses below this part of the largest, or of the speed squared, hold nothing: the phase of a motion is free."""
+EXACT = 1e-9
+"""Relative error of what is made of differences: of fields, by differences of accelerations, and of forces of rates."""
 MOST = 30
 """Iterations of Newton's method."""
+
+
+class NotSteadyError(ComputationError):
+    """A start that moves, and not steadily."""
 
 
 class Twist(NamedTuple):
@@ -82,7 +90,7 @@ class Twists:
         rng = np.random.default_rng(0)
         states = rng.normal(size=(12, unknowns))
         off = np.concatenate([self._off(q) for q in states])
-        _, sizes, ways = np.linalg.svd(off, full_matrices=True)
+        _, sizes, ways = np.linalg.svd(off, full_matrices=False)
         self.basis = ways[int(np.sum(sizes > 1e-9 * max(1.0, float(np.max(sizes, initial=0.0))))) :].T
 
     def _of_body(self, name: str, frame: Any, d: int) -> Iterator[Twist]:
@@ -90,13 +98,14 @@ class Twists:
         size = len(self.bodies) * d
 
         def twist(left: bool, spin: int | None, blocks: list[tuple[int, int, Array]], moved: Any = None) -> Twist:
-            matrix, constant = np.zeros((size, size)), np.zeros(size)
+            constant = np.zeros(size)
+            matrix = scipy.sparse.lil_array((size, size))
             for row, column, block in blocks:
                 matrix[d * row : d * row + d, d * column : d * column + d] += block
             for k in here if moved is not None else ():
                 if self.places[k]:
                     constant[d * k : d * k + d] = moved
-            return Twist(name, left, spin, matrix, constant)
+            return Twist(name, left, spin, matrix.tocsr(), constant)
 
         units = np.eye(d)
         quarters = [plane.QUARTER] if d == plane.DIMENSIONS else [_skew(axis) for axis in units]
@@ -182,7 +191,7 @@ class Steady:
 
     q, v: coordinates and rates at the time t [s]; matrix, constant: A and a of its field; carried: of each body the
     rate [rad/s] of the frame that it is seen in, (3,); axis: that the fastest body turns about, (3,); speed: of that
-    body [rad/s]; moved: how far the start is away [m]; balanced: whether the forces balance.
+    body [rad/s]; least: size of forces that count for nothing; moved: how far the start is away [m].
     """
 
     scene: Scene
@@ -196,6 +205,7 @@ class Steady:
     carried: dict[str, Array]
     axis: Array
     speed: float
+    least: float
     moved: float = 0.0
 
     def look(self, q: Array, v: Array, a: Array, t: float) -> Seen:
@@ -210,8 +220,8 @@ class Steady:
         damping = self.evaluator.damping(q, v).toarray()
         return Seen(
             evaluation.jacobian.toarray(), freedom, freedom.basis.T @ force, evaluation.gap, stiffness, damping,
-            max(self.metric.size(part) for part in
-                (evaluation.elastic, evaluation.force - evaluation.elastic, self.evaluator.mass @ a)),
+            max(self.least, *(self.metric.size(part) for part in
+                              (evaluation.elastic, evaluation.force - evaluation.elastic, self.evaluator.mass @ a))),
         )  # fmt: skip
 
     def here(self) -> Seen:
@@ -228,17 +238,17 @@ class Steady:
         return turned, turned @ self.q + moved[:n, n], turned @ self.v
 
     def stiffness(self, seen: Seen) -> Tangent:
-        """Stiffness of small motions in the moving frame, centrifugal, of dampers and other forces of rates included."""
+        """Stiffness of small motions in the moving frame, with the centrifugal one and that of forces of rates."""
         inertial = self.evaluator.mass @ self.matrix @ self.matrix
         friction = self._by_rates(seen)
         matrix = seen.stiffness.matrix + inertial - friction
-        bound = seen.stiffness.bound + ROUND * abs(inertial) + 1e-9 * abs(friction)
+        bound = seen.stiffness.bound + EXACT * (abs(inertial) + abs(friction))
         return Tangent(np.asarray(matrix), np.asarray(bound))
 
     def gyroscopic(self, seen: Seen) -> Tangent:
         """Damping and gyroscopic matrix of small motions in the moving frame."""
         coriolis = 2.0 * (self.evaluator.mass @ self.matrix)
-        return Tangent(seen.damping + coriolis, ROUND * (abs(seen.damping) + abs(coriolis)))
+        return Tangent(seen.damping + coriolis, ROUND * abs(seen.damping) + EXACT * abs(coriolis))
 
     def _by_rates(self, seen: Seen) -> Array:
         """Derivative along the free directions of the forces that the rates X(q) make."""
@@ -318,9 +328,7 @@ def steady_motion(
     raise refusal
 
 
-def _fields(
-    twists: Twists, evaluator: Evaluator, q: Array, v: Array, t: float
-) -> Iterator[tuple[Array, Array]]:
+def _fields(twists: Twists, evaluator: Evaluator, q: Array, v: Array, t: float) -> Iterator[tuple[Array, Array]]:
     """Weights of fields through a start, and of those that may be added, (fields,) and (fields, combinations).
 
     First the field whose motion has the start's acceleration and its rate, too; then, for starts out of balance, any
@@ -331,9 +339,7 @@ def _fields(
     any_of = _narrowed(root @ twists.at(q), root @ v, np.zeros(twists.basis.shape[1]), None)
     a = evaluator.acceleration(q, v, t)
     step = 1e-5 * float(np.linalg.norm(root @ v)) / max(float(np.linalg.norm(root @ a)), 1e-300)
-    before, after = (
-        evaluator.acceleration(q + s * v + 0.5 * s * s * a, v + s * a, t + s) for s in (-step, step)
-    )
+    before, after = (evaluator.acceleration(q + s * v + 0.5 * s * s * a, v + s * a, t + s) for s in (-step, step))
     found = any_of
     for state, wanted in ((v, a), (a, (after - before) / (2.0 * step))):
         size = float(np.linalg.norm(root @ state))
@@ -377,14 +383,14 @@ def _checked(
         raise _refused(begun, twists, v, size)
     if off > CONSTANT:
         raise ComputationError(
-            f"{found.scene.name}: turning at {found.speed:.4g} rad/s, the machine's {part} changes along the motion (by "
-            f"{off:.2g} of its size) in a frame at rest and in one that turns: small motions have coefficients that are "
-            "periodic in time, and no modes"
+            f"{found.scene.name}: at {found.speed:.4g} rad/s the {part} changes along the motion (by {off:.2g} of its "
+            "size) in a frame at rest and in one that turns: small motions have coefficients that are periodic in "
+            "time, and no modes"
         )
     return found
 
 
-def _refused(begun: Steady, twists: Twists, v: Array, size: float) -> ComputationError:
+def _refused(begun: Steady, twists: Twists, v: Array, size: float) -> NotSteadyError:
     """The refusal of a motion, with its largest residual acceleration along the field."""
 
     def residual(q: Array, v: Array, t: float) -> tuple[float, str]:
@@ -394,9 +400,9 @@ def _refused(begun: Steady, twists: Twists, v: Array, size: float) -> Computatio
     worst, body = max([residual(begun.q, v, begun.t), *(residual(*state) for state in states)])
     central, _ = twists.fastest(begun.matrix @ v, size)
     frame = f"in the frame that turns at {begun.speed:.4g} rad/s" if begun.speed else "as it advances"
-    return ComputationError(
+    return NotSteadyError(
         f"{begun.scene.name}: the start moves, and it is no steady motion: {frame} the residual acceleration of {body} "
-        f"is up to {worst:.3g} m/s^2 (the steady one is {central:.3g}); --speeds 0 gives the modes at rest"
+        f"is up to {worst:.3g} m/s^2 (the steady one is {central:.3g})"
     )
 
 
@@ -424,10 +430,9 @@ def _steady(
         fastest = whole if np.linalg.norm(whole) > (1.0 + 1e-9) * np.linalg.norm(fastest) else fastest
     speed = float(np.linalg.norm(fastest))
     axis = fastest / speed if speed else np.array([0.0, 0.0, 1.0])
-    whole = {name: rate if len(rate) == 3 else np.array([0.0, 0.0, float(rate[0])]) for name, rate in carried.items()}
-    return Steady(
-        scene, evaluator, metric, t, q, matrix @ q + constant, matrix, constant, whole, axis, speed
-    )  # fmt: skip
+    spatial = {name: rate if len(rate) == 3 else np.array([0.0, 0.0, float(rate[0])]) for name, rate in carried.items()}
+    least = STRAINED * metric.size(abs(evaluator.stiffness(q, t, load=0.0)) @ np.abs(q))
+    return Steady(scene, evaluator, metric, t, q, matrix @ q + constant, matrix, constant, spatial, axis, speed, least)
 
 
 def _constant(twists: Twists, begun: Steady, seen: Seen, weights: Array, idle: Array) -> Array:

@@ -1,10 +1,10 @@
 """Small motions about a steady motion: gyroscopic modes, as an observer at rest sees them, and their sense of whirl.
 
 In a basis Z of the free directions, Z' M Z = I, small motions in the moving frame obey
-y'' + Z' (D + 2 M A) Z y' + Z' (K + M A^2) Z y = 0. A frame that is carried at the rate W about n shifts what turns in it:
-of a displacement u the part along n keeps its frequency, and those that turn with and against the frame, (u1 +- i u2)/2,
-have it raised and lowered by W. A mode of which one part is nearly all has that frequency at rest; any other, as of a
-blade, is stated in the turning frame (Genta, Dynamics of Rotating Systems, 2005).
+y'' + Z' (D + 2 M A) Z y' + Z' (K + M A^2) Z y = 0. A frame that is carried at the rate W about n shifts what turns in
+it: of a displacement u the part along n keeps its frequency, and those that turn with and against the frame,
+(u1 +- i u2)/2, have it raised and lowered by W. A mode of which one part is nearly all has that frequency at rest; any
+other, as of a blade, is stated in the turning frame (Genta, Dynamics of Rotating Systems, 2005).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from shoal.mechanics.affine import combined
 from shoal.mechanics.analysis.damped import Complex, roots
 from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.analysis.small_motions import parts_of, spectrum
-from shoal.mechanics.analysis.steady import Steady
+from shoal.mechanics.analysis.steady import FITS, Steady
 from shoal.mechanics.assembly.coordinates import Placement
 from shoal.mechanics.frames import BeamFrame, RigidFrame
 from shoal.mechanics.numerics.tile import Array
@@ -74,6 +74,7 @@ class _Observed:
         for name, weight, matrix in _motions(steady, placement):
             carried = steady.carried[name]
             rate = float(np.linalg.norm(carried))
+            rate = rate if rate > FITS * steady.speed else 0.0
             axis = carried / rate if rate else steady.axis
             one, other = (np.asarray(side).ravel() for side in turns.across(axis[:, None]))
             rows.append(weight * (np.stack([one, other, axis]) @ matrix))
@@ -84,7 +85,11 @@ class _Observed:
     def mode(self, value: complex, shape: Complex, level: float) -> Whirl:
         """One mode, as it is seen at rest."""
         first, second, along = np.moveaxis(self.matrix @ shape, 1, 0) if len(self.rates) else np.zeros((3, 0))
-        parts = {1: np.abs(first + 1j * second) ** 2 / 2, -1: np.abs(first - 1j * second) ** 2 / 2, 0: np.abs(along) ** 2}
+        parts = {
+            1: np.abs(first + 1j * second) ** 2 / 2,
+            -1: np.abs(first - 1j * second) ** 2 / 2,
+            0: np.abs(along) ** 2,
+        }
         shares: dict[float, Array] = {}
         for sign, energies in parts.items():
             for rate, energy in zip(self.rates, energies, strict=True):
@@ -129,24 +134,28 @@ def _motions(steady: Steady, placement: Placement) -> list[tuple[str, float, Arr
             continue
         centre = frame.origin + combined(frame.directors, _centre(scene, name))
         found.append((name, np.sqrt(mass), _spatial(points([centre], n).matrix[0])))
-        inertia = float(np.mean(np.abs(np.linalg.eigvals(np.atleast_2d(_inertia(body))))))
-        found.append((name, np.sqrt(inertia), _rotation(frame, steady.q)))
+        found.append((name, np.sqrt(_across(body, frame, steady)), _rotation(frame, steady.q)))
     return found
 
 
 def _centre(scene: Scene, name: str) -> tuple[float, ...]:
-    centre = [float(np.max(np.asarray(part))) for part in np.atleast_1d(scene.bodies[name].centre_of_mass)]
+    body: Any = scene.bodies[name]
+    centre = [float(np.max(np.asarray(part))) for part in np.atleast_1d(body.centre_of_mass)]
     return tuple([*centre, 0.0, 0.0][: scene.dimensions])
 
 
-def _inertia(body: Any) -> Any:
-    """Moments of inertia of a body, a number or a matrix [kg m^2]."""
+def _across(body: Any, frame: RigidFrame, steady: Steady) -> float:
+    """Mean moment of inertia of a body about the axes across that of the motion [kg m^2]."""
     inertia = np.asarray(body.inertia, dtype=float)
-    return np.diag(inertia) if inertia.ndim == 1 else inertia
+    if inertia.ndim == 0:
+        return float(inertia)
+    matrix = np.diag(inertia) if inertia.ndim == 1 else inertia
+    axis = points(list(frame.directors), len(steady.q)).at(steady.q) @ steady.axis
+    return float(np.trace(matrix) - axis @ matrix @ axis) / 2
 
 
 def _rotation(frame: RigidFrame, q: Array) -> Array:
-    """Small rotation of a rigid body by the coordinates, (3, unknowns): half the sum of directors times their change."""
+    """Small rotation of a rigid body, half the sum of directors times their changes, (3, unknowns)."""
     found = points(list(frame.directors), len(q))
     now = found.at(q)
     if now.shape[1] == 2:

@@ -14,6 +14,7 @@ from shoal.terminal import screen
 if TYPE_CHECKING:
     from shoal.engines.compare import Comparison
     from shoal.engines.sweep import Sweep
+    from shoal.mechanics.analysis.campbell import Campbell
     from shoal.mechanics.analysis.equilibrium import Equilibrium
     from shoal.mechanics.analysis.joint_reactions import Reactions
     from shoal.mechanics.analysis.modes import Modes
@@ -183,8 +184,22 @@ def _exerted(title: str, headings: list[str], reactions: Reactions, values: Arra
     screen.out.print(table)
 
 
-def modes_table(modes: Modes) -> None:
-    """Frequencies, slowest first."""
+def modes_table(modes: Modes | Campbell) -> None:
+    """Frequencies, slowest first; of a Campbell diagram at each speed."""
+    from shoal.mechanics.analysis.campbell import Campbell
+
+    if isinstance(modes, Campbell):
+        from shoal.pictures.campbell import HEADINGS, rows, says
+
+        table = screen.table(f"{modes.scene.name}: small motions about the {modes.about} by speed", *HEADINGS)
+        for row in rows(modes):
+            table.add_row(*row)
+        screen.out.print(table)
+        screen.say(says(modes))
+        errors = [error for one in modes.modes if one for error in one.mesh_errors]
+        if errors:
+            screen.say(f"estimated mesh error of the eigenvalues: {max(errors):.1e} of their size, at most")
+        return
     turning = ("whirl", "frame") if modes.speed is not None else ()
     headings = ("mode", "frequency [Hz]", "[rad/s]", "damping ratio", "growth [1/s]", "kind", *turning)
     table = screen.table(f"{modes.scene.name}: small motions about the {modes.about}", *headings)
