@@ -11,6 +11,7 @@ import orjson
 import pytest
 from scipy import stats
 from shoal.engines.sweep import SpotCheck
+from shoal.error_budget import ErrorBudget
 from shoal.scene import load_scene
 from shoal.trajectory import Status
 from shoal.wire import KIND, packed, unpacked
@@ -27,7 +28,7 @@ def drawn(rng: np.random.Generator, depth: int = 0) -> Any:
         None, True, int(rng.integers(-(2**62), 2**62)), bits, -0.0, math.inf, complex(bits, -math.inf), "\u00b5@\n",
         np.float64(bits), np.bool_(True), rng.integers(0, 2**64, (2, 0, 3), dtype=np.uint64), Status.DRIFTED,
         rng.integers(0, 2**64, (3, 2), dtype=np.uint64).view(np.float64).T, np.array(["a", "bc"]),
-        SpotCheck(1, 2, bits),
+        SpotCheck(1, 2, ErrorBudget({"time": bits})),
     )  # fmt: skip
     if depth == 3 or rng.random() < 0.4:
         return leaves[rng.integers(len(leaves))]

@@ -189,14 +189,16 @@ def compare(
     times: Times | None = None,
     *,
     values: Values | None = None,
+    verify: bool = True,
 ) -> Comparison:
     """Run a scene on several engines; `differences()` tells how far apart they come out.
 
-    engines: by name; else our solver and at most two that can run the scene. Raises InputError.
+    engines: by name; else our solver and at most two that can run the scene; verify: estimate the errors that they may
+    share, of the mesh and of the theory, by more careful runs of one. Raises InputError.
     """
     from shoal.engines.compare import compare
 
-    return compare(_scene(scene, values), engines, times)
+    return compare(_scene(scene, values), engines, times, verify)
 
 
 def statics(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
 
 if TYPE_CHECKING:
@@ -91,6 +92,11 @@ class Trajectory:
         """Whether every lane may be believed."""
         return all(status is Status.OK for status in self.status)
 
+    @property
+    def errors(self) -> ErrorBudget:
+        """What is known of how far the markers are off [m]; empty where it was not estimated."""
+        return ErrorBudget.from_json(self.model.get("errors"))
+
     def __repr__(self) -> str:
         what = f"{self.lanes} lanes" if self.lanes > 1 else str(self.status[0])
         return f"Trajectory({', '.join(self.markers)}; {len(self.times)} samples, {self.engine}, {what})"
@@ -164,6 +170,7 @@ class Trajectory:
                 for name in self.markers
             },
             "final": {name: plain(self.marker(name, lane)[-1]) for name in self.markers},
+            "error": plain(self.errors.total),
             "energy_drift": plain(self.energy_drift[lane]),
             "constraint_drift": plain(self.constraint_drift[lane]),
             "steps": self.steps,

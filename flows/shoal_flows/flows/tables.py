@@ -27,8 +27,7 @@ def of_motion(motion: Trajectory) -> str:
     shown = table(("marker", *_places(motion.axes)), ends) if motion.ok else "No places are shown, as it is rejected."
     evidence = f"{motion.status[0]}; energy drift {motion.energy_drift[0]:.1e}, constraint drift "
     evidence += f"{motion.constraint_drift[0]:.1e}, {motion.steps} steps, {motion.wall_s:.3f} s"
-    verification = motion.model.get("verification")
-    notes = remarks(motion.model) + ([] if verification is None else list(estimates(verification)))
+    notes = remarks(motion.model) + list(estimates(motion))
     return "\n\n".join([shown, evidence, *notes])
 
 
@@ -38,6 +37,8 @@ def of_comparison(comparison: Comparison) -> str:
     rows += [(engine, "refused", reason, "") for engine, reason in comparison.refused.items()]
     shown = table(("engines", "marker", "largest distance [m]", "distance at the end [m]"), rows)
     notes = next(filter(None, (remarks(motion.model) for motion in comparison.trajectories.values())), [])
+    if comparison.errors.estimates:
+        notes = [f"Known error of the model that they share: {comparison.errors}.", *notes]
     return "\n\n".join([shown, *notes])
 
 
@@ -61,7 +62,8 @@ def of_response(found: Response) -> str:
         if not brief or told in brief:
             ends.setdefault(f"{name.partition('.')[0]}.{of}", {})[told] = value
     shown = table(("at the end", *next(iter(ends.values()))), ((of, *told.values()) for of, told in ends.items()))
-    said = [f"{found.status}; {found.evaluations} runs; {found.why}", found.message, found.mixes_starts]
+    evidence = f"{found.status}, {found.errors.brief}; {found.evaluations} runs; {found.why}"
+    said = [evidence, found.message, found.mixes_starts]
     for one in found.limits:
         kept = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
         told = (
@@ -79,7 +81,8 @@ def of_response(found: Response) -> str:
 def of_equilibrium(found: Equilibrium) -> str:
     """Where the markers rest, and the evidence."""
     rows = [(name, *found.marker(name), found.angle(name)) for name in found.markers]
-    evidence = f"{found.status}; {found.residual:.1e} of the forces is not balanced, {found.iterations} iterations"
+    evidence = f"{found.status}, {found.errors.brief}; {found.residual:.1e} of the forces is not balanced, "
+    evidence += f"{found.iterations} iterations"
     places = _places("xyz"[: found.scene.dimensions])
     return table(("marker", *places, "angle [rad]"), rows) + f"\n\n{evidence}"
 
@@ -87,7 +90,7 @@ def of_equilibrium(found: Equilibrium) -> str:
 def of_selection(found: Selection) -> str:
     """Every model that was tried, and why the chosen one."""
     rows = ((rung.name, rung.role, rung.error, "chosen" if rung is found.chosen else "") for rung in found.rungs)
-    return table(("model", "role", "estimated error [m]", ""), rows) + f"\n\n{found.reason}"
+    return table(("model", "role", "estimated error [m]", ""), rows) + f"\n\n{found.reason}; error {found.errors}"
 
 
 def of_exports(found: Exports) -> str:

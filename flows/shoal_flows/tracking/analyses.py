@@ -12,7 +12,7 @@ from shoal.selection import Selection
 from shoal.trajectory import json_text
 
 from shoal_flows.exports import Exports
-from shoal_flows.tracking.engines import log_motion_of, stated
+from shoal_flows.tracking.engines import log_errors, log_motion_of, stated
 from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.store import open_run
 from shoal_flows.verdicts import verdict
@@ -32,8 +32,7 @@ def log_statics(found: Equilibrium, picture: bytes) -> str:
                 run.metric(f"final/{name}/{axis}", float(value))
         run.metric("final/residual", found.residual)
         run.metric("final/iterations", found.iterations)
-        if found.mesh_error is not None:
-            run.metric("final/mesh_error", found.mesh_error)
+        log_errors(run, found.errors)
         run.picture(picture, "rest.png")
         return run.run_id
 
@@ -49,6 +48,7 @@ def log_selection(found: Selection, album: Mapping[str, bytes]) -> str:
         log_motion_of(run, scene, found.trajectory, found)
         run.params({"tolerance": found.tolerance, "chosen": found.chosen.name})
         run.metric("final/estimated_error", found.chosen.error)
+        log_errors(run, found.errors)
         run.metric("final/rungs", len(found.rungs))
         run.text(json_text(found.to_json(), indent=1), "selection.json")
         for file, content in album.items():

@@ -7,6 +7,7 @@ from typing import Any
 
 from shoal.engines.compare import Comparison
 from shoal.engines.sweep import Sweep
+from shoal.error_budget import ErrorBudget
 from shoal.pictures.choice import tells_places
 from shoal.pictures.engines import engines
 from shoal.pictures.files import rows
@@ -34,6 +35,7 @@ def log_comparison(comparison: Comparison, picture: bytes | None = None) -> str:
             for part in ("largest", "final"):
                 if row[part] is not None:
                     study.metric(f"difference/{pair}/{row['marker']}/{part}", row[part])
+        log_errors(study, comparison.errors)
         marker = tip(list(scene.markers))
         shown = picture or png(engines(comparison, marker, f"{scene.name}: the engines over each other"))
         study.picture(shown, "engines.png")
@@ -52,9 +54,7 @@ def log_forward(scene: Scene, motion: Trajectory, album: Mapping[str, bytes]) ->
     with open_run("Forward", name, description=scene.description, tags=tags) as run:
         run.judge(*verdict(motion))
         log_motion_of(run, scene, motion)
-        for name, error in motion.model.get("verification", {}).items():
-            if name.endswith("_error") and error is not None:
-                run.metric(f"final/{name}", error)
+        log_errors(run, motion.errors)
         for file, content in album.items():
             run.picture(content, file)
         return run.run_id
@@ -73,9 +73,7 @@ def log_sweep(result: Sweep) -> str:
         run.metric("final/wall_s", result.wall_s)
         run.metric("final/failed_points", sum(status != "ok" for status in result.status))
         if result.check is not None:
-            for name in ("time_error", "mesh_error"):
-                if (error := getattr(result.check, name)) is not None:
-                    run.metric(f"final/{name}", error)
+            log_errors(run, result.errors)
         run.text(rows(result), "sweep.csv")
         if len(result.grid) <= 2:
             for marker in result.displacements:
@@ -85,7 +83,7 @@ def log_sweep(result: Sweep) -> str:
 
 def log_motion_of(run: Run, scene: Scene, motion: Trajectory, selection: Selection | None = None) -> None:
     """What was computed of a scene, and where its markers went if places may be told; selection: of its model."""
-    kept = (item for item in motion.model.items() if not item[0].startswith(("initial", "verification")))
+    kept = (item for item in motion.model.items() if not item[0].startswith(("initial", "verification", "errors")))
     made = {f"model.{name}": value for name, value in kept}
     run.params({**stated(scene), "engine": motion.engine, **made})
     run.text(as_yaml(scene.model_dump(mode="json")), "scene.yaml")
@@ -97,6 +95,14 @@ def log_motion_of(run: Run, scene: Scene, motion: Trajectory, selection: Selecti
     if told:
         log_ends(run, motion)
     log_motion(run, motion, told=told)
+
+
+def log_errors(run: Run, errors: ErrorBudget) -> None:
+    """The sum of the known errors [m], and its parts."""
+    if errors.total is not None:
+        run.metric("final/error", errors.total)
+    for source, error in errors.known.items():
+        run.metric(f"final/{source}_error", error)
 
 
 def stated(scene: Scene) -> dict[str, Any]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
 from shoal.response import Response
 from shoal.trajectory import json_text
 
+from shoal_flows.tracking.engines import log_errors
 from shoal_flows.tracking.model.files import as_yaml
 from shoal_flows.tracking.store import Run, open_run
 from shoal_flows.verdicts import verdict
@@ -36,9 +36,9 @@ def log_response(study: str, found: Response, album: Mapping[str, bytes]) -> str
 
 def _figures(run: Run, found: Response) -> None:
     run.metric("wall_s", found.wall_s)
-    for name in ("evaluations", "repeated", "failed", "horizon", "mesh_error", "step_error"):
-        value = getattr(found, name)
-        run.metric(f"final/{name}", math.nan if value is None else float(value))
+    for name in ("evaluations", "repeated", "failed", "horizon"):
+        run.metric(f"final/{name}", float(getattr(found, name)))
+    log_errors(run, found.errors)
     told = {}
     if found.bounds is not None:
         run.metric("final/gap", found.bounds.gap)

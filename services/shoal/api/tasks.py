@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -136,7 +136,7 @@ def _simulated(bench: Bench, request: Simulate, scene: Scene, bounded: bool, not
         found = engine.simulate_many(scene, values, times)
         if request.verify:
             checked = spot_check(engine, scene, values, found.status, found.times)
-            model = {**found.model, "verification": plain(asdict(checked))}
+            model = {**found.model, "errors": checked.errors.to_json(), "verification": checked.to_json()}
             found = replace(found, model=model, message=found.message or checked.complaint)
     if bounded:
         check_end(found, scene)

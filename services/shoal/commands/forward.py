@@ -134,9 +134,12 @@ def sweep(
 @click.option("--engines", help="Names, separated by commas; else ours and at most two others that can run the scene.")
 @options.values
 @options.at
+@options.verify
 @options.as_json
 @options.out(".json", ".png")
-def compare(scene: str, engines: str | None, values: Values, times: Times, as_json: bool, out: Out) -> None:
+def compare(
+    scene: str, engines: str | None, values: Values, times: Times, verify: bool, as_json: bool, out: Out
+) -> None:
     """Run SCENE on several engines and show how far apart they are."""
     from shoal.engines.compare import compare, compared
     from shoal.pictures import files
@@ -148,7 +151,7 @@ def compare(scene: str, engines: str | None, values: Values, times: Times, as_js
     with screen.working(f"running {wanted.name} on {', '.join(names)}"):
         for name in names:
             screen.compile_for(name, [1], wanted)
-        comparison = compare(wanted, names, times)
+        comparison = compare(wanted, names, times, verify)
     if out is not None:
         files.comparison(comparison, out)
     screen.show(comparison.to_json(), as_json, lambda: tables.comparison_table(comparison))

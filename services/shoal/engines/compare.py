@@ -12,6 +12,10 @@ import numpy as np
 from shoal.arguments import told
 from shoal.engines import get_engine
 from shoal.engines.capabilities import able
+from shoal.engines.gauss import GaussEngine
+from shoal.engines.verification import verify as errors_of
+from shoal.engines.verification import with_errors
+from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Trajectory, plain
@@ -22,11 +26,20 @@ COMPARED = ("gauss", "exudyn", "casadi", "tree")
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Trajectories by engine; engines that cannot run the scene are in `refused` with their reason."""
+    """Trajectories by engine; engines that cannot run the scene are in `refused` with their reason.
+
+    verified: the engine whose run was verified, ours where it ran; empty where none was
+    """
 
     scene: Scene
     trajectories: dict[str, Trajectory]
     refused: dict[str, str]
+    verified: str = ""
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """Known errors of the markers [m] of the run that was verified: engines share the mesh and the theory."""
+        return self.trajectories[self.verified].errors if self.verified else ErrorBudget()
 
     @property
     def ok(self) -> bool:
@@ -70,6 +83,8 @@ class Comparison:
             "scene": self.scene.name,
             "engines": {name: trajectory.to_json() for name, trajectory in self.trajectories.items()},
             "refused": self.refused,
+            "error": plain(self.errors.total),
+            "errors": self.errors.to_json(),
             "differences": self.differences(),
         }
 
@@ -80,10 +95,14 @@ def compared(scene: Scene) -> list[str]:
 
 
 def compare(
-    scene: Scene, engines: Sequence[str] | None = None, times: Sequence[float] | Array | None = None
+    scene: Scene,
+    engines: Sequence[str] | None = None,
+    times: Sequence[float] | Array | None = None,
+    verify: bool = True,
 ) -> Comparison:
     """Run a scene on those engines, or on those of `compared`.
 
+    verify: estimate the errors of one run, as engines that agree may be wrong together: of one mesh, of one theory.
     Raises InputError for an unknown engine, or if the scene suits none.
     """
     if engines is not None and (isinstance(engines, str) or not engines):
@@ -98,4 +117,13 @@ def compare(
             refused[name] = str(error)
     if not trajectories:
         raise InputError(next(iter(refused.values())))
-    return Comparison(scene, trajectories, refused)
+    good = [name for name, motion in trajectories.items() if motion.ok]
+    if not verify or not good:
+        return Comparison(scene, trajectories, refused)
+    native = GaussEngine().name
+    looked_at = native if native in good else good[0]
+    motion = trajectories[looked_at]
+    trajectories[looked_at] = with_errors(
+        motion, errors_of(motion, scene, chosen[looked_at] if looked_at == native else None)
+    )
+    return Comparison(scene, trajectories, refused, looked_at)

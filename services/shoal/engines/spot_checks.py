@@ -10,6 +10,7 @@ import numpy as np
 from shoal.engines.contract import Engine
 from shoal.engines.sweep import SpotCheck, Sweep
 from shoal.engines.verification import verified
+from shoal.error_budget import worst
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status
 
@@ -39,11 +40,9 @@ def spot_check(
     for point in looked_at:
         here = {path: float(column[point]) for path, column in values.items()}
         run = verified(engine, scene.with_values(here), times)
-        estimated = run.model.get("verification", {})
         check = replace(
             check,
-            time_error=larger(check.time_error, estimated.get("time_error")),
-            mesh_error=larger(check.mesh_error, estimated.get("mesh_error")),
+            errors=worst([check.errors, run.errors]),
             complaint=check.complaint or ("" if run.ok else f"{_words(here)}: {run.message}"),
         )
     return check

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from shoal.arguments import check, mapping, numbers
 from shoal.engines.contract import Engine, sampling_times
 from shoal.engines.starts import Elsewhere, Stated
+from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory, plain
@@ -26,21 +27,25 @@ LONE = 4
 
 @dataclass(frozen=True)
 class SpotCheck:
-    """Largest estimated errors at the markers [m] among the points that were looked at; None: none was estimated.
+    """Largest estimated errors at the markers [m], by source, among the points that were looked at.
 
     complaint: the first point that a more careful run does not bear out, and why
     """
 
     looked_at: int
     points: int
-    time_error: float | None = None
-    mesh_error: float | None = None
+    errors: ErrorBudget = field(default_factory=ErrorBudget)
     complaint: str = ""
 
     def __str__(self) -> str:
-        errors = {"time": self.time_error, "mesh": self.mesh_error}
-        known = ", ".join(f"{name} {error:.1e} m" for name, error in errors.items() if error is not None)
-        return f"estimated error at the markers, largest of {self.looked_at} points: {known or 'unknown'}"
+        return f"estimated error at the markers, largest of {self.looked_at} points: {self.errors}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        by_source = {f"{source}_error": self.errors.estimates.get(source) for source in ("time", "mesh")}
+        by_source |= {f"{source}_error": error for source, error in self.errors.estimates.items()}
+        counted = {"looked_at": self.looked_at, "points": self.points, "complaint": self.complaint}
+        return dict(plain({**counted, **by_source, "errors": self.errors.to_json()}))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +90,11 @@ class Sweep:
     def message(self) -> str:
         """Why not all of it can be believed, and whether some points start elsewhere than stated; empty if neither."""
         return "; ".join(filter(None, (self.complaint, self.elsewhere.told("points"))))
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """Of the markers [m], the largest of the points that were looked at; empty where none was."""
+        return ErrorBudget() if self.check is None else self.check.errors
 
     @property
     def elsewhere(self) -> Elsewhere:
@@ -144,7 +154,8 @@ class Sweep:
             "engine": self.engine,
             "time": self.time,
             "rows": self.rows(),
-            "verification": None if self.check is None else plain(asdict(self.check)),
+            "error": self.errors.total,
+            "verification": None if self.check is None else self.check.to_json(),
             "starts": self.elsewhere.to_json(),
             "wall_s": self.wall_s,
         }

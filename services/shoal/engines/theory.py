@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from shoal.engines.contract import Engine
+from shoal.engines.deviation import Deviation
 from shoal.errors import InputError
 from shoal.scene import Rod, Scene
 from shoal.scene.refined import unbent
+from shoal.scene.shear import slender_share
 from shoal.trajectory import Trajectory
 
 WITH_SHEAR = ("exudyn-ge",)
@@ -25,16 +25,25 @@ def left_out(trajectory: Trajectory, scene: Scene, native: Engine, share: Callab
     r radius of gyration of the section, kappa by Cowper 1966); this share of the effect that bending has at all, the
     distance from the run with rigid rods, is an order of magnitude. share: which rod's counts, if not the largest.
     """
+    found = theory_deviations(trajectory, scene, native, share)
+    return None if found is None else sum(one.distance for one in found)
+
+
+def theory_deviations(
+    trajectory: Trajectory, scene: Scene, native: Engine, share: Callable[..., float] = max
+) -> list[Deviation] | None:
+    """The same as differences of runs, which add up; see `left_out`."""
     _, slender = _rods(scene, trajectory.engine in WITH_SHEAR)
+    scenes = rigid_runs(scene, trajectory.engine)
     try:
-        runs = [native.simulate(one, trajectory.times) for one in rigid_runs(scene, trajectory.engine)]
+        runs = [native.simulate(one, trajectory.times) for one in scenes]
     except InputError:
         return None
     if not runs or not all(run.ok for run in runs):
         return None
-    rotary = runs[0].distance(runs[1])
+    found = [Deviation("theory", runs[0], runs[1], (scenes[0], scenes[1]))]
     counted = share((slender_share(rod) for rod in slender.values() if rod.element != "rigid"), default=0.0)
-    return rotary + (counted * runs[0].distance(trajectory) if counted else 0.0)
+    return found + ([Deviation("theory", trajectory, runs[0], (scene, scenes[0]), counted)] if counted else [])
 
 
 def rigid_runs(scene: Scene, engine: str = "gauss") -> list[Scene]:
@@ -78,11 +87,3 @@ def softer(trajectory: Trajectory, scene: Scene, native: Engine) -> float | None
     }
     run = native.simulate(scene.with_values(values), trajectory.times)
     return run.distance(trajectory) if run.ok else None
-
-
-def slender_share(rod: Rod) -> float:
-    """By how much shear and rotary inertia lower the stiffness of a rod in bending, over its mass."""
-    nu = rod.poisson_ratio
-    section = rod.section_at(0.0)
-    slenderness = np.pi * np.sqrt(section.bending / section.area) / rod.length
-    return float(slenderness**2 * (2 * (1 + nu) / section.shear(nu) + 1.0))

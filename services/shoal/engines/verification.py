@@ -12,22 +12,25 @@ those of other engines' are local.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from shoal.engines.capabilities import of_kind
 from shoal.engines.contract import Engine
+from shoal.engines.deviation import Deviation, turned
 from shoal.engines.gauss import GaussEngine
-from shoal.engines.theory import left_out
+from shoal.engines.theory import theory_deviations
+from shoal.error_budget import ErrorBudget
 from shoal.errors import ShoalError
 from shoal.mechanics import expense
 from shoal.mechanics.integrators import facts
 from shoal.mechanics.persist import DAMPED, as_run
 from shoal.mechanics.reach import span
 from shoal.mechanics.simulate import STEP_MARGIN, stable_step
-from shoal.scene import GROUND, Revolute, Scene, Slider, Solver
+from shoal.scene import GROUND, Revolute, Rod, Scene, Slider, Solver
 from shoal.scene.joints import places
 from shoal.scene.refined import refined, unbent
 from shoal.trajectory import Array, Status, Trajectory, plain
@@ -58,6 +61,8 @@ Friction and kinks leave methods of higher order no more where steps are long.
 SHARPER, CREEP = 0.1, 0.01
 """Factor on the speed over which dry friction is smoothed, for the run that tells the creep, and how far that one may
 creep itself: a fraction of the machine's size, or rad."""
+LEFT = 0.25
+"""Share of a mesh error that twice as many elements leave, where it falls with the square of their size or faster."""
 COARSE = 0.03
 """A mesh error beyond this fraction of the scale is looked at with four times the elements, which locks less."""
 UNTRUSTED = (Status.DIVERGED, Status.ENERGY, Status.DRIFTED, Status.OUT_OF_REACH)
@@ -72,7 +77,11 @@ SMALLER = "a smaller solver.step, or solver.relative_tolerance and solver.absolu
 CLOSE = {"solver.relative_tolerance": 1e-8, "solver.absolute_tolerance": 1e-9}
 """Tolerances of second runs by integrators that choose their steps."""
 
-Second = Callable[[str, Callable[[], Iterator[Scene]], int], tuple[Trajectory | None, str]]
+SOURCES = "time", "mesh", "theory", "friction", "bending"
+"""Of errors at the markers: the time step, the mesh, neglected shear and rotary inertia, smoothed dry friction, and
+modal rods that bend far."""
+
+Second = Callable[[str, Callable[[], Iterator[Scene]], int], tuple[tuple[Trajectory, Scene] | None, str]]
 """Makes a second run of a scene; see `_second`."""
 
 
@@ -80,12 +89,14 @@ Second = Callable[[str, Callable[[], Iterator[Scene]], int], tuple[Trajectory | 
 class Verification:
     """Estimated errors of a run at its markers [m], None where they were not estimated and `note` says why.
 
-    time_error: against a more careful run of the same mesh; mesh_error: against twice as many elements;
+    time_error: against a more careful run of the same mesh; mesh_error: against twice as many elements, a third more
+    than the two differ by, as the finer mesh has an error too (`LEFT`);
     theory_error: what the rods' theory leaves out, friction_error: how far what should stick creeps, as dry friction is
     smoothed, bending_error: of modal rods, against cables that may bend far, each None where there is nothing of the
     kind; scale: how far the markers get from the ground [m];
     rejected: why the more careful run is itself not to be trusted; engine: that made the run, if it is not the native
-    one, from which that of time is then how far it is off, whichever of them is wrong
+    one, from which that of time is then how far it is off, whichever of them is wrong; not_estimated: sources whose
+    error is of interest and not known; deviations: the second runs, which tell the error of any other quantity too
     """
 
     time_error: float | None
@@ -98,6 +109,20 @@ class Verification:
     bending_error: float | None = None
     angle_error: float | None = None
     engine: str = ""
+    not_estimated: tuple[str, ...] = ()
+    deviations: tuple[Deviation, ...] = field(default=(), repr=False, compare=False)
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """All that is known of how far the markers are off [m]: numerical errors, and what the model leaves out."""
+        known = {source: getattr(self, f"{source}_error") for source in SOURCES}
+        return ErrorBudget(
+            {source: error for source, error in known.items() if error is not None or source in self.not_estimated}
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data, for `model["verification"]`."""
+        return dict(plain({one.name: getattr(self, one.name) for one in fields(self) if one.compare}))
 
     @property
     def complaint(self) -> str:
@@ -140,12 +165,25 @@ class Verification:
 
 
 def verified(engine: Engine, scene: Scene, times: Sequence[float] | Array | None = None) -> Trajectory:
-    """Run a scene and verify it; `model["verification"]` holds the estimates. Raises InputError."""
+    """Run a scene and verify it; `errors` and `model["verification"]` hold the estimates. Raises InputError."""
+    return run_verified(engine, scene, times)[0]
+
+
+def run_verified(
+    engine: Engine, scene: Scene, times: Sequence[float] | Array | None = None
+) -> tuple[Trajectory, Verification | None]:
+    """Run a scene and verify it, with the second runs; None of a run that failed. Raises InputError."""
     trajectory = engine.simulate(scene, times)
     if not trajectory.ok:
-        return trajectory
+        return trajectory, None
     verification = verify(trajectory, scene, engine if trajectory.engine == GaussEngine().name else None)
-    model = {**trajectory.model, "verification": dict(plain(asdict(verification)))}
+    return with_errors(trajectory, verification), verification
+
+
+def with_errors(trajectory: Trajectory, verification: Verification) -> Trajectory:
+    """Return a run with the errors that were estimated of it, failed where they are too large."""
+    found = {"errors": verification.errors.to_json(), "verification": verification.to_json()}
+    model = {**trajectory.model, **found}
     if verification.complaint:
         return replace(trajectory, model=model, status=(Status.FAILED,), message=verification.complaint)
     return replace(trajectory, model=model, message=verification.warning)
@@ -155,49 +193,74 @@ def verify(trajectory: Trajectory, scene: Scene, native: Engine | None = None) -
     """Estimate the errors of a run of a scene by more careful ones. native: the native solver, else the one here."""
     scene = as_run(scene, trajectory)
     scale = _scale(trajectory, scene)
+    flexible = any(scene.flexible_rods)
     if "unknowns" not in trajectory.model:
-        return Verification(None, None, scale, f"errors not estimated: {trajectory.engine} does not tell its unknowns")
+        note = f"errors not estimated: {trajectory.engine} does not tell its unknowns"
+        return Verification(None, None, scale, note, not_estimated=("time", "mesh") if flexible else ("time",))
     native = native or GaussEngine()
     second = partial(_second, native, trajectory, scene)
     careful, note = second("time", lambda: _careful(scene, trajectory), 1)
-    notes, time_error, angle_error = [note], None, None
+    found, notes, missing = list[Deviation](), [note], list[str]()
     if careful is not None:
-        if careful.status[0] in UNTRUSTED:
-            return Verification(None, None, scale, rejected=careful.message)
-        (time_error, angle_error), notes[0] = _time_error(trajectory, careful, scene, scale, second)
-    mesh_error = None
-    if any(scene.flexible_rods):
-        mesh_error, note = _mesh_error(trajectory, scene, scale, second)
-        notes.append(note)
-    friction_error, note = _friction_error(trajectory, scene, second)
-    notes.append(note)
-    bending_error, note = _bending_error(trajectory, scene, second)
-    told = "; ".join(note for note in [*notes, note] if note)
-    theory_error = left_out(trajectory, scene, native)
-    other = "" if trajectory.engine == GaussEngine().name else trajectory.engine
+        if careful[0].status[0] in UNTRUSTED:
+            return Verification(None, None, scale, rejected=careful[0].message, not_estimated=("time",))
+        in_time, notes[0] = _time_deviation(trajectory, careful, scene, scale, second)
+        found += [] if in_time is None else [in_time]
+    missing += [] if found else ["time"]
+    looked_at = [("mesh", flexible, partial(_mesh_deviation, trajectory, scene, scale, second))]
+    looked_at += [("friction", bool(_rubbing(scene)), partial(_friction_deviation, trajectory, scene, second))]
+    looked_at += [("bending", bool(_modal(scene)), partial(_bending_deviation, trajectory, scene, second))]
+    for source, concerned, look in looked_at:
+        if concerned:
+            one, note = look()
+            notes.append(note)
+            found += [] if one is None else [one]
+            missing += [] if one is not None else [source]
+    found += theory_deviations(trajectory, scene, native) or []
+    errors = {
+        source: sum(one.distance for one in found if one.source == source)
+        if any(one.source == source for one in found)
+        else None
+        for source in SOURCES
+    }
+    angle = next((one.angle for one in found if one.source == "time"), None)
     return Verification(
-        time_error, mesh_error, scale, told, "", theory_error, friction_error, bending_error, angle_error, other
+        errors["time"],
+        errors["mesh"],
+        scale,
+        "; ".join(filter(None, notes)),
+        "",
+        errors["theory"],
+        errors["friction"],
+        errors["bending"],
+        angle,
+        "" if trajectory.engine == GaussEngine().name else trajectory.engine,
+        tuple(missing),
+        tuple(found),
     )
 
 
-def _mesh_error(trajectory: Trajectory, scene: Scene, scale: float, second: Second) -> tuple[float | None, str]:
-    """The distance from runs on more elements [m]; None and why where there are none."""
+def _mesh_deviation(trajectory: Trajectory, scene: Scene, scale: float, second: Second) -> tuple[Deviation | None, str]:
+    """From runs on more elements; None and why where there are none."""
     finer, note = second("mesh", lambda: on_finer_mesh(scene, 2), 2)
-    if finer is None or not finer.ok:
+    if finer is None or not finer[0].ok:
         return None, note or "mesh error not estimated: the run on twice as many elements is rejected"
-    mesh_error = trajectory.distance(finer)
-    if COARSE * scale < mesh_error:
+    found = Deviation("mesh", trajectory, finer[0], (scene, finer[1]), 1.0 / (1.0 - LEFT))
+    if COARSE * scale < trajectory.distance(finer[0]):
         finest, _ = second("mesh", lambda: on_finer_mesh(scene, 4), 4)
-        if finest is not None and finest.ok:
-            mesh_error = max(mesh_error, trajectory.distance(finest))
-    return mesh_error, ""
+        if finest is not None and finest[0].ok:
+            other = Deviation("mesh", trajectory, finest[0], (scene, finest[1]), 1.0 / (1.0 - LEFT**2))
+            found = max(found, other, key=lambda one: one.distance)
+    return found, ""
 
 
-def _bending_error(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[float | None, str]:
-    """How far the markers are from where cables bring them in place of modal rods [m], which may bend far."""
-    modal = {name: rod for name, rod in scene.flexible_rods.items() if rod.element == "modal"}
-    if not modal:
-        return None, ""
+def _modal(scene: Scene) -> dict[str, Rod]:
+    return {name: rod for name, rod in scene.flexible_rods.items() if rod.element == "modal"}
+
+
+def _bending_deviation(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[Deviation | None, str]:
+    """From cables in place of modal rods, which may bend far."""
+    modal = _modal(scene)
     if any(np.any(scene.start(name).modes) or np.any(scene.start(name).mode_rates) for name in modal):
         return None, "error of small bending not estimated: cables start unstrained"
     values: dict[str, object] = {}
@@ -205,37 +268,37 @@ def _bending_error(trajectory: Trajectory, scene: Scene, second: Second) -> tupl
         fields = rod.by_elements("ancf-quintic", max(MODES_A_CABLE, rod.modes) // MODES_A_CABLE)
         values |= {f"bodies.{name}.{field}": value for field, value in fields.items()} | unbent(scene, name)
     far, note = second("bending", lambda: _able(scene.with_values(values), scene.solver.step), 4)
-    if far is None or not far.ok:
+    if far is None or not far[0].ok:
         return None, note or "error of small bending not estimated: the run with cables is rejected"
-    return trajectory.distance(far), ""
+    return Deviation("bending", trajectory, far[0], (scene, far[1])), ""
 
 
-def _friction_error(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[float | None, str]:
-    """How far the markers are from where dry friction brings them that holds ten times better [m]: blocks creep.
+def _rubbing(scene: Scene) -> dict[str, Revolute | Slider]:
+    return {name: joint for name, joint in scene.joints.items() if isinstance(joint, Revolute | Slider) and joint.dry}
+
+
+def _friction_deviation(trajectory: Trajectory, scene: Scene, second: Second) -> tuple[Deviation | None, str]:
+    """From dry friction that holds ten times better: blocks creep.
 
     It holds better still where even so it would creep far in the time of the run.
     """
-    rubbing = {
-        name: joint for name, joint in scene.joints.items() if isinstance(joint, Revolute | Slider) and joint.dry
-    }
-    if not rubbing:
-        return None, ""
+    rubbing = _rubbing(scene)
     sharp, sizes = SHARPER, {"revolute": 1.0, "slider": span(scene)}
     for name, joint in rubbing.items():
         far = CREEP * of_kind(sizes, joint.kind, f"joints.{name}.coulomb")
         sharp = min(sharp, far / (joint.coulomb_speed * max(float(trajectory.times[-1]), scene.solver.step)))
     sharper = {f"joints.{name}.coulomb_speed": sharp * joint.coulomb_speed for name, joint in rubbing.items()}
     held, note = second("friction", lambda: _able(scene.with_values(sharper), scene.solver.step), 1)
-    if held is None or not held.ok:
+    if held is None or not held[0].ok:
         return None, note or "effect of the smoothed friction not estimated: the run with a sharper one is rejected"
     # Creep is proportional to the speed, of which this part is gone.
-    return trajectory.distance(held) / (1.0 - sharp), ""
+    return Deviation("friction", trajectory, held[0], (scene, held[1]), 1.0 / (1.0 - sharp)), ""
 
 
 def _second(
     native: Engine, trajectory: Trajectory, run: Scene, what: str, make: Callable[[], Iterator[Scene]], times: int
-) -> tuple[Trajectory | None, str]:
-    """The first of some second runs, on so many times the unknowns, that can be had and believed.
+) -> tuple[tuple[Trajectory, Scene] | None, str]:
+    """The first of some second runs with its scene, on so many times the unknowns, that can be had and believed.
 
     If none can be believed, the last of them; if none can be had, None and why not the first.
     """
@@ -259,49 +322,45 @@ def _second(
                     continue
             second = native.simulate(scene, trajectory.times)
             if second.ok:
-                return second, ""
+                return (second, scene), ""
             if second.status[0] is Status.FAILED:
                 note = note or f"{what} error not estimated: {second.message}"
             else:
-                doubtful = second
+                doubtful = second, scene
     except ShoalError as error:
         note = note or f"{what} error not estimated: {error}"
     return doubtful, note
 
 
-def _time_error(
-    trajectory: Trajectory, careful: Trajectory, scene: Scene, scale: float, second: Second
-) -> tuple[tuple[float | None, float | None], str]:
-    """The distance of the two runs as an error of the first [m], and that of its angles [rad], which is None in space.
-
-    Both are None, and the note says why, where the runs are no measure of it.
-    """
-    away = _apart(trajectory, careful)
+def _time_deviation(
+    trajectory: Trajectory, careful: tuple[Trajectory, Scene], scene: Scene, scale: float, second: Second
+) -> tuple[Deviation | None, str]:
+    """From a more careful run; None, and the note says why, where the two are no measure of the error."""
+    run, where = careful
+    found = Deviation("time", trajectory, run, (scene, where))
     if not _adaptive(trajectory):
         # One that chooses its steps is as good as exact beside one that does not.
-        away = away if facts(careful.model["integrator"]).adaptive else HALVING * away
-    elif scene.solver.relative_tolerance > LOOSE:
-        away = HALVING * away
-    else:
-        chaotic = bool(np.any(away > WRONG * np.array([scale, 1.0])))
-        if not chaotic and careful.steps <= FEWER * trajectory.steps:
-            away = away / (np.sqrt(SPAN) - 1.0)
-        else:
-            # A chaotic motion may be lost to the looser run and not yet to this one, and one whose steps end for other
-            # reasons than its tolerance has the same ones in both: a tighter one with shorter steps tells.
-            tighter, note = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)
-            if tighter is not None and tighter.ok:
-                away = _apart(trajectory, tighter)
-            elif not chaotic:
-                return (None, None), note or "time error not estimated: the run with shorter steps is rejected"
-    return (float(away[0]), None if scene.dimensions == 3 else float(away[1])), ""
+        return found if facts(run.model["integrator"]).adaptive else replace(found, factor=HALVING), ""
+    if scene.solver.relative_tolerance > LOOSE:
+        return replace(found, factor=HALVING), ""
+    away = _apart(trajectory, run)
+    chaotic = bool(np.any(away > WRONG * np.array([scale, 1.0])))
+    if not chaotic and run.steps <= FEWER * trajectory.steps:
+        return replace(found, factor=1.0 / (np.sqrt(SPAN) - 1.0)), ""
+    # A chaotic motion may be lost to the looser run and not yet to this one, and one whose steps end for other
+    # reasons than its tolerance has the same ones in both: a tighter one with shorter steps tells.
+    tighter, note = second("time", lambda: _careful(scene, trajectory, TIGHTER), 1)
+    if tighter is not None and tighter[0].ok:
+        return replace(found, other=tighter[0], scenes=(scene, tighter[1])), ""
+    if not chaotic:
+        return None, note or "time error not estimated: the run with shorter steps is rejected"
+    return found, ""
 
 
 def _apart(one: Trajectory, other: Trajectory) -> Array:
     """How far the markers of two runs are apart [m], and in the plane how far they are turned [rad], (2,)."""
-    turned = one.angles - other.angles if len(one.axes) == 2 else np.zeros(1)
-    turned = turned - 2.0 * np.pi * np.rint(turned / (2.0 * np.pi))
-    return np.array([one.distance(other), np.max(np.abs(turned), initial=0.0)])
+    angles = turned(one.angles - other.angles) if len(one.axes) == 2 else np.zeros(1)
+    return np.array([one.distance(other), np.max(np.abs(angles), initial=0.0)])
 
 
 def _adaptive(trajectory: Trajectory) -> bool:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shoal.error_budget import ErrorBudget
 from shoal.trajectory import Array, json_text
 
 if TYPE_CHECKING:
@@ -38,7 +39,6 @@ def of_motion(motion: Trajectory) -> Columns:
 
 def about_motion(motion: Trajectory, scene: Scene) -> dict[str, str | float]:
     """The scene, what computed its motion, and how far to trust it; without what is not known."""
-    checked = motion.model.get("verification") or {}
     told = {
         **_about(scene, motion.engine, str(motion.status[0]), motion.message),
         "integrator": motion.model.get("integrator"),
@@ -46,12 +46,14 @@ def about_motion(motion: Trajectory, scene: Scene) -> dict[str, str | float]:
         "steps": float(motion.steps),
         "energy_drift": float(motion.energy_drift[0]),
         "constraint_drift": float(motion.constraint_drift[0]),
-        **{
-            f"{name}_error_m": checked.get(f"{name}_error")
-            for name in ("time", "mesh", "theory", "friction", "bending")
-        },
+        **_errors(motion.errors),
     }
     return {name: value for name, value in told.items() if value is not None and value == value}
+
+
+def _errors(errors: ErrorBudget) -> dict[str, float | None]:
+    """The sum of what is known, and its parts [m]."""
+    return {"error_m": errors.total, **{f"{source}_error_m": error for source, error in errors.estimates.items()}}
 
 
 def _about(scene: Scene, engine: str, status: str, message: str) -> dict[str, Any]:
@@ -82,12 +84,10 @@ def _column(values: list[Any]) -> Any:
 
 def about_sweep(result: Sweep) -> dict[str, str | float]:
     """As of a motion."""
-    check = result.check
     told = {
         **_about(result.scene, result.engine, "ok" if result.ok else "failed", result.message),
         "time_s": result.time,
-        "time_error_m": None if check is None else check.time_error,
-        "mesh_error_m": None if check is None else check.mesh_error,
+        **_errors(result.errors),
     }
     return {name: value for name, value in told.items() if value is not None}
 

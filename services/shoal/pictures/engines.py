@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from shoal.engines.compare import Comparison
-from shoal.pictures.style import BLACK, ENGINES, GREY, OTHER, VERMILION, canvas, headline, log_ticks, styled
+from shoal.pictures.style import BLACK, ENGINES, GREY, ORANGE, OTHER, VERMILION, canvas, headline, log_ticks, styled
 from shoal.trajectory import Array
 
 _WIDTHS = (5.0, 3.0, 1.8)
@@ -38,6 +38,8 @@ def engines(comparison: Comparison, marker: str, title: str) -> Figure:
         distance = np.linalg.norm(a.marker(marker) - b.marker(marker), axis=1)
         style = {"color": _PAIRS[k % 3], "linestyle": _LINES[k % 4]}
         last.plot(a.times, 1e6 * distance, label=f"{one}, {other}", **style)
+    if pairs and comparison.errors.total:
+        last.axhline(1e6 * comparison.errors.total, color=ORANGE, linestyle="--", label="known error of the model")
     headline(figure, title)
     above.set_ylabel(f"position of {marker} [m]")
     above.legend()

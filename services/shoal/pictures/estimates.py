@@ -1,34 +1,45 @@
-"""What second runs say about a run, in words."""
+"""What is known of the errors of a run, in words."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
+
+from shoal.error_budget import ErrorBudget, Grade
+from shoal.pictures.numbers import length
+from shoal.trajectory import Trajectory
+
+REMEDIES = {
+    "theory": "neglected shear and rotary inertia of slender rods (rotary_inertia: true counts the latter in rigid "
+    "rods, simo-reissner has both)",
+    "bending": "modal rods bend only a little; cables may bend far",
+    "friction": "dry friction is smoothed below coulomb_speed, so that what should stick creeps, in proportion to it",
+}
+"""What the sources stand for that are no errors of a computation but of its model, and what avoids them."""
 
 
-def estimates(verification: Mapping[str, Any]) -> Iterator[str]:
-    """Sentences about the errors at the markers and about what the model leaves out; `asdict` of a Verification."""
-    errors = {"time": verification["time_error"], "mesh": verification["mesh_error"]}
-    parts = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
-    if verification.get("angle_error") is not None:
-        parts.insert(1, f"{verification['angle_error']:.1e} rad")
-    if known := ", ".join(parts):
-        yield f"estimated error at the markers: {known}"
-    if verification["note"]:
+def estimates(trajectory: Trajectory) -> Iterator[str]:
+    """Sentences about the error at the markers, the sum of all known ones first, and what its parts are."""
+    verification = trajectory.model.get("verification") or {}
+    if trajectory.errors.estimates:
+        angle = verification.get("angle_error")
+        turned = "" if angle is None else f"; angles, by the time step: {angle:.1e} rad"
+        yield f"estimated error at the markers: {trajectory.errors}{turned}"
+    if verification.get("note"):
         yield verification["note"]
-    if verification.get("theory_error") is not None:
-        yield (
-            "left out by the theory of slender rods: shear and rotary inertia of the section, about "
-            f"{verification['theory_error']:.1e} m (rotary_inertia: true counts it in rigid rods, "
-            "simo-reissner has both)"
-        )
-    if verification.get("bending_error") is not None:
-        yield (
-            "modal rods bend only a little: cables, which may bend far, come out about "
-            f"{verification['bending_error']:.1e} m away at the markers"
-        )
-    if verification.get("friction_error") is not None:
-        yield (
-            f"dry friction is smoothed below coulomb_speed, so that what should stick creeps: about "
-            f"{verification['friction_error']:.1e} m at the markers (proportional to coulomb_speed)"
-        )
+    for source, why in REMEDIES.items():
+        if source in trajectory.errors.known:
+            yield f"{source}: {why}"
+
+
+def budget(errors: ErrorBudget) -> str:
+    """The sum of the known errors and its parts, as people read lengths: "31 mm (mesh 31 mm, time 19 µm)"."""
+    if errors.total is None:
+        return "not known"
+    parts = [f"{source} {length(error)}" for source, error in errors.known.items()]
+    parts += [f"{source} not known" for source in errors.unknown]
+    return f"{length(errors.total)} ({', '.join(parts)})"
+
+
+def grade(trajectory: Trajectory) -> Grade:
+    """The colour of a run: that of its largest known error as a share of the distance to the ground."""
+    return trajectory.errors.grade(trajectory.ok, (trajectory.model.get("verification") or {}).get("scale"))

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from shoal.pictures.instants import curve, time_axis
-from shoal.pictures.style import GREY, LINES, ORANGE, VERMILION, canvas, headline, log_ticks, styled
+from shoal.pictures.style import GREY, LINES, VERMILION, canvas, headline, log_ticks, styled
 from shoal.response import Response
 from shoal.response.boxes import Ends
 from shoal.response.result import Bounds
@@ -33,10 +33,10 @@ def gaps(found: Response, marker: str) -> Figure:
         curve(panel, t, np.maximum(wide, LEAST), label=f"{what} of {quantity}", **look)
         curve(panel, t, np.where(within, np.maximum(gap, LEAST), np.nan), alpha=0.5, label=f"gap of {quantity}", **look)
         if within.any():
-            largest.append(float(gap[within].max()) / max(float(wide.max()), LEAST))
-    for error, name, colour in ((found.mesh_error, "mesh error", VERMILION), (found.step_error, "step error", ORANGE)):
-        if error:
-            panel.axhline(error, color=colour, linestyle=":", label=name)
+            beyond_runs = gap + found.column(marker, quantity, found.model)
+            largest.append(float(beyond_runs[within].max()) / max(float(wide.max()), LEAST))
+    if found.errors.total:
+        panel.axhline(found.errors.total, color=VERMILION, linestyle=":", label="known error of the model")
     if not within.all():
         panel.axvline(found.horizon, color=GREY, linestyle=":", label="horizon")
     panel.set_yscale("log")
@@ -61,4 +61,5 @@ def _known(found: Response) -> tuple[str, Array, Array]:
     else:
         what, bounds = "scatter", found.boxes.mean
         size = bounds.upper - bounds.lower + found.boxes.std.upper
-    return what, size, np.maximum(bounds.lower - bounds.lower_outer, bounds.upper_outer - bounds.upper)
+    gap = np.maximum(bounds.lower - bounds.lower_outer, bounds.upper_outer - bounds.upper) - found.model
+    return what, size, np.maximum(gap, 0.0)

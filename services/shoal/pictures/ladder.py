@@ -53,7 +53,7 @@ def _cost(rung: Rung) -> float:
 
 
 def _says(found: Selection) -> str:
-    error = length(found.chosen.error)
+    error = length(found.errors.total)
     if found.met:
         return f"{found.chosen.scene.name}: the cheapest model within {length(found.tolerance)} is off by about {error}"
     return f"{found.chosen.scene.name}: no model within {length(found.tolerance)}; the best is off by about {error}"

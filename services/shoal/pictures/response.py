@@ -33,6 +33,7 @@ def response(found: Response, marker: str) -> Figure:
         else "{0} scatters with a standard deviation of {1} at most"
     )
     when = f", {looked_at(found.times)}" if len(found.times) <= FEW else ""
+    when += f"; known error {length(found.errors.total)}" if found.errors.estimates else ""
     trust = "" if found.ok else f" ({found.status}: see the message)"
     headline(figure, f"{found.scene}: {says.format(marker, length(widest))}{when}{trust}")
     return figure

@@ -10,6 +10,7 @@ from shoal.mechanics.analysis.evaluate import points
 from shoal.mechanics.assembly.placement import place
 from shoal.mechanics.numerics.tile import stacked
 from shoal.pictures.motion import Motion, traced_out
+from shoal.pictures.numbers import length
 from shoal.pictures.outline import ground
 from shoal.pictures.poses import poses
 from shoal.trajectory import Array
@@ -23,7 +24,8 @@ def rest(found: Equilibrium) -> Figure:
     name = found.markers[-1]
     at = found.marker(name)
     place = ", ".join(f"{x:.4g}" for x in np.where(np.abs(at) < _ZERO * np.max(np.abs(found.points)), 0.0, at))
-    title = f"{found.scene.name}: at rest {name} is at ({place}) m"
+    known = f", known error {length(found.errors.total)}" if found.errors.estimates else ""
+    title = f"{found.scene.name}: at rest {name} is at ({place}) m{known}"
     if not found.ok:
         title = f"{found.scene.name} ({found.status}: not to be trusted)"
     return poses(rest_motion(found), title, "from the start to the place of rest")

@@ -9,7 +9,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.pictures.choice import rows, tells_places, why
 from shoal.pictures.drawn import Drawn
-from shoal.pictures.estimates import estimates
+from shoal.pictures.estimates import budget, estimates, grade
 from shoal.pictures.ladder import ladder
 from shoal.pictures.motion import Motion, scene_motion
 from shoal.pictures.numbers import length
@@ -50,7 +50,7 @@ def page(
     return render(
         "simulation.html.j2",
         title=scene.name,
-        trusted=trajectory.ok,
+        grade=grade(trajectory),
         lead=_lead(trajectory, selection),
         motion=animation(moving, "The machine"),
         headings=[
@@ -69,8 +69,7 @@ def page(
 def _remarks(trajectory: Trajectory, selection: Selection | None) -> list[str]:
     if selection is not None:
         return why(selection)
-    verification = trajectory.model.get("verification")
-    return [] if verification is None else [f"{one[0].upper()}{one[1:]}." for one in estimates(verification)]
+    return [f"{one[0].upper()}{one[1:]}." for one in estimates(trajectory)]
 
 
 def moved(trajectory: Trajectory, scene: Scene) -> Motion:
@@ -81,14 +80,10 @@ def moved(trajectory: Trajectory, scene: Scene) -> Motion:
 def _lead(trajectory: Trajectory, selection: Selection | None) -> str:
     if not trajectory.ok:
         return f"Not to be trusted: {trajectory.message or trajectory.status[0]}."
-    verification = trajectory.model.get("verification") or {}
-    known = [verification.get(key) for key in ("time_error", "mesh_error")]
-    found = [f"{what} error {length(error)}" for what, error in zip(("time", "mesh"), known, strict=True) if error]
-    if selection is not None:
-        found.append(f"error {length(selection.chosen.error)}, for a tolerance of {length(selection.tolerance)}")
+    asked = "" if selection is None else f", for a tolerance of {length(selection.tolerance)}"
     name = trajectory.markers[-1]
     place = ", ".join(f"{x:.4g}" for x in trajectory.marker(name)[-1])
-    trust = f" Estimated at the markers: {', '.join(found)}." if found else ""
+    trust = f" Estimated error at the markers: {budget(trajectory.errors)}{asked}."
     return f"After {trajectory.times[-1]:g} s, {name} is at ({place}) m.{trust}"
 
 

@@ -41,7 +41,8 @@ def _says(result: Sweep, marker: str, moved: Array) -> str:
     place = ", ".join(f"{path} = {values[most]:.3g}" for path, values in result.grid.items())
     far = f"{result.scene.name}: {after} {marker} has moved farthest, {length(float(size[most]))}, from {place}"
     left = sum(status is not Status.OK for status in result.status)
-    return far + (f"; {left} of {len(result.status)} points failed" if left else "")
+    far += f"; {left} of {len(result.status)} points failed" if left else ""
+    return f"{far}; known error {length(result.errors.total)}" if result.errors.estimates else far
 
 
 def _lines(result: Sweep, marker: str) -> Figure:
@@ -50,6 +51,8 @@ def _lines(result: Sweep, marker: str) -> Figure:
     styles = ((BLUE, "-"), (ORANGE, "--"), (BLACK, ":"))
     for part, direction, (color, line) in zip(moved.T, _directions(moved), styles, strict=False):
         axes.plot(values, part, color=color, linestyle=line, label=direction)
+        if result.errors.total is not None:
+            axes.fill_between(values, part - result.errors.total, part + result.errors.total, color=color, alpha=0.15)
     headline(figure, _says(result, marker, moved))
     axes.set_xlabel(labelled(path))
     axes.set_ylabel(f"displacement of {marker} [m]")

@@ -73,7 +73,8 @@ def agrees(comparison: Comparison, marker: str) -> str:
     if not found or None in found:
         return f"{comparison.scene.name}: {marker} by each engine"
     apart = f"{len(comparison.trajectories)} engines place {marker} within {length(max(found))} of each other"
-    return f"{comparison.scene.name}: {apart}"
+    shared = f"; known error of their model {length(comparison.errors.total)}" if comparison.errors.estimates else ""
+    return f"{comparison.scene.name}: {apart}{shared}"
 
 
 def _error(estimate: Estimate) -> float:

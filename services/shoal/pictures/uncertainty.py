@@ -10,6 +10,7 @@ import numpy as np
 from shoal.engines import get_engine
 from shoal.errors import ComputationError, InputError
 from shoal.pictures.drawn import Drawn
+from shoal.pictures.estimates import budget
 from shoal.pictures.gaps import gaps
 from shoal.pictures.indices import indices
 from shoal.pictures.instants import FEW
@@ -33,7 +34,7 @@ def uncertainty(found: Response) -> str:
     return render(
         "uncertainty.html.j2",
         title=f"{found.scene}: uncertain parameters",
-        trusted=found.ok,
+        grade=found.grade,
         lead=_lead(found),
         parameters=_parameters(found),
         limits=[_limit(one) for one in found.limits],
@@ -55,14 +56,20 @@ def _lead(found: Response) -> str:
     told = found.bounds.upper - found.bounds.lower if found.bounds is not None else None
     if told is not None:
         widest, marker = _largest(found, told)
-        return f"Places of {marker} differ by up to {length(widest)} {looked_at(found.times)}; runs attain the bounds."
+        return (
+            f"Places of {marker} differ by up to {length(widest)} {looked_at(found.times)}; runs attain the bounds. "
+            f"Known error of the model: {budget(found.errors)}."
+        )
     if found.boxes is not None:
         deviation, among = found.boxes.std.upper, "Over all interval values, "
     else:
         assert found.statistics is not None
         deviation, among = found.statistics.std, ""
     spread, marker = _largest(found, deviation)
-    return f"{among}{marker} scatters with a standard deviation of up to {length(spread)} {looked_at(found.times)}."
+    return (
+        f"{among}{marker} scatters with a standard deviation of up to {length(spread)} {looked_at(found.times)}. "
+        f"Known error of the model: {budget(found.errors)}."
+    )
 
 
 def _largest(found: Response, of: Array) -> tuple[float, str]:
@@ -83,8 +90,9 @@ def _limit(one: Judged) -> list[str]:
         return [one.limit.text, chances, f"{lower:.3g} to {upper:.3g}", how]
     if one.passing is None:
         says = {True: f"kept {looked_at(one.times)}", False: "passed", None: "not decided"}[one.kept]
-        return [one.limit.text, says, f"{one.margin:.3g} {one.limit.unit}", how]
-    (low,), (high,) = (end[-1:] for end in one.passing.estimate.interval)
+        error = f" ({one.errors.brief})" if one.errors.estimates else ""
+        return [one.limit.text, says, f"{one.margin:.3g} {one.limit.unit}{error}", how]
+    low, high = one.interval
     return [one.limit.text, one.passing.estimate.told, f"{low:.3g} to {high:.3g}", how]
 
 
@@ -117,7 +125,7 @@ def _over_nominal(found: Response, case: Worst) -> dict[str, Any]:
 def _case(case: Worst) -> list[str]:
     shown = case.shown
     values = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
-    errors = f"{length(shown.mesh_error)}, {length(shown.step_error)}"
+    errors = "unknown" if shown.errors is None else str(shown.errors.budget)
     return [case.of, values, f"{shown.margin:.4g}", f"{shown.time:.4g}", errors]
 
 
@@ -136,7 +144,7 @@ def _pictures(found: Response) -> list[Drawn]:
         lie = "Outer bounds lie a gap beyond what runs attain"
         if found.boxes is not None:
             lie = "Outer bounds of the mean lie a gap beyond those told; the scatter is its spread and a deviation"
-        words = f"{lie}; mesh and step errors are those of the runs that decide."
+        words = f"{lie}; the known error of the model is that of the runs that decide."
         alt = f"{'Widths' if found.boxes is None else 'Scatter'}, gaps and errors of {last} over time."
         drawn.append(Drawn("gaps", gaps(found, last), alt, words))
     shares = found.statistics.total if found.statistics is not None else None
@@ -191,11 +199,10 @@ def _remarks(found: Response) -> list[str]:
 
 
 def _provenance(found: Response) -> list[tuple[str, str]]:
-    errors = f"mesh {length(found.mesh_error)}, step {length(found.step_error)}"
     return [
         ("method", f"{found.method}: {found.why}"),
         ("effort", f"{found.evaluations} runs, {sum(one.evaluations for one in found.limits)} more for limits"),
-        ("errors", f"{errors}, of the runs that decide"),
+        ("errors", f"{budget(found.errors)}, of the runs that decide"),
         ("engine", found.engine),
         ("seed", str(found.seed)),
         ("scene", found.stated.fingerprint),

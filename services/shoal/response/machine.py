@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from shoal.response.runs import Answers
 from shoal.scene import Scene
 from shoal.trajectory import Array, Status, Trajectory
 
+Run = TypeVar("Run")
 CHUNK = 2_000_000
 """So many numbers of an answer are computed in one call."""
 FINER = 4.0, 16.0
@@ -167,7 +168,7 @@ def _smaller_steps(scene: Scene, finer: float) -> dict[str, float]:
     }
 
 
-def stable(scene: Scene, run: Callable[[Scene], Trajectory]) -> tuple[Trajectory, dict[str, float]]:
+def stable(scene: Scene, run: Callable[[Scene], Run]) -> tuple[Run, dict[str, float]]:
     """A run of a scene, and a setting of the solver where its own steps are too long. Raises InputError."""
     settings: dict[str, float] = {}
     for finer in FINER:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shoal.engines.starts import Elsewhere
+from shoal.error_budget import GOOD, ErrorBudget, Grade
 from shoal.errors import InputError
 from shoal.response.allocation import Allocation
 from shoal.response.boxes import Boxes
@@ -24,6 +25,8 @@ from shoal.trajectory import Array, plain
 if TYPE_CHECKING:
     import xarray as xr
 
+FAIR = 0.1
+"""Share of what varies up to which a known error of the model is small: a tenth of the width moves no bound far."""
 BOUNDS = "lower", "upper", "lower_outer", "upper_outer"
 
 
@@ -57,7 +60,8 @@ class Response:
     method did; times: instants [s]; markers: names; horizon: up to when bounds hold [s]; bounds: None if a parameter is
     random; statistics: None unless all are; boxes: bounds of the statistics, if only some are; columns are (instants,
     markers, quantities) in this order;
-    mesh_error, step_error: of extremal runs [m], None where not estimated; stated: the scene with its model in the
+    errors: of the markers in extremal runs [m], empty where not estimated; model: the same of every column, by which
+    outer bounds and errors of statistics are wider, (columns,); stated: the scene with its model in the
     middle; engine: its name; limits: of what must not happen;
     allocation: tolerances that keep the limit, where they were asked for; finer: which bounds a finer mesh moves, where
     a model was asked for; controls: runs all over the box of intervals that test what was foretold; elsewhere: how many
@@ -81,8 +85,8 @@ class Response:
     horizon: float
     bounds: Bounds | None
     statistics: Statistics | None
-    mesh_error: float | None
-    step_error: float | None
+    errors: ErrorBudget
+    model: Array
     stated: Scene
     engine: str
     limits: tuple[Judged, ...] = ()
@@ -96,6 +100,32 @@ class Response:
     def mixes_starts(self) -> str:
         """That some runs start elsewhere than stated, in words; empty if none does."""
         return "" if self.elsewhere is None else self.elsewhere.told()
+
+    @property
+    def mesh_error(self) -> float | None:
+        """Of the markers in extremal runs [m]; None where it was not estimated."""
+        return self.errors.estimates.get("mesh")
+
+    @property
+    def step_error(self) -> float | None:
+        """The same of the time step."""
+        return self.errors.estimates.get("time")
+
+    @property
+    def scatter(self) -> float:
+        """The widest bounds or the largest standard deviation of a coordinate [m]."""
+        if self.bounds is not None:
+            sizes = self.bounds.upper - self.bounds.lower
+        else:
+            of = self.statistics if self.boxes is None else self.boxes.std
+            assert of is not None
+            sizes = of.std if isinstance(of, Statistics) else of.upper
+        return max(float(self.column(name, axis, sizes).max()) for name in self.markers for axis in self.axes)
+
+    @property
+    def grade(self) -> Grade:
+        """The colour of the answer: that of the known error as a share of what varies."""
+        return self.errors.grade(self.ok, self.scatter * FAIR / GOOD)
 
     @property
     def ok(self) -> bool:
@@ -126,13 +156,14 @@ class Response:
         return np.asarray(whole[..., self.markers.index(marker), self.quantities.index(quantity)])
 
     def gaps(self, marker: str, quantity: str) -> Array:
-        """Distance of outer and attained bounds as a share of the largest width over time, (instants,), nan where it is
-        not known. Of intervals only.
+        """Distance of outer and attained bounds, without the error of the model, as a share of the largest width over
+        time, (instants,), nan where it is not known. Of intervals only.
         """
         assert self.bounds is not None
         found = {name: self.column(marker, quantity, getattr(self.bounds, name)) for name in BOUNDS}
         width = float((found["upper"] - found["lower"]).max())
         beyond = np.maximum(found["lower"] - found["lower_outer"], found["upper_outer"] - found["upper"])
+        beyond = np.maximum(beyond - self.column(marker, quantity, self.model), 0.0)
         # What is not known stays so where nothing varies.
         return np.asarray(beyond / width if width > 0 else np.where(np.isfinite(beyond), 0.0, np.nan))
 
@@ -266,6 +297,8 @@ class Response:
             "statistics": self._told_statistics(),
             "mesh_error": plain(self.mesh_error),
             "step_error": plain(self.step_error),
+            "error": plain(self.errors.total),
+            "errors": plain(self.errors.to_json()),
             "finer_mesh": None if self.finer is None else {**self.finer.to_json(), "moved": self.moved()},
             "limits": [one.to_json() for one in self.limits],
             "allocation": None if self.allocation is None else self.allocation.to_json(),
@@ -299,6 +332,7 @@ class Response:
         return {
             "t": plain(self.times),
             **{name: at(getattr(found, name)) for name in BOUNDS},
+            "error": at(self.model),
             "gap": plain(self.gap(marker, quantity)),
             "argument_lower": plain(self.column(marker, quantity, found.at_lower.T).T),
             "argument_upper": plain(self.column(marker, quantity, found.at_upper.T).T),

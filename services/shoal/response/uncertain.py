@@ -6,7 +6,7 @@ import hashlib
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,7 @@ import numpy as np
 from shoal.arguments import check
 from shoal.engines import get_engine
 from shoal.engines.contract import sampling_times
-from shoal.engines.spot_checks import larger
 from shoal.engines.starts import Stated, Tally
-from shoal.engines.verification import WRONG, verified
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import clock, reach
 from shoal.memory import Memory
@@ -42,7 +40,8 @@ from shoal.response.limits.crosschecked import allowing, crosschecked
 from shoal.response.limits.judge import Reach, require, watched
 from shoal.response.limits.limit import Limit
 from shoal.response.limits.quantities import of_section
-from shoal.response.machine import Machine, stable
+from shoal.response.machine import Machine
+from shoal.response.model_errors import model_errors, unestimated
 from shoal.response.read import parameters
 from shoal.response.respond import MOST, Answer, respond
 from shoal.response.result import Bounds, Response
@@ -54,10 +53,6 @@ from shoal.versions import versions
 
 CHECKED = 6
 """Extremal runs, or drawn ones, that are looked at by more careful runs."""
-LEFT = 0.25
-"""Share of a mesh error that twice as many elements leave, where it falls with the square of their size or faster."""
-NEGLIGIBLE = 0.01
-"""An error below this share of what the runs differ by rejects none of them."""
 UNRESOLVED = 1e-8
 """Runs that differ by less than this share of a limit's quantity differ by the errors of their steps."""
 REFUSED = "failed-runs", "model-rejected", "beyond-horizon"
@@ -152,7 +147,12 @@ def uncertain(
     bounds = answer.bounds
     if bounds is not None and math.isfinite(answer.horizon):
         bounds = _beyond(wanted, inputs, bounds, machine)
-    mesh, step, rejected = _errors(machine, answer, seed) if verify and not keep.over else (None, None, "")
+    known = (
+        model_errors(machine, answer.runs, _deciding(answer, seed))
+        if verify and not keep.over
+        else unestimated(machine)
+    )
+    bounds = None if bounds is None else known.of_bounds(bounds)
     judged, allocation, finer = list[Judged](), None, None
     try:
         if tolerance is not None and bounds is not None and verify and not keep.over:
@@ -171,12 +171,14 @@ def uncertain(
         pass
     finally:
         keep.close()
-    statistics, lacks = answer.statistics, list[str]()
+    statistics = None if answer.statistics is None else known.of_statistics(answer.statistics)
+    boxes = None if answer.boxes is None else known.of_boxes(answer.boxes)
+    lacks = list[str]()
     for told in judged:
         if statistics is not None and told.passing is not None and not told.doubt:
             statistics, lack = allowing(statistics, machine, told.limit, told.passing.estimate)
             lacks += [lack] if lack else []
-    status, message = _status(answer, gap, rejected, judged)
+    status, message = _status(answer, gap, known.rejected, judged)
     message = "; ".join([message] * bool(message) + lacks)
     if status in REFUSED:
         judged = [replace(told, kept=None) if told.kept else told for told in judged]
@@ -208,13 +210,13 @@ def uncertain(
         horizon=min(answer.horizon, float(when[-1])),
         bounds=bounds,
         statistics=statistics,
-        mesh_error=mesh,
-        step_error=step,
+        errors=known.budget,
+        model=known.columns,
         stated=wanted,
         engine=engine,
         limits=tuple(judged),
         allocation=allocation,
-        boxes=answer.boxes,
+        boxes=boxes,
         finer=finer,
         controls=answer.runs.controls,
         elsewhere=starts.elsewhere,
@@ -246,65 +248,14 @@ def _beyond(scene: Scene, inputs: Inputs, bounds: Bounds, machine: Machine) -> B
     return replace(bounds, lower_outer=lower, upper_outer=upper)
 
 
-def _errors(machine: Machine, answer: Answer, seed: int) -> tuple[float | None, float | None, str]:
-    """Largest mesh and step errors [m] of the runs that attain most bounds, or of some that were drawn."""
+def _deciding(answer: Answer, seed: int) -> list[int]:
+    """The runs that attain most bounds, or some that were drawn."""
     runs = answer.runs
-    if answer.bounds is not None:
-        values = runs.values
-        used = Counter([*values.argmin(axis=0).tolist(), *values.argmax(axis=0).tolist()])
-        chosen = [run for run, _ in used.most_common(CHECKED)]
-    else:
-        chosen = np.random.default_rng(seed).choice(len(runs.germs), min(CHECKED, len(runs.germs)), False).tolist()
-    mesh: float | None = None
-    step: float | None = None
-    for run in chosen:
-        given = {path: float(at[0]) for path, at in runs.inputs.values(runs.germs[[run]]).items()}
-        careful, _ = stable(
-            machine.scene.with_values(given), lambda scene: verified(machine.engine, scene, machine.times)
-        )
-        estimated = careful.model.get("verification", {})
-        if not careful.ok and not (nothing := _nothing(machine, runs.values))(estimated):
-            return _whole(mesh), step, f"a more careful run does not bear one out: {careful.message}{nothing}"
-        mesh = larger(mesh, estimated.get("mesh_error"))
-        step = larger(step, estimated.get("time_error"))
-    return _whole(mesh), step, ""
-
-
-@dataclass(frozen=True)
-class _Nothing:
-    """Up to which errors of single runs are nothing beside what the runs differ by; in words what that is.
-
-    length [m], angle [rad]; name: of the widest coordinate
-    """
-
-    length: float
-    angle: float
-    name: str
-
-    def __call__(self, estimated: Mapping[str, Any]) -> bool:
-        """Whether these errors are nothing; empty where the run has failed."""
-        if not estimated or estimated["rejected"]:
-            return False
-        errors = (estimated[name] or 0.0 for name in ("time_error", "mesh_error", "bending_error"))
-        return max(errors) <= self.length and (estimated["angle_error"] or 0.0) <= self.angle
-
-    def __str__(self) -> str:
-        return f"; {self.length:.2g} m, {100 * NEGLIGIBLE:g} % of the width of {self.name}, would be nothing"
-
-
-def _nothing(machine: Machine, values: Array) -> _Nothing:
-    """values: of all runs, (runs, columns)."""
-    widths = np.ptp(values, axis=0).reshape(machine.columns).max(axis=0)
-    coordinates = [k for k, name in enumerate(machine.quantities) if name in "xyz"]
-    marker, axis = divmod(int(widths[:, coordinates].argmax()), len(coordinates))
-    name = f"{list(machine.scene.markers)[marker]}.{machine.quantities[axis]}"
-    angle = max(WRONG, NEGLIGIBLE * float(widths[:, -1].max()))
-    return _Nothing(NEGLIGIBLE * float(widths[marker, axis]), angle, name)
-
-
-def _whole(apart: float | None) -> float | None:
-    """The mesh error of runs that are so far from those on a mesh twice as fine [m], which has a share of it itself."""
-    return None if apart is None else apart / (1 - LEFT)
+    if answer.bounds is None:
+        drawn = np.random.default_rng(seed).choice(len(runs.germs), min(CHECKED, len(runs.germs)), False)
+        return list(drawn.tolist())
+    used = Counter([*runs.values.argmin(axis=0).tolist(), *runs.values.argmax(axis=0).tolist()])
+    return [run for run, _ in used.most_common(CHECKED)]
 
 
 def _keep(scene: Scene, times: Array, engine: str, checkpoint: Path | str | None, end: float | None) -> Keep:

@@ -1,9 +1,12 @@
-"""Rods with shear in the place of slender ones."""
+"""Rods with shear in the place of slender ones, and the size of what slender ones leave out (Timoshenko 1921)."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from shoal.scene.bodies import Rod
 from shoal.scene.refined import unbent
 from shoal.scene.scene import Scene
 
@@ -20,3 +23,31 @@ def with_shear(scene: Scene) -> Scene | None:
             fields = {**rod.by_elements("simo-reissner", count), "quadrature": "full"}
             values |= {f"bodies.{name}.{field}": value for field, value in fields.items()} | unbent(scene, name)
     return scene.with_values(values) if values and scene.dimensions == 2 else None
+
+
+def stouter(scene: Scene, *, exact: bool = True) -> Scene | None:
+    """The scene with what slender rods leave out: shear and rotary inertia; None where nothing is left out.
+
+    Flexible rods are those of `with_shear` where it has them, else softer by their share of it; rigid rods have the
+    rotary inertia of their section. exact: whether `with_shear` is asked at all, whose rods need an implicit method
+    """
+    stout = with_shear(scene) if exact else None
+    values: dict[str, Any] = {}
+    for name, rod in scene.bodies.items():
+        if not isinstance(rod, Rod) or rod.shears:
+            continue
+        if rod.element == "rigid" and not rod.rotary_inertia:
+            values[f"bodies.{name}.rotary_inertia"] = True
+        elif rod.element != "rigid" and stout is None and rod.youngs_modulus is not None:
+            values[f"bodies.{name}.youngs_modulus"] = rod.youngs_modulus / (1.0 + slender_share(rod))
+    if not values:
+        return stout
+    return (stout or scene).with_values(values)
+
+
+def slender_share(rod: Rod) -> float:
+    """By how much shear and rotary inertia lower the stiffness of a rod in bending, over its mass."""
+    nu = rod.poisson_ratio
+    section = rod.section_at(0.0)
+    slenderness = np.pi * np.sqrt(section.bending / section.area) / rod.length
+    return float(slenderness**2 * (2 * (1 + nu) / section.shear(nu) + 1.0))

@@ -12,6 +12,7 @@ from shoal.arguments import check
 from shoal.engines.contract import sampling_times
 from shoal.engines.gauss import GaussEngine
 from shoal.engines.theory import left_out, softer
+from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError, InputError
 from shoal.mechanics import clock
 from shoal.scene import Rod, Scene
@@ -60,6 +61,12 @@ class Selection:
     shear: float
     wall_s: float = 0.0
 
+    @property
+    def errors(self) -> ErrorBudget:
+        """Of the chosen model at the markers [m]: its steps and its mesh, and what its theory leaves out."""
+        model = self.chosen.error if np.isfinite(self.chosen.error) else None
+        return ErrorBudget({"model": model, **({"theory": self.shear} if self.shear else {})})
+
     def to_json(self) -> dict[str, Any]:
         """The ladder, which `shoal simulate --tolerance --json` prints below `selection`."""
         data = {
@@ -67,6 +74,7 @@ class Selection:
             "status": "met" if self.met else "not met",
             "reason": self.reason,
             "estimated_error": self.chosen.error,
+            "errors": self.errors.to_json(),
             "neglected_shear": self.shear,
             "truth": self.limits,
             "levels": {rod: vars(level) for rod, level in self.chosen.levels.items()},
@@ -133,7 +141,8 @@ def select(
     elif may_shear and (not found.met or found.shear > COUNTS_FROM * tolerance):
         stout = {rod: SHEARS if limit == SLENDER else limit for rod, limit in limits.items()}
         found = _of_both(found, _of_theory(task, stout))
-    return replace(found, wall_s=clock.now() - begin)
+    model = {**found.trajectory.model, "errors": found.errors.to_json()}
+    return replace(found, trajectory=replace(found.trajectory, model=model), wall_s=clock.now() - begin)
 
 
 class _Task(NamedTuple):

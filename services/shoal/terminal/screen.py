@@ -12,12 +12,16 @@ from rich.markup import escape
 from rich.measure import Measurement
 from rich.table import Table
 
+from shoal.error_budget import Grade
 from shoal.mechanics import notes
 from shoal.scene import Scene
 from shoal.trajectory import json_text
 
 _ENOUGH = 10_000
 """Columns that every table has room in."""
+
+COLOURS: Mapping[Grade, str] = {"good": "green", "fair": "yellow", "bad": "red"}
+"""Of a line that says how far an answer is to be trusted."""
 
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)

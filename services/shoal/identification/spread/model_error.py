@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shoal.engines.gauss import GaussEngine
-from shoal.engines.theory import WITH_SHEAR, slender_share
+from shoal.engines.theory import WITH_SHEAR
 from shoal.engines.verification import CLOSE
 from shoal.errors import InputError
 from shoal.identification.forward import ForwardModel
@@ -16,7 +16,7 @@ from shoal.mechanics.integrators import facts
 from shoal.mechanics.simulate import stable_step
 from shoal.scene import Rod, Scene
 from shoal.scene.refined import refined
-from shoal.scene.shear import with_shear
+from shoal.scene.shear import slender_share, with_shear
 from shoal.trajectory import Array
 
 _STABLE = 0.9

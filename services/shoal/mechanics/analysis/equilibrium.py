@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from shoal.error_budget import ErrorBudget, Grade
 from shoal.mechanics.analysis.joint_reactions import Reactions
 from shoal.mechanics.numerics.tile import Array
+from shoal.mechanics.reach import span
 from shoal.scene import Rod, Scene
 from shoal.trajectory import plain
 
@@ -37,7 +39,9 @@ class Equilibrium:
     eigenvalues: of the reduced stiffness in the metric of the mass [rad^2/s^2], lowest first; all positive means
     stable, but where forces follow the motion; levels: below these each is zero to working accuracy. steps: load steps.
     reactions: in the joints. turns: what angle forces have counted [rad].
-    mesh_error: how far the markers are from the limit of ever finer meshes [m], None where it is not known.
+    mesh_error: how far the markers are from the limit of ever finer meshes [m], theory_error: from where rods with
+    shear rest, each None where it is not known; not_estimated: sources whose error is of interest and not known;
+    estimated: whether errors were looked for.
     """
 
     scene: Scene
@@ -62,6 +66,24 @@ class Equilibrium:
     reactions: Reactions | None
     turns: Array = field(repr=False)
     mesh_error: float | None = None
+    theory_error: float | None = None
+    not_estimated: tuple[str, ...] = ()
+    estimated: bool = False
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """Known errors of the markers [m]; that of the solver is its last correction."""
+        if not self.estimated:
+            return ErrorBudget()
+        known = {"mesh": self.mesh_error, "theory": self.theory_error}
+        found = {name: error for name, error in known.items() if error is not None or name in self.not_estimated}
+        solver = {"solver": float(self.correction) * span(self.scene)} if np.isfinite(self.correction) else {}
+        return ErrorBudget({**found, **solver})
+
+    @property
+    def grade(self) -> Grade:
+        """The colour of the answer."""
+        return self.errors.grade(self.ok, span(self.scene))
 
     @property
     def ok(self) -> bool:
@@ -105,6 +127,9 @@ class Equilibrium:
             "strain_energy": self.strain_energy,
             "residual": self.residual,
             "mesh_error": self.mesh_error,
+            "theory_error": self.theory_error,
+            "error": plain(self.errors.total),
+            "errors": plain(self.errors.to_json()),
             "constraint_gap": self.gap,
             "correction": plain(self.correction),
             "eigenvalues": plain(np.real(self.eigenvalues)[:6]),

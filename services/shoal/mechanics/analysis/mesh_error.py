@@ -9,16 +9,20 @@ some mesh, and the distance is small there by chance.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
+from shoal.errors import ShoalError
 from shoal.mechanics.analysis.campbell import Campbell, campbell
 from shoal.mechanics.analysis.equilibrium import Equilibrium
 from shoal.mechanics.analysis.modes import Modes, modes
 from shoal.mechanics.analysis.statics import statics
 from shoal.scene import Scene
 from shoal.scene.refined import refined
+from shoal.scene.shear import stouter
 
 FALLS = (2.0, 4.0)
 """Between these factors the distance of two meshes is taken to fall with each doubling: at most as at order two."""
@@ -44,12 +48,26 @@ def beyond(gap: float, last: float = np.nan) -> float:
 
 
 def of_equilibrium(found: Equilibrium, scene: Scene) -> Equilibrium:
-    """A place of rest of a scene with how far its markers are from the limit of ever finer meshes, about [m]."""
-    second = None if not found.ok or (fine := finer(scene)) is None else statics(fine, found.time)
-    if second is None or not second.ok:
+    """A place of rest of a scene with how far its markers are from the limit of ever finer meshes, about [m].
+
+    And how far from where rods with shear rest, or, in space, rods that are softer by what shear is worth.
+    """
+    if not found.ok:
         return found
-    gap = apart(found, second)
-    return replace(found, mesh_error=gap + beyond(gap))
+    mesh, theory, missing = None, None, list[str]()
+    if (fine := finer(scene)) is not None:
+        second = statics(fine, found.time)
+        gap = apart(found, second)
+        mesh = gap + beyond(gap) if second.ok else None
+        missing += [] if second.ok else ["mesh"]
+    if any(scene.flexible_rods) and (stout := stouter(scene)) is not None:
+        try:
+            other = statics(stout, found.time)
+        except ShoalError:
+            other = None
+        theory = apart(found, other) if other is not None and other.ok else None
+        missing += [] if theory is not None else ["theory"]
+    return replace(found, mesh_error=mesh, theory_error=theory, not_estimated=tuple(missing), estimated=True)
 
 
 def apart(one: Equilibrium, other: Equilibrium) -> float:
@@ -58,30 +76,73 @@ def apart(one: Equilibrium, other: Equilibrium) -> float:
 
 
 def of_modes(found: Modes, scene: Scene) -> Modes:
-    """Modes of a scene, each with how far its eigenvalue is about from the limit of ever finer meshes, relative."""
-    if not found.ok or (fine := finer(scene)) is None:
+    """Modes of a scene, each with how far its eigenvalue is about from the limit of ever finer meshes, relative.
+
+    And how far from that with the shear and the rotary inertia that slender rods leave out.
+    """
+    if not found.ok:
         return found
-    second = modes(fine, about="start" if found.about == "start" else "equilibrium", count=len(found.modes))
-    return _of(found, second) if second.ok else found
+    return _with_errors([found], scene, lambda other: [_modes(found, other)])[0] or found
 
 
 def of_campbell(found: Campbell, scene: Scene) -> Campbell:
     """The same at every speed of a Campbell diagram."""
-    if not found.ok or (fine := finer(scene)) is None:
+    if not found.ok:
         return found
     count = max((len(one.modes) for one in found.modes if one), default=1)
-    second = campbell(fine, found.speeds, about="start" if found.about == "start" else "equilibrium", count=count)
-    pairs = zip(found.modes, second.modes, strict=True)
-    return replace(found, modes=tuple(one and (_of(one, other) if other else one) for one, other in pairs))
+
+    def run(other: Scene) -> list[Modes | None]:
+        try:
+            return list(campbell(other, found.speeds, about=_about(found.about), count=count).modes)
+        except ShoalError:
+            return [None] * len(found.modes)
+
+    return replace(found, modes=tuple(_with_errors(found.modes, scene, run)))
 
 
-def _of(found: Modes, second: Modes) -> Modes:
-    """Modes with the errors that follow from those on a finer mesh."""
-    if len(second.modes) < len(found.modes):
-        return found
+def _modes(found: Modes, scene: Scene) -> Modes | None:
+    """Those of another scene; None where it has none."""
+    try:
+        second = modes(scene, about=_about(found.about), count=len(found.modes))
+    except ShoalError:
+        return None
+    return second if second.ok else None
+
+
+def _about(about: str) -> Literal["equilibrium", "start"]:
+    return "start" if about == "start" else "equilibrium"
+
+
+def _with_errors(
+    found: Sequence[Modes | None], scene: Scene, run: Callable[[Scene], Sequence[Modes | None]]
+) -> list[Modes | None]:
+    """Modes with the errors of their eigenvalues. run: those of another scene, in the same order"""
+    others = {"mesh": finer(scene), "theory": stouter(scene)}
+    runs = {source: run(other) for source, other in others.items() if other is not None}
+    told = list[Modes | None]()
+    for number, one in enumerate(found):
+        if one is None:
+            told.append(None)
+            continue
+        gaps = {source: _gaps(one, second[number]) for source, second in runs.items()}
+        told.append(
+            replace(
+                one,
+                mesh_errors=tuple(gap + beyond(gap) for gap in gaps.get("mesh", ())),
+                theory_errors=gaps.get("theory", ()),
+                not_estimated=tuple(source for source, errors in gaps.items() if not errors),
+                estimated=True,
+            )
+        )
+    return told
+
+
+def _gaps(found: Modes, second: Modes | None) -> tuple[float, ...]:
+    """How far the eigenvalues are from those of a second run, relative; none where it has fewer modes."""
+    if second is None or len(second.modes) < len(found.modes):
+        return ()
     pairs = zip(found.modes, second.modes, strict=False)
-    gaps = (_apart(one.eigenvalue, other.eigenvalue) for one, other in pairs)
-    return replace(found, mesh_errors=tuple(gap + beyond(gap) for gap in gaps))
+    return tuple(_apart(one.eigenvalue, other.eigenvalue) for one, other in pairs)
 
 
 def _apart(one: complex, other: complex) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shoal.arguments import check, one_of
+from shoal.error_budget import ErrorBudget
 from shoal.errors import ComputationError
 from shoal.mechanics.analysis import left_out
 from shoal.mechanics.analysis.balance import BALANCED, Balance
@@ -38,9 +39,11 @@ if TYPE_CHECKING:
 Complex = npt.NDArray[np.complex128]
 ABOUT = ("equilibrium", "start")
 COARSE = 0.5
-"""An eigenvalue whose mesh error is above this part of it is not known."""
+"""An eigenvalue whose known error is above this part of it is not known."""
 MOVED = 1e-6
 """A place farther from the start than this part of the machine's size is another."""
+RELATIVE = "of the eigenvalue"
+"""Unit of its errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +104,10 @@ class Mode:
 class Modes:
     """The lowest modes about a state q, slowest first (unstable ones before all). balanced: whether forces balance.
 
-    mesh_errors: how far each eigenvalue is from the limit of ever finer meshes, relative; empty if not known. speed:
-    of the steady motion that they are about [rad/s], None at rest; moving: why the motion of the start, which is left
-    out, is no steady one
+    mesh_errors: how far each eigenvalue is from the limit of ever finer meshes, theory_errors: from that with shear and
+    rotary inertia, relative; empty if not known. speed: of the steady motion that they are about [rad/s], None at rest;
+    moving: why the motion of the start, which is left out, is no steady one; not_estimated: sources whose error is of
+    interest and not known; estimated: whether errors were looked for
     """
 
     scene: Scene
@@ -116,6 +120,24 @@ class Modes:
     mesh_errors: tuple[float, ...] = ()
     speed: float | None = None
     moving: str = ""
+    theory_errors: tuple[float, ...] = ()
+    not_estimated: tuple[str, ...] = ()
+    estimated: bool = False
+
+    @property
+    def errors(self) -> tuple[ErrorBudget, ...]:
+        """Known errors of each eigenvalue, relative; of a rigid machine without rods, nothing is left out."""
+        if not self.estimated:
+            return (ErrorBudget({}, RELATIVE),) * len(self.modes)
+        known = {"mesh": self.mesh_errors, "theory": self.theory_errors}
+        sources = {name: errors for name, errors in known.items() if errors}
+        lacking = dict.fromkeys(self.not_estimated)
+        each = range(len(self.modes))
+        rounding = {} if sources or lacking else {"rounding": float(np.finfo(float).eps)}
+        return tuple(
+            ErrorBudget({**{name: errors[k] for name, errors in sources.items()}, **lacking, **rounding}, RELATIVE)
+            for k in each
+        )
 
     @property
     def ok(self) -> bool:
@@ -124,9 +146,13 @@ class Modes:
 
     @property
     def verdict(self) -> tuple[str, str]:
-        """The status (ok, unbalanced, moving, unstable, cannot-be-told or coarse-mesh), and why it is not ok."""
+        """The status and why it is not ok.
+
+        ok, unbalanced, moving, unstable, cannot-be-told, coarse-mesh or beyond-theory
+        """
         kinds = [mode.kind for mode in self.modes]
         coarse = [number for number, error in enumerate(self.mesh_errors, 1) if error > COARSE]
+        unknown = [number for number, error in enumerate(self.errors, 1) if (error.total or 0.0) > COARSE]
         if not self.balanced and self.about != "start":
             return "unbalanced", "the forces do not balance"
         if self.moving:
@@ -141,6 +167,12 @@ class Modes:
                 "coarse-mesh",
                 f"the mesh is too coarse for {_named(coarse)}; take more elements or a smaller --count",
             )
+        if unknown:
+            return (
+                "beyond-theory",
+                f"slender rods leave out too much of {_named(unknown)}: shear and rotary inertia; take simo-reissner "
+                "rods or a smaller --count",
+            )
         return "ok", ""
 
     @property
@@ -149,7 +181,7 @@ class Modes:
         return np.array([mode.frequency for mode in self.modes])
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row a mode, lowest first: kind, frequencies [Hz], damping ratio, growth [1/s], relative mesh error."""
+        """A row a mode, lowest first: kind, frequencies [Hz], damping ratio, growth [1/s], relative errors."""
         import pandas as pd
 
         rows = [
@@ -162,6 +194,7 @@ class Modes:
                 "mesh_error": self.mesh_errors[number] if self.mesh_errors else np.nan,
                 "whirl": mode.whirl,
                 "frame": mode.frame,
+                "error": np.nan if (error := self.errors[number].total) is None else error,
             }
             for number, mode in enumerate(self.modes)
         ]
@@ -187,6 +220,8 @@ class Modes:
                     "whirl": mode.whirl,
                     "frame": mode.frame,
                     "mesh_error": self.mesh_errors[number] if self.mesh_errors else None,
+                    "theory_error": self.theory_errors[number] if self.theory_errors else None,
+                    "error": self.errors[number].total,
                     "shape": {
                         name: {
                             **{f"d{axis}": _two(part) for axis, part in zip("xyz", mode.points[k], strict=False)},

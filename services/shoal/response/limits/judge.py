@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shoal.engines.contract import Engine
-from shoal.engines.verification import verified
+from shoal.engines.verification import run_verified
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import get_way, probability
 from shoal.response.limits.judged import Judged, Shown
 from shoal.response.limits.limit import Limit
+from shoal.response.limits.margin_errors import margin_errors
 from shoal.response.limits.margins import Margins
 from shoal.response.machine import Machine, stable
 from shoal.response.runs import Model
@@ -102,14 +103,24 @@ def judge(
         )
     lower, outer, germs, evaluations, failed = reach(told, abs(limit.bound))
     worst = int(lower.argmin())
-    kept = False if lower[worst] < 0 else True if outer.min() >= 0 else None
     shown = _show(limit, machine, inputs, germs[worst], verify)
+    off = np.zeros(1) if shown.errors is None else shown.errors.over_time
+    kept = _decided(lower + off, outer - off)
+    hidden = kept is None and _decided(lower, outer) is not None
+    if shown.errors is not None and shown.errors.unknown:
+        kept, hidden = None, True
     if verify and kept is not False and 1 < len(times) < FINER:
         shown = replace(shown, between=_between(limit, machine, shown))
     return Judged(
-        *(limit, "bounds", inputs, times, None, kept, float(lower[worst]), float(outer.min())),
+        *(limit, "bounds", inputs, times, None, kept, float(lower[worst]), float((outer - off).min())),
         *(shown, evaluations, failed, ""),
+        hidden=hidden,
     )
+
+
+def _decided(attained: Array, outer: Array) -> bool | None:
+    """Whether a limit is kept by margins over time: those that a run attains, and those that any may have."""
+    return False if attained.min() < 0 else True if outer.min() >= 0 else None
 
 
 def _between(limit: Limit, machine: Machine, shown: Shown) -> float | None:
@@ -139,8 +150,9 @@ def show(limit: Limit, scene: Scene, times: Array, engine: Engine, inputs: Input
     """Run a scene once more, with care, with these values of the parameters, (parameters,). Raises InputError."""
     here = limit.scene(scene.with_values(inputs.at(named)))
     able, when = limit.engine(engine, here), limit.instants(times)
-    motion, settings = stable(here, lambda one: verified(able, one, when))
-    return _shown(limit, times, inputs, named, here, motion, settings)
+    (motion, verification), settings = stable(here, lambda one: run_verified(able, one, when))
+    shown = _shown(limit, times, inputs, named, here, motion, settings)
+    return replace(shown, errors=margin_errors(limit, verification, len(times)))
 
 
 def _shown(
@@ -153,7 +165,6 @@ def _shown(
     settings: Mapping[str, float],
 ) -> Shown:
     margins = Watch(limit, len(times)).margins(motion, scene, {})[0]
-    estimated = motion.model.get("verification", {})
     instant = int(np.argmin(margins))
     return Shown(
         dict(zip(inputs.names, named.tolist(), strict=True)),
@@ -162,6 +173,4 @@ def _shown(
         float(margins[instant]),
         str(motion.status[0]),
         motion.message,
-        estimated.get("mesh_error"),
-        estimated.get("time_error"),
     )

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from scipy import special
 
+from shoal.error_budget import ErrorBudget
 from shoal.response.control import unseen
 from shoal.response.inputs import Inputs
 from shoal.response.limits.choice import Passing
 from shoal.response.limits.estimate import Estimate
 from shoal.response.limits.limit import Limit
+from shoal.response.limits.margin_errors import MarginErrors
 from shoal.trajectory import Array, plain
 
 NEARLY_SURE = 0.99
@@ -26,8 +28,8 @@ class Shown:
     """A run that shows how a limit is passed, or how close to it the machine comes, made again and verified.
 
     parameters: name -> value; values: path -> value; time [s]: of the least margin; margin: there; status: of the run;
-    mesh_error, step_error [m]: estimated; between [s]: when it passes the limit although it does not at the instants
-    looked at, None where it does not, or nobody has looked
+    errors: of its margins, None where they were not estimated; between [s]: when it passes the limit although it does
+    not at the instants looked at, None where it does not, or nobody has looked
     """
 
     parameters: dict[str, float]
@@ -36,13 +38,13 @@ class Shown:
     margin: float
     status: str
     message: str
-    mesh_error: float | None
-    step_error: float | None
+    errors: MarginErrors | None = None
     between: float | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return dict(plain(vars(self)))
+        errors = None if self.errors is None else self.errors.budget.to_json()
+        return dict(plain({**vars(self), "errors": errors}))
 
 
 @dataclass(frozen=True)
@@ -68,8 +70,8 @@ class Between:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """From the lower end of the one to the upper end of the other, each of 95 % confidence."""
-        return float(self.lower.estimates[0].interval[0][-1]), float(self.upper.estimates[0].interval[1][-1])
+        """From the lower end of the one to the upper end of the other, see `Judged.interval`."""
+        return self.lower.interval[0], self.upper.interval[1]
 
     @property
     def outer(self) -> tuple[float, float]:
@@ -117,9 +119,11 @@ class Judged:
     """Of one limit.
 
     way: that was asked for; times [s]; passing: of random parameters, else None; kept: of intervals, whether no values
-    pass it, None where that is not decided; margin, outer: the least that a run attains, and that any may have, nan
-    where not known; shown: the most probable way to pass it, or the run with the least margin; evaluations, failed:
-    runs made for it alone; reason: why the first of these failed; between: of random parameters beside intervals
+    pass it, None where that is not decided; margin, outer: the least that a run attains, and that any may have with the
+    known error of the model, nan where not known; shown: the most probable way to pass it, or the run with the least
+    margin; evaluations, failed: runs made for it alone; reason: why the first of these failed; between: of random
+    parameters beside intervals; hidden: whether runs would decide it, were the known error of their model not as large
+    as the margin
     """
 
     limit: Limit
@@ -135,6 +139,13 @@ class Judged:
     failed: int
     reason: str
     between: Between | None = None
+    hidden: bool = False
+
+    @property
+    def errors(self) -> ErrorBudget:
+        """Known errors of the quantity at the run that is shown; empty where they were not estimated."""
+        none = ErrorBudget({}, self.limit.unit)
+        return none if self.shown is None or self.shown.errors is None else self.shown.errors.budget
 
     @property
     def estimates(self) -> list[Estimate]:
@@ -165,6 +176,13 @@ class Judged:
         found = self.passing.doubt if self.passing is not None else ""
         if self.passing is None and self.kept is None:
             found = "no run passes it, and the outer bounds do not show that none does"
+            if self.hidden:
+                least = f"the least margin of the runs is {self.margin:.3g} {self.limit.unit}"
+                found = f"{least}, and their known error {self.errors}; --tolerance finds a better model"
+        if not found and self.errors.unknown and self.passing is not None:
+            found = f"the error of the model is not known ({', '.join(self.errors.unknown)})"
+        if not found and (moved := self.moved) > MOST_BEYOND:
+            found = f"the known error of the model, {self.errors}, may change beta by {moved:.2g}"
         if not found and self.failed:
             found = f"{self.failed} of {self.evaluations} runs failed even with smaller steps: {self.reason}"
         if not found and self.shown is not None and self.shown.status != "ok":
@@ -199,8 +217,8 @@ class Judged:
         ]
         return {
             "probability": estimate.probability,
-            "lower": lower[-1],
-            "upper": upper[-1],
+            "lower": self.interval[0],
+            "upper": self.interval[1],
             "confidence": 0.95,
             "coefficient_of_variation": estimate.coefficient,
             "unseen": unseen(passing.plain) if passing.plain else None,
@@ -209,20 +227,34 @@ class Judged:
             "why": passing.why,
             "design_points": points,
             "first_passage": {"t": self.times, "probability": estimate.passed, "lower": lower, "upper": upper},
-            "probability_with_mesh_error": self._moved(passing),
+            "probability_with_errors": None if not self.moved else list(self._with_errors(estimate.probability)),
         }
 
     def _named(self, place: Array) -> dict[str, float]:
         found = self.inputs.named(self.inputs.standard(place[None]))[0]
         return dict(zip(self.inputs.names, found.tolist(), strict=True))
 
-    def _moved(self, passing: Passing) -> list[float] | None:
-        """Between which two the probability lies if the mesh moves the margin by its error, to first order."""
-        if self.limit.unit != "m" or self.shown is None or self.shown.mesh_error is None or not passing.points:
-            return None
-        point, chance = passing.points[0], passing.estimate.probability
-        if not chance > 0 or not point.converged:
-            return None
-        off = self.shown.mesh_error / point.slope
-        ends = special.ndtr(-point.beta + np.array([-off, off])) / special.ndtr(-point.beta)
-        return [float(end) for end in np.minimum(chance * ends, 1.0)]
+    @property
+    def moved(self) -> float:
+        """By how much the known error of the model may change the reliability index, to first order.
+
+        0 where there is no such point, or no error is known.
+        """
+        if self.passing is None or not self.passing.points or self.shown is None or self.shown.errors is None:
+            return 0.0
+        point = self.passing.points[0]
+        return float(self.shown.errors.over_time[point.instant] / point.slope) if point.converged else 0.0
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Between which two the probability lies, with 95 % confidence and the known error of the model."""
+        (estimate,) = self.estimates
+        lower, upper = (float(end[-1]) for end in estimate.interval)
+        return self._with_errors(lower)[0], self._with_errors(upper)[1]
+
+    def _with_errors(self, chance: float) -> tuple[float, float]:
+        """A probability with the least and the largest reliability index that the error of the model allows."""
+        if not 0.0 < chance < 1.0 or not self.moved:
+            return chance, chance
+        low, high = special.ndtr(special.ndtri(chance) + np.array([-self.moved, self.moved]))
+        return float(low), float(high)

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shoal.error_budget import worst
 from shoal.pictures.choice import rows, tells_places
-from shoal.pictures.estimates import estimates
+from shoal.pictures.estimates import estimates, grade
 from shoal.pictures.start import reasons, remarks
 from shoal.terminal import screen
 
@@ -38,18 +39,16 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
         screen.out.print(table)
     else:
         screen.say(f"{title}: no places are shown, as the run is rejected")
-    verification = trajectory.model.get("verification")
-    unknown = verification is not None and trajectory.ok and verification["time_error"] is None
     screen.say(
-        f"status {trajectory.status[0]}{', but its time error is not known' if unknown else ''}; energy off by "
-        f"{trajectory.energy_drift[0]:.1e}, constraints by {trajectory.constraint_drift[0]:.1e}"
+        f"status {trajectory.status[0]}, {trajectory.errors.brief}; energy off by {trajectory.energy_drift[0]:.1e}, "
+        f"constraints by {trajectory.constraint_drift[0]:.1e}",
+        style=screen.COLOURS[grade(trajectory)],
     )
     slowed = trajectory.model.get("slowed_modes")
     raised = f"; the inertia of {slowed} axial modes is raised to suit the step" if slowed else ""
     screen.say(f"{trajectory.steps} steps in {trajectory.wall_s * 1e3:.1f} ms{raised}")
     screen.say(*remarks(trajectory.model))
-    if verification is not None:
-        screen.say(*estimates(verification))
+    screen.say(*estimates(trajectory))
 
 
 def selection_table(selection: Selection) -> None:
@@ -65,10 +64,8 @@ def selection_table(selection: Selection) -> None:
     screen.out.print(table)
     screen.say(*(f"{rod} stays rigid: {reason}" for rod, reason in selection.rigid.items()))
     verdict = "met" if selection.met else "not met"
-    known = f"{chosen.name}, estimated error {chosen.error:.1e} m; " if np.isfinite(chosen.error) else ""
+    known = f"{chosen.name}, estimated error {selection.errors}; " if np.isfinite(chosen.error) else ""
     screen.say(f"{verdict}: {known}{selection.reason}")
-    if selection.shear > selection.tolerance:
-        screen.say(f"beyond the beams' theory: shear and rotary inertia, about {selection.shear:.0e} m")
     screen.out.print()
 
 
@@ -117,6 +114,12 @@ def comparison_table(comparison: Comparison) -> None:
     screen.out.print(table)
     screen.say(*(f"{name} refused: {reason}" for name, reason in comparison.refused.items()))
     screen.say(*next(filter(None, (remarks(trajectory.model) for trajectory in comparison.trajectories.values())), []))
+    if comparison.errors.estimates:
+        screen.say(
+            f"known error of the model that engines share, by more careful runs of {comparison.verified}: "
+            f"{comparison.errors}",
+            style=screen.COLOURS[grade(comparison.trajectories[comparison.verified])],
+        )
     if len(comparison.trajectories) < 2:
         return
     table = screen.table("distances over all samples", "engines", "marker", "largest [m]", "final [m]")
@@ -138,12 +141,15 @@ def equilibrium_table(equilibrium: Equilibrium) -> None:
         reactions_table([equilibrium.reactions])
     lowest = equilibrium.eigenvalues[:1].real
     screen.say(
-        f"status {equilibrium.status}{f' ({equilibrium.message})' if equilibrium.message else ''}; "
+        f"status {equilibrium.status}{f' ({equilibrium.message})' if equilibrium.message else ''}, "
+        f"{equilibrium.errors.brief}; "
         f"unbalanced {equilibrium.residual:.1e} of all forces, joints gape by {equilibrium.gap:.1e}"
-        + ("" if equilibrium.mesh_error is None else f"; estimated mesh error {equilibrium.mesh_error:.1e} m")
         + "".join(f"; lowest eigenvalue {value:.4g} rad^2/s^2" for value in lowest)
-        + f"; {equilibrium.iterations} iterations"
+        + f"; {equilibrium.iterations} iterations",
+        style=screen.COLOURS[equilibrium.grade],
     )
+    if equilibrium.errors.estimates:
+        screen.say(f"estimated error at the markers: {equilibrium.errors}")
 
 
 def reactions_table(found: list[Reactions]) -> None:
@@ -196,21 +202,24 @@ def modes_table(modes: Modes | Campbell) -> None:
             table.add_row(*row)
         screen.out.print(table)
         screen.say(says(modes))
-        errors = [error for one in modes.modes if one for error in one.mesh_errors]
-        if errors:
-            screen.say(f"estimated mesh error of the eigenvalues: {max(errors):.1e} of their size, at most")
+        errors = [error for one in modes.modes if one for error in one.errors]
+        if any(error.total is not None for error in errors):
+            screen.say(f"estimated error of the eigenvalues, at most: {worst(errors)}")
         return
     turning = ("whirl", "frame") if modes.speed is not None else ()
+    known = any(error.total is not None for error in modes.errors)
     headings = ("mode", "frequency [Hz]", "[rad/s]", "damping ratio", "growth [1/s]", "kind", *turning)
+    headings += ("error",) if known else ()
     table = screen.table(f"{modes.scene.name}: small motions about the {modes.about}", *headings)
     for number, mode in enumerate(modes.modes, 1):
         numbers = (mode.frequency, mode.angular_frequency, mode.damping_ratio, mode.eigenvalue.real)
         seen = (mode.whirl or "-", mode.frame) if turning else ()
-        table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind, *seen)
+        error = [] if not known else ["-" if (off := modes.errors[number - 1].total) is None else f"{off:.1e}"]
+        table.add_row(str(number), *(f"{value:.6g}" for value in numbers), mode.kind, *seen, *error)
     screen.out.print(table)
     if modes.message:
         screen.say(modes.message)
-    if modes.mesh_errors:
-        screen.say(f"estimated mesh error of the eigenvalues: {max(modes.mesh_errors):.1e} of their size, at most")
+    if known:
+        screen.say(f"estimated error of the eigenvalues, at most: {worst(modes.errors)}")
     if not modes.balanced:
         screen.say("the forces do not balance there; these are motions relative to its fall")

@@ -35,7 +35,9 @@ def response_table(response: Response) -> None:
         headings = "mean", "deviation", "5 %", "95 %"
         told = response.statistics
         columns = [told.mean, told.std, told.quantiles[1], told.quantiles[-2]]
-    table = screen.table(title, "", *headings, *(("gap",) if response.bounds is not None else ()))
+    estimated = response.errors.total is not None
+    headings += ("gap",) if response.bounds is not None else ()
+    table = screen.table(title, "", *headings, *(("error",) if estimated else ()))
     for marker in response.markers:
         for quantity in response.quantities:
             unit = "rad" if quantity == "angle" else "m"
@@ -45,6 +47,8 @@ def response_table(response: Response) -> None:
             if response.bounds is not None:
                 gap = response.gap(marker, quantity)
                 cells.append("-" if np.isnan(gap) else f"{gap:.0e}")
+            if estimated:
+                cells.append(f"{response.column(marker, quantity, response.model)[-1]:.0e}")
             table.add_row(escape(f"{marker}.{quantity} [{unit}]"), *cells)
     screen.out.print(table)
     if response.statistics is not None:
@@ -57,7 +61,9 @@ def response_table(response: Response) -> None:
         _allocation(response.allocation)
     mixed = f", but {response.mixes_starts}" if response.mixes_starts else ""
     screen.say(
-        f"status {response.status}{mixed}; {response.evaluations} runs in {response.wall_s:.2f} s; {response.why}"
+        f"status {response.status}{mixed}, {response.errors.brief}; {response.evaluations} runs in "
+        f"{response.wall_s:.2f} s; {response.why}",
+        style=screen.COLOURS[response.grade],
     )
     for joint in response.inputs.joints:
         if joint.left:
@@ -70,7 +76,9 @@ def response_table(response: Response) -> None:
         screen.say(response.message)
     if response.bounds is not None:
         gap = response.bounds.gap
-        known = f"outer ones lie {gap:.1e} of the width off; they hold until {response.horizon:g} s"
+        known = (
+            f"outer ones lie {gap:.1e} of the width off{_by_model(response)}; they hold until {response.horizon:g} s"
+        )
         unknown = "how much farther other values go is not known"
         screen.say(f"bounds {looked_at(response.times)} are attained by runs; {unknown if np.isnan(gap) else known}")
         if response.unseen is not None:
@@ -81,17 +89,20 @@ def response_table(response: Response) -> None:
     if response.boxes is not None:
         screen.say(
             f"statistics {looked_at(response.times)} lie between these values, whatever the intervals are; they are "
-            f"known to {response.boxes.gap:.1e} of the scatter, until {response.horizon:g} s"
+            f"known to {response.boxes.gap:.1e} of the scatter{_by_model(response)}, until {response.horizon:g} s"
         )
-    errors = {"mesh": response.mesh_error, "step": response.step_error}
-    told_of = [f"{name} {error:.1e} m" for name, error in errors.items() if error is not None]
-    if told_of:
-        screen.say(f"estimated errors of the runs that decide: {', '.join(told_of)}")
+    if response.errors.estimates:
+        screen.say(f"estimated error of the runs that decide: {response.errors}")
     if response.finer is not None:
         moved = [f"{name} by {one['by']:.1e} at {one['t']:g} s" for name, one in list(response.moved().items())[:3]]
         screen.say(
             f"{response.finer.runs} runs that attain bounds, on twice as fine a mesh, move most: {', '.join(moved)}"
         )
+
+
+def _by_model(response: Response) -> str:
+    """What the model adds to a gap, in words."""
+    return "" if response.errors.total is None else f" and the known error of the model, {response.errors.total:.1e} m"
 
 
 def _limit(judged: Judged) -> None:
@@ -102,16 +113,17 @@ def _limit(judged: Judged) -> None:
         how = "most probably with"
     elif judged.passing is not None:
         estimate = judged.passing.estimate
-        lower, upper = estimate.interval
+        lower, upper = judged.interval
         screen.say(
-            f"{title}: is passed {at} with probability {estimate.told}, with 95 % confidence between {lower[-1]:.3g} "
-            f"and {upper[-1]:.3g}",
+            f"{title}: is passed {at} with probability {estimate.told}, with 95 % confidence between {lower:.3g} "
+            f"and {upper:.3g}",
             f"  by {judged.passing.why}; {judged.evaluations} runs",
             style="bold",
         )
         how = "most probably with"
     else:
         undecided = f"is kept by all runs {at}, which proves nothing"
+        undecided = f"is not decided {at}: {judged.reason_to_doubt}" if judged.hidden else undecided
         says = {True: f"is kept for all values {at}", False: "is passed", None: undecided}
         screen.say(f"{title}: {says[judged.kept]}", style="bold")
         how = "passed with" if judged.kept is False else "nearest with"
@@ -119,7 +131,8 @@ def _limit(judged: Judged) -> None:
         screen.say(f"  {judged.note}")
     if shown is not None:
         known = ", ".join(f"{name} = {value:.6g}" for name, value in shown.parameters.items())
-        screen.say(f"  {how} {known}: margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s")
+        error = f", {judged.errors.brief}" if judged.errors.estimates else ""
+        screen.say(f"  {how} {known}: margin {shown.margin:.3g} {judged.limit.unit} at {shown.time:g} s{error}")
 
 
 def _between(title: str, judged: Judged, found: Between) -> None:

@@ -1,0 +1,121 @@
+"""Known errors of the model behind a study: time step, mesh and neglected theory, of every marker's quantity over time.
+
+The runs that decide are repeated with more care. What these move a place by is what the bounds, means and quantiles of
+the study may be off by, whatever its own method says: outer bounds and errors of statistics take it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shoal.engines.deviation import by_source
+from shoal.engines.verification import WRONG, Verification, run_verified
+from shoal.error_budget import ErrorBudget, worst
+from shoal.response.boxes import Boxes, Ends
+from shoal.response.machine import Machine, stable
+from shoal.response.result import Bounds
+from shoal.response.runs import Runs
+from shoal.response.statistics import Statistics
+from shoal.trajectory import Array
+
+NEGLIGIBLE = 0.01
+"""An error below this share of what the runs differ by rejects none of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelErrors:
+    """budget: of the markers, the largest of the runs that were looked at; columns: of every column, all sources
+    together, (columns,); rejected: why a more careful run does not bear one out
+    """
+
+    budget: ErrorBudget
+    columns: Array
+    rejected: str = ""
+
+    def of_bounds(self, found: Bounds) -> Bounds:
+        """Bounds whose outer ones allow for the model."""
+        off, chance = self.columns, found.likely
+        return replace(
+            found,
+            lower_outer=found.lower_outer - off,
+            upper_outer=found.upper_outer + off,
+            likely=None if chance is None else np.stack([chance[0] - off, chance[1] + off]),
+        )
+
+    def of_statistics(self, found: Statistics) -> Statistics:
+        """Statistics whose errors allow for the model: a deviation differs by no more than the answers do."""
+        return replace(found, error=found.error + self.columns, std_error=found.std_error + self.columns)
+
+    def of_boxes(self, found: Boxes) -> Boxes:
+        """Statistics over intervals whose outer bounds allow for the model."""
+        std = self._wider(found.std)
+        std = replace(std, lower_outer=np.maximum(std.lower_outer, 0.0))
+        quantiles = tuple(self._wider(one) for one in found.quantiles)
+        return replace(found, mean=self._wider(found.mean), std=std, quantiles=quantiles)
+
+    def _wider(self, found: Ends) -> Ends:
+        off = self.columns
+        return replace(found, lower_outer=found.lower_outer - off, upper_outer=found.upper_outer + off)
+
+
+def unestimated(machine: Machine) -> ModelErrors:
+    """None are known."""
+    return ModelErrors(ErrorBudget(), np.zeros(int(np.prod(machine.columns))))
+
+
+def model_errors(machine: Machine, runs: Runs, chosen: Sequence[int]) -> ModelErrors:
+    """Return the largest errors of some runs of a study. chosen: their numbers. Raises InputError."""
+    found = unestimated(machine)
+    for run in chosen:
+        given = {path: float(at[0]) for path, at in runs.inputs.values(runs.germs[[run]]).items()}
+        (careful, verification), _ = stable(
+            machine.scene.with_values(given), lambda scene: run_verified(machine.engine, scene, machine.times)
+        )
+        if verification is not None:
+            columns = np.maximum(found.columns, _columns(verification, len(found.columns)))
+            found = ModelErrors(worst([found.budget, verification.errors]), columns)
+        if not careful.ok and not (nothing := _nothing(machine, runs.values))(verification):
+            why = f"a more careful run does not bear one out: {careful.message}{nothing}"
+            return replace(found, rejected=why)
+    return found
+
+
+def _columns(verification: Verification, count: int) -> Array:
+    """The sum over sources of every column, (columns,)."""
+    errors = by_source(verification.deviations, lambda one: one.of_markers().ravel())
+    return sum(errors.values(), np.zeros(count))
+
+
+@dataclass(frozen=True)
+class _Nothing:
+    """Up to which errors of single runs are nothing beside what the runs differ by; in words what that is.
+
+    length [m], angle [rad]; name: of the widest coordinate
+    """
+
+    length: float
+    angle: float
+    name: str
+
+    def __call__(self, estimated: Verification | None) -> bool:
+        """Whether these errors are nothing; None where the run has failed."""
+        if estimated is None or estimated.rejected:
+            return False
+        errors = (estimated.errors.known.get(source, 0.0) for source in ("time", "mesh", "bending"))
+        return max(errors) <= self.length and (estimated.angle_error or 0.0) <= self.angle
+
+    def __str__(self) -> str:
+        return f"; {self.length:.2g} m, {100 * NEGLIGIBLE:g} % of the width of {self.name}, would be nothing"
+
+
+def _nothing(machine: Machine, values: Array) -> _Nothing:
+    """values: of all runs, (runs, columns)."""
+    widths = np.ptp(values, axis=0).reshape(machine.columns).max(axis=0)
+    coordinates = [k for k, name in enumerate(machine.quantities) if name in "xyz"]
+    marker, axis = divmod(int(widths[:, coordinates].argmax()), len(coordinates))
+    name = f"{list(machine.scene.markers)[marker]}.{machine.quantities[axis]}"
+    angle = max(WRONG, NEGLIGIBLE * float(widths[:, -1].max()))
+    return _Nothing(NEGLIGIBLE * float(widths[marker, axis]), angle, name)
