@@ -44,12 +44,12 @@ CALLS: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {
     "design": (("paper-case-1",), {"about": "start", "noise": 1e-3}),
 }
 ERRORS: dict[str, tuple[str, ...]] = {
-    "simulate": ("verification", "time_error"),
-    "select": ("selection", "estimated_error"),
-    "sweep": ("verification", "time_error"),
-    "uncertain": ("gap",),
-    "statics": ("mesh_error",),
-    "modes": ("modes", "0", "mesh_error"),
+    "simulate": ("model", "errors", "total"),
+    "select": ("selection", "errors", "total"),
+    "sweep": ("error",),
+    "uncertain": ("error",),
+    "statics": ("error",),
+    "modes": ("modes", "0", "error"),
     "reactions": ("reactions", "0", "unbalanced"),
     "export": ("distance",),
     "identify": ("parameters", "theta1", "std"),
@@ -274,7 +274,7 @@ def test_lanes_are_looked_at(gauss: httpx.Client) -> None:
     assert found["points"] == bare["points"]
     checked = found["model"]["verification"]
     assert (checked["looked_at"], checked["points"]) == (3, 3)
-    assert checked["time_error"] == shoal.sweep(SCENE, lanes, 0.2).check.time_error  # type: ignore[union-attr]
+    assert checked["time_error"] == shoal.sweep(SCENE, lanes, 0.2).errors.estimates["time"]
     assert "verification" not in bare["model"]
 
 

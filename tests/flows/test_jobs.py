@@ -36,7 +36,7 @@ def test_a_motion_is_verified_and_one_that_a_second_run_contradicts_is_not_trust
     assert not motion.ok
     assert motion.message.startswith("the time error is about ")
     good = jobs.simulated("single-pendulum", "gauss", {})[1]
-    assert "estimated error at the markers: time " in of_motion(good)
+    assert "estimated error at the markers: " in of_motion(good)
 
 
 def test_sweep_covers_the_grid(sweep: Sweep) -> None:

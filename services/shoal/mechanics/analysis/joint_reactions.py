@@ -8,11 +8,12 @@ the joints whose forces are not unique are named.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from shoal.error_budget import ErrorBudget
 from shoal.errors import InputError
 from shoal.mechanics import joints, plane
 from shoal.mechanics.analysis import plane_forces, space_forces
@@ -39,8 +40,9 @@ class JointReaction:
 
     at: where [m]; force [N] and torque [N m] (counter-clockwise, in space a vector), friction included; components:
     each unknown of the joint by name (fx, fy, torque, normal, axial, coupled, ...) with its value; unique: whether none
-    of them could be different with the same motion. force_error [N], torque_error [N m]: how far another run is away
-    (`reactions_verified`), None where there was none.
+    of them could be different with the same motion. force_error [N], torque_error [N m]: how far other runs are away
+    (`reactions_verified`): with other steps, more elements and what slender rods leave out, all together; None where
+    there was none.
     """
 
     joint: str
@@ -61,7 +63,8 @@ class Reactions:
     redundancy: how many self-stresses are possible. constraints: those of the model that depend on others, at a
     neighbouring state as well. unbalanced: what no joint can balance, relative to all forces. scale: size of all forces
     on the bodies [N], torques by the machine's size. settled: whether the forces agree with those of another run, as
-    far as there was one (`reactions_verified`); message: what of that is to be known.
+    far as there was one (`reactions_verified`); message: what of that is to be known. errors: of the forces at all
+    times [N], by source, the largest of all joints.
     """
 
     time: float
@@ -72,6 +75,7 @@ class Reactions:
     scale: float = 0.0
     settled: bool = True
     message: str = ""
+    errors: ErrorBudget = field(default_factory=ErrorBudget)
 
     @property
     def ok(self) -> bool:
@@ -99,6 +103,8 @@ class Reactions:
             "not_unique": list(self.not_unique),
             "redundant_constraints": list(self.constraints),
             "unbalanced": plain(self.unbalanced),
+            "error": plain(self.errors.total),
+            "errors": plain(self.errors.to_json()),
         }
 
 

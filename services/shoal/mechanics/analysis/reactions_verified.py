@@ -13,14 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from shoal.errors import ComputationError
+from shoal.error_budget import ErrorBudget
+from shoal.errors import ComputationError, ShoalError
 from shoal.mechanics.analysis.joint_reactions import Reactions
+from shoal.mechanics.analysis.mesh_error import beyond, finer
 from shoal.mechanics.analysis.reactions import reactions
 from shoal.mechanics.assembly.build import build
 from shoal.mechanics.integrators import STRIDES, facts, pick
 from shoal.mechanics.reach import span
 from shoal.mechanics.stability import step_limit
 from shoal.scene import Scene
+from shoal.scene.shear import stouter
 
 SHARE = 0.05
 """Of the largest force in the joints at these times: errors beyond it are not believed."""
@@ -33,11 +36,50 @@ _MOST = 200_000
 
 
 def verified(scene: Scene, times: Sequence[float]) -> list[Reactions]:
-    """Reactions at times [s] with their errors in time, on the mesh as stated. Raises InputError, ComputationError.
+    """Reactions at times [s] with their errors. Raises InputError, ComputationError.
 
-    `settled` is false, and `message` says what to do, where no two runs agree within SHARE.
+    `settled` is false, and `message` says what to do, where no two runs with other steps agree within SHARE. Errors of
+    the mesh and of the theory of slender rods are added to those of the steps.
     """
-    runs = [reactions(scene, times)]
+    stated = reactions(scene, times)
+    found = _in_time(stated, scene, times)
+    sources = {"time": _largest(found)}
+    for source, other in (("mesh", finer(scene)), ("theory", stouter(scene, exact=False))):
+        if other is None:
+            continue
+        # Elements of half the length need half the step.
+        shorter = {"solver.step": 0.5 * scene.solver.step} if source == "mesh" else {}
+        try:
+            away = _told(stated, reactions(other.with_values(shorter), times))
+        except ShoalError:
+            sources[source] = None
+            continue
+        factor = 1.0 + beyond(1.0) if source == "mesh" else 1.0
+        found = [_with(one, two, factor) for one, two in zip(found, away, strict=True)]
+        sources[source] = factor * (_largest(away) or 0.0)
+    return [replace(one, errors=ErrorBudget(sources, "N")) for one in found]
+
+
+def _largest(found: list[Reactions]) -> float | None:
+    """The largest error of a force [N]; None where none is known."""
+    errors = [joint.force_error for one in found for joint in one.joints.values()]
+    return max((error for error in errors if error is not None), default=0.0 if not errors else None)
+
+
+def _with(found: Reactions, other: Reactions, factor: float) -> Reactions:
+    """With so many times the errors of another run added."""
+    joints = {}
+    for name, joint in found.joints.items():
+        more = other.joints[name]
+        force = (joint.force_error or 0.0) + factor * (more.force_error or 0.0)
+        torque = (joint.torque_error or 0.0) + factor * (more.torque_error or 0.0)
+        joints[name] = replace(joint, force_error=force, torque_error=torque)
+    return replace(found, joints=joints)
+
+
+def _in_time(stated: list[Reactions], scene: Scene, times: Sequence[float]) -> list[Reactions]:
+    """With their errors in time, on the mesh as stated."""
+    runs = [stated]
     if not any(times):
         return _told(runs[0], runs[0])
     lever, off, why = span(scene), np.inf, ""

@@ -116,7 +116,7 @@ def comparison_table(comparison: Comparison) -> None:
     screen.say(*next(filter(None, (remarks(trajectory.model) for trajectory in comparison.trajectories.values())), []))
     if comparison.errors.estimates:
         screen.say(
-            f"known error of the model that engines share, by more careful runs of {comparison.verified}: "
+            f"known error of the model that engines share (more careful runs of {comparison.verified}): "
             f"{comparison.errors}",
             style=screen.COLOURS[grade(comparison.trajectories[comparison.verified])],
         )
@@ -174,6 +174,8 @@ def reactions_table(found: list[Reactions]) -> None:
             told = told if reactions.constraints else "; none away from this position"
             screen.say(f"{reactions.redundancy} more than needed: least forces are shown{told}")
     screen.say(*dict.fromkeys(one.message for one in found if one.ok and one.message))
+    if found[0].errors.estimates:
+        screen.say(f"estimated error of the forces, largest of all joints: {found[0].errors}")
 
 
 _ERRORS = {"force": "error [N]", "torque": "error [N m]"}
@@ -211,6 +213,7 @@ def modes_table(modes: Modes | Campbell) -> None:
     headings = ("mode", "frequency [Hz]", "[rad/s]", "damping ratio", "growth [1/s]", "kind", *turning)
     headings += ("error",) if known else ()
     table = screen.table(f"{modes.scene.name}: small motions about the {modes.about}", *headings)
+    table.columns[headings.index("kind")].no_wrap = True
     for number, mode in enumerate(modes.modes, 1):
         numbers = (mode.frequency, mode.angular_frequency, mode.damping_ratio, mode.eigenvalue.real)
         seen = (mode.whirl or "-", mode.frame) if turning else ()

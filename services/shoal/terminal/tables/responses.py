@@ -23,7 +23,7 @@ def response_table(response: Response) -> None:
     title = f"{response.scene} at t = {response.times[-1]:g} s, {response.method}"
     headings: tuple[str, ...]
     if response.bounds is not None:
-        headings = "lower", "upper", "outer lower", "outer upper"
+        headings = "lower", "upper", "outer low", "outer high"
         found = response.bounds
         columns = [found.lower, found.upper, found.lower_outer, found.upper_outer]
     elif response.boxes is not None:
