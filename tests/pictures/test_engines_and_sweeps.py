@@ -77,7 +77,7 @@ def test_engines_that_end_at_one_height_are_named_together() -> None:
     bricard = load_scene("bricard").with_values({"solver.duration": 0.01})
     above, below = engines(compare(bricard, ["gauss", "exudyn"]), "P3", "two").axes
     assert [text.get_text() for text in above.texts] == ["x, z", "y"]
-    assert len(below.lines) == 1
+    assert [line.get_label() for line in below.lines] == ["gauss, exudyn", "known error of the model"]
     alone = engines(compare(bricard, ["gauss"]), "P3", "one").axes
     assert [len(axes.lines) for axes in alone] == [3]
 

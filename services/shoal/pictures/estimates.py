@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
-from shoal.error_budget import ErrorBudget, Grade
+from shoal.error_budget import GOOD, ErrorBudget, Grade
 from shoal.pictures.numbers import length
 from shoal.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from shoal.selection import Selection
 
 REMEDIES = {
     "theory": "neglected shear and rotary inertia of slender rods (rotary_inertia: true counts the latter in rigid "
@@ -40,6 +44,9 @@ def budget(errors: ErrorBudget) -> str:
     return f"{length(errors.total)} ({', '.join(parts)})"
 
 
-def grade(trajectory: Trajectory) -> Grade:
-    """The colour of a run: that of its largest known error as a share of the distance to the ground."""
-    return trajectory.errors.grade(trajectory.ok, (trajectory.model.get("verification") or {}).get("scale"))
+def grade(trajectory: Trajectory, selection: Selection | None = None) -> Grade:
+    """The colour of a run: its known error as a share of the distance to the ground, or of the tolerance asked for."""
+    size = (trajectory.model.get("verification") or {}).get("scale")
+    if selection is not None:
+        size = selection.tolerance / GOOD
+    return trajectory.errors.grade(trajectory.ok, size)

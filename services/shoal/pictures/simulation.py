@@ -50,7 +50,7 @@ def page(
     return render(
         "simulation.html.j2",
         title=scene.name,
-        grade=grade(trajectory),
+        grade=grade(trajectory, selection),
         lead=_lead(trajectory, selection),
         motion=animation(moving, "The machine"),
         headings=[

@@ -294,7 +294,8 @@ def _allocated(
     prices, widest = costs_of(costs, inputs), accepted(machine.scene, inputs)
     if inputs.random.any():
         return of_random(wanted, machine, inputs, stated, target, prices, widest, **how)
-    told, when = watched(machine, wanted), machine.times
+    # Tolerances that keep the limit keep it by the known error of the model.
+    told, when = watched(machine, wanted.tightened(stated.errors.total or 0.0)), machine.times
 
     def least(here: Inputs) -> Reached:
         lower, outer, germs, evaluations, _ = _reach(here, when, None, seed, most)(told, abs(wanted.bound))

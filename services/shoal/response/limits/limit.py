@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +57,10 @@ class Limit:
     def instants(self, times: Array) -> Array:
         """Those of a motion that tells the margins at `times` [s]: angles are counted from the start."""
         return np.append(0.0, times) if self.is_dynamic and times[0] > 0.0 else times
+
+    def tightened(self, off: float) -> Limit:
+        """The limit that is passed by so much less, in its unit."""
+        return replace(self, bound=self.bound - off if self.above else self.bound + off)
 
     def margin(self, of: Array) -> Array:
         """How far the quantity is from the bound, negative beyond it."""

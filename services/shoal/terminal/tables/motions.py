@@ -42,7 +42,7 @@ def trajectory_table(trajectory: Trajectory, scene: Scene, selection: Selection 
     screen.say(
         f"status {trajectory.status[0]}, {trajectory.errors.brief}; energy off by {trajectory.energy_drift[0]:.1e}, "
         f"constraints by {trajectory.constraint_drift[0]:.1e}",
-        style=screen.COLOURS[grade(trajectory)],
+        style=screen.COLOURS[grade(trajectory, selection)],
     )
     slowed = trajectory.model.get("slowed_modes")
     raised = f"; the inertia of {slowed} axial modes is raised to suit the step" if slowed else ""
